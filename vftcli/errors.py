@@ -1,0 +1,45 @@
+"""Errors a user can cause and can mend.
+
+Every message is one line: what is wrong, what there is, what to do. The command line prints it and
+exits with code 1; nothing else in the package prints or exits.
+"""
+
+
+class VftError(Exception):
+    """Base class of every error that is the input's fault rather than the program's."""
+
+
+class ShapeError(VftError):
+    """An array has another shape than its neighbours call for."""
+
+
+class ClockError(VftError):
+    """A time axis does not increase, or has too few samples."""
+
+
+class LogError(VftError):
+    """A log cannot be read as what it claims to be."""
+
+
+class UnknownFormatError(LogError):
+    """No reader recognises the file, or more than one does."""
+
+
+class MissingSignalError(VftError):
+    """A computation needs a signal that the log does not have."""
+
+
+class RobotError(VftError):
+    """A robot description is missing, incomplete or unphysical."""
+
+
+class ParameterError(VftError):
+    """A parameter is unknown or outside the range in which the method is defined."""
+
+
+class ReferenceTorqueError(VftError):
+    """A reference cannot be made from what was given."""
+
+
+class OutputError(VftError):
+    """A file cannot be written, or exists and --force was not given."""

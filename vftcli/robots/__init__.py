@@ -1,0 +1,52 @@
+"""Robots: the built-in profiles, and the loaders of users' own TOML and URDF files."""
+
+import difflib
+from pathlib import Path
+
+from vftcli.errors import RobotError
+from vftcli.robots.chain import Chain, Payload
+from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
+
+PROFILES: dict[str, Path] = {
+    name: Path(__file__).parent / f"{name}.toml" for name in ("ur5", "ur5e", "ur10e", "panda", "fr3")
+}
+"""Built-in profile name → its file."""
+
+
+def load_robot(robot: str | Path) -> Robot:
+    """Load a robot by profile name, TOML file or URDF file.
+
+    Raises:
+        RobotError: If there is no such profile or file, or it is not a valid description.
+    """
+    if str(robot) in PROFILES:
+        from vftcli.robots.profile import load_profile
+
+        return load_profile(PROFILES[str(robot)])
+    path = Path(robot)
+    if path.suffix.lower() in {".urdf", ".xml"}:
+        from vftcli.robots.urdf import load_urdf
+
+        return load_urdf(path)
+    if path.suffix.lower() == ".toml":
+        from vftcli.robots.profile import load_profile
+
+        return load_profile(path)
+    close = difflib.get_close_matches(str(robot).lower(), PROFILES, n=1)
+    hint = f" Did you mean {close[0]}?" if close else ""
+    raise RobotError(
+        f"no robot {str(robot)!r}.{hint} Built in: {', '.join(PROFILES)}; "
+        "or give a FILE.toml or FILE.urdf."
+    )
+
+
+__all__ = [
+    "PROFILES",
+    "Chain",
+    "JointFriction",
+    "Limits",
+    "Payload",
+    "Robot",
+    "SensorNoise",
+    "load_robot",
+]

@@ -1,0 +1,183 @@
+"""The serial chain: the constants every computation on an arm starts from.
+
+Frame j has its origin *on* axis j, its z along the axis, and turns with link j, whatever the
+convention of the description was (standard DH, modified DH, xyz-rpy, URDF with any axis). Inertials
+are moved into these frames once, when a robot is loaded. The batched kernels, the kinematics and
+the Pinocchio model are all made from this one object.
+"""
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from vftcli.arrays import Array, check_shape, frozen
+from vftcli.errors import RobotError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Payload:
+    """A rigid load on the flange.
+
+    Attributes:
+        mass: Mass. [kg]
+        com: Centre of mass in flange axes, from the flange origin. (3,) [m]
+        inertia: Inertia tensor about the centre of mass, in flange axes. (3, 3) [kg·m²]
+    """
+
+    mass: float
+    com: Array
+    inertia: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "com", frozen(self.com))
+        object.__setattr__(self, "inertia", frozen(self.inertia))
+        check_shape(self.com, (3,), "com", "the payload")
+        check_shape(self.inertia, (3, 3), "inertia", "the payload")
+        if why := unphysical(self.mass, self.inertia):
+            raise RobotError(f"the payload is unphysical: {why}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chain:
+    """Geometry and inertia of an n-joint revolute serial arm at rest on its base.
+
+    Attributes:
+        names: Joint names, base to tip.
+        rotation: Orientation of frame j in frame j−1 at q = 0. (n, 3, 3)
+        translation: Origin of frame j in frame j−1. (n, 3) [m]
+        mass: Link masses. (n,) [kg]
+        com: Centres of mass in the link's own frame. (n, 3) [m]
+        inertia: Inertia tensors about the centre of mass, in the link's axes. (n, 3, 3) [kg·m²]
+        rotor_inertia: Rotor inertia reflected to the joint side. (n,) [kg·m²]
+        gravity: Gravity vector in base axes, (0, 0, −9.81) for an upright base. (3,) [m/s²]
+        flange_rotation: Orientation of the flange in frame n. (3, 3)
+        flange_translation: Origin of the flange in frame n. (3,) [m]
+    """
+
+    names: tuple[str, ...]
+    rotation: Array
+    translation: Array
+    mass: Array
+    com: Array
+    inertia: Array
+    rotor_inertia: Array
+    gravity: Array
+    flange_rotation: Array
+    flange_translation: Array
+
+    def __post_init__(self) -> None:
+        n = self.joints
+        shapes = {
+            "rotation": (n, 3, 3),
+            "translation": (n, 3),
+            "mass": (n,),
+            "com": (n, 3),
+            "inertia": (n, 3, 3),
+            "rotor_inertia": (n,),
+            "gravity": (3,),
+            "flange_rotation": (3, 3),
+            "flange_translation": (3,),
+        }
+        for field in fields(self):
+            if field.name in shapes:
+                value = frozen(getattr(self, field.name))
+                object.__setattr__(self, field.name, value)
+                check_shape(value, shapes[field.name], field.name, "the chain")
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return len(self.names)
+
+    def with_payload(self, payload: Payload | None) -> "Chain":
+        """Return the chain with a load fixed to its flange, merged into the last link."""
+        if payload is None:
+            return self
+        R, r = self.flange_rotation, self.flange_translation
+        masses = [float(self.mass[-1]), payload.mass]
+        coms = [self.com[-1], R @ payload.com + r]
+        inertias = [self.inertia[-1], R @ payload.inertia @ R.T]
+        mass, com, inertia = merge_bodies(masses, coms, inertias)
+        return replace(
+            self,
+            mass=np.append(self.mass[:-1], mass),
+            com=np.vstack([self.com[:-1], com]),
+            inertia=np.concatenate([self.inertia[:-1], inertia[None]]),
+        )
+
+    def to_pinocchio(self, name: str = "arm") -> Any:  # noqa: ANN401 - Pinocchio is untyped
+        """Build the Pinocchio model of this chain, with a frame ``flange``.
+
+        Reflected rotor inertia becomes the model's `armature`, which `rnea`, `crba` and `aba`
+        include.
+        """
+        import pinocchio as pin
+
+        model = pin.Model()
+        model.name = name
+        parent = 0
+        for j, joint in enumerate(self.names):
+            placement = pin.SE3(np.array(self.rotation[j]), np.array(self.translation[j]))
+            parent = model.addJoint(parent, pin.JointModelRZ(), placement, joint)
+            inertia = pin.Inertia(
+                float(self.mass[j]), np.array(self.com[j]), np.array(self.inertia[j])
+            )
+            model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+        flange = pin.SE3(np.array(self.flange_rotation), np.array(self.flange_translation))
+        model.addFrame(pin.Frame("flange", parent, flange, pin.FrameType.OP_FRAME))
+        model.armature = np.array(self.rotor_inertia)
+        model.gravity.linear = np.array(self.gravity)
+        return model
+
+
+def merge_bodies(
+    masses: list[float], coms: list[Array], inertias: list[Array]
+) -> tuple[float, Array, Array]:
+    """Merge rigidly joined bodies given in one frame into one mass, centre of mass and tensor.
+
+    Args:
+        masses: Masses. [kg]
+        coms: Centres of mass, (3,) each. [m]
+        inertias: Tensors about each centre of mass, (3, 3) each. [kg·m²]
+
+    Returns:
+        Mass [kg], centre of mass (3,) [m] and tensor about it (3, 3) [kg·m²] (parallel axes).
+    """
+    mass = float(sum(masses))
+    if mass == 0.0:
+        return 0.0, np.zeros(3), np.sum(inertias, axis=0)
+    com: Array = np.sum([m * c for m, c in zip(masses, coms, strict=True)], axis=0) / mass
+    inertia = np.zeros((3, 3))
+    for m, c, tensor in zip(masses, coms, inertias, strict=True):
+        d = c - com
+        inertia += tensor + m * (np.dot(d, d) * np.eye(3) - np.outer(d, d))
+    return mass, com, inertia
+
+
+def symmetric(entries: list[float]) -> Array:
+    """Return the tensor of (xx, xy, xz, yy, yz, zz). (3, 3)"""
+    xx, xy, xz, yy, yz, zz = entries
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def unphysical(mass: float, inertia: Array) -> str:
+    """Say why no rigid body can have this mass and tensor about its centre of mass, or "".
+
+    A tensor of a real mass distribution has non-negative principal moments, none larger than the
+    sum of the other two. Published tables are rounded, so 1e-6 of the largest moment is let pass.
+    """
+    if not np.isfinite(mass) or mass < 0:
+        return f"mass is {mass:g} kg; it must be zero or positive"
+    if not np.all(np.isfinite(inertia)):
+        return "inertia is not finite"
+    low, middle, high = np.linalg.eigvalsh(inertia)
+    slack = 1e-6 * max(abs(high), abs(low), 1e-12)
+    if low < -slack:
+        return f"inertia has the negative principal moment {low:.4g} kg·m²"
+    if high > low + middle + slack:
+        return (
+            f"inertia breaks the triangle inequality: principal moment {high:.4g} is larger than "
+            f"{low:.4g} + {middle:.4g} kg·m²"
+        )
+    return ""

@@ -1,0 +1,166 @@
+"""Robot: everything known about one arm, whatever file it came from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vftcli.arrays import Array, check_shape, frozen
+from vftcli.errors import RobotError
+from vftcli.robots.chain import Chain, Payload
+
+TORQUE_SOURCES = ("current", "link_torque", "joint_torque")
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointFriction:
+    """Friction of one joint: a model's name and its parameters (the keys of the robot file).
+
+    Attributes:
+        model: A name in `vftcli.dynamics.friction.MODELS`, or "none".
+        parameters: The model's numbers by key, in SI units of torque and rad/s.
+        confidence: Where the numbers come from, in words.
+    """
+
+    model: str = "none"
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    confidence: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Joint limits; NaN where the description gives none.
+
+    Attributes:
+        q_min: Lower position limits. (n,) [rad]
+        q_max: Upper position limits. (n,) [rad]
+        qd_max: Speed limits. (n,) [rad/s]
+        tau_max: Torque limits. (n,) [N·m]
+        qdd_max: Acceleration limits. (n,) [rad/s²]
+    """
+
+    q_min: Array
+    q_max: Array
+    qd_max: Array
+    tau_max: Array
+    qdd_max: Array
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            object.__setattr__(self, f.name, frozen(getattr(self, f.name)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorNoise:
+    """Standard deviations of the joint measurements; NaN where unknown.
+
+    Attributes:
+        current: Motor current. (n,) [A]
+        tau: Joint torque. (n,) [N·m]
+        q: Position. (n,) [rad]
+        qd: Velocity. (n,) [rad/s]
+    """
+
+    current: Array
+    tau: Array
+    q: Array
+    qd: Array
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            object.__setattr__(self, f.name, frozen(getattr(self, f.name)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Robot:
+    """One arm: chain, drives, friction, limits and the gains its observers start from.
+
+    Attributes:
+        name: Short name, as used with ``--robot``.
+        title: Name for headings.
+        chain: Geometry and inertia of the bare arm.
+        torque_source: What a log of this arm measures: "current", "link_torque" or "joint_torque".
+        torque_constant: Joint torque per motor current, gear included. (n,) [N·m/A]
+        friction: One model a joint.
+        limits: Joint limits.
+        noise: Measurement noise.
+        sample_rate_hz: The vendor's own rate, NaN if not given. [Hz]
+        payload: The load mounted on the flange, or None.
+        payloads: Further loads by name, for ``--payload NAME``.
+        gains: Observer name → parameter → number, list or word, as in ``[observers.*]``.
+        document: The whole parsed robot file, for sections that others read (admittance) and for
+            writing a changed profile.
+        notes: What a user of the numbers should know.
+        path: The file it was loaded from, None for one made in memory.
+    """
+
+    name: str
+    chain: Chain
+    title: str = ""
+    torque_source: str = "joint_torque"
+    torque_constant: Array | None = None
+    friction: tuple[JointFriction, ...] = ()
+    limits: Limits
+    noise: SensorNoise
+    sample_rate_hz: float = float("nan")
+    payload: Payload | None = None
+    payloads: Mapping[str, Payload] = field(default_factory=dict)
+    gains: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    document: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    path: Path | None = None
+
+    def __post_init__(self) -> None:
+        n = self.joints
+        if self.torque_constant is not None:
+            object.__setattr__(self, "torque_constant", frozen(self.torque_constant))
+            check_shape(self.torque_constant, (n,), "torque_constant", self.name)
+        if self.friction and len(self.friction) != n:
+            raise RobotError(f"{self.name}: {len(self.friction)} friction models for {n} joints")
+        if self.torque_source not in TORQUE_SOURCES:
+            raise RobotError(
+                f"{self.name}: torque_source {self.torque_source!r} is unknown; "
+                f"there is {', '.join(TORQUE_SOURCES)}"
+            )
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return self.chain.joints
+
+    @cached_property
+    def loaded_chain(self) -> Chain:
+        """The chain with the mounted payload merged into the last link."""
+        return self.chain.with_payload(self.payload)
+
+    @cached_property
+    def model(self) -> Any:  # noqa: ANN401 - Pinocchio is untyped
+        """The Pinocchio model of the loaded chain, with a frame ``flange``."""
+        return self.loaded_chain.to_pinocchio(self.name)
+
+    def with_payload(self, payload: str | Payload | None) -> "Robot":
+        """Return the robot with a load on its flange: a name from the file, a Payload, or None.
+
+        Raises:
+            RobotError: If the file names no such payload.
+        """
+        if isinstance(payload, str):
+            if payload not in self.payloads:
+                there = ", ".join(self.payloads) or "none"
+                raise RobotError(
+                    f"{self.name}: no payload {payload!r}; the robot file has {there}. "
+                    "Add a [payload.NAME] section with mass, com and inertia."
+                )
+            payload = self.payloads[payload]
+        return replace(self, payload=payload)
+
+    def without_friction(self) -> "Robot":
+        """Return the robot with no friction model, for ``--friction none``."""
+        return replace(self, friction=())
+
+    def with_gravity(self, gravity: Array) -> "Robot":
+        """Return the robot on a base whose gravity vector, in base axes, is `gravity`. [m/s²]"""
+        return replace(self, chain=replace(self.chain, gravity=np.asarray(gravity, dtype=float)))

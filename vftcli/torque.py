@@ -1,0 +1,52 @@
+"""ExternalTorque: an observer's estimate or the reference it is judged by. The same type."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vftcli.arrays import Array, check_clock, check_shape, frozen
+from vftcli.errors import ShapeError
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExternalTorque:
+    """Torque the environment exerts on the robot, positive along each joint axis.
+
+    Attributes:
+        name: Short name of the observer or of the reference, as used in tables and column names.
+        t: Time on the recording's clock. (T,) [s]
+        tau: External torque; NaN where it is not known. (T, n) [N·m]
+        sd: One standard deviation of `tau` by the estimator's own account. (T, n) [N·m]
+        floor: Root-mean-square error that the estimate itself is known to have. (n,) [N·m]
+        notes: What a reader of the numbers should know, one sentence each.
+    """
+
+    name: str
+    t: Array
+    tau: Array
+    sd: Array | None = None
+    floor: Array | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("t", "tau", "sd", "floor"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(getattr(self, name)))
+        if self.tau.ndim != 2:
+            raise ShapeError(f"tau of {self.name} has shape {self.tau.shape}; expected (T, n)")
+        check_clock(self.t, self.name)
+        check_shape(self.tau, (len(self.t), self.tau.shape[1]), "tau", self.name)
+        if self.sd is not None:
+            check_shape(self.sd, self.tau.shape, "sd", self.name)
+        if self.floor is not None:
+            check_shape(self.floor, self.tau.shape[1:], "floor", self.name)
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return int(self.tau.shape[1])
+
+    @property
+    def finite(self) -> Array:
+        """1 where a sample is known for a joint, 0 elsewhere. (T, n)"""
+        return np.isfinite(self.tau).astype(np.float64)
