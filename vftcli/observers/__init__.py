@@ -1,1 +1,200 @@
-"""Observers."""
+"""Disturbance observers: one table, and the parameters each starts from."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.errors import ParameterError
+from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
+from vftcli.observers.kalman import KalmanObserver
+from vftcli.observers.momentum import MomentumObserver
+from vftcli.observers.observer import Observer, Tuning, per_joint
+from vftcli.observers.settings import PARAMETERS, Settings, joint_values, merged, parse_settings
+
+FALLBACK_RATE = 10.0
+"""First-order gain where a robot gives no gains at all. [1/s]"""
+
+
+class Setup(NamedTuple):
+    """What an observer is built from.
+
+    Attributes:
+        gains: The robot file's ``[observers.*]``.
+        settings: The user's ``--set``.
+        joints: Number of joints n.
+        step: Nominal sample time. [s]
+        as_printed: Use the paper's printed formulas.
+    """
+
+    gains: Mapping[str, Mapping[str, Any]]
+    settings: Settings
+    joints: int
+    step: float
+    as_printed: bool
+
+
+class Entry(NamedTuple):
+    """One line of the observer table.
+
+    Attributes:
+        title: The field's name for it.
+        section: The ``--set`` section its parameters stand in.
+        equations: The paper's equations.
+        summary: What it does, in a sentence.
+        build: Makes it from a Setup, with notes on gains nobody gave.
+    """
+
+    title: str
+    section: str
+    equations: str
+    summary: str
+    build: Callable[[Setup], tuple[Observer, tuple[str, ...]]]
+
+
+def build_fdo(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
+    """The filtered dynamics observer, its cutoff given or left over from the Kalman filter."""
+    given = merged("fdo", "fdo", setup.gains, setup.settings)
+    omega, notes = given.get("omega"), ()
+    if omega is None:
+        rate, origin = leftover_rate(setup)
+        omega = float(1.0 / np.mean(1.0 / rate))
+        notes = (f"fdo.omega was not given: {omega:.3g} rad/s from {origin}",)
+    value = joint_values(omega, setup.joints, "fdo.omega")
+    if np.any(value != value[0]):
+        raise ParameterError("fdo.omega takes one cutoff for all joints; gmo.gain takes one each")
+    return FilteredDynamicsObserver(omega=float(value[0]), as_printed=setup.as_printed), notes
+
+
+def build_gmo(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
+    """The momentum observer, its gains given or left over from the Kalman filter."""
+    given = merged("gmo", "gmo", setup.gains, setup.settings)
+    gain, notes = given.get("gain"), ()
+    if gain is None:
+        gain, origin = leftover_rate(setup)
+        listed = ", ".join(f"{k:.3g}" for k in gain)
+        notes = (f"gmo.gain was not given: {listed} 1/s from {origin}",)
+    values = joint_values(gain, setup.joints, "gmo.gain")
+    return MomentumObserver(gain=values, as_printed=setup.as_printed), notes
+
+
+def build_kfo(scheme: str) -> Callable[[Setup], tuple[Observer, tuple[str, ...]]]:
+    """The builder of a Kalman observer with one discretisation."""
+
+    def build(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
+        name = f"kfo-{scheme}"
+        given = merged("kfo", name, setup.gains, setup.settings)
+        convention = str(given.pop("noise_convention", "density"))
+        values = {
+            key: joint_values(value, setup.joints, f"kfo.{key}")
+            for key, value in given.items()
+            if key in PARAMETERS["kfo"]
+        }
+        observer = KalmanObserver(
+            discretisation=scheme,
+            noise_convention=convention,
+            as_printed=setup.as_printed,
+            **values,
+        )
+        missing = [key for key in ("r_diag", "q_p_diag", "q_tau_diag") if key not in values]
+        notes: tuple[str, ...] = ()
+        if missing:
+            omega = float(observer.tuning(setup.step, setup.joints).omega_n[0])
+            notes = (
+                f"kfo.{', kfo.'.join(missing)} not given: defaults, ω_n = {omega:.3g} rad/s on J1",
+            )
+        return observer, notes
+
+    return build
+
+
+OBSERVERS: dict[str, Entry] = {
+    "fdo": Entry(
+        "filtered dynamics observer",
+        "fdo",
+        "(19)–(29)",
+        "low-pass filtered equation of motion; one cutoff for all joints",
+        build_fdo,
+    ),
+    "gmo": Entry(
+        "generalised momentum observer",
+        "gmo",
+        "(30)–(35)",
+        "first-order residual of the momentum balance; one gain a joint",
+        build_gmo,
+    ),
+    "kfo-fe": Entry(
+        "disturbance Kalman filter, forward Euler",
+        "kfo",
+        "(36)–(42)",
+        "momentum and a random-walk torque as states; three variances a joint",
+        build_kfo("fe"),
+    ),
+    "kfo-zoh": Entry(
+        "disturbance Kalman filter, zero-order hold",
+        "kfo",
+        "(36)–(40), (43), (44)",
+        "the same with the exact process noise",
+        build_kfo("zoh"),
+    ),
+}
+"""Name at the command line → the observer."""
+
+DEFAULT = ("fdo", "gmo", "kfo-fe", "kfo-zoh")
+
+
+def sections() -> dict[str, Sequence[str]]:
+    """The ``--set`` sections and their parameters: shared ones, then each observer's own name."""
+    own = {name: PARAMETERS[entry.section] for name, entry in OBSERVERS.items()}
+    return {**PARAMETERS, **own}
+
+
+def observer_settings(assignments: Sequence[str]) -> Settings:
+    """Read the command line's ``--set`` values.
+
+    Raises:
+        ParameterError: If one is malformed or names nothing there is.
+    """
+    return parse_settings(assignments, sections())
+
+
+def leftover_rate(setup: Setup) -> tuple[np.ndarray[Any, np.dtype[np.float64]], str]:
+    """First-order gain where none was given: the Kalman filter's delay, else 10 1/s. (n,) [1/s]"""
+    if "kfo" in setup.gains or "kfo" in setup.settings:
+        kalman, _ = build_kfo("fe")(setup)
+        delay = kalman.tuning(setup.step, setup.joints).delay
+        return 1.0 / delay, "the delay of kfo-fe"
+    return per_joint(FALLBACK_RATE, setup.joints), "the default, as the robot file gives no gains"
+
+
+def build_observers(
+    names: Sequence[str], setup: Setup
+) -> tuple[tuple[Observer, ...], tuple[str, ...]]:
+    """Build observers by name, with notes on gains that nobody gave.
+
+    Raises:
+        ParameterError: If a name or a parameter is not one there is, or is out of range.
+    """
+    observers, notes = [], []
+    for name in dict.fromkeys(names):
+        if name not in OBSERVERS:
+            raise ParameterError(f"no observer {name!r}; there is {', '.join(OBSERVERS)}")
+        observer, remarks = OBSERVERS[name].build(setup)
+        observers.append(observer)
+        notes.extend(remarks)
+    return tuple(observers), tuple(dict.fromkeys(notes))
+
+
+__all__ = [
+    "DEFAULT",
+    "OBSERVERS",
+    "FilteredDynamicsObserver",
+    "KalmanObserver",
+    "MomentumObserver",
+    "Observer",
+    "Settings",
+    "Setup",
+    "Tuning",
+    "build_observers",
+    "observer_settings",
+]

@@ -1,0 +1,107 @@
+"""Friction models: torque lost in a joint as a function of its velocity."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.robots.robot import JointFriction
+
+SMOOTHING = 0.01
+"""Velocity at which the smoothed sign tanh(q̇/smoothing) reaches tanh(1), by default. [rad/s]"""
+
+
+def coulomb_viscous(
+    dq: Array,
+    coulomb: Array | float,
+    viscous: Array | float,
+    quadratic: Array | float = 0.0,
+    offset: Array | float = 0.0,
+    smoothing: Array | float = SMOOTHING,
+) -> Array:
+    """Coulomb, viscous and signed quadratic friction with an offset. Like `dq` [N·m]
+
+    f = offset + f_c tanh(q̇/smoothing) + f_v q̇ + f_2 q̇|q̇|
+
+    Args:
+        dq: Joint velocities. (T,) or (T, n) [rad/s]
+        coulomb: Coulomb torque f_c. [N·m]
+        viscous: Viscous coefficient f_v. [N·m·s/rad]
+        quadratic: Signed quadratic coefficient f_2. [N·m·s²/rad²]
+        offset: Torque at rest. [N·m]
+        smoothing: Velocity over which the sign is smoothed. [rad/s]
+    """
+    torque: Array = dq / smoothing
+    np.tanh(torque, out=torque)
+    torque *= coulomb
+    torque += viscous * dq
+    if np.any(quadratic):
+        torque += quadratic * dq * np.abs(dq)
+    if np.any(offset):
+        torque += offset
+    return torque
+
+
+def sigmoid(
+    dq: Array, amplitude: Array | float, slope: Array | float, shift: Array | float
+) -> Array:
+    """Sigmoid friction, zero at rest. Like `dq` [N·m]
+
+    f = A/(1 + exp(−s(q̇ + v₀))) − A/(1 + exp(−s v₀))
+
+    Args:
+        dq: Joint velocities. (T,) or (T, n) [rad/s]
+        amplitude: A. [N·m]
+        slope: s. [s/rad]
+        shift: v₀. [rad/s]
+
+    Reference:
+        C. Gaz et al., "Dynamic identification of the Franka Emika Panda robot with retrieval of
+        feasible parameters using penalty-based optimization", IEEE RA-L 2019, Sec. II.
+    """
+    moving = amplitude / (1.0 + np.exp(-slope * (dq + shift)))
+    at_rest = amplitude / (1.0 + np.exp(-slope * np.asarray(shift)))
+    torque: Array = moving - at_rest
+    return torque
+
+
+MODELS: dict[str, Callable[..., Array]] = {
+    "coulomb-viscous": coulomb_viscous,
+    "coulomb-viscous-offset": coulomb_viscous,
+    "coulomb-viscous-quadratic": coulomb_viscous,
+    "sigmoid": sigmoid,
+}
+"""Name in a robot file → function of velocity and the file's parameters."""
+
+
+def friction_torque(friction: Sequence[JointFriction], dq: Array) -> Array:
+    """Friction torque of every joint at every sample, opposing motion when subtracted. (T, n) [N·m]
+
+    Joints that share a model are evaluated together.
+
+    Args:
+        friction: One model a joint; empty for a frictionless arm.
+        dq: Joint velocities. (T, n) [rad/s]
+
+    Raises:
+        ParameterError: If a model's name is unknown.
+    """
+    torque = np.zeros_like(dq)
+    groups: dict[tuple[str, tuple[str, ...]], list[int]] = {}
+    for j, joint in enumerate(friction):
+        if joint.model != "none":
+            groups.setdefault((joint.model, tuple(sorted(joint.parameters))), []).append(j)
+    for (model, _keys), joints in groups.items():
+        if model not in MODELS:
+            raise ParameterError(f"no friction model {model!r}; there is {', '.join(MODELS)}")
+        values = stacked([friction[j].parameters for j in joints])
+        if len(joints) == dq.shape[1]:
+            return MODELS[model](dq, **values)
+        torque[:, joints] = MODELS[model](dq[:, joints], **values)
+    return torque
+
+
+def stacked(parameters: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+    """Turn one mapping a joint into one array a parameter. (n,) each"""
+    return {key: np.array([p[key] for p in parameters]) for key in parameters[0]}

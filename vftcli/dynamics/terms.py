@@ -1,0 +1,86 @@
+"""DynamicsTerms: all an observer ever sees of a robot and its log."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vftcli.arrays import Array, check_clock, check_shape, frozen, handed_over
+from vftcli.dynamics.drive import check_joints, uses_current
+from vftcli.dynamics.friction import friction_torque
+from vftcli.dynamics.kernels import CHUNK, Workspace, maps_of, momentum_chunk
+from vftcli.errors import ShapeError
+from vftcli.recording import Recording
+from vftcli.robots.robot import Robot
+
+
+@dataclass(frozen=True, kw_only=True)
+class DynamicsTerms:
+    r"""Momentum form of the equations of motion: :math:`\dot p = \mu + \tau_{ext}` (33).
+
+    Attributes:
+        t: Time. (T,) [s]
+        p: Generalised momentum M q̇. (T, n) [kg·m²/s]
+        mu: μ = τ + Cᵀq̇ − g − F_f, the torque that changes p without contact. (T, n) [N·m]
+    """
+
+    t: Array
+    p: Array
+    mu: Array
+
+    def __post_init__(self) -> None:
+        for name in ("t", "p", "mu"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        if self.p.ndim != 2:
+            raise ShapeError(f"p has shape {self.p.shape}; expected (T, n)")
+        check_clock(self.t, "the dynamics terms")
+        check_shape(self.p, (len(self.t), self.p.shape[1]), "p", "the dynamics terms")
+        check_shape(self.mu, self.p.shape, "mu", "the dynamics terms")
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return int(self.p.shape[1])
+
+    @property
+    def samples(self) -> int:
+        """Number of samples T."""
+        return len(self.t)
+
+
+def dynamics_terms(recording: Recording, robot: Robot) -> DynamicsTerms:
+    """Evaluate p and μ along a recording, chunk by chunk.
+
+    Beside the recording and the two results it needs memory for one chunk only.
+
+    Raises:
+        MissingSignalError: If velocities, or both currents and torques, are missing.
+        RobotError: If the number of joints differs.
+    """
+    check_joints(recording, robot)
+    q, dq = recording.q, recording.require("dq")
+    effort, scale = effort_of(recording, robot)
+    samples, n = q.shape
+    p, mu = np.empty((samples, n)), np.empty((samples, n))
+    maps, size = maps_of(robot.loaded_chain), min(CHUNK, samples)
+    space, rows = Workspace(n, size), np.empty((3, n, size))
+    for start in range(0, samples, CHUNK):
+        span = slice(start, min(start + CHUNK, samples))
+        momentum, coriolis, gravity = rows[:, :, : span.stop - span.start]
+        columns = np.ascontiguousarray(q[span].T), np.ascontiguousarray(dq[span].T)
+        momentum_chunk(maps, space, *columns, momentum, coriolis, gravity)
+        coriolis -= gravity
+        p[span] = momentum.T
+        np.multiply(effort[span], scale, out=mu[span])
+        mu[span] += coriolis.T
+        if robot.friction:
+            mu[span] -= friction_torque(robot.friction, dq[span])
+    return DynamicsTerms(t=recording.t, p=handed_over(p), mu=handed_over(mu))
+
+
+def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]:
+    """The measured effort (T, n) and what turns it into torque: K [N·m/A], or 1 for torques."""
+    from vftcli.dynamics.drive import drive_torque
+
+    if uses_current(recording, robot) and robot.torque_constant is not None:
+        return recording.require("current"), robot.torque_constant
+    return drive_torque(recording, robot), 1.0

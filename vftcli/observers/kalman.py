@@ -1,0 +1,201 @@
+"""Disturbance Kalman filters, KFO (36)–(44): forward Euler and zero-order hold."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vftcli.arrays import Array, frozen, handed_over
+from vftcli.dynamics.terms import DynamicsTerms
+from vftcli.errors import ParameterError
+from vftcli.observers.kalman_gains import Covariance, Gains, Steady, gain_sequence, steady
+from vftcli.observers.kalman_model import (
+    DISCRETISATIONS,
+    NOISE_CONVENTIONS,
+    Densities,
+    Discrete,
+    discretise,
+)
+from vftcli.observers.observer import Complex, Tuning, per_joint
+from vftcli.observers.recursion import Steps, recursion, steps_of
+from vftcli.torque import ExternalTorque
+
+
+@dataclass(frozen=True, kw_only=True)
+class KalmanObserver:
+    r"""Kalman filter on x = [p; τ_ext] with ṗ = μ + τ_ext + w_p, τ̇_ext = A_τ τ_ext + w_τ.
+
+    With diagonal R, Q_p and Q_τ it is n two-state filters whose gains do not depend on the data.
+    The input is the trapezoid ½(μᵗ + μᵗ⁻¹). The first sample is x̂⁰ = [p⁰; 0] with the stationary
+    prior, so that at a constant sample time there is no transient of the gains; on an uneven clock
+    the covariance is propagated with every step's own A, B, Q and R.
+
+    For A_τ = 0, A_c² = 0 and both discretisations have the same A and B; they differ in Q only.
+
+    Attributes:
+        discretisation: "fe" (41), (42) or "zoh" (43), (44).
+        r_diag: R, one number or one a joint. (n,) [(N·m·s)²·s under "density"]
+        q_p_diag: Q_p. (n,) [(N·m)²·s]
+        q_tau_diag: Q_τ. (n,) [(N·m)²/s]
+        decay: a in A_τ = −a; a number with its sign turned means the same. (n,) [1/s]
+        noise_convention: A key of `NOISE_CONVENTIONS`.
+        initial_covariance: P⁻ of the first sample as (P₁₁, P₁₂, P₂₂), one a joint, or None for the
+            stationary one. (3, n)
+        as_printed: Use μᵗ alone (40) and the literal noise convention.
+
+    Raises:
+        ParameterError: If a variance is not positive, or a name is unknown.
+    """
+
+    discretisation: str = "fe"
+    r_diag: Array | float = 0.5
+    q_p_diag: Array | float = 0.01
+    q_tau_diag: Array | float = 5000.0
+    decay: Array | float = 0.0
+    noise_convention: str = "density"
+    initial_covariance: Array | None = None
+    as_printed: bool = False
+
+    def __post_init__(self) -> None:
+        if self.discretisation not in DISCRETISATIONS:
+            raise ParameterError(
+                f"discretisation {self.discretisation!r}; there is {', '.join(DISCRETISATIONS)}"
+            )
+        if self.noise_convention not in NOISE_CONVENTIONS:
+            raise ParameterError(
+                f"kfo.noise_convention is {self.noise_convention!r}; "
+                f"there is {', '.join(NOISE_CONVENTIONS)}"
+            )
+        for name in ("r_diag", "q_p_diag", "q_tau_diag", "decay"):
+            value = frozen(np.atleast_1d(np.asarray(getattr(self, name), dtype=np.float64)))
+            value = frozen(np.abs(value)) if name == "decay" else value
+            object.__setattr__(self, name, value)
+            least_allowed = value > 0 if name in {"r_diag", "q_tau_diag"} else value >= 0
+            if not (np.all(np.isfinite(value)) and np.all(least_allowed)):
+                raise ParameterError(
+                    f"kfo.{name} is {value.tolist()}; R and Q_τ must be positive, Q_p and the decay "
+                    "must not be negative"
+                )
+
+    @property
+    def name(self) -> str:
+        """kfo-fe or kfo-zoh."""
+        return f"kfo-{self.discretisation}"
+
+    def densities(self, joints: int) -> Densities:
+        """The parameters, one a joint."""
+        values = (self.r_diag, self.q_p_diag, self.q_tau_diag, self.decay)
+        return Densities(*(per_joint(value, joints) for value in values))
+
+    def model(self, step: Array | float, joints: int) -> Discrete:
+        """The discrete model at one sample time, or one a sample as a column (T, 1). [s]"""
+        convention = "literal" if self.as_printed else self.noise_convention
+        step = np.asarray(step, dtype=np.float64)
+        return discretise(self.discretisation, convention, step, self.densities(joints))
+
+    def steady(self, step: float, joints: int) -> Steady:
+        """Stationary gains and prior at a sample time. [s]"""
+        return steady(self.model(step, joints), self.densities(joints).decay)
+
+    def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
+        """Run over a whole log; `sd` is √P₂₂, the filter's own account of its error."""
+        n, steps = terms.joints, steps_of(terms.t)
+        gains, a12, a22 = self.gains(steps, terms.samples, n)
+        state = filtered(terms, gains, a12, a22, steps, trapezoid=not self.as_printed)
+        variance = np.broadcast_to(gains.posterior.p22, terms.p.shape)
+        return ExternalTorque(
+            name=self.name,
+            t=terms.t,
+            tau=state[:, 1],
+            sd=np.sqrt(variance),
+        )
+
+    def gains(self, steps: Steps, samples: int, joints: int) -> tuple[Gains, Array, Array]:
+        """Gains, A₁₂ and A₂₂: one row (n,) if nothing changes along the log, else one a sample."""
+        settled = self.steady(steps.median, joints)
+        if steps.uniform and self.initial_covariance is None:
+            model = self.model(steps.median, joints)
+            return settled.gains, model.a12, model.a22
+        prior = settled.prior
+        if self.initial_covariance is not None:
+            given = np.broadcast_to(
+                np.asarray(self.initial_covariance, dtype=np.float64).reshape(3, -1), (3, joints)
+            )
+            prior = Covariance(*given)
+        dt = np.full(samples, steps.median) if steps.uniform else steps.dt
+        model = self.model(dt[:, None], joints)
+        return gain_sequence(model, prior, settled.gains.posterior), model.a12, model.a22
+
+    def tuning(self, step: float, joints: int) -> Tuning:
+        """ω_n = (Q_τ/R)^¼, ζ = ½√(2 + Q_p/√(Q_τR)) of the effective densities, and the exact delay.
+
+        Q and R are taken as the convention makes them at this sample time; the delay to a ramp is
+        L₁/L₂ − Ts/2 with the discrete gains, exact for A_τ = 0.
+        """
+        d, model = self.densities(joints), self.model(step, joints)
+        gains = self.steady(step, joints).gains
+        # The convention scales all of Q alike, so Q₂₂/Ts (with A_τ = 0) is the effective density.
+        scale = model.step if self._counts_step_twice() else np.ones(joints)
+        r, q_p, q_tau = model.r * step, d.q_p * scale, d.q_tau * scale
+        omega = (q_tau / r) ** 0.25
+        zeta = 0.5 * np.sqrt(2.0 + q_p / np.sqrt(q_tau * r))
+        bend = 1.0 - 2.0 * zeta**2
+        ratio = gains.l1 / gains.l2
+        return Tuning(
+            omega_n=omega,
+            zeta=zeta,
+            delay=ratio - step / 2.0,
+            bandwidth=omega * np.sqrt(bend + np.sqrt(bend**2 + 1.0)) / (2.0 * np.pi),
+            dc_gain=step / (model.a12 + (1.0 - model.a22) * ratio),
+            numbers=3 * joints,
+        )
+
+    def _counts_step_twice(self) -> bool:
+        literal = self.as_printed or self.noise_convention == "literal"
+        return literal and self.discretisation == "fe"
+
+    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
+        """Exact response to τ_ext = e^{jωt} whose integral, the momentum, is sampled. (F, n)"""
+        model, gains = self.model(step, joints), self.steady(step, joints).gains
+        omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[:, None]
+        omega = np.where(omega == 0.0, 1e-9, omega)
+        back = np.exp(-1j * omega * step)
+        f11, f12, f21, f22 = transition(gains, model.a12, model.a22)
+        # (I − F z⁻¹) x = L p: the second row of the inverse times L.
+        determinant = (1.0 - f11 * back) * (1.0 - f22 * back) - f12 * f21 * back**2
+        second = (f21 * back * gains.l1 + (1.0 - f11 * back) * gains.l2) / determinant
+        response: Complex = second / (1j * omega)
+        return response
+
+
+def transition(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array, Array, Array]:
+    """F = (I − LC)A of the filtered state, entry by entry."""
+    rest = 1.0 - gains.l1
+    return rest, rest * a12, -gains.l2, a22 - gains.l2 * a12
+
+
+def filtered(
+    terms: DynamicsTerms,
+    gains: Gains,
+    a12: Array,
+    a22: Array,
+    steps: Steps,
+    *,
+    trapezoid: bool = True,
+) -> Array:
+    """x̂ᵗ = (I−LC)(A x̂ᵗ⁻¹ + B u) + L pᵗ from x̂⁰ = [p⁰; 0]. (T, 2, n)
+
+    The first sample has no innovation. u is ½(μᵗ + μᵗ⁻¹), or μᵗ alone without `trapezoid`.
+    """
+    samples, n = terms.p.shape
+    rows = gains.l1.ndim == 2
+    l1, l2 = (g[1:] if rows else g for g in (gains.l1, gains.l2))
+    dt = steps.median if steps.uniform else steps.dt[1:, None]
+    moved = 0.5 * (terms.mu[1:] + terms.mu[:-1]) if trapezoid else terms.mu[1:].copy()
+    moved *= dt
+    x = np.empty((samples, 2, n))
+    x[0, 0], x[0, 1] = terms.p[0], 0.0
+    x[1:, 0] = (1.0 - l1) * moved + l1 * terms.p[1:]
+    x[1:, 1] = l2 * (terms.p[1:] - moved)
+    F = np.stack(transition(gains, a12, a22), axis=-2)
+    F = F.reshape(*F.shape[:-2], 2, 2, n)
+    return recursion(F, x, np.zeros((2, n)))

@@ -1,0 +1,94 @@
+"""Generalised momentum observer, GMO (30)–(35)."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vftcli.arrays import Array, frozen, handed_over
+from vftcli.dynamics.terms import DynamicsTerms
+from vftcli.errors import ParameterError
+from vftcli.observers.filtered_dynamics import scalar_recursion, tail
+from vftcli.observers.first_order import (
+    first_order_response,
+    first_order_tuning,
+    half_steps,
+    restarts,
+)
+from vftcli.observers.observer import Complex, Tuning, per_joint
+from vftcli.observers.recursion import recursion, steps_of
+from vftcli.torque import ExternalTorque
+
+
+@dataclass(frozen=True, kw_only=True)
+class MomentumObserver:
+    r"""First-order residual of the momentum balance, :math:`\dot r = K(\dot p - \mu - r)`.
+
+    Discretised by the implicit trapezoidal rule with a = K·Ts/2, stable for every gain:
+
+        rᵗ = [(1−a)rᵗ⁻¹ + K(pᵗ − pᵗ⁻¹) − a(μᵗ + μᵗ⁻¹)]/(1+a),  r⁰ = 0
+
+    (35) as printed feeds back r^{i−1} + r^{i−2}, which oscillates above K·Ts = 0.343 and is unstable
+    from 2 on; that form runs with `as_printed`.
+
+    Attributes:
+        gain: Bandwidth K, one number or one a joint. (n,) [1/s]
+        as_printed: Feed back one sample late, as (35) is printed.
+
+    Raises:
+        ParameterError: If a gain is not positive.
+    """
+
+    name: ClassVar[str] = "gmo"
+    gain: Array | float = 10.0
+    as_printed: bool = False
+
+    def __post_init__(self) -> None:
+        gain = frozen(np.atleast_1d(np.asarray(self.gain, dtype=np.float64)))
+        object.__setattr__(self, "gain", gain)
+        if not (np.all(np.isfinite(gain)) and np.all(gain > 0)):
+            raise ParameterError(f"gmo.gain is {gain.tolist()} 1/s; every gain must be positive")
+
+    def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
+        """Run over a whole log from r = 0 at its first sample.
+
+        Past a gap with a > 1 the filter starts afresh, and the estimate's notes say so.
+        """
+        gain, steps = per_joint(self.gain, terms.joints), steps_of(terms.t)
+        a = half_steps(gain, steps)
+        p, mu = terms.p, terms.mu
+        if self.as_printed:
+            return self._as_printed(terms, gain, a)
+        x = np.zeros_like(p)
+        x[1:] = (gain * (p[1:] - p[:-1]) - tail(a) * (mu[1:] + mu[:-1])) / (1.0 + tail(a))
+        decay = (1.0 - a) / (1.0 + a)
+        fresh, notes = restarts(a, gain, steps)
+        if notes:
+            decay, x = np.where(fresh, 0.0, decay), np.where(fresh, 0.0, x)
+        tau = scalar_recursion(decay, x)
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), notes=notes)
+
+    def _as_printed(self, terms: DynamicsTerms, gain: Array, a: Array) -> ExternalTorque:
+        """rᵗ = rᵗ⁻¹ + K(pᵗ−pᵗ⁻¹) − a(μᵗ+μᵗ⁻¹+rᵗ⁻¹+rᵗ⁻²), r⁻¹ = r⁰ = 0: two states a joint."""
+        n, p, mu = terms.joints, terms.p, terms.mu
+        x = np.zeros((terms.samples, 2, n))
+        x[1:, 0] = gain * (p[1:] - p[:-1]) - tail(a) * (mu[1:] + mu[:-1])
+        F = np.zeros((len(a), 2, 2, n))
+        F[:, 0, 0], F[:, 0, 1], F[:, 1, 0] = 1.0 - a, -a, 1.0
+        with np.errstate(over="ignore", invalid="ignore"):
+            tau = recursion(F[0] if len(a) == 1 else F, x, np.zeros((2, n)))[:, 0]
+        unstable = np.flatnonzero((2.0 * np.median(a, axis=0) >= 2.0))
+        notes: tuple[str, ...] = ()
+        if len(unstable):
+            joints = ", ".join(f"J{j + 1}" for j in unstable)
+            notes = (f"K·Ts ≥ 2 on {joints}: (35) as printed is unstable there",)
+        tau = np.where(np.isfinite(tau), tau, np.nan)
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), notes=notes)
+
+    def tuning(self, step: float, joints: int) -> Tuning:
+        """What K means at a sample time. [s]"""
+        return first_order_tuning(per_joint(self.gain, joints), step, numbers=joints)
+
+    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
+        """Complex gain at `frequency` [Hz]. (F, n)"""
+        return first_order_response(per_joint(self.gain, joints), frequency, step)

@@ -1,0 +1,65 @@
+"""What every observer is: parameters in, one estimate of the external torque out."""
+
+from dataclasses import dataclass, fields
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.arrays import Array, frozen
+from vftcli.dynamics.terms import DynamicsTerms
+from vftcli.torque import ExternalTorque
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """What an observer's parameters mean, joint by joint.
+
+    Attributes:
+        omega_n: Natural frequency; for a first-order observer its cutoff. (n,) [rad/s]
+        zeta: Damping ratio; NaN for a first-order observer. (n,)
+        delay: Lag behind a slow ramp. (n,) [s]
+        bandwidth: Frequency at which the gain has fallen by 3 dB. (n,) [Hz]
+        dc_gain: Gain to a constant torque, 1 where unbiased. (n,)
+        numbers: How many numbers there are to tune for an n-joint arm.
+    """
+
+    omega_n: Array
+    zeta: Array
+    delay: Array
+    bandwidth: Array
+    dc_gain: Array
+    numbers: int
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if field.name != "numbers":
+                object.__setattr__(self, field.name, frozen(getattr(self, field.name)))
+
+
+class Observer(Protocol):
+    """A disturbance observer; it knows (t, p, μ) and nothing else of the robot or its log."""
+
+    @property
+    def name(self) -> str:
+        """Its name at the command line."""
+        ...
+
+    def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
+        """Run over a whole log."""
+        ...
+
+    def tuning(self, step: float, joints: int) -> Tuning:
+        """What the parameters mean at a sample time. [s]"""
+        ...
+
+    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
+        """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""
+        ...
+
+
+def per_joint(value: Array | float, joints: int) -> Array:
+    """One number a joint from one number or one a joint. (n,)"""
+    return np.array(np.broadcast_to(np.asarray(value, dtype=np.float64), (joints,)))

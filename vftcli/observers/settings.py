@@ -1,0 +1,101 @@
+"""Observer parameters: what the command line sets, what the robot file gives, what is left over."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+
+Value = float | str | list[float]
+Settings = dict[str, dict[str, Value]]
+"""Section ("fdo", "gmo", "kfo", or one observer's own name) → parameter → value."""
+
+PARAMETERS: dict[str, tuple[str, ...]] = {
+    "fdo": ("omega",),
+    "gmo": ("gain",),
+    "kfo": ("r_diag", "q_p_diag", "q_tau_diag", "decay", "noise_convention"),
+}
+"""Section → the parameters it takes; `kfo` holds for every Kalman filter."""
+
+WORDS = {"noise_convention"}
+
+
+def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[str]]) -> Settings:
+    """Read ``observer.parameter=VALUE`` assignments; a value is a number or one a joint.
+
+    Args:
+        assignments: The command line's ``--set`` values.
+        sections: Section → parameters, `PARAMETERS` with the observers' own names added.
+
+    Raises:
+        ParameterError: If an assignment is malformed or names nothing there is.
+    """
+    settings: Settings = {}
+    for text in assignments:
+        left, equals, right = text.partition("=")
+        section, dot, parameter = left.strip().partition(".")
+        if not (equals and dot and right.strip()):
+            raise ParameterError(
+                f"--set {text!r} is not OBSERVER.PARAMETER=VALUE, as gmo.gain=30 or "
+                "gmo.gain=5,3,4,10,10,10"
+            )
+        check_name(section, parameter, sections)
+        settings.setdefault(section, {})[parameter] = parse_value(parameter, right.strip(), text)
+    return settings
+
+
+def check_name(section: str, parameter: str, sections: Mapping[str, Sequence[str]]) -> None:
+    """Raise a ParameterError that lists what there is unless the name exists."""
+    if section not in sections:
+        close = get_close_matches(section, sections, n=1)
+        hint = f" Did you mean {close[0]}?" if close else ""
+        raise ParameterError(f"no observer {section!r} to set.{hint} There is {', '.join(sections)}")
+    if parameter not in sections[section]:
+        close = get_close_matches(parameter, sections[section], n=1)
+        hint = f" Did you mean {close[0]}?" if close else ""
+        raise ParameterError(
+            f"{section} has no parameter {parameter!r}.{hint} It has {', '.join(sections[section])}"
+        )
+
+
+def parse_value(parameter: str, text: str, assignment: str) -> Value:
+    """A word, a number, or a list of numbers."""
+    if parameter in WORDS:
+        return text
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ParameterError(f"--set {assignment!r}: {text!r} is not a number or a list") from None
+    if not all(np.isfinite(numbers)):
+        raise ParameterError(f"--set {assignment!r}: every number must be finite")
+    return numbers[0] if len(numbers) == 1 else numbers
+
+
+def merged(section: str, name: str, *sources: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Parameters of one observer: later sources win, its own section over the shared one."""
+    found: dict[str, Any] = {}
+    for source in sources:
+        found |= source.get(section, {})
+        if name != section:
+            found |= source.get(name, {})
+    return found
+
+
+def joint_values(value: Any, joints: int, what: str) -> Array:  # noqa: ANN401 - TOML is untyped
+    """One number a joint from one number or a list of them. (n,)
+
+    Raises:
+        ParameterError: If the list has another length.
+    """
+    try:
+        array = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise ParameterError(f"{what} is {value!r}; it must be a number or one a joint") from None
+    if array.ndim != 1 or array.size not in {1, joints}:
+        raise ParameterError(
+            f"{what} has {array.size} values; give one, or one for each of {joints} joints"
+        )
+    return np.array(np.broadcast_to(array, (joints,)))
