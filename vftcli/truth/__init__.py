@@ -1,1 +1,1 @@
-"""Truth."""
+"""Ground truth: what the estimates are judged by, each with its own error where it can be known."""

@@ -1,0 +1,55 @@
+"""Analysis: everything one run over one log made, ready to be shown."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import polars as pl
+
+from vftcli.arrays import Array
+from vftcli.dynamics.terms import DynamicsTerms
+from vftcli.observers.observer import Observer, Tuning
+from vftcli.recording import Recording
+from vftcli.robots.robot import Robot
+from vftcli.torque import ExternalTorque
+
+
+@dataclass(frozen=True, kw_only=True)
+class Analysis:
+    """One log, one robot, its observers' estimates, and how they compare with the reference.
+
+    Attributes:
+        recording: The log.
+        robot: The arm as it was used: payload mounted, friction possibly off.
+        terms: p and μ along the log.
+        observers: The observers that ran.
+        estimates: Their estimates, in the same order.
+        tunings: What each observer's parameters mean at this log's sample time, by name.
+        reference: What the estimates are judged by, or None.
+        errors: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
+        notes: What the reader of the numbers should know, one sentence each.
+        run: The command, versions and conventions, as `run.json` holds them.
+    """
+
+    recording: Recording
+    robot: Robot
+    terms: DynamicsTerms
+    observers: tuple[Observer, ...]
+    estimates: tuple[ExternalTorque, ...]
+    tunings: Mapping[str, Tuning]
+    reference: ExternalTorque | None = None
+    errors: pl.DataFrame | None = None
+    notes: tuple[str, ...] = ()
+    run: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def torques(self) -> tuple[ExternalTorque, ...]:
+        """The estimates, and the reference last if there is one, under the name "reference"."""
+        if self.reference is None:
+            return self.estimates
+        return (*self.estimates, self.reference)
+
+    @property
+    def t(self) -> Array:
+        """Time since the log's first sample. (T,) [s]"""
+        return self.recording.t
