@@ -86,6 +86,8 @@ class Recording:
         wrench_frame: Frame, axes and sign of `wrench`, in words; None where unknown.
         joint_names: The joints' names in the log's order, or empty.
         robot_hint: Name of the profile the log itself settles, or None.
+        payload_mass: Mass of the payload the controller was told of, None if not logged. [kg]
+        payload_com: Its centre of mass in flange axes. (3,) [m]
         source: Where it came from and what was repaired.
     """
 
@@ -104,6 +106,8 @@ class Recording:
     wrench_frame: str | None = None
     joint_names: tuple[str, ...] = ()
     robot_hint: str | None = None
+    payload_mass: float | None = None
+    payload_com: tuple[float, ...] | None = None
     source: Source = Source()
 
     def __post_init__(self) -> None:

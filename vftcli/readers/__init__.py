@@ -1,1 +1,99 @@
-"""Readers."""
+"""Readers: a log in any known format becomes a Recording. The content decides, never the name."""
+
+from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
+
+from vftcli.errors import LogError, UnknownFormatError
+from vftcli.readers import libfranka, rtde, tables
+from vftcli.readers.cleaning import cleaned
+from vftcli.readers.opening import Digest
+from vftcli.readers.reader import LogFile, RawLog, Reader, Request, open_log
+from vftcli.recording import Recording
+
+READERS: dict[str, Reader] = {
+    reader.name: reader
+    for reader in (
+        rtde.OFFICIAL,
+        rtde.BINARY,
+        rtde.UR_RTDE,
+        libfranka.NEW,
+        libfranka.OLD,
+        libfranka.STATES,
+        tables.HEADED,
+        tables.HEADERLESS,
+        tables.NPY,
+    )
+}
+"""Every format by name: one reader, one line."""
+
+
+def read(
+    path: str | Path,
+    *,
+    format: str | None = None,  # noqa: A002 - the word users know from --format
+    columns: str | None = None,
+    signals: Collection[str] | None = None,
+) -> Recording:
+    """Read a log, recognising its format by content unless one is named.
+
+    Args:
+        path: A file or a bag folder.
+        format: Name of a format in READERS.
+        columns: Which columns hold which signals, in the grammar of ``--columns``.
+        signals: Fields of Recording that are wanted; others may be left unread. None for all.
+
+    Raises:
+        UnknownFormatError: If no format fits, or more than one.
+        LogError: If the file cannot be read as what it is.
+        ClockError: If its clock stands still, runs backwards or holds no samples.
+    """
+    path = Path(path)
+    file = open_log(path)
+    reader = _reader(file, format, columns)
+    digest = Digest(path)
+    request = Request(columns=columns, signals=frozenset(signals) if signals is not None else None)
+    recording = cleaned(reader.read(file, request), path, reader.name)
+    return replace(recording, source=replace(recording.source, sha256=digest.hexdigest()))
+
+
+def recognise(path: str | Path) -> Reader:
+    """Return the reader that a path's content calls for.
+
+    Raises:
+        UnknownFormatError: If no format fits, or more than one.
+    """
+    return _recognise(open_log(Path(path)))
+
+
+def _reader(file: LogFile, name: str | None, columns: str | None) -> Reader:
+    if name is not None and name not in READERS:
+        raise UnknownFormatError(f"no format {name!r}; known formats: {', '.join(READERS)}.")
+    reader = READERS[name] if name else _recognise(file)
+    if columns is None:
+        return reader
+    if not reader.columns:
+        takers = ", ".join(r.name for r in READERS.values() if r.columns)
+        raise LogError(
+            f"{file.path}: --columns does not apply to {reader.name}, whose signals are known. "
+            f"It applies to {takers}."
+        )
+    return reader if reader.general or not file.lines else tables.HEADED
+
+
+def _recognise(file: LogFile) -> Reader:
+    found = [r for r in READERS.values() if not r.general and r.recognises(file)]
+    found = found or [r for r in READERS.values() if r.general and r.recognises(file)]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        raise UnknownFormatError(
+            f"{file.path}: not recognised as any of {', '.join(READERS)}. Name its format with "
+            "--format, or see docs/formats.md for what each expects."
+        )
+    raise UnknownFormatError(
+        f"{file.path}: could be {' or '.join(r.name for r in found)}. Say which with --format."
+    )
+
+
+__all__ = ["READERS", "LogFile", "RawLog", "Reader", "Request", "read", "recognise"]

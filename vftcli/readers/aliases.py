@@ -1,0 +1,186 @@
+"""Aliases: the names under which users' tables hold the signals, found without being told."""
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from vftcli.errors import LogError
+from vftcli.readers.joints import kinematic_order
+from vftcli.readers.table import Cell, Pick, Picks, Table, checked, listed
+
+CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "seconds", "t_src_ns")
+"""Names of the clock; a unit may follow, as in time_ms."""
+
+ALIASES: dict[str, tuple[str, ...]] = {
+    "q": (
+        "q", "actual_q", "state.q", "joint_pos", "joint_position", "position", "positions",
+        "joint_positions", "q_actual", "observation.state",
+    ),
+    "dq": (
+        "dq", "qd", "actual_qd", "state.dq", "velocity", "velocities", "joint_vel",
+        "joint_velocity", "joint_velocities", "qd_actual", "dq_actual",
+    ),
+    "torque": (
+        "tau", "tau_j", "state.tau_j", "effort", "efforts", "torque", "torques", "joint_torque",
+        "joint_torques", "motor_torque", "motor_torques_measured",
+    ),
+    "current": (
+        "actual_current", "current", "currents", "i_actual", "motor_current", "joint_current",
+        "i",
+    ),
+    "tau_ext": (
+        "tau_ext", "tau_ext_hat_filtered", "motor_torques_external", "tau_ext_vendor",
+    ),
+    "target_q": ("target_q", "q_d", "q_target", "target_position"),
+    "target_dq": ("target_dq", "target_qd", "dq_d", "qd_target", "target_velocity"),
+    "target_current": ("target_current", "current_d", "i_target"),
+    "target_torque": ("target_torque", "target_moment", "tau_d"),
+    "temperature": ("temperature", "joint_temperature", "joint_temperatures"),
+}  # fmt: skip
+"""Field of Recording → names its columns go by, in lower case and without their index."""
+
+TURNED = {"tau_ext_hat_filtered", "motor_torques_external"}
+"""libfranka's residual under its own names: measured torque minus model, the torque BY the robot."""
+
+WRENCHES = (
+    "fx fy fz mx my mz",
+    "fx fy fz tx ty tz",
+    "wrench/fx wrench/fy wrench/fz wrench/mx wrench/my wrench/mz",
+    "wrench/fx wrench/fy wrench/fz wrench/tx wrench/ty wrench/tz",
+)
+"""Names of the six columns of a wrench."""
+
+INDEXED = re.compile(
+    r"(?P<stem>.*?)[_./ ]?(?:(?:joint|j)_?(?P<a>\d+)|\[(?P<b>\d+)\]|(?P<c>\d+))", re.IGNORECASE
+)
+JOINT_FIRST = re.compile(
+    r"(?:.*/)?(?P<joint>[A-Za-z][\w ]*)[/.](?P<stem>position|velocity|effort)(?:\[\])?"
+)
+"""A joint's name before the signal's, as PlotJuggler exports JointState topics."""
+
+TURNED_NOTE = (
+    "turned the sign of tau_ext_hat_filtered: libfranka logs measured torque minus model, "
+    "the torque on the robot is its negative"
+)
+
+
+class Group(NamedTuple):
+    """Columns that share a name but for their index."""
+
+    cells: tuple[Cell, ...]
+    indices: tuple[int, ...]
+    joints: tuple[str, ...] = ()
+
+
+def picks_by_alias(table: Table) -> tuple[Picks, tuple[str, ...]]:
+    """Find the signals of a headed table by the names of its columns, and the joints' names.
+
+    Raises:
+        LogError: If two groups of columns could be the same signal, or none is the positions.
+    """
+    groups = grouped(table)
+    signals = [pick for signal in ALIASES if (pick := _pick_of(table, signal, groups)) is not None]
+    if (wrench := _wrench(table)) is not None:
+        signals.append(wrench)
+    joints = next((len(p.cells) for p in signals if p.signal == "q"), 0)
+    signals = [p for p in signals if len(p.cells) == joints or p.signal in {"q", "wrench"}]
+    picks = checked(table, Picks(signals=tuple(signals), clock=_clock(table)))
+    names = next((g.joints for g in groups.values() if g.joints), ())
+    return picks, names
+
+
+def grouped(table: Table) -> dict[str, Group]:
+    """The columns of a table by name without index, in lower case."""
+    found: dict[str, dict[int, Cell]] = {}
+    by_joint: dict[str, dict[str, Cell]] = {}
+    for column, name in enumerate(table.names or ()):
+        if column in table.lists:
+            cells = {k: Cell(column, k) for k in range(table.lists[column])}
+            found.setdefault(name.lower(), {}).update(cells)
+        elif match := JOINT_FIRST.fullmatch(name):
+            by_joint.setdefault(match["stem"], {})[match["joint"]] = Cell(column)
+        elif match := INDEXED.fullmatch(name):
+            index = int(match["a"] or match["b"] or match["c"])
+            if found.setdefault(match["stem"].lower(), {}).setdefault(index, Cell(column)) != Cell(
+                column
+            ):
+                raise LogError(
+                    f"{table.path}: two columns could be {match['stem']} of index {index}: "
+                    f"{name!r} and another. Name the columns with --columns."
+                )
+    groups = {
+        stem: Group(tuple(cells[i] for i in sorted(cells)), tuple(sorted(cells)))
+        for stem, cells in found.items()
+    }
+    for stem, cells_of in by_joint.items():
+        order = kinematic_order(tuple(cells_of))
+        names = tuple(tuple(cells_of)[k] for k in order)
+        cells_in_order = tuple(cells_of[name] for name in names)
+        groups[stem] = Group(cells_in_order, tuple(range(len(names))), names)
+    return groups
+
+
+def _pick_of(table: Table, signal: str, groups: dict[str, Group]) -> Pick | None:
+    found = [name for name in ALIASES[signal] if name in groups]
+    if not found:
+        return None
+    if len(found) > 1:
+        raise LogError(
+            f"{table.path}: {' and '.join(found)} could both be {signal}. Say which with "
+            f"--columns, as in q=…,{signal if signal != 'torque' else 'tau'}={found[0]}_{{i}}."
+        )
+    name = found[0]
+    group = groups[name]
+    first = group.indices[0]
+    if group.indices != tuple(range(first, first + len(group.indices))):
+        raise LogError(
+            f"{table.path}: the columns of {name} are numbered "
+            f"{', '.join(map(str, group.indices[:12]))}, with holes. Name them with --columns."
+        )
+    turned = name in TURNED
+    return Pick(
+        signal=signal,
+        cells=group.cells,
+        factor=-1.0 if turned else 1.0,
+        note=TURNED_NOTE if turned else "",
+    )
+
+
+def _wrench(table: Table) -> Pick | None:
+    names = [name.lower() for name in table.names or ()]
+    for text in WRENCHES:
+        wanted = text.split()
+        if all(names.count(name) == 1 for name in wanted):
+            return Pick(signal="wrench", cells=tuple(Cell(names.index(n)) for n in wanted))
+    return None
+
+
+def _clock(table: Table) -> Pick | None:
+    names = [name.lower() for name in table.names or ()]
+    bare = [re.sub(r"[_ ]?[\[(]?(?<=[_\[( ])(s|ms|us|ns)[\])]?$", "", name) for name in names]
+    found = [
+        column for column, name in enumerate(names) if name in CLOCKS or bare[column] in CLOCKS[:4]
+    ]
+    if len(found) > 1:
+        there = listed([(table.names or ())[column] for column in found])
+        raise LogError(
+            f"{table.path}: {there} could each be the clock. Say which with --columns, as in "
+            f"t={(table.names or ())[found[0]]},q=…"
+        )
+    return Pick(signal="t", cells=(Cell(found[0]),)) if found else None
+
+
+def vector_picks(table: Table, names: dict[str, str], joints: Sequence[int]) -> tuple[Pick, ...]:
+    """Picks of vendor columns that are called name_0, name_1, … where all of them are there.
+
+    Args:
+        table: The table.
+        names: Field of Recording → the vendor's name.
+        joints: The indices of the joints.
+    """
+    position = {name: column for column, name in reversed(list(enumerate(table.names or ())))}
+    return tuple(
+        Pick(signal=signal, cells=tuple(Cell(position[f"{name}_{j}"]) for j in joints))
+        for signal, name in names.items()
+        if all(f"{name}_{j}" in position for j in joints)
+    )

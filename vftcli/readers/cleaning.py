@@ -1,0 +1,227 @@
+"""Cleaning: what every log goes through on its way to a Recording. Nothing is repaired silently."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.arrays import Array, handed_over
+from vftcli.errors import ClockError, LogError
+from vftcli.readers.reader import RawLog
+from vftcli.recording import Recording, Source
+
+GARBAGE_ROWS = 100
+"""Rows at the start of a log among which a misaligned packet may have left garbage."""
+
+GARBAGE_VALUE = 1e6
+"""No joint measurement in SI units is this large; a misread double nearly always is, or is tiny."""
+
+DENORMAL = 1e-300
+
+GAP_STEPS = 4.0
+"""A step this many times the median is reported as a gap."""
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass
+class Findings:
+    """What cleaning did and saw, gathered along the way."""
+
+    repairs: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    duplicates: int = 0
+
+
+def cleaned(raw: RawLog, path: Path, format_name: str) -> Recording:
+    """Make a Recording of what a reader found.
+
+    In order: garbage of a misaligned packet at the start is dropped, values that are no numbers are
+    refused, repeated stamps are dropped, a clock that runs backwards is refused, gaps are counted,
+    and positions that can only be degrees are refused.
+
+    Raises:
+        LogError: If a signal holds NaN or infinity, or its unit cannot be radians.
+        ClockError: If the clock is not finite, runs backwards, or holds no samples.
+    """
+    findings = Findings(list(raw.repairs), list(raw.warnings))
+    rows = len(raw.stamps)
+    if rows == 0:
+        raise ClockError(f"{path}: no samples; the log holds a header only.")
+    raw = without_leading_garbage(raw, findings)
+    refuse_unknown_numbers(raw, path)
+    refuse_backward_steps(raw, path)
+    raw = without_repeats(raw, findings)
+    if raw.degrees_possible:
+        refuse_degrees(raw.signals["q"], path)
+    t = seconds(raw)
+    report_gaps(t, findings)
+    source = Source(
+        path=path,
+        format=format_name,
+        clock=raw.clock,
+        t0=float(raw.stamps[0]) * raw.tick,
+        t0_ns=_nanoseconds(raw),
+        rows=rows,
+        duplicates=findings.duplicates,
+        repairs=tuple(findings.repairs),
+        warnings=tuple(findings.warnings),
+    )
+    signals = {name: handed_over(np.ascontiguousarray(v)) for name, v in raw.signals.items()}
+    return Recording(
+        t=handed_over(t),
+        **signals,  # type: ignore[arg-type]
+        wrench_frame=raw.wrench_frame if "wrench" in signals else None,
+        joint_names=raw.joint_names,
+        robot_hint=raw.robot_hint,
+        payload_mass=raw.payload_mass,
+        payload_com=raw.payload_com,
+        source=source,
+    )
+
+
+def seconds(raw: RawLog) -> Array:
+    """Time since the first sample; whole ticks are subtracted before they are scaled. (T,) [s]"""
+    elapsed: Array = (raw.stamps - raw.stamps[0]).astype(np.float64)
+    return elapsed if raw.tick == 1.0 else elapsed * raw.tick
+
+
+def _nanoseconds(raw: RawLog) -> int | None:
+    if raw.stamps.dtype.kind not in "iu":
+        return None
+    per_tick = round(raw.tick * 1e9)
+    return int(raw.stamps[0]) * per_tick if per_tick >= 1 else None
+
+
+def kept(raw: RawLog, keep: Mask | slice) -> RawLog:
+    """Return the log with some of its rows only."""
+    signals = {name: value[keep] for name, value in raw.signals.items()}
+    return replace(raw, stamps=raw.stamps[keep], signals=signals)
+
+
+def without_leading_garbage(raw: RawLog, findings: Findings) -> RawLog:
+    """Drop the rows at the start that a misaligned packet left: absurd values, then a time jump.
+
+    Without an absurd value nothing is dropped, so that a jump of the clock alone is not hidden.
+    """
+    head = slice(0, min(GARBAGE_ROWS, len(raw.stamps)))
+    absurd = np.zeros(head.stop, dtype=bool)
+    for value in raw.signals.values():
+        size = np.abs(value[head])
+        with np.errstate(invalid="ignore"):
+            bad = ~(size < GARBAGE_VALUE) | ((size > 0) & (size < DENORMAL))
+        absurd |= bad.any(axis=1)
+    absurd |= ~np.isfinite(raw.stamps[head].astype(np.float64))
+    if not absurd.any() or absurd.all():
+        return raw
+    count = int(np.flatnonzero(absurd)[-1]) + 1
+    count = max(count, _last_jump(raw, head.stop))
+    if count >= len(raw.stamps) - 1 or absurd[:count].mean() < 0.1:
+        return raw
+    findings.repairs.append(
+        f"dropped {count} leading row{'s' if count > 1 else ''} of garbage "
+        "(absurd values or a jumping clock, as a misaligned packet leaves them)"
+    )
+    return replace(kept(raw, slice(count, None)), first_row=raw.first_row + count)
+
+
+def _last_jump(raw: RawLog, rows: int) -> int:
+    """Index of the row after the last backward or enormous step among the first rows, or 0."""
+    t = raw.stamps[:rows].astype(np.float64) * raw.tick
+    steps = np.diff(t)
+    usual = np.median(np.diff(raw.stamps.astype(np.float64))) * raw.tick
+    with np.errstate(invalid="ignore"):
+        jumps = ~((steps >= 0) & (steps <= max(60.0, 1000 * usual)))
+    return int(np.flatnonzero(jumps)[-1]) + 1 if jumps.any() else 0
+
+
+def refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
+    """Raise a LogError that names the row and column of the first NaN or infinity."""
+    if not np.isfinite(raw.stamps).all():
+        row = raw.first_row + int(np.argmin(np.isfinite(raw.stamps)))
+        raise LogError(f"{path}: the clock is not a number in sample {row}. Cut the row out.")
+    for name, value in raw.signals.items():
+        # a sum is finite if every term is; the slow look is only for the message
+        if np.isfinite(np.sum(value)) or np.isfinite(value).all():
+            continue
+        unknown = ~np.isfinite(value)
+        row, column = (int(k) for k in np.argwhere(unknown)[0])
+        lost = int(unknown[:, column].sum())
+        if lost == len(value):
+            raise LogError(
+                f"{path}: {name} of joint {column + 1} holds no numbers at all, only empty cells "
+                "or NaN. Leave the signal out (with _ in --columns), or record it."
+            )
+        raise LogError(
+            f"{path}: {name} {'axis' if name == 'wrench' else 'of joint'} {column + 1} is "
+            f"{value[row, column]} in sample {raw.first_row + row} (t = "
+            f"{seconds(raw)[row]:.6g} s), {lost} such in all. Nothing is filled in: cut the rows "
+            "out, or leave the signal out with _ in --columns."
+        )
+
+
+def refuse_backward_steps(raw: RawLog, path: Path) -> None:
+    """Raise a ClockError that names the first sample whose stamp lies before the one before."""
+    backward = np.diff(raw.stamps) < 0
+    if not backward.any():
+        return
+    k = int(np.argmax(backward)) + 1
+    t = seconds(raw)
+    raise ClockError(
+        f"{path}: time runs backwards {int(backward.sum())}×, first at sample {raw.first_row + k} "
+        f"(from {t[k - 1]:.6f} to {t[k]:.6f} s). Two logs in one file, or rows out of order: "
+        "split or sort it first."
+    )
+
+
+def without_repeats(raw: RawLog, findings: Findings) -> RawLog:
+    """Drop rows whose stamp repeats the one before, and say so."""
+    fresh = np.concatenate([[True], np.diff(raw.stamps) > 0])
+    repeats = int(len(fresh) - fresh.sum())
+    if repeats == 0:
+        return raw
+    again = np.flatnonzero(~fresh)
+    changed = np.zeros(repeats, dtype=bool)
+    for value in raw.signals.values():
+        changed |= (value[again] != value[again - 1]).any(axis=1)
+    findings.duplicates = repeats
+    findings.repairs.append(
+        f"dropped {repeats} row{'s' if repeats > 1 else ''} whose stamp repeats the one before"
+    )
+    if different := int(changed.sum()):
+        findings.warnings.append(
+            f"{different} of the {repeats} repeated stamps carried other values: the stamps are "
+            "coarser than the samples, or two sources share one file"
+        )
+    return kept(raw, fresh)
+
+
+def report_gaps(t: Array, findings: Findings) -> None:
+    """Report steps several times the median; they are kept as they are."""
+    if len(t) < 3:
+        return
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    gaps = np.flatnonzero(steps > GAP_STEPS * usual)
+    if gaps.size:
+        k = int(gaps[np.argmax(steps[gaps])])
+        findings.warnings.append(
+            f"{gaps.size} gap{'s' if gaps.size > 1 else ''} of more than {GAP_STEPS:g} sample "
+            f"times, the longest {steps[k]:.4g} s at t = {t[k]:.4g} s; kept as they are"
+        )
+
+
+def refuse_degrees(q: Array, path: Path) -> None:
+    """Raise a LogError if positions of unstated unit can hardly be radians.
+
+    No joint of these arms turns through 13 rad; the seven-joint arms stay within ±2π.
+    """
+    largest, travel = float(np.max(np.abs(q))), float(np.max(np.ptp(q, axis=0)))
+    limit = 2 * np.pi + 0.1 if q.shape[1] == 7 else 13.0
+    if largest > limit or travel > 13.0:
+        raise LogError(
+            f"{path}: positions reach {largest:.4g} and travel {travel:.4g}, which looks like "
+            "degrees. Say the unit with --columns: q[deg]=… or q[rad]=… (q[deg]:"
+            f"{q.shape[1]} for a headerless table)."
+        )

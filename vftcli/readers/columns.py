@@ -1,0 +1,171 @@
+"""The --columns grammar: which column of a table holds which signal, in which unit and sign."""
+
+import re
+from dataclasses import dataclass
+
+from vftcli.errors import LogError
+
+SIGNALS: dict[str, str] = {
+    "q": "q",
+    "dq": "dq",
+    "current": "current",
+    "tau": "torque",
+    "target_q": "target_q",
+    "target_dq": "target_dq",
+    "target_current": "target_current",
+    "target_torque": "target_torque",
+    "tau_ext": "tau_ext",
+    "wrench": "wrench",
+    "temperature": "temperature",
+}
+"""Name in --columns → field of Recording. `t` is the clock and `_` skips."""
+
+DEGREE = 0.017453292519943295
+
+UNITS: dict[str, dict[str, float]] = {
+    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "q": {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "rev": 360 * DEGREE},
+    "dq": {
+        "rad/s": 1.0, "rad": 1.0, "deg/s": DEGREE, "deg": DEGREE, "rpm": 6 * DEGREE,
+    },
+    "current": {"A": 1.0, "mA": 1e-3},
+    "tau": {"Nm": 1.0, "N·m": 1.0, "mNm": 1e-3, "Ncm": 1e-2},
+    "temperature": {"C": 1.0, "°C": 1.0, "degC": 1.0},
+}  # fmt: skip
+"""Kind of signal → unit in brackets → factor to SI."""
+
+KINDS = {
+    "target_q": "q",
+    "target_dq": "dq",
+    "target_current": "current",
+    "target_torque": "tau",
+    "tau_ext": "tau",
+}
+"""Signals that share another signal's units."""
+
+ITEM = re.compile(
+    r"(?P<minus>-)?(?P<name>[A-Za-z_]+)(?:\[(?P<unit>[^\]]*)\])?"
+    r"(?:@(?P<rate>[0-9.eE+]+)(?:Hz)?|:(?P<count>\d+)|=(?P<pattern>.+))?"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Item:
+    """One item of a --columns text.
+
+    Attributes:
+        signal: A key of SIGNALS, `t`, or `_`.
+        factor: What a value is multiplied with to be in SI units and in our sign.
+        unit: The unit as written, or None.
+        count: Columns in a row that it covers, in a headerless table.
+        pattern: The column names it means, in a headed table.
+        rate: Sampling rate of a table that has no clock. [Hz]
+    """
+
+    signal: str
+    factor: float = 1.0
+    unit: str | None = None
+    count: int = 1
+    pattern: str | None = None
+    rate: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ColumnSpec:
+    """A parsed --columns text: the items, and whether they name columns or count them."""
+
+    items: tuple[Item, ...]
+    named: bool
+
+    def item(self, signal: str) -> Item | None:
+        """The item of a signal, or None."""
+        return next((item for item in self.items if item.signal == signal), None)
+
+    @property
+    def width(self) -> int:
+        """Number of columns that a counting text describes."""
+        return sum(item.count for item in self.items if item.rate is None)
+
+
+def parse_columns(text: str) -> ColumnSpec:
+    """Parse a --columns text.
+
+    Raises:
+        LogError: If an item cannot be understood; the message shows the item and the grammar.
+    """
+    items = tuple(_parse_item(part, text) for part in _split(text))
+    named = any(item.pattern is not None for item in items)
+    for item in items:
+        if named and item.pattern is None and item.rate is None:
+            raise LogError(
+                f"--columns: {item.signal} has no column name while others have one. Name every "
+                "signal (q=joint_{i}), or count columns in file order (t,q:6), not both."
+            )
+    names = [item.signal for item in items if item.signal != "_"]
+    for name in names:
+        if names.count(name) > 1:
+            raise LogError(f"--columns: {name} is given twice. Skip the other columns with _.")
+    if "q" not in names and not named:
+        raise LogError("--columns: no q; a log needs joint positions, as in t,q:6,dq:6,current:6.")
+    return ColumnSpec(items=items, named=named)
+
+
+def _split(text: str) -> list[str]:
+    """Split at the commas that stand outside brackets."""
+    parts = re.split(r",(?![^\[]*\])", text)
+    return [part.strip() for part in parts if part.strip()]
+
+
+def _parse_item(part: str, text: str) -> Item:
+    match = ITEM.fullmatch(part)
+    if match is None:
+        raise LogError(
+            f"--columns: cannot understand {part!r}. Items are t, q:6, q[deg]:7, -tau_ext:7, _:13 "
+            "(in file order), or q=joint_pos_{i} (by name)."
+        )
+    name = match["name"]
+    if name not in SIGNALS and name not in {"t", "_"}:
+        raise LogError(
+            f"--columns: no signal {name!r}. Signals: t {' '.join(SIGNALS)}, and _ to skip."
+        )
+    if name == "_" and (match["pattern"] or match["minus"]):
+        raise LogError(f"--columns: {part!r}: _ only skips, as in _:13.")
+    factor = unit_factor(name, match["unit"]) * (-1.0 if match["minus"] else 1.0)
+    rate = _rate(part, name, match["rate"])
+    count = int(match["count"] or (6 if name == "wrench" and match["pattern"] is None else 1))
+    if count == 0 or count > 10_000 or (name == "t" and count != 1):
+        raise LogError(f"--columns: {part!r} covers {count} columns; it must cover at least one.")
+    return Item(
+        signal=name,
+        factor=factor,
+        unit=match["unit"],
+        count=count,
+        pattern=match["pattern"],
+        rate=rate,
+    )
+
+
+def _rate(part: str, name: str, text: str | None) -> float | None:
+    if text is None:
+        return None
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = 0.0
+    if name != "t" or not 0 < rate < 1e7:
+        raise LogError(f"--columns: {part!r}: a table without a clock is given as t@125Hz.")
+    return rate
+
+
+def unit_factor(signal: str, unit: str | None) -> float:
+    """Factor from a unit in brackets to SI; the bracket of a wrench names its frame instead.
+
+    Raises:
+        LogError: If the signal has no such unit.
+    """
+    if unit is None or signal in {"wrench", "_"}:
+        return 1.0
+    units = UNITS[KINDS.get(signal, signal)]
+    if unit not in units:
+        raise LogError(f"--columns: {signal} has no unit {unit!r}; units: {', '.join(units)}.")
+    return units[unit]

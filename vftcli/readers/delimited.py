@@ -1,0 +1,311 @@
+"""Text tables: comma, semicolon, tab or space separated, with every line end met in the wild."""
+
+import csv
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vftcli.errors import LogError
+from vftcli.readers.reader import LogFile
+from vftcli.readers.table import Column
+
+SEPARATORS = (",", ";", "\t", " ")
+TAIL_BYTES = 1024 * 1024
+COMPARED_ROWS = 20
+"""Rows before the last that tell whether its last number is whole."""
+
+
+def as_number(text: str, *, decimal_comma: bool = False) -> float | None:
+    """The number that a cell holds, or None."""
+    if decimal_comma:
+        text = text.replace(",", ".")
+    try:
+        return float(text) if "_" not in text else None
+    except ValueError:
+        return None
+
+
+def split_cells(line: str, separator: str) -> list[str]:
+    """The cells of one line, quotes taken off, blanks around them too."""
+    if '"' in line:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+    return [cell.strip() for cell in line.split(separator)]
+
+
+@dataclass
+class TextTable:
+    """A delimited text table; only the columns asked for are parsed, always as float64.
+
+    Attributes:
+        file: The opened file.
+    """
+
+    file: LogFile
+    lists: Mapping[int, int] = field(default_factory=dict)
+    _repairs: list[str] = field(default_factory=list)
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.file.path
+
+    @property
+    def repairs(self) -> tuple[str, ...]:
+        """What loading dropped or mended."""
+        return tuple(self._repairs)
+
+    @cached_property
+    def _sample(self) -> list[str]:
+        """The first lines that hold something, comments taken off."""
+        lines = [decoded(line) for line in self.file.lines[:200]]
+        if len(self.file.lines) <= 200 and not self.file.is_whole:
+            lines = lines[:-1] if len(lines) > 1 else lines  # the head may end inside a line
+        lines[0] = lines[0].removeprefix("\ufeff")
+        comments = [line for line in lines if line.lstrip().startswith("#")]
+        rows = [line for line in lines if not line.lstrip().startswith("#")]
+        if comments and rows and self._names_in(comments[-1], rows[0]):
+            return [comments[-1].lstrip("# "), *rows]
+        return rows or lines
+
+    @staticmethod
+    def _names_in(comment: str, row: str) -> bool:
+        """Whether a comment line has one name for each cell of a row, as np.savetxt writes it."""
+        names = re.split(r"[,;\t ]+", comment.lstrip("# ").strip())
+        cells = re.split(r"[,;\t ]+", row.strip())
+        return len(names) == len(cells) and all(as_number(name) is None for name in names)
+
+    @cached_property
+    def separator(self) -> str:
+        """The separator that splits the first lines into the same, largest number of cells."""
+        lines = self._sample[:5]
+        best, most = " " if len(lines[0].split()) > 1 else ",", 1
+        for separator in SEPARATORS:
+            counts = {len(split_cells(line.strip(" "), separator)) for line in lines[:2]}
+            if len(counts) == 1 and max(counts) > most:
+                if separator == "," and ";" in lines[0]:
+                    continue  # decimal commas between semicolons
+                best, most = separator, max(counts)
+                break
+        return best
+
+    @cached_property
+    def decimal_comma(self) -> bool:
+        """Whether numbers are written 0,5: only where semicolons or tabs separate them."""
+        rows = self._sample[1:3] if len(self._sample) > 1 else self._sample
+        return self.separator in ";\t" and any(re.search(r"\d,\d", row) for row in rows)
+
+    @cached_property
+    def _first_cells(self) -> list[str]:
+        return self._cells(self._sample[0])
+
+    def _cells(self, line: str) -> list[str]:
+        line = line.strip(" \r")
+        return line.split() if self.separator == " " else split_cells(line, self.separator)
+
+    @cached_property
+    def names(self) -> tuple[str, ...] | None:
+        """The header's names, or None if the first line holds numbers only."""
+        cells = self._first_cells
+        numbers = [as_number(cell, decimal_comma=self.decimal_comma) for cell in cells]
+        if all(n is not None for n, cell in zip(numbers, cells, strict=True) if cell):
+            return None
+        return tuple(cells)
+
+    @cached_property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self._first_cells)
+
+    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
+        """Parse some columns; a clock of long whole numbers or dates comes back as integers.
+
+        Raises:
+            LogError: If a row has too many cells or a cell holds no number.
+        """
+        import polars as pl
+
+        kinds = {column: pl.Float64 for column in columns}
+        if clock is not None:
+            kinds[clock] = self._clock_kind(clock)
+        for text in (self._text, self._mended):
+            try:
+                frame = self._parse(text(), kinds)
+            except pl.exceptions.PolarsError:
+                continue
+            if not self._has_blank_rows(frame):
+                return {c: _numbers(frame[str(c)], self.path) for c in columns}
+        raise self._diagnosed(kinds)
+
+    def _parse(self, source: Any, kinds: Mapping[int, Any]) -> Any:  # noqa: ANN401 - polars lazily
+        import polars as pl
+
+        return pl.read_csv(
+            source,
+            has_header=False,
+            skip_lines=self._lines_before_rows if isinstance(source, Path) else 0,
+            separator=self.separator,
+            columns=sorted(kinds),
+            schema={str(c): kinds.get(c, pl.String) for c in range(self.width)},
+            quote_char='"' if self._quoted else None,
+            decimal_comma=self.decimal_comma,
+            glob=False,
+        )
+
+    @property
+    def _quoted(self) -> bool:
+        return any('"' in line for line in self._sample)
+
+    @property
+    def _lines_before_rows(self) -> int:
+        """Raw lines before the first row of numbers."""
+        lines = self.file.head.split(b"\n", 2000)[:2000]
+        for number, line in enumerate(lines):
+            text = decoded(line).removeprefix("\ufeff").strip()
+            if text and not text.startswith("#"):
+                return number + (self.names is not None and not self._header_is_comment)
+        return 0
+
+    @property
+    def _header_is_comment(self) -> bool:
+        lines = [decoded(line).removeprefix("\ufeff").strip() for line in self.file.lines[:200]]
+        first = next((line for line in lines if not line.startswith("#")), "")
+        return self.names is not None and self._cells(first) != list(self.names)
+
+    def _text(self) -> Any:  # noqa: ANN401 - a path or bytes
+        """The table as it can be parsed at once: the path, or bytes where something must go."""
+        head = self.file.head
+        if self._needs_mending(head):
+            return self._mended()
+        end = self._end()
+        if self.file.wrapping is None and end is None:
+            return self.path
+        content = self.file.content
+        return _after_lines(bytes(content[:end]), self._lines_before_rows)
+
+    def _needs_mending(self, head: bytes) -> bool:
+        blank = re.search(rb"(\n|^)[ \t\r]*\n", head) is not None
+        lone = b"\r" in head and (b"\r\r" in head or head.count(b"\r") != head.count(b"\r\n"))
+        blanks = self.separator == " " and re.search(rb"  |\n | \r?\n", head) is not None
+        comments = re.search(rb"\n[ \t]*#", head) is not None
+        return blank or lone or blanks or comments or head.startswith(b"\xef\xbb\xbf")
+
+    def _mended(self) -> bytes:
+        """The rows with plain line ends, without blank lines, comments and doubled blanks."""
+        end = self._end()
+        text = bytes(self.file.content[:end]).removeprefix(b"\xef\xbb\xbf")
+        text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        if self.separator == " ":
+            text = re.sub(rb"[ \t]+", b" ", text).replace(b"\n ", b"\n").replace(b" \n", b"\n")
+        text = re.sub(rb"^[ \t]*#[^\n]*\n", b"", text.lstrip(b"\n "), flags=re.MULTILINE)
+        text = re.sub(rb"\n\s*\n", b"\n", text)
+        if self.names is not None and not self._header_is_comment:
+            text = text.partition(b"\n")[2]
+        return text
+
+    def _end(self) -> int | None:
+        """Where the last row is cut, so that it has to go; None if it is whole."""
+        content = self.file.content
+        tail = bytes(content[-TAIL_BYTES:])
+        stripped = tail.rstrip(b"\r\n")
+        rows = [line for line in re.split(rb"[\r\n]+", stripped) if line.strip()]
+        if len(rows) < 2:
+            return None
+        ended = len(stripped) < len(tail)
+        if not self._is_cut(rows, ended=ended):
+            return None
+        note = "dropped the last row, which is cut"
+        if note not in self._repairs:
+            self._repairs.append(note)
+        start = len(stripped) - len(re.split(rb"[\r\n]+", stripped)[-1])
+        return len(content) - len(tail) + start
+
+    def _is_cut(self, rows: list[bytes], *, ended: bool) -> bool:
+        """Whether the last row lacks cells, or may lack digits of its last number."""
+        last = self._cells(decoded(rows[-1]))
+        if len(last) < self.width:
+            return len(self._cells(decoded(rows[-2]))) == self.width or len(rows) == 2
+        if ended:
+            return False
+        above = [self._cells(decoded(row)) for row in rows[-COMPARED_ROWS - 1 : -1]]
+        ends = {cells[-1] for cells in above[self.names is not None and len(rows) <= 2 :] if cells}
+        decimals = {len(end.partition(".")[2]) for end in ends}
+        if "." in last[-1] or "," in last[-1]:
+            return decimals != {len(last[-1].partition(".")[2])}
+        return ends != {last[-1]}
+
+    def _clock_kind(self, clock: int) -> Any:  # noqa: ANN401 - a polars type
+        import polars as pl
+
+        row = (
+            self._sample[1] if self.names is not None and len(self._sample) > 1 else self._sample[0]
+        )
+        cells = self._cells(row)
+        text = cells[clock] if clock < len(cells) else ""
+        if re.fullmatch(r"\d{16,19}", text):
+            return pl.Int64
+        if re.match(r"\d{4}-\d\d-\d\d", text):
+            return pl.String
+        return pl.Float64
+
+    @staticmethod
+    def _has_blank_rows(frame: Any) -> bool:  # noqa: ANN401 - polars
+        """Whether a row holds nothing at all, which is a blank line that slipped through."""
+        import polars as pl
+
+        if all(series.null_count() == 0 for series in frame):
+            return False
+        return bool(frame.select(pl.all_horizontal(pl.all().is_null()).any()).item())
+
+    def _diagnosed(self, kinds: Mapping[int, Any]) -> LogError:
+        """Look at the table row by row for what the parser could not take."""
+        rows = self._mended().split(b"\n")
+        for number, row in enumerate(rows, start=1):
+            cells = self._cells(decoded(row))
+            if len(cells) > self.width:
+                return LogError(
+                    f"{self.path}: row {number} has {len(cells)} cells, the first line "
+                    f"{self.width}. Two logs in one file, or a damaged row: cut it out."
+                )
+            for column in sorted(kinds):
+                cell = cells[column] if column < len(cells) else ""
+                if cell and as_number(cell, decimal_comma=self.decimal_comma) is None:
+                    name = f" ({self.names[column]})" if self.names else ""
+                    return LogError(
+                        f"{self.path}: row {number}, column {column + 1}{name}: {cell[:40]!r} is "
+                        "not a number. Cut the row out, or leave the column out with _."
+                    )
+        return LogError(f"{self.path}: cannot be parsed as a table of numbers; is it a log?")
+
+
+def decoded(line: bytes) -> str:
+    """A line as text: UTF-8, else Latin-1."""
+    try:
+        return line.decode("utf-8")
+    except UnicodeDecodeError:
+        return line.decode("latin-1")
+
+
+def _after_lines(text: bytes, lines: int) -> bytes:
+    for _ in range(lines):
+        text = text.partition(b"\n")[2]
+    return text
+
+
+def _numbers(series: Any, path: Path) -> Column:  # noqa: ANN401 - polars
+    """A parsed column: empty cells become NaN, dates nanoseconds since 1970."""
+    import polars as pl
+
+    if series.dtype == pl.String:
+        try:
+            series = series.str.to_datetime(time_unit="ns", time_zone=None).dt.epoch("ns")
+        except pl.exceptions.PolarsError:
+            raise LogError(f"{path}: the clock's column holds no times. Name it: t=…") from None
+    if series.dtype == pl.Int64 and series.null_count():
+        series = series.cast(pl.Float64)
+    values: Column = series.to_numpy()
+    return values if series.dtype != pl.Float64 or not series.null_count() else np.array(values)

@@ -1,0 +1,74 @@
+"""Joint names: their order along the arm, and the robot they belong to."""
+
+import re
+from collections.abc import Sequence
+
+UR_NAMES = (
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+)
+"""The UR drivers' joint names, base to tip; the arrays of the ROS 1 driver are alphabetical."""
+
+UR_WORDS = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
+"""The names on UR's teach pendant, base to tip."""
+
+FRANKA = re.compile(r"(?:.*_)?(panda|fr3|fer|fp3)_joint([1-7])")
+NUMBERED = re.compile(r".*?joint[_ ]?(\d+)", re.IGNORECASE)
+
+HINTS = {"panda": "panda", "fer": "panda", "fr3": "fr3"}
+"""Stem of Franka's joint names → profile."""
+
+
+def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:
+    """Positions of the arm's joints among `names`, base to tip.
+
+    Franka and UR joints are found by name wherever they stand, prefixes and further joints (a
+    gripper's fingers) set aside; unknown names keep the file's order.
+    """
+    for order in (_franka_order(names), _ur_order(names), _word_order(names), _numbered(names)):
+        if order:
+            return order
+    return tuple(range(len(names)))
+
+
+def _franka_order(names: Sequence[str]) -> tuple[int, ...]:
+    found = {int(m[2]): k for k, name in enumerate(names) if (m := FRANKA.fullmatch(name))}
+    if len(found) != 7 or sum(bool(FRANKA.fullmatch(name)) for name in names) != 7:
+        return ()
+    return tuple(found[j] for j in range(1, 8))
+
+
+def _ur_order(names: Sequence[str]) -> tuple[int, ...]:
+    order = []
+    for wanted in UR_NAMES:
+        found = [k for k, name in enumerate(names) if name.endswith(wanted)]
+        if len(found) != 1:
+            return ()
+        order.append(found[0])
+    return tuple(order)
+
+
+def _word_order(names: Sequence[str]) -> tuple[int, ...]:
+    words = [re.sub(r"[_ ]+", " ", name.lower()).strip() for name in names]
+    if sorted(words) != sorted(UR_WORDS):
+        return ()
+    return tuple(words.index(word) for word in UR_WORDS)
+
+
+def _numbered(names: Sequence[str]) -> tuple[int, ...]:
+    """Joints called joint1, joint_2, …: by number, if every one has its own and they are whole."""
+    matches = [NUMBERED.fullmatch(name) for name in names]
+    numbers = [int(m[1]) for m in matches if m]
+    if len(numbers) != len(names) or len(set(numbers)) != len(numbers):
+        return ()
+    return tuple(int(k) for k in sorted(range(len(numbers)), key=lambda k: numbers[k]))
+
+
+def robot_of(names: Sequence[str]) -> str | None:
+    """The profile that joint names settle; UR names do not tell the model."""
+    stems = {m[1] for name in names if (m := FRANKA.fullmatch(name))}
+    return HINTS.get(stems.pop()) if len(stems) == 1 else None

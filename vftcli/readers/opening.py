@@ -1,0 +1,144 @@
+"""Opening files: gzip and zstd taken off within bounds, whole files as memory, digests beside."""
+
+import hashlib
+import mmap
+import threading
+import zlib
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Literal
+
+from vftcli.errors import LogError
+
+HEAD_BYTES = 256 * 1024
+"""Bytes that recognition looks at."""
+
+Wrapping = Literal["gzip", "zstd"]
+
+MAGICS: dict[bytes, Wrapping] = {b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd"}
+
+UNPACKED_LIMIT = 128 * 1024 * 1024
+UNPACKED_RATIO = 50
+"""A wrapped file may unpack to 128 MiB or to fifty times its size, whichever is more.
+
+Recorded numbers shrink by 3 to 15; a log that shrinks a hundredfold is not a recorded log.
+"""
+
+CHUNK = 1024 * 1024
+
+
+def head_of(path: Path) -> tuple[bytes, Wrapping | None]:
+    """Return the first bytes of a file's content, unwrapped, and what it was wrapped in.
+
+    Raises:
+        LogError: If the file does not exist, cannot be opened, or is empty.
+    """
+    if not path.exists():
+        raise LogError(f"{path}: no such file or folder. Check the path.")
+    if not path.is_file():
+        raise LogError(f"{path}: neither a file nor a folder. Save the log to a file first.")
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD_BYTES)
+    except OSError as error:
+        raise LogError(f"{path}: cannot be opened ({error.strerror})") from None
+    if not head:
+        raise LogError(f"{path}: the file is empty; nothing was recorded into it.")
+    for magic, wrapping in MAGICS.items():
+        if head.startswith(magic):
+            return _unwrapped_head(path, wrapping), wrapping
+    return head, None
+
+
+def _unwrapped_head(path: Path, wrapping: Wrapping) -> bytes:
+    found = b""
+    for piece in _pieces(path, wrapping):
+        found += piece
+        if len(found) >= HEAD_BYTES:
+            break
+    if not found:
+        raise LogError(f"{path}: the {wrapping} file unpacks to nothing; it is empty or damaged.")
+    return found[:HEAD_BYTES]
+
+
+def unwrapped(path: Path, wrapping: Wrapping | None) -> memoryview:
+    """Return a file's whole content: mapped if plain, unpacked into memory if wrapped.
+
+    Raises:
+        LogError: If it is damaged, or unpacks beyond the limit.
+    """
+    if wrapping is not None:
+        return memoryview(b"".join(_pieces(path, wrapping)))
+    if path.stat().st_size < CHUNK:
+        return memoryview(path.read_bytes())
+    with path.open("rb") as file:
+        return memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+
+
+def _pieces(path: Path, wrapping: Wrapping) -> Iterator[bytes]:
+    """Unpack a file piece by piece; a cut end yields what there is, a bomb is refused."""
+    limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * path.stat().st_size)
+    total = 0
+    for piece in (_gunzipped if wrapping == "gzip" else _unzstd)(path):
+        total += len(piece)
+        if total > limit:
+            raise LogError(
+                f"{path}: unpacks to more than {limit >> 20} MiB, more than a log this small can "
+                f"hold. If it is genuine, unpack it ({wrapping} -d) and give the unpacked file."
+            )
+        yield piece
+
+
+def _gunzipped(path: Path) -> Iterator[bytes]:
+    with path.open("rb") as file:
+        unpacker = zlib.decompressobj(wbits=31)
+        while packed := file.read(CHUNK // 16):
+            try:
+                while packed:
+                    yield unpacker.decompress(packed, CHUNK)
+                    packed = unpacker.unconsumed_tail
+                    if unpacker.eof and (packed := unpacker.unused_data):
+                        unpacker = zlib.decompressobj(wbits=31)  # the next member
+            except zlib.error as error:
+                raise LogError(f"{path}: the gzip file is damaged ({error})") from None
+
+
+def _unzstd(path: Path) -> Iterator[bytes]:
+    import zstandard
+
+    with path.open("rb") as file:
+        reader = zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(
+            file, read_across_frames=True
+        )
+        while True:
+            try:
+                piece = reader.read(CHUNK)
+            except zstandard.ZstdError as error:
+                raise LogError(f"{path}: the zstd file is damaged ({error})") from None
+            if not piece:
+                return
+            yield piece
+
+
+class Digest:
+    """SHA-256 of a file, or of all files of a folder in name order, computed beside the reading."""
+
+    def __init__(self, path: Path) -> None:
+        self._paths = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+        self._sum = hashlib.sha256()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        buffer = bytearray(CHUNK)
+        view = memoryview(buffer)
+        for path in self._paths:
+            with suppress(OSError), path.open("rb", buffering=0) as file:
+                while count := file.readinto(view):
+                    self._sum.update(view[:count])
+
+    def hexdigest(self) -> str:
+        """Wait for the end and return the digest."""
+        self._thread.join()
+        return self._sum.hexdigest()

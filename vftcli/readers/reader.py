@@ -1,0 +1,159 @@
+"""Reader: what a log format is to this package, and the file a reader is handed."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from vftcli.arrays import Array
+from vftcli.readers.opening import Wrapping, head_of, unwrapped
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogFile:
+    """A file or folder as the readers see it: its first bytes already unwrapped.
+
+    Attributes:
+        path: The file or folder.
+        head: The first bytes of the content, after gzip or zstd were taken off; empty for a folder.
+        entries: Names in the folder, sorted; empty for a file.
+        wrapping: What the file is compressed with as a whole, or None.
+    """
+
+    path: Path
+    head: bytes = b""
+    entries: tuple[str, ...] = ()
+    wrapping: Wrapping | None = None
+
+    @property
+    def is_folder(self) -> bool:
+        """Whether the path is a folder."""
+        return self.path.is_dir()
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether `head` is the whole content."""
+        return len(self.content) == len(self.head)
+
+    @cached_property
+    def content(self) -> memoryview:
+        """The whole content, unwrapped; the pages of a plain file are read when they are touched.
+
+        Raises:
+            LogError: If a compressed file is damaged or unpacks to an unreasonable size.
+        """
+        return unwrapped(self.path, self.wrapping)
+
+    @cached_property
+    def lines(self) -> list[bytes]:
+        """The non-empty lines of the head, without their ends; [] if the head is not text."""
+        if not looks_like_text(self.head):
+            return []
+        lines = self.head.replace(b"\r", b"\n").split(b"\n")
+        return [line for line in lines if line.strip()]
+
+    @property
+    def first_line(self) -> bytes:
+        """The first non-empty line without a byte-order mark, or nothing."""
+        return self.lines[0].removeprefix(b"\xef\xbb\xbf") if self.lines else b""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RawLog:
+    """What a reader found, in SI units, before the clock is cleaned.
+
+    Attributes:
+        stamps: Time stamps in ticks of `tick`; whole numbers stay whole. (T,)
+        tick: Length of one tick. [s]
+        clock: Which clock the stamps are from, in words.
+        signals: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
+        first_row: Number in the file of the first sample, counted from 1, for messages.
+        wrench_frame: Frame, axes and sign of the wrench, in words.
+        joint_names: The joints' names, base to tip, or empty.
+        robot_hint: Name of the profile that the log itself settles, or None.
+        degrees_possible: Whether nothing says that the positions are in radians.
+        repairs: What the reader dropped, turned or derived.
+        warnings: What looks suspicious.
+        constants: Last values of further columns that the reader asked for.
+        payload_mass: Mass the controller was told of. [kg]
+        payload_com: Its centre of mass in flange axes. (3,) [m]
+    """
+
+    stamps: Array
+    tick: float = 1.0
+    clock: str
+    signals: Mapping[str, Array]
+    first_row: int = 1
+    wrench_frame: str | None = None
+    joint_names: tuple[str, ...] = ()
+    robot_hint: str | None = None
+    degrees_possible: bool = False
+    repairs: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    constants: tuple[float, ...] = ()
+    payload_mass: float | None = None
+    payload_com: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What the caller asked of a reader.
+
+    Attributes:
+        columns: The text of ``--columns``, or None.
+        signals: The signals that are wanted; None for all. Others may be left unread.
+    """
+
+    columns: str | None = None
+    signals: frozenset[str] | None = None
+
+    def wants(self, signal: str) -> bool:
+        """Whether a signal has to be read; the clock and the positions always are."""
+        return self.signals is None or signal in self.signals or signal in {"t", "q"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reader:
+    """One log format.
+
+    Attributes:
+        name: Name for ``--format``.
+        title: Name for tables.
+        recording: How a user records such a log.
+        takes: Which signals are taken from it, with their meaning.
+        pitfalls: What to look out for.
+        recognises: Whether a file's content is of this format.
+        read: Reads it.
+        general: Whether it takes any table, and is asked only if no other format fits.
+        columns: Whether the columns may be described by ``--columns``.
+    """
+
+    name: str
+    title: str
+    recording: str
+    takes: str
+    pitfalls: str
+    recognises: Callable[[LogFile], bool] = field(repr=False)
+    read: Callable[[LogFile, Request], RawLog] = field(repr=False)
+    general: bool = False
+    columns: bool = False
+
+
+def looks_like_text(head: bytes) -> bool:
+    """Whether bytes could be the start of a text file in UTF-8 or an eight-bit encoding."""
+    if not head or b"\0" in head:
+        return False
+    controls = sum(head.count(bytes([c])) for c in (1, 2, 3, 4, 5, 6, 14, 15, 16, 17, 18, 19, 127))
+    return controls == 0
+
+
+def open_log(path: Path) -> LogFile:
+    """Open a path for recognition: unwrap the head of a file, list a folder.
+
+    Raises:
+        LogError: If there is no such path or it cannot be opened.
+    """
+    if path.is_dir():
+        return LogFile(path=path, entries=tuple(sorted(p.name for p in path.iterdir())))
+    head, wrapping = head_of(path)
+    return LogFile(path=path, head=head, wrapping=wrapping)

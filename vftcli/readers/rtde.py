@@ -1,0 +1,193 @@
+"""UR's real-time data exchange: the official client's text and binary files, and ur_rtde's CSV."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vftcli.errors import LogError
+from vftcli.readers.aliases import vector_picks
+from vftcli.readers.delimited import TextTable
+from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.table import Cell, Pick, Picks, Table, checked, picked
+
+JOINT_COLUMNS = {
+    "q": "actual_q",
+    "dq": "actual_qd",
+    "current": "actual_current",
+    "target_q": "target_q",
+    "target_dq": "target_qd",
+    "target_current": "target_current",
+    "target_torque": "target_moment",
+    "temperature": "joint_temperatures",
+    "wrench": "actual_TCP_force",
+}
+"""Field of Recording → RTDE's name; all have six elements, name_0 to name_5."""
+
+CLOCK = "controller clock (timestamp, seconds since power-on)"
+WRENCH_FRAME = "base axes at the TCP, as force on the robot; estimated from currents on CB3, measured on e-Series"
+
+PAYLOAD = ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2")
+"""The payload that the controller was told of; its last value counts."""
+
+BINARY_TYPES = {
+    b"DOUBLE": ">f8",
+    b"UINT64": ">u8",
+    b"INT32": ">i4",
+    b"UINT32": ">u4",
+    b"UINT8": "u1",
+    b"BOOL": "u1",
+}
+"""Type words of the second line of the official client's binary file."""
+
+
+def read_rtde(table: Table, request: Request) -> RawLog:
+    """Read a table of RTDE names: timestamp and positions are required, the rest is optional.
+
+    Raises:
+        LogError: If there is no timestamp or no actual_q.
+    """
+    names = table.names or ()
+    if "timestamp" not in names:
+        raise LogError(
+            f"{table.path}: no timestamp among {len(names)} columns. Record it, or state the rate: "
+            "--format table --columns 't@125Hz,q=actual_q_{i},dq=actual_qd_{i},"
+            "current=actual_current_{i}'."
+        )
+    picks = Picks(
+        signals=vector_picks(table, JOINT_COLUMNS, range(6)),
+        clock=Pick(signal="t", cells=(Cell(names.index("timestamp")),), unit="s"),
+        constants=tuple(names.index(name) for name in PAYLOAD if name in names),
+    )
+    if not any(pick.signal == "q" for pick in picks.signals):
+        raise LogError(
+            f"{table.path}: no actual_q_0 … actual_q_5 among its {len(names)} columns. Add actual_q "
+            "to the recipe and record again."
+        )
+    raw = picked(table, checked(table, picks), request, clock_name=CLOCK, wrench_frame=WRENCH_FRAME)
+    if len(raw.constants) != len(PAYLOAD) or not np.all(np.isfinite(raw.constants)):
+        return raw
+    return replace(raw, payload_mass=raw.constants[0], payload_com=raw.constants[1:])
+
+
+def read_rtde_text(file: LogFile, request: Request) -> RawLog:
+    """Read a text file of either client."""
+    return read_rtde(TextTable(file), request)
+
+
+class BinaryTable:
+    """The official client's binary file: two lines of text, then big-endian records."""
+
+    lists: dict[int, int] = {}  # noqa: RUF012 - a constant: records hold scalars only
+
+    def __init__(self, file: LogFile) -> None:
+        self.path = file.path
+        names, types, self._start = _binary_header(file)
+        self.names: tuple[str, ...] | None = names
+        self.width = len(names)
+        fields = [(str(k), BINARY_TYPES[word]) for k, word in enumerate(types)]
+        self._record = np.dtype(fields)
+        self._body = file.content[self._start :]
+        self._repairs: list[str] = []
+        size = self._record.itemsize
+        if len(self._body) % size and len(self._body) % (size + 1) == 0:
+            self._record = np.dtype([("id", "u1"), *fields])
+            self._repairs.append("skipped the leading byte of each record, a recipe id")
+        if rest := len(self._body) % self._record.itemsize:
+            self._repairs.append(f"dropped {rest} bytes of a cut last record")
+
+    @property
+    def repairs(self) -> tuple[str, ...]:
+        """What was dropped."""
+        return tuple(self._repairs)
+
+    def load(self, columns: Any, clock: int | None) -> dict[int, Any]:  # noqa: ANN401, ARG002
+        """Return columns as float64 in the machine's byte order."""
+        rows = len(self._body) // self._record.itemsize
+        records = np.frombuffer(self._body, dtype=self._record, count=rows)
+        return {c: records[str(c)].astype(np.float64) for c in columns}
+
+
+def _binary_header(file: LogFile) -> tuple[tuple[str, ...], list[bytes], int]:
+    first, end, rest = bytes(file.content[: 1 << 20]).partition(b"\n")
+    second, end_too, _ = rest.partition(b"\n")
+    names = tuple(first.decode("ascii", errors="replace").split())
+    types = second.split()
+    if not end or not end_too or len(names) != len(types) or not names:
+        raise LogError(
+            f"{file.path}: the header names {len(names)} columns and {len(types)} types; a binary "
+            "RTDE file has one type a column. It is damaged or cut."
+        )
+    if unknown := set(types) - set(BINARY_TYPES):
+        raise LogError(f"{file.path}: unknown column type {unknown.pop()!r} in the second line.")
+    return names, types, len(first) + len(second) + 2
+
+
+def read_rtde_binary(file: LogFile, request: Request) -> RawLog:
+    """Read the official client's binary file."""
+    return read_rtde(BinaryTable(file), request)
+
+
+def _has_rtde_names(cells: list[bytes]) -> bool:
+    return any(cell.strip() in {b"actual_q_0", b"target_q_0"} for cell in cells)
+
+
+def is_binary(file: LogFile) -> bool:
+    """Whether the second line consists of RTDE type words."""
+    first, _, rest = file.head[: 1 << 17].partition(b"\n")
+    words = set(rest.partition(b"\n")[0].split())
+    return bool(words) and words <= set(BINARY_TYPES) and len(first) > 0
+
+
+def is_official(file: LogFile) -> bool:
+    """Whether the header has RTDE names between blanks."""
+    return not is_binary(file) and _has_rtde_names(file.first_line.split(b" "))
+
+
+def is_ur_rtde(file: LogFile) -> bool:
+    """Whether the header has RTDE names between commas."""
+    return _has_rtde_names(file.first_line.split(b","))
+
+
+_TAKES = (
+    "actual_q, actual_qd, actual_current [A], their targets, target_moment (the controller's "
+    "inverse dynamics, no friction), actual_TCP_force, joint_temperatures, payload."
+)
+
+OFFICIAL = Reader(
+    name="ur-csv",
+    title="UR official RTDE client, text",
+    recording="record.py of RTDE_Python_Client_Library with its default recipe.",
+    takes=_TAKES,
+    pitfalls=(
+        "Windows writes CR CR LF. Clients before June 2025 drop packets, which leaves gaps. "
+        "A last line cut by Ctrl-C is dropped."
+    ),
+    recognises=is_official,
+    read=read_rtde_text,
+    columns=True,
+)
+
+BINARY = Reader(
+    name="ur-binary",
+    title="UR official RTDE client, binary",
+    recording="record.py --binary (from October 2023 on); its default name is robot_data.csv.",
+    takes=_TAKES,
+    pitfalls="The name says .csv; the content decides. A cut last record is dropped.",
+    recognises=is_binary,
+    read=read_rtde_binary,
+)
+
+UR_RTDE = Reader(
+    name="ur-rtde",
+    title="ur_rtde (SDU) startFileRecording, CSV",
+    recording="RTDEReceiveInterface.startFileRecording(file, variables), with timestamp among them.",
+    takes=_TAKES,
+    pitfalls=(
+        "Six decimals only. Rows come from a host thread: stamps repeat (dropped) and double "
+        "steps occur (kept)."
+    ),
+    recognises=is_ur_rtde,
+    read=read_rtde_text,
+    columns=True,
+)

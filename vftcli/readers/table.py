@@ -1,0 +1,346 @@
+"""Tables: columns of numbers under names or in file order, whatever file they come from."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.arrays import Array
+from vftcli.errors import LogError
+from vftcli.readers.columns import ColumnSpec, Item
+from vftcli.readers.reader import RawLog, Request
+
+Column = NDArray[Any]
+"""One column as it is stored: (T,) numbers, or (T, k) for a column of lists."""
+
+
+class Table(Protocol):
+    """Columns of numbers that are loaded when they are asked for.
+
+    Attributes:
+        path: The file, for messages.
+        names: Column names, or None for a headerless table.
+        width: Number of columns.
+        lists: Column → length of its lists, for columns that hold lists.
+    """
+
+    path: Path
+    names: tuple[str, ...] | None
+    width: int
+    lists: Mapping[int, int]
+
+    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
+        """Load columns as float64; the clock's column may stay whole numbers."""
+
+    @property
+    def repairs(self) -> tuple[str, ...]:
+        """What loading dropped or mended."""
+
+
+class Cell(NamedTuple):
+    """A column, or one element of a column of lists."""
+
+    column: int
+    element: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pick:
+    """The cells that make up one signal.
+
+    Attributes:
+        signal: Field of Recording, or "t".
+        cells: One cell a joint, base to tip.
+        factor: Factor to SI units and to our sign.
+        unit: The unit if it was stated.
+        frame: Frame of a wrench if it was stated.
+        note: Sentence for the repairs, if anything was turned.
+    """
+
+    signal: str
+    cells: tuple[Cell, ...]
+    factor: float = 1.0
+    unit: str | None = None
+    frame: str | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Picks:
+    """All signals of a table and its clock, or its rate [Hz] where it has no clock.
+
+    `constants` are columns of which the last value counts.
+    """
+
+    signals: tuple[Pick, ...]
+    clock: Pick | None
+    rate: float | None = None
+    constants: tuple[int, ...] = ()
+
+
+def picked(
+    table: Table,
+    picks: Picks,
+    request: Request,
+    *,
+    clock_name: str = "",
+    **more: Any,  # noqa: ANN401
+) -> RawLog:
+    """Load the picked columns of a table and scale them.
+
+    Args:
+        table: The table.
+        picks: What to load.
+        request: Signals nobody asked for are left unread.
+        clock_name: Which clock the stamps are from, in words.
+        more: Further fields of the RawLog.
+
+    Raises:
+        LogError: If the table has no clock, or no positions.
+    """
+    signals = tuple(p for p in picks.signals if request.wants(p.signal))
+    clock = picks.clock.cells[0] if picks.clock else None
+    wanted = {cell.column for pick in signals for cell in pick.cells} | set(picks.constants)
+    if clock is not None:
+        wanted.add(clock.column)
+    loaded = table.load(sorted(wanted), clock.column if clock else None)
+    arrays = {pick.signal: _stacked(pick, loaded) for pick in signals}
+    stamps, tick, words = _stamps(table, picks, loaded, clock_name)
+    warnings = tuple(more.pop("warnings", ()))
+    notes = tuple(pick.note for pick in signals if pick.note)
+    wrench = next((pick for pick in signals if pick.signal == "wrench"), None)
+    more.setdefault("wrench_frame", wrench.frame if wrench else None)
+    return RawLog(
+        stamps=stamps,
+        tick=tick,
+        clock=words,
+        signals=arrays,
+        repairs=(*table.repairs, *notes),
+        warnings=warnings,
+        constants=tuple(_last(loaded[column]) for column in picks.constants),
+        **more,
+    )
+
+
+def _last(column: Column) -> float:
+    return float(column[-1]) if len(column) else float("nan")
+
+
+def _stacked(pick: Pick, loaded: Mapping[int, Column]) -> Array:
+    """One signal's cells side by side, scaled. (T, n)"""
+    rows = len(loaded[pick.cells[0].column])
+    out = np.empty((rows, len(pick.cells)))
+    for j, cell in enumerate(pick.cells):
+        column = loaded[cell.column]
+        out[:, j] = column if cell.element is None else column[:, cell.element]
+    if pick.factor != 1.0:
+        out *= pick.factor
+        out += 0.0  # a turned zero is plain zero
+    return out
+
+
+def _stamps(
+    table: Table, picks: Picks, loaded: Mapping[int, Column], clock_name: str
+) -> tuple[Column, float, str]:
+    """The stamps, the length of their tick and which clock they are."""
+    if picks.clock is None:
+        if picks.rate is None:
+            raise LogError(
+                f"{table.path}: no clock. Name its column with --columns (t=…, or t in file "
+                "order), or say the rate of a log without one: t@125Hz."
+            )
+        rows = len(next(iter(loaded.values())))
+        return np.arange(rows), 1 / picks.rate, f"none: {picks.rate:g} Hz as stated"
+    cell = picks.clock.cells[0]
+    column = loaded[cell.column]
+    stamps = column if cell.element is None else column[:, cell.element]
+    name = table.names[cell.column] if table.names else f"column {cell.column + 1}"
+    words = clock_name or f"column {name}" if table.names else name
+    if picks.clock.factor < 0:
+        raise LogError(
+            f"{table.path}: --columns turns the sign of the clock; time cannot run back."
+        )
+    if picks.clock.unit is not None:
+        return stamps, picks.clock.factor, f"{words} [{picks.clock.unit}]"
+    tick, unit = tick_of(stamps, name)
+    return stamps, tick, words if unit == "s" else f"{words}, taken as {unit}"
+
+
+def tick_of(stamps: Column, name: str) -> tuple[float, str]:
+    """Length of a tick of unstated unit: from the name, else from the size of stamps and steps.
+
+    Whole numbers one apart are milliseconds of a 1 kHz log; epoch stamps tell by their size;
+    everything else is seconds.
+    """
+    units = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
+    if match := re.search(r"[_\[(.](ns|us|ms|s)[\])]?$", name.lower()):
+        return units[match[1]], match[1]
+    if len(stamps) == 0 or not np.isfinite(stamps[0]):
+        return 1.0, "s"
+    for size, unit in ((1e17, "ns"), (1e14, "us"), (1e11, "ms")):
+        if abs(float(stamps[0])) > size:
+            return units[unit], unit
+    step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    whole = stamps.dtype.kind in "iu" or bool(np.all(np.mod(stamps[:1000], 1) == 0))
+    return (1e-3, "ms") if whole and 0.8 <= step <= 1.2 else (1.0, "s")
+
+
+def picks_of(table: Table, spec: ColumnSpec) -> Picks:
+    """Find the columns that a --columns text means.
+
+    Raises:
+        LogError: If the table lacks a column that is named, or has another number of columns.
+    """
+    if spec.named:
+        if table.names is None:
+            raise LogError(
+                f"{table.path}: the table has no header, so --columns must count its "
+                f"{table.width} columns in file order, as in t,q:6,dq:6,current:6."
+            )
+        found = [_pick(item, _named(table, item)) for item in spec.items if item.pattern]
+    else:
+        found = list(_counted(table, spec))
+    signals = tuple(pick for pick in found if pick.signal not in {"t", "_"})
+    clock = next((pick for pick in found if pick.signal == "t"), None)
+    rate = next((item.rate for item in spec.items if item.rate is not None), None)
+    return checked(table, Picks(signals=signals, clock=clock, rate=rate))
+
+
+def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
+    cells = [
+        cell
+        for column in range(table.width)
+        for cell in (
+            [Cell(column, k) for k in range(table.lists[column])]
+            if column in table.lists
+            else [Cell(column)]
+        )
+    ]
+    if spec.width != len(cells):
+        missing = len(cells) - spec.width
+        remedy = f"skip the rest with _:{missing}" if missing > 0 else "leave some out"
+        raise LogError(
+            f"{table.path}: --columns describes {spec.width} columns, the table has "
+            f"{len(cells)}; {remedy}."
+        )
+    picks, start = [], 0
+    for item in spec.items:
+        if item.rate is not None:
+            continue
+        picks.append(_pick(item, tuple(cells[start : start + item.count])))
+        start += item.count
+    return picks
+
+
+def _pick(item: Item, cells: tuple[Cell, ...]) -> Pick:
+    from vftcli.readers.columns import SIGNALS
+
+    wrench = item.signal == "wrench"
+    return Pick(
+        signal=SIGNALS.get(item.signal, item.signal),
+        cells=cells,
+        factor=item.factor,
+        unit=item.unit,
+        frame=item.unit if wrench else None,
+        note=f"turned the sign of {item.signal} (--columns)" if item.factor < 0 else "",
+    )
+
+
+def _named(table: Table, item: Item) -> tuple[Cell, ...]:
+    """The cells that a pattern names, in the order of its indices."""
+    pattern = item.pattern or ""
+    names = table.names or ()
+    if "|" in pattern:
+        return tuple(c for part in pattern.split("|") for c in _exact(table, item, part.strip()))
+    if "{i}" not in pattern:
+        return _exact(table, item, pattern)
+    template = re.compile(
+        re.escape(pattern).replace(r"\{i\}", r"(\d+)", 1).replace(r"\{i\}", r"\1")
+    )
+    found = {
+        int(match[1]): column
+        for column, name in enumerate(names)
+        if (match := template.fullmatch(name))
+    }
+    if not found:
+        raise missing_column(table, item.signal, pattern)
+    first = min(found)
+    for index in range(first, first + len(found)):
+        if index not in found:
+            raise LogError(
+                f"{table.path}: {item.signal}={pattern} finds {len(found)} columns but none for "
+                f"index {index}. Name them one by one with |."
+            )
+    return tuple(Cell(found[index]) for index in range(first, first + len(found)))
+
+
+def _exact(table: Table, item: Item, name: str) -> tuple[Cell, ...]:
+    names = table.names or ()
+    bare, elements = name, slice(None)
+    if name not in names and (match := re.fullmatch(r"(.+)\[(\d*):(\d*)\]", name)):
+        bare = match[1]
+        elements = slice(*(int(text) if text else None for text in match.group(2, 3)))
+    elif name not in names and (match := re.fullmatch(r"(.+)\[(\d+)\]", name)):
+        bare, elements = match[1], slice(int(match[2]), int(match[2]) + 1)
+    if names.count(bare) != 1:
+        if bare in names:
+            raise LogError(
+                f"{table.path}: {names.count(bare)} columns are called {bare!r}. Count the "
+                "columns in file order instead, as in t,q:6,_:12."
+            )
+        raise missing_column(table, item.signal, bare)
+    column = names.index(bare)
+    if column not in table.lists:
+        if bare != name:
+            raise LogError(
+                f"{table.path}: {bare!r} is a column of numbers, not of lists: {name!r}."
+            )
+        return (Cell(column),)
+    length = table.lists[column]
+    cells = tuple(Cell(column, k) for k in range(length)[elements])
+    if not cells or (elements.stop or 0) > length:
+        raise LogError(f"{table.path}: {bare!r} holds lists of {length}; there is no {name!r}.")
+    return cells
+
+
+def missing_column(table: Table, signal: str, name: str) -> LogError:
+    """The error for a column that is not there, listing what is."""
+    return LogError(
+        f"{table.path}: no column {name!r} for {signal}; the table has {listed(table.names or ())}."
+    )
+
+
+def listed(names: Sequence[str], most: int = 24) -> str:
+    """Names for a message; a long list is cut."""
+    shown = ", ".join(name if len(name) <= 40 else name[:37] + "…" for name in names[:most])
+    return shown + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def checked(table: Table, picks: Picks) -> Picks:
+    """Return the picks, or raise unless there are positions and all signals have their width.
+
+    Raises:
+        LogError: If q is missing or a signal has another number of columns than q.
+    """
+    joints = next((len(p.cells) for p in picks.signals if p.signal == "q"), 0)
+    if joints == 0:
+        there = listed(table.names) if table.names else f"{table.width} columns without names"
+        raise LogError(
+            f"{table.path}: no joint positions (q) among {there}. Name their columns with "
+            "--columns, as in q=joint_pos_{i}; a table without positions is no log of an arm."
+        )
+    for pick in picks.signals:
+        expected = 6 if pick.signal == "wrench" else joints
+        if len(pick.cells) != expected:
+            raise LogError(
+                f"{table.path}: {pick.signal} has {len(pick.cells)} columns, "
+                + ("a wrench has 6" if pick.signal == "wrench" else f"q has {joints}")
+                + ". Check --columns."
+            )
+    if picks.clock is not None and len(picks.clock.cells) != 1:
+        raise LogError(f"{table.path}: t must be one column, not {len(picks.clock.cells)}.")
+    return picks

@@ -1,0 +1,215 @@
+"""Generic tables: headed by aliases or described by --columns; text, npy, npz and Parquet."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vftcli.errors import LogError
+from vftcli.readers.aliases import picks_by_alias
+from vftcli.readers.columns import parse_columns
+from vftcli.readers.delimited import TextTable, as_number
+from vftcli.readers.joints import robot_of
+from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.table import Column, Table, picked, picks_of
+
+
+def from_table(table: Table, request: Request, **more: Any) -> RawLog:  # noqa: ANN401
+    """Read a table by its --columns text, else by the aliases of its column names.
+
+    Raises:
+        LogError: If the columns cannot be told.
+    """
+    if request.columns is not None:
+        spec = parse_columns(request.columns)
+        stated = (item := spec.item("q")) is not None and item.unit is not None
+        return picked(table, picks_of(table, spec), request, degrees_possible=not stated, **more)
+    if table.names is None:
+        raise LogError(
+            f"{table.path}: a table of {table.width} columns without a header. Say what they are "
+            "with --columns, in file order, as in t,q:6,dq:6,current:6 (_:13 skips 13 columns)."
+        )
+    picks, joints = picks_by_alias(table)
+    return picked(
+        table,
+        picks,
+        request,
+        degrees_possible=True,
+        joint_names=joints,
+        robot_hint=robot_of(joints),
+        **more,
+    )
+
+
+@dataclass
+class ArrayTable:
+    """A table whose columns are in memory already: arrays of numbers or of lists.
+
+    Attributes:
+        path: The file.
+        columns: Name → (T,) or (T, k).
+        headed: Whether the names are the file's own.
+    """
+
+    path: Path
+    columns: Mapping[str, Column]
+    headed: bool = True
+    notes: tuple[str, ...] = ()
+    lists: Mapping[int, int] = field(init=False)
+
+    def __post_init__(self) -> None:
+        arrays = enumerate(self.columns.values())
+        self.lists = {k: array.shape[1] for k, array in arrays if array.ndim == 2}
+
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        """The columns' names, or None if the file has none."""
+        return tuple(self.columns) if self.headed else None
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.columns)
+
+    @property
+    def repairs(self) -> tuple[str, ...]:
+        """What had to be done to the arrays."""
+        return self.notes
+
+    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
+        """Return columns as float64; whole stamps stay whole.
+
+        Raises:
+            LogError: If a column holds no numbers, or the columns differ in length.
+        """
+        arrays = list(self.columns.values())
+        names = list(self.columns)
+        lengths = {len(arrays[c]) for c in columns}
+        if len(lengths) > 1:
+            told = ", ".join(f"{names[c]} {len(arrays[c])}" for c in columns)
+            raise LogError(f"{self.path}: the arrays differ in length: {told} rows.")
+        loaded = {}
+        for c in columns:
+            if arrays[c].dtype.kind not in "fiub":
+                raise LogError(f"{self.path}: {names[c]} holds {arrays[c].dtype}, not numbers.")
+            whole = c == clock and arrays[c].dtype.kind in "iu" and arrays[c].dtype.itemsize == 8
+            loaded[c] = arrays[c].astype(np.int64 if whole else np.float64, copy=False)
+        return loaded
+
+
+def numpy_array(path: Path, content: Any) -> Column:  # noqa: ANN401 - any readable buffer
+    """One array of an .npy file, never executing what it may carry.
+
+    Raises:
+        LogError: If the array is cut, holds objects, or claims more data than there is.
+    """
+    try:
+        array = np.lib.format.read_array(BytesIO(content), allow_pickle=False)
+    except (ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError, KeyError) as error:
+        reason = str(error).split("\n")[0][:120]
+        raise LogError(f"{path}: not a readable array ({reason}). Save it with np.save.") from None
+    return np.asarray(array)
+
+
+def read_text(file: LogFile, request: Request) -> RawLog:
+    """Read a text table, headed or described."""
+    return from_table(TextTable(file), request)
+
+
+def read_npy(file: LogFile, request: Request) -> RawLog:
+    """Read an .npy file: a matrix with one row a sample, or a structured array."""
+    check_npy_header(file)
+    array = numpy_array(file.path, file.content)
+    if array.dtype.names:
+        return from_table(
+            ArrayTable(path=file.path, columns={n: array[n] for n in array.dtype.names}), request
+        )
+    if array.ndim != 2 or array.size == 0:
+        raise LogError(
+            f"{file.path}: the array has shape {array.shape}; a log is a matrix with a row a sample."
+        )
+    columns = {str(k): array[:, k] for k in range(array.shape[1])}
+    return from_table(ArrayTable(path=file.path, columns=columns, headed=False), request)
+
+
+def check_npy_header(file: LogFile) -> None:
+    """Raise a LogError if the array that the header claims is larger than the file."""
+    stream = BytesIO(file.head)
+    try:
+        version = np.lib.format.read_magic(stream)
+        header = {
+            (1, 0): np.lib.format.read_array_header_1_0,
+            (2, 0): np.lib.format.read_array_header_2_0,
+        }[version]
+        shape, _, dtype = header(stream)
+        claimed = int(np.prod([int(s) for s in shape], dtype=object)) * dtype.itemsize
+    except (ValueError, KeyError, SyntaxError, TypeError, OverflowError, RecursionError) as error:
+        reason = str(error).split("\n")[0][:120]
+        raise LogError(f"{file.path}: not a readable .npy file ({reason})") from None
+    if claimed > len(file.content) or any(s < 0 for s in shape):
+        raise LogError(
+            f"{file.path}: the header claims {claimed} bytes, the file holds {len(file.content)}; "
+            "it is cut."
+        )
+
+
+def is_headed(file: LogFile) -> bool:
+    """Whether a text file starts with a line of column names."""
+    return bool(file.lines) and TextTable(file).names is not None and _has_numbers(file)
+
+
+def is_headerless(file: LogFile) -> bool:
+    """Whether a text file starts with a line of numbers."""
+    return bool(file.lines) and TextTable(file).names is None
+
+
+def _has_numbers(file: LogFile) -> bool:
+    """Whether the line after the header holds at least one number in as many cells."""
+    table = TextTable(file)
+    if len(table._sample) < 2:  # noqa: SLF001 - a header alone is a table without samples
+        return table.width > 1
+    cells = table._cells(table._sample[1])  # noqa: SLF001
+    numbers = [as_number(cell, decimal_comma=table.decimal_comma) for cell in cells]
+    return len(cells) > 1 and sum(n is not None for n in numbers) * 2 >= len(cells)
+
+
+HEADED = Reader(
+    name="table",
+    title="Table with a header (CSV, TSV)",
+    recording="Any program that writes one row a sample under one line of names.",
+    takes="Columns by alias (q, dq, tau, current, tau_ext, wrench, …) or by --columns.",
+    pitfalls=(
+        "Two columns that could be one signal are refused. Units other than s, rad, A, N·m have "
+        "to be said: q[deg]=…"
+    ),
+    recognises=is_headed,
+    read=read_text,
+    general=True,
+    columns=True,
+)
+
+HEADERLESS = Reader(
+    name="headerless",
+    title="Table without a header (CSV, TSV, text)",
+    recording="np.savetxt, identification data sets.",
+    takes="What --columns says, in file order: t,q:6,dq:6,current:6.",
+    pitfalls="--columns is required and must account for every column; _:13 skips thirteen.",
+    recognises=is_headerless,
+    read=read_text,
+    general=True,
+    columns=True,
+)
+
+NPY = Reader(
+    name="npy",
+    title="NumPy array (.npy)",
+    recording="np.save of a matrix with one row a sample, or of a structured array.",
+    takes="What --columns says, in file order; a structured array by its field names.",
+    pitfalls="float64 stamps in nanoseconds since 1970 are rounded to 256 ns.",
+    recognises=lambda file: file.head.startswith(b"\x93NUMPY"),
+    read=read_npy,
+    columns=True,
+)
