@@ -1,1 +1,1 @@
-"""Outputs."""
+"""Outputs: show what the analysis made; nothing here computes an estimate or an error."""

@@ -1,0 +1,168 @@
+"""Writing files whole or not at all, and never over something without being told to."""
+
+import os
+import secrets
+import shutil
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from vftcli.errors import OutputError
+
+
+@contextmanager
+def atomic(path: Path, force: bool = False) -> Iterator[Path]:
+    """Yield a temporary path beside `path`, which takes its place when the block ends well.
+
+    A device or pipe (``/dev/stdout``) is yielded as it is. If the block fails nothing is left.
+
+    Args:
+        path: Where the file shall be.
+        force: Whether a file that is there may be replaced.
+
+    Raises:
+        OutputError: If the file exists and `force` is not set, or it cannot be written.
+    """
+    path = Path(path)
+    if path.is_char_device() or path.is_fifo():
+        yield path
+        return
+    refuse_existing(path, force)
+    target = path.resolve() if path.is_symlink() else path
+    temporary = target.with_name(f".{secrets.token_hex(4)}.{target.name}")
+    try:
+        check_writable(target.parent)
+        yield temporary
+        temporary.replace(target)
+    except OSError as error:
+        raise unwritable(path, error) from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str, force: bool = False) -> None:
+    """Write UTF-8 text, whole or not at all.
+
+    Raises:
+        OutputError: As `atomic` does.
+    """
+    with atomic(path, force) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+class OutputFolder:
+    """A folder that gets all of its files at once, when the block ends well.
+
+    Until then they are in a temporary folder on the same file system; if the block fails, it goes,
+    and with it every folder that was made for it. ``folder / "name"`` is where to write a file.
+
+    Raises:
+        OutputError: If the folder is a file or cannot be written, or holds one of `names` and
+            `force` is not set.
+    """
+
+    def __init__(self, path: Path, force: bool = False, names: Iterable[str] = ()) -> None:
+        self.path = Path(path)
+        self.force = force
+        self.names = tuple(names)
+        self.made: list[Path] = []
+        self.temporary = self.path
+
+    def __truediv__(self, name: str) -> Path:
+        """Where to write the file `name`, its folder made if need be."""
+        path = self.temporary / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path
+
+    def __enter__(self) -> Self:
+        """Refuse what must not be overwritten, and make the temporary folder."""
+        if self.path.exists() and not self.path.is_dir():
+            raise OutputError(f"{self.path} is a file; -o needs the name of a folder")
+        for name in self.names:
+            refuse_existing(self.path / name, self.force)
+        try:
+            self.made = make_folders(self.path)
+            check_writable(self.path)
+            self.temporary = self.path / f".{secrets.token_hex(4)}.partial"
+            self.temporary.mkdir()
+        except OSError as error:
+            self._discard()
+            raise unwritable(self.path, error) from None
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        _trace: TracebackType | None,
+    ) -> None:
+        """Move the files into place, or leave nothing."""
+        if error is None:
+            try:
+                self._move()
+            except OSError as failure:
+                self._discard()
+                raise unwritable(self.path, failure) from None
+            except OutputError:
+                self._discard()
+                raise
+            self.temporary.rmdir()
+            return
+        self._discard()
+        if isinstance(error, OSError) and self._concerns(error):
+            raise unwritable(self.path, error) from None
+
+    def _move(self) -> None:
+        """Put every file where it belongs, after a last look that nothing is in the way."""
+        files = sorted(p for p in self.temporary.rglob("*") if not p.is_dir())
+        for file in files:
+            refuse_existing(self.path / file.relative_to(self.temporary), self.force)
+        for file in files:
+            target = self.path / file.relative_to(self.temporary)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            file.replace(target)
+        for folder in sorted((p for p in self.temporary.rglob("*")), reverse=True):
+            folder.rmdir()
+
+    def _discard(self) -> None:
+        """Remove the temporary folder and the folders that were made, if they are empty."""
+        if self.temporary != self.path:
+            shutil.rmtree(self.temporary, ignore_errors=True)
+        for folder in reversed(self.made):
+            if folder.is_dir() and not any(folder.iterdir()):
+                folder.rmdir()
+
+    def _concerns(self, error: OSError) -> bool:
+        """Whether an error of the operating system is about this folder."""
+        return error.filename is None or str(error.filename).startswith(str(self.path))
+
+
+def refuse_existing(path: Path, force: bool) -> None:
+    """Raise an OutputError if something is at `path` that must not be overwritten."""
+    if path.is_dir():
+        raise OutputError(f"{path} is a folder; give the name of a file")
+    if not force and (path.exists() or path.is_symlink()):
+        raise OutputError(f"{path} exists; give another -o, or --force to overwrite it")
+
+
+def make_folders(path: Path) -> list[Path]:
+    """Make a folder and its missing parents; return those made, outermost first."""
+    missing = [p for p in (path, *path.parents) if not p.exists()]
+    path.mkdir(parents=True, exist_ok=True)
+    return missing[::-1]
+
+
+def check_writable(folder: Path) -> None:
+    """Raise the operating system's error if no file can be made in `folder`."""
+    if not folder.is_dir():
+        raise FileNotFoundError(2, "there is no such folder", str(folder))
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise PermissionError(13, "no permission to write there", str(folder))
+
+
+def unwritable(path: Path, error: OSError) -> OutputError:
+    """The one-line error for what the operating system refused."""
+    why = error.strerror or str(error)
+    return OutputError(f"{path} cannot be written: {why[0].lower()}{why[1:]}; give another -o")

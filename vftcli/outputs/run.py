@@ -1,0 +1,185 @@
+"""run.json: what was run on what, so that every number can be made again."""
+
+import hashlib
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import vftcli
+from vftcli.analysis import Analysis
+from vftcli.observers.observer import Observer, Tuning
+from vftcli.recording import Recording
+from vftcli.robots.robot import Robot
+from vftcli.torque import ExternalTorque
+
+CONVENTIONS = {
+    "sign": "tau_ext is the torque the environment exerts ON the robot: "
+    "M ddq + C dq + g + friction = tau + tau_ext",
+    "frame": "joint torques, positive along each joint axis; joints count from 1 at the base",
+    "units": "s, rad, rad/s, A, N, N·m, kg",
+    "time": "seconds from the log's first sample",
+}
+"""What every number in an output means."""
+
+PACKAGES = ("numpy", "scipy", "polars", "pin")
+"""Packages whose versions are recorded beside Python's; none is imported for it."""
+
+
+def run_record(
+    analysis: Analysis, command: str | Sequence[str], options: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Everything `run.json` holds.
+
+    Args:
+        analysis: What was run.
+        command: The command line, as the user typed it.
+        options: Further settings to record, by name.
+    """
+    return {
+        "command": command if isinstance(command, str) else shell_line(command),
+        "versions": versions(),
+        "input": input_record(analysis.recording),
+        "robot": robot_record(analysis.robot),
+        "observers": [
+            observer_record(observer, analysis.tunings.get(observer.name))
+            for observer in analysis.observers
+        ],
+        "reference": reference_record(analysis.reference),
+        "conventions": CONVENTIONS,
+        "repairs": list(analysis.recording.source.repairs),
+        "warnings": list(analysis.recording.source.warnings),
+        "notes": all_notes(analysis),
+        "options": dict(options or {}),
+    }
+
+
+def to_json(record: Mapping[str, Any]) -> str:
+    """A record as JSON text; what is not a finite number becomes null."""
+    return json.dumps(plain(record), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def plain(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
+    """A value in JSON's own types: arrays as lists, NaN as None, dataclasses as objects."""
+    match value:
+        case None | bool() | int() | str():
+            return value
+        case float() | np.floating():
+            return float(value) if np.isfinite(value) else None
+        case np.ndarray() | np.generic():
+            return plain(value.tolist())
+        case Mapping():
+            return {str(key): plain(item) for key, item in value.items()}
+        case list() | tuple() | set() | frozenset():
+            return [plain(item) for item in value]
+        case _ if is_dataclass(value) and not isinstance(value, type):
+            return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    return str(value)
+
+
+def shell_line(words: Sequence[str]) -> str:
+    """A command line as one would type it again."""
+    import shlex
+
+    return shlex.join(words)
+
+
+def versions() -> dict[str, str]:
+    """Versions of the program and of what computes its numbers, by name."""
+    found = {"vftcli": vftcli.__version__, "python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def input_record(recording: Recording) -> dict[str, Any]:
+    """Which log it was and what is in it."""
+    source = recording.source
+    return {
+        "path": str(source.path) if source.path is not None else None,
+        "format": source.format,
+        "sha256": source.sha256 or None,
+        "clock": source.clock,
+        "t0_s": source.t0,
+        "rows": source.rows,
+        "duplicates": source.duplicates,
+        "samples": recording.samples,
+        "joints": recording.joints,
+        "start_s": float(recording.t[0]),
+        "end_s": float(recording.t[-1]),
+        "rate_hz": 1.0 / recording.step if recording.samples > 1 else None,
+        "signals": list(recording.signals),
+    }
+
+
+def robot_record(robot: Robot) -> dict[str, Any]:
+    """Which robot it was taken to be. A built-in profile is told by its name, not its path."""
+    built_in = robot.path is not None and Path(vftcli.__file__).parent in robot.path.parents
+    return {
+        "name": robot.name,
+        "title": robot.title,
+        "file": None if built_in or robot.path is None else str(robot.path),
+        "sha256": file_sha256(robot.path),
+        "torque_source": robot.torque_source,
+        "friction": [joint.model for joint in robot.friction] or "none",
+        "payload_kg": robot.payload.mass if robot.payload is not None else None,
+        "gravity_m_s2": robot.chain.gravity.tolist(),
+        "notes": list(robot.notes),
+    }
+
+
+def file_sha256(path: Path | None) -> str | None:
+    """Hex digest of a file's bytes, None where there is no file."""
+    if path is None or not path.is_file():
+        return None
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def observer_record(observer: Observer, tuning: Tuning | None) -> dict[str, Any]:
+    """An observer's parameters, and what they mean at the log's sample time."""
+    meaning = (
+        {
+            "omega_n_rad_s": tuning.omega_n,
+            "zeta": tuning.zeta,
+            "delay_s": tuning.delay,
+            "bandwidth_hz": tuning.bandwidth,
+            "dc_gain": tuning.dc_gain,
+            "numbers_to_tune": tuning.numbers,
+        }
+        if tuning is not None
+        else {}
+    )
+    return {"name": observer.name, "parameters": parameters(observer), **plain(meaning)}
+
+
+def parameters(observer: Observer) -> dict[str, Any]:
+    """An observer's parameters by name, as JSON can hold them."""
+    if not is_dataclass(observer):
+        return {}
+    return {
+        field.name: plain(getattr(observer, field.name)) for field in fields(observer) if field.init
+    }
+
+
+def reference_record(reference: ExternalTorque | None) -> dict[str, Any] | None:
+    """What the estimates were judged by."""
+    if reference is None:
+        return None
+    floor = plain(reference.floor)
+    return {"name": reference.name, "floor_Nm": floor, "notes": list(reference.notes)}
+
+
+def all_notes(analysis: Analysis) -> list[str]:
+    """Notes of the run, of every estimate and of the reference, each once."""
+    notes = [*analysis.notes]
+    for torque in analysis.torques:
+        notes += [f"{torque.name}: {note}" for note in torque.notes if note not in analysis.notes]
+    return list(dict.fromkeys(notes))
