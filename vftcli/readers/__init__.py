@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from vftcli.errors import LogError, UnknownFormatError
-from vftcli.readers import libfranka, rtde, tables
+from vftcli.readers import arrays_file, libfranka, lerobot, parquet, pickles, rtde, tables
 from vftcli.readers.cleaning import cleaned
 from vftcli.readers.opening import Digest
 from vftcli.readers.reader import LogFile, RawLog, Reader, Request, open_log
@@ -23,6 +23,10 @@ READERS: dict[str, Reader] = {
         tables.HEADED,
         tables.HEADERLESS,
         tables.NPY,
+        arrays_file.NPZ,
+        pickles.PICKLE,
+        parquet.PARQUET,
+        lerobot.LEROBOT,
     )
 }
 """Every format by name: one reader, one line."""
@@ -31,7 +35,7 @@ READERS: dict[str, Reader] = {
 def read(
     path: str | Path,
     *,
-    format: str | None = None,  # noqa: A002 - the word users know from --format
+    format: str | None = None,
     columns: str | None = None,
     signals: Collection[str] | None = None,
 ) -> Recording:

@@ -40,7 +40,7 @@ ALIASES: dict[str, tuple[str, ...]] = {
 """Field of Recording → names its columns go by, in lower case and without their index."""
 
 TURNED = {"tau_ext_hat_filtered", "motor_torques_external"}
-"""libfranka's residual under its own names: measured torque minus model, the torque BY the robot."""
+"""Names of libfranka's residual, measured torque minus model: its sign has to be turned."""
 
 WRENCHES = (
     "fx fy fz mx my mz",

@@ -71,7 +71,7 @@ def cleaned(raw: RawLog, path: Path, format_name: str) -> Recording:
     signals = {name: handed_over(np.ascontiguousarray(v)) for name, v in raw.signals.items()}
     return Recording(
         t=handed_over(t),
-        **signals,  # type: ignore[arg-type]
+        **signals,
         wrench_frame=raw.wrench_frame if "wrench" in signals else None,
         joint_names=raw.joint_names,
         robot_hint=raw.robot_hint,

@@ -93,7 +93,9 @@ def parse_columns(text: str) -> ColumnSpec:
     Raises:
         LogError: If an item cannot be understood; the message shows the item and the grammar.
     """
-    items = tuple(_parse_item(part, text) for part in _split(text))
+    if not _split(text):
+        raise LogError("--columns is empty. Say which column is which, as in t,q:6,dq:6,current:6.")
+    items = tuple(_parse_item(part) for part in _split(text))
     named = any(item.pattern is not None for item in items)
     for item in items:
         if named and item.pattern is None and item.rate is None:
@@ -116,7 +118,7 @@ def _split(text: str) -> list[str]:
     return [part.strip() for part in parts if part.strip()]
 
 
-def _parse_item(part: str, text: str) -> Item:
+def _parse_item(part: str) -> Item:
     match = ITEM.fullmatch(part)
     if match is None:
         raise LogError(

@@ -129,7 +129,7 @@ class TextTable:
         """
         import polars as pl
 
-        kinds = {column: pl.Float64 for column in columns}
+        kinds = dict.fromkeys(columns, pl.Float64)
         if clock is not None:
             kinds[clock] = self._clock_kind(clock)
         for text in (self._text, self._mended):

@@ -111,7 +111,7 @@ def read_states(file: LogFile, request: Request) -> RawLog:
         states.append(state)
     if not states:
         raise LogError(f"{file.path}: no robot state in any line.")
-    notes = (f"skipped {skipped} lines that hold no state",) if skipped else ()
+    notes: tuple[str, ...] = (f"skipped {skipped} lines that hold no state",) if skipped else ()
     notes += ("dropped the last line, which is cut",) if cut else ()
     return _read_states(file, states, notes, request)
 

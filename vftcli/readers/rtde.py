@@ -25,7 +25,10 @@ JOINT_COLUMNS = {
 """Field of Recording → RTDE's name; all have six elements, name_0 to name_5."""
 
 CLOCK = "controller clock (timestamp, seconds since power-on)"
-WRENCH_FRAME = "base axes at the TCP, as force on the robot; estimated from currents on CB3, measured on e-Series"
+WRENCH_FRAME = (
+    "base axes at the TCP, as force on the robot; estimated from currents on CB3, measured on "
+    "e-Series"
+)
 
 PAYLOAD = ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2")
 """The payload that the controller was told of; its last value counts."""
@@ -61,8 +64,8 @@ def read_rtde(table: Table, request: Request) -> RawLog:
     )
     if not any(pick.signal == "q" for pick in picks.signals):
         raise LogError(
-            f"{table.path}: no actual_q_0 … actual_q_5 among its {len(names)} columns. Add actual_q "
-            "to the recipe and record again."
+            f"{table.path}: no actual_q_0 … actual_q_5 among its {len(names)} columns. Add "
+            "actual_q to the recipe and record again."
         )
     raw = picked(table, checked(table, picks), request, clock_name=CLOCK, wrench_frame=WRENCH_FRAME)
     if len(raw.constants) != len(PAYLOAD) or not np.all(np.isfinite(raw.constants)):
@@ -78,10 +81,9 @@ def read_rtde_text(file: LogFile, request: Request) -> RawLog:
 class BinaryTable:
     """The official client's binary file: two lines of text, then big-endian records."""
 
-    lists: dict[int, int] = {}  # noqa: RUF012 - a constant: records hold scalars only
-
     def __init__(self, file: LogFile) -> None:
         self.path = file.path
+        self.lists: dict[int, int] = {}
         names, types, self._start = _binary_header(file)
         self.names: tuple[str, ...] | None = names
         self.width = len(names)
@@ -181,7 +183,7 @@ BINARY = Reader(
 UR_RTDE = Reader(
     name="ur-rtde",
     title="ur_rtde (SDU) startFileRecording, CSV",
-    recording="RTDEReceiveInterface.startFileRecording(file, variables), with timestamp among them.",
+    recording="RTDEReceiveInterface.startFileRecording(file, variables), timestamp among them.",
     takes=_TAKES,
     pitfalls=(
         "Six decimals only. Rows come from a host thread: stamps repeat (dropped) and double "

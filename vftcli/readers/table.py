@@ -1,7 +1,7 @@
 """Tables: columns of numbers under names or in file order, whatever file they come from."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -19,26 +19,30 @@ Column = NDArray[Any]
 
 
 class Table(Protocol):
-    """Columns of numbers that are loaded when they are asked for.
+    """Columns of numbers that are loaded when they are asked for."""
 
-    Attributes:
-        path: The file, for messages.
-        names: Column names, or None for a headerless table.
-        width: Number of columns.
-        lists: Column → length of its lists, for columns that hold lists.
-    """
+    @property
+    def path(self) -> Path:
+        """The file, for messages."""
 
-    path: Path
-    names: tuple[str, ...] | None
-    width: int
-    lists: Mapping[int, int]
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        """Column names, or None for a headerless table."""
 
-    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
-        """Load columns as float64; the clock's column may stay whole numbers."""
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+
+    @property
+    def lists(self) -> Mapping[int, int]:
+        """Column → length of its lists, for columns that hold lists."""
 
     @property
     def repairs(self) -> tuple[str, ...]:
         """What loading dropped or mended."""
+
+    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
+        """Load columns as float64; the clock's column may stay whole numbers."""
 
 
 class Cell(NamedTuple):
@@ -189,8 +193,10 @@ def tick_of(stamps: Column, name: str) -> tuple[float, str]:
     return (1e-3, "ms") if whole and 0.8 <= step <= 1.2 else (1.0, "s")
 
 
-def picks_of(table: Table, spec: ColumnSpec) -> Picks:
-    """Find the columns that a --columns text means.
+def picks_of(
+    table: Table, spec: ColumnSpec, check: Callable[[Table, Picks], Picks] | None = None
+) -> Picks:
+    """Find the columns that a --columns text means; `check` replaces the check for a log's signals.
 
     Raises:
         LogError: If the table lacks a column that is named, or has another number of columns.
@@ -207,7 +213,7 @@ def picks_of(table: Table, spec: ColumnSpec) -> Picks:
     signals = tuple(pick for pick in found if pick.signal not in {"t", "_"})
     clock = next((pick for pick in found if pick.signal == "t"), None)
     rate = next((item.rate for item in spec.items if item.rate is not None), None)
-    return checked(table, Picks(signals=signals, clock=clock, rate=rate))
+    return (check or checked)(table, Picks(signals=signals, clock=clock, rate=rate))
 
 
 def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:

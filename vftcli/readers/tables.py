@@ -121,7 +121,7 @@ def read_text(file: LogFile, request: Request) -> RawLog:
 
 def read_npy(file: LogFile, request: Request) -> RawLog:
     """Read an .npy file: a matrix with one row a sample, or a structured array."""
-    check_npy_header(file)
+    check_npy_header(file, len(file.content))
     array = numpy_array(file.path, file.content)
     if array.dtype.names:
         return from_table(
@@ -129,14 +129,14 @@ def read_npy(file: LogFile, request: Request) -> RawLog:
         )
     if array.ndim != 2 or array.size == 0:
         raise LogError(
-            f"{file.path}: the array has shape {array.shape}; a log is a matrix with a row a sample."
+            f"{file.path}: the array has shape {array.shape}; a log is a matrix, a row a sample."
         )
     columns = {str(k): array[:, k] for k in range(array.shape[1])}
     return from_table(ArrayTable(path=file.path, columns=columns, headed=False), request)
 
 
-def check_npy_header(file: LogFile) -> None:
-    """Raise a LogError if the array that the header claims is larger than the file."""
+def check_npy_header(file: LogFile, size: int) -> None:
+    """Raise a LogError if the array that the header claims is larger than `size` bytes."""
     stream = BytesIO(file.head)
     try:
         version = np.lib.format.read_magic(stream)
@@ -149,10 +149,9 @@ def check_npy_header(file: LogFile) -> None:
     except (ValueError, KeyError, SyntaxError, TypeError, OverflowError, RecursionError) as error:
         reason = str(error).split("\n")[0][:120]
         raise LogError(f"{file.path}: not a readable .npy file ({reason})") from None
-    if claimed > len(file.content) or any(s < 0 for s in shape):
+    if claimed > size or any(s < 0 for s in shape):
         raise LogError(
-            f"{file.path}: the header claims {claimed} bytes, the file holds {len(file.content)}; "
-            "it is cut."
+            f"{file.path}: the header claims {claimed} bytes, the file holds {size}; it is cut."
         )
 
 
@@ -169,9 +168,9 @@ def is_headerless(file: LogFile) -> bool:
 def _has_numbers(file: LogFile) -> bool:
     """Whether the line after the header holds at least one number in as many cells."""
     table = TextTable(file)
-    if len(table._sample) < 2:  # noqa: SLF001 - a header alone is a table without samples
+    if len(table._sample) < 2:
         return table.width > 1
-    cells = table._cells(table._sample[1])  # noqa: SLF001
+    cells = table._cells(table._sample[1])
     numbers = [as_number(cell, decimal_comma=table.decimal_comma) for cell in cells]
     return len(cells) > 1 and sum(n is not None for n in numbers) * 2 >= len(cells)
 

@@ -1,0 +1,167 @@
+"""Bundles of arrays: .npz files, and the dictionaries that panda-py and frankapy hand to users."""
+
+import zipfile
+from collections.abc import Mapping
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+
+from vftcli.errors import LogError
+from vftcli.readers.aliases import TURNED_NOTE
+from vftcli.readers.columns import parse_columns
+from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.table import Cell, Column, Pick, Picks, checked, picked
+from vftcli.readers.tables import ArrayTable, from_table, numpy_array
+
+PANDA_PY = {
+    "q": "q",
+    "dq": "dq",
+    "torque": "tau_J",
+    "tau_ext": "tau_ext_hat_filtered",
+    "wrench": "O_F_ext_hat_K",
+}
+"""Field of Recording → key of panda-py's get_log()."""
+
+WRENCH_FRAME = "base axes at the stiffness frame K, as force BY the robot ON the environment"
+
+
+def read_npz(file: LogFile, request: Request) -> RawLog:
+    """Read an .npz file: one array a signal, or whatever --columns names."""
+    return read_arrays(file, npz_arrays(file), request)
+
+
+def npz_arrays(file: LogFile) -> dict[str, Column]:
+    """The arrays of an .npz file by name, unpacked within bounds.
+
+    Raises:
+        LogError: If it is damaged, holds objects, or unpacks beyond the limit.
+    """
+    limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * len(file.content))
+    arrays = {}
+    try:
+        with zipfile.ZipFile(BytesIO(file.content)) as bundle:
+            total = sum(member.file_size for member in bundle.infolist())
+            if total > limit:
+                raise LogError(
+                    f"{file.path}: unpacks to {total >> 20} MiB, more than {limit >> 20} MiB. Save "
+                    "the arrays you need with np.savez."
+                )
+            for member in bundle.infolist():
+                if member.filename.endswith(".npy"):
+                    with bundle.open(member) as stream:
+                        content = stream.read(limit + 1)
+                    check_claim(file, content)
+                    arrays[member.filename.removesuffix(".npy")] = numpy_array(file.path, content)
+    except (
+        zipfile.BadZipFile,
+        NotImplementedError,
+        RuntimeError,
+        EOFError,
+        OSError,
+        ValueError,
+    ) as e:
+        reason = str(e).split("\n")[0][:120]
+        raise LogError(f"{file.path}: a damaged .npz file ({reason})") from None
+    return arrays
+
+
+def check_claim(file: LogFile, content: bytes) -> None:
+    """Raise a LogError if an array's header claims more than its member holds."""
+    from vftcli.readers.tables import check_npy_header
+
+    check_npy_header(LogFile(path=file.path, head=content), len(content))
+
+
+def read_arrays(file: LogFile, arrays: Mapping[str, Column], request: Request) -> RawLog:
+    """Read named arrays as panda-py's log, by --columns, or by alias.
+
+    Raises:
+        LogError: If the arrays differ in length or none is the positions.
+    """
+    shaped = {name: _shaped(array) for name, array in arrays.items() if array.ndim in {1, 2, 3}}
+    table = ArrayTable(path=file.path, columns=shaped)
+    if request.columns is not None and parse_columns(request.columns).named:
+        return from_table(table, request)
+    if request.columns is not None:
+        raise LogError(
+            f"{file.path}: its arrays have names ({', '.join(list(arrays)[:20])}); --columns must "
+            "name them, as in t[ms]=time,q=q,tau=tau_J."
+        )
+    if {"q", "time"} <= set(shaped) and {"tau_J", "O_T_EE", "dq"} & set(shaped):
+        return _read_panda_py(table, request)
+    return from_table(table, request)
+
+
+def _shaped(array: Column) -> Column:
+    """An array as a column: (T,) of (T, 1), rows of matrices laid out flat."""
+    if array.ndim == 3:
+        return array.reshape(len(array), -1)
+    if array.ndim == 2 and array.shape[1] == 1:
+        return array[:, 0]
+    return array
+
+
+def _read_panda_py(table: ArrayTable, request: Request) -> RawLog:
+    """Read panda-py's log: time in milliseconds, the vendor's residual turned."""
+    names = list(table.columns)
+    signals = []
+    for signal, name in PANDA_PY.items():
+        width = table.lists.get(names.index(name)) if name in names else None
+        if width is None:
+            continue
+        turned = signal == "tau_ext"
+        signals.append(
+            Pick(
+                signal=signal,
+                cells=tuple(Cell(names.index(name), j) for j in range(width)),
+                factor=-1.0 if turned else 1.0,
+                note=TURNED_NOTE if turned else "",
+            )
+        )
+    clock = Pick(signal="t", cells=(Cell(names.index("time")),), factor=1e-3, unit="ms")
+    picks = checked(table, Picks(signals=tuple(signals), clock=clock))
+    return picked(
+        table,
+        picks,
+        request,
+        clock_name="robot clock (milliseconds since start)",
+        wrench_frame=WRENCH_FRAME,
+    )
+
+
+def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
+    """The arrays of a dictionary of arrays or of lists of equally long arrays.
+
+    Raises:
+        LogError: If nothing in it is an array of numbers.
+    """
+    arrays = {}
+    for name, value in log.items():
+        if not isinstance(value, np.ndarray | list) or not len(value):
+            continue
+        try:
+            array = np.asarray(value)
+        except ValueError:
+            raise LogError(f"{file.path}: {name!s:.40} holds rows of different lengths.") from None
+        if array.dtype.kind in "fiub":
+            arrays[str(name)] = array
+    if not arrays:
+        raise LogError(f"{file.path}: holds no arrays of numbers, so no log.")
+    return arrays
+
+
+NPZ = Reader(
+    name="npz",
+    title="NumPy bundle (.npz), panda-py logs among them",
+    recording="np.savez(path, **panda.get_log()) after panda.enable_logging(n).",
+    takes="panda-py: q, dq, tau_J, −tau_ext_hat_filtered, O_F_ext_hat_K. Others by alias.",
+    pitfalls=(
+        "panda-py logs in milliseconds, only while a controller runs, into a ring buffer. Arrays "
+        "of objects are refused."
+    ),
+    recognises=lambda file: file.head.startswith(b"PK\x03\x04") and b".npy" in file.head[:4096],
+    read=read_npz,
+    columns=True,
+)

@@ -1,0 +1,92 @@
+"""LeRobot datasets, versions 2 and 3: a folder of Parquet files with meta/info.json."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vftcli.errors import LogError
+from vftcli.readers.parquet import EPISODE, ParquetTable
+from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.tables import from_table
+
+INFO_LIMIT = 16 * 1024 * 1024
+
+
+def read_lerobot(file: LogFile, request: Request) -> RawLog:
+    """Read the first episode of a dataset; which one, of how many, is said.
+
+    Raises:
+        LogError: If the folder has no Parquet data or its info cannot be read.
+    """
+    info = _info(file.path)
+    files = sorted((file.path / "data").rglob("*.parquet"))
+    if not files:
+        raise LogError(f"{file.path}: a LeRobot dataset without data/**/*.parquet.")
+    table = ParquetTable(files[0], files[0])
+    rows, first = None, 0
+    if EPISODE in (table.names or ()):
+        episodes = table.load([(table.names or ()).index(EPISODE)], None)
+        numbers = next(iter(episodes.values()))
+        first = int(numbers[0])
+        rows = np.flatnonzero(numbers == numbers[0])
+    table = ParquetTable(files[0], files[0], rows)
+    total = info.get("total_episodes", "an unknown number")
+    fps = info.get("fps", "unknown")
+    note = f"took episode {first} of {total!s:.20}; the dataset's rate is {fps!s:.20} Hz"
+    request = Request(
+        columns=request.columns or default_columns(table, info), signals=request.signals
+    )
+    raw = from_table(table, request, warnings=(note,))
+    return raw
+
+
+def default_columns(table: ParquetTable, info: dict[str, Any]) -> str:
+    """A --columns text for a dataset's usual names: the first numbers of observation.state.
+
+    The state of an arm often ends with its gripper; the names in info.json tell.
+    """
+    names = list(table.names or ())
+    if "observation.state" not in names:
+        raise LogError(
+            f"{table.path}: no observation.state among {', '.join(names[:20])}. Name the columns: "
+            "--columns 't=timestamp,q[rad]=observation.state[0:7]'."
+        )
+    length = table.lists.get(names.index("observation.state"), 0)
+    feature = info.get("features", {})
+    feature = feature.get("observation.state", {}) if isinstance(feature, dict) else {}
+    labels = feature.get("names") if isinstance(feature, dict) else None
+    if isinstance(labels, dict):
+        labels = next(iter(labels.values()), None)
+    joints = length
+    if isinstance(labels, list) and len(labels) == length:
+        fingers = [k for k, label in enumerate(labels) if "grip" in str(label).lower()]
+        joints = min(fingers) if fingers else length
+    return f"t=timestamp,q=observation.state[0:{joints}]"
+
+
+def _info(folder: Path) -> dict[str, Any]:
+    path = folder / "meta" / "info.json"
+    try:
+        if path.stat().st_size > INFO_LIMIT:
+            raise LogError(f"{path}: larger than {INFO_LIMIT >> 20} MiB; no description is.")
+        info = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        raise LogError(f"{path}: not a readable description of a dataset") from None
+    return info if isinstance(info, dict) else {}
+
+
+LEROBOT = Reader(
+    name="lerobot",
+    title="LeRobot dataset (v2, v3)",
+    recording="lerobot-record; the folder that holds meta/info.json.",
+    takes="timestamp and observation.state as q, of the first episode; more by --columns.",
+    pitfalls=(
+        "float32, 60 Hz or less; a gripper may follow the joints: q=observation.state[0:7]. No "
+        "torques, so no external torque can be estimated."
+    ),
+    recognises=lambda file: "meta" in file.entries and (file.path / "meta" / "info.json").is_file(),
+    read=read_lerobot,
+    columns=True,
+)
