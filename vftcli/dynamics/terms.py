@@ -1,11 +1,12 @@
 """DynamicsTerms: all an observer ever sees of a robot and its log."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from vftcli.arrays import Array, check_clock, check_shape, frozen, handed_over
-from vftcli.dynamics.drive import check_joints, uses_current
+from vftcli.dynamics.drive import check_joints, drive_torque, uses_current
 from vftcli.dynamics.friction import friction_torque
 from vftcli.dynamics.kernels import CHUNK, Workspace, maps_of, momentum_chunk
 from vftcli.errors import ShapeError
@@ -47,10 +48,17 @@ class DynamicsTerms:
         return len(self.t)
 
 
-def dynamics_terms(recording: Recording, robot: Robot) -> DynamicsTerms:
+def dynamics_terms(
+    recording: Recording, robot: Robot, *, literal: bool = False
+) -> DynamicsTerms:
     """Evaluate p and μ along a recording, chunk by chunk.
 
     Beside the recording and the two results it needs memory for one chunk only.
+
+    Args:
+        recording: The log.
+        robot: The arm, its payload mounted.
+        literal: Use the paper's numeric method (7)–(16) instead of the batched kernels.
 
     Raises:
         MissingSignalError: If velocities, or both currents and torques, are missing.
@@ -59,8 +67,23 @@ def dynamics_terms(recording: Recording, robot: Robot) -> DynamicsTerms:
     check_joints(recording, robot)
     q, dq = recording.q, recording.require("dq")
     effort, scale = effort_of(recording, robot)
+    p, mu = np.empty(q.shape), np.empty(q.shape)
+    chunks = literal_chunks if literal else kernel_chunks
+    for span, momentum, free_torque in chunks(robot, q, dq):
+        p[span] = momentum
+        np.multiply(effort[span], scale, out=mu[span])
+        mu[span] += free_torque
+        if robot.friction:
+            mu[span] -= friction_torque(robot.friction, dq[span])
+    return DynamicsTerms(t=recording.t, p=handed_over(p), mu=handed_over(mu))
+
+
+Chunk = tuple[slice, Array, Array]
+
+
+def kernel_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
+    """Yield p and Cᵀq̇ − g of one chunk of samples after another, by the batched kernels."""
     samples, n = q.shape
-    p, mu = np.empty((samples, n)), np.empty((samples, n))
     maps, size = maps_of(robot.loaded_chain), min(CHUNK, samples)
     space, rows = Workspace(n, size), np.empty((3, n, size))
     for start in range(0, samples, CHUNK):
@@ -69,18 +92,19 @@ def dynamics_terms(recording: Recording, robot: Robot) -> DynamicsTerms:
         columns = np.ascontiguousarray(q[span].T), np.ascontiguousarray(dq[span].T)
         momentum_chunk(maps, space, *columns, momentum, coriolis, gravity)
         coriolis -= gravity
-        p[span] = momentum.T
-        np.multiply(effort[span], scale, out=mu[span])
-        mu[span] += coriolis.T
-        if robot.friction:
-            mu[span] -= friction_torque(robot.friction, dq[span])
-    return DynamicsTerms(t=recording.t, p=handed_over(p), mu=handed_over(mu))
+        yield span, momentum.T, coriolis.T
+
+
+def literal_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
+    """Yield p and Cᵀq̇ − g of the whole log at once, by the paper's numeric method."""
+    from vftcli.dynamics.literal import literal_momentum_terms
+
+    p, coriolis, gravity = literal_momentum_terms(robot.model, q, dq)
+    yield slice(0, len(q)), p, coriolis - gravity
 
 
 def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]:
     """The measured effort (T, n) and what turns it into torque: K [N·m/A], or 1 for torques."""
-    from vftcli.dynamics.drive import drive_torque
-
     if uses_current(recording, robot) and robot.torque_constant is not None:
         return recording.require("current"), robot.torque_constant
     return drive_torque(recording, robot), 1.0

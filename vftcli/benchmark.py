@@ -1,0 +1,202 @@
+"""The benchmark: Table II on this machine, and the ratios that do not depend on it.
+
+Every ratio is between things measured in one run, interleaved round by round, so that a machine
+whose speed drifts drifts for both sides. Medians over the rounds are reported.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.dynamics.kernels import momentum_terms
+from vftcli.dynamics.literal import literal_momentum_terms
+from vftcli.dynamics.terms import DynamicsTerms, dynamics_terms
+from vftcli.observers import DEFAULT, OBSERVERS, Observer, Setup
+from vftcli.recording import Recording
+from vftcli.robots import Robot, load_robot
+
+SAMPLES = 30_060
+"""Samples of the paper's Table II."""
+
+SCRIPT_SAMPLES = 1_500
+"""Samples the slow per-sample scripts run over; their time is scaled to all samples."""
+
+PAPER_TABLE_2 = {"fdo": 10.869, "gmo": 10.541, "kfo-fe": 17.578, "kfo-zoh": 58.363}
+"""The paper's total times over 30 060 samples on its laptop. [s]"""
+
+
+@dataclass
+class Timings:
+    """Seconds by name, one value a round."""
+
+    seconds: dict[str, list[float]] = field(default_factory=dict)
+
+    def measure(self, name: str, work: Callable[[], object], scale: float = 1.0) -> None:
+        """Time one call; `scale` extrapolates a shortened one."""
+        begin = time.perf_counter()
+        work()
+        self.seconds.setdefault(name, []).append((time.perf_counter() - begin) * scale)
+
+    def median(self, name: str) -> float:
+        """Median over the rounds. [s]"""
+        return float(np.median(self.seconds[name]))
+
+
+def circle(robot: Robot, samples: int, rate: float = 125.0) -> Recording:
+    """A smooth periodic motion of an arm with plausible currents, seed 0."""
+    rng = np.random.default_rng(0)
+    t = np.arange(samples) / rate
+    phase = rng.uniform(0.0, 2.0 * np.pi, robot.joints)
+    omega = 2.0 * np.pi / 4.0
+    angle = omega * t[:, None] + phase
+    q, dq = 0.4 * np.sin(angle), 0.4 * omega * np.cos(angle)
+    current = rng.normal(0.0, 1.0, q.shape)
+    return Recording(t=t, q=q, dq=dq, current=current, torque=current)
+
+
+def rnea_loop(model: Any, q: Array, dq: Array) -> None:  # noqa: ANN401
+    """The yardstick: one bare `pin.rnea` call a sample, one term, nothing else."""
+    import pinocchio as pin
+
+    data, zero = model.createData(), np.zeros(model.nv)
+    for k in range(len(q)):
+        pin.rnea(model, data, q[k], dq[k], zero)
+
+
+def analytic_script(model: Any, recording: Recording, kalman: Any) -> None:  # noqa: ANN401
+    """What one would write at first: Pinocchio a sample, and a dense Kalman filter."""
+    import pinocchio as pin
+
+    q, dq, tau = recording.q, recording.require("dq"), recording.require("torque")
+    data, n, step = model.createData(), model.nv, recording.step
+    p, mu = np.empty_like(q), np.empty_like(q)
+    for k in range(len(q)):
+        M = pin.crba(model, data, q[k])
+        C = pin.computeCoriolisMatrix(model, data, q[k], dq[k])
+        p[k] = M @ dq[k]
+        mu[k] = tau[k] + C.T @ dq[k] - pin.computeGeneralizedGravity(model, data, q[k])
+    first_order_loops(p, mu, step)
+    dense_kalman_loop(p, mu, step, kalman)
+    dense_kalman_loop(p, mu, step, kalman)
+
+
+def literal_script(model: Any, recording: Recording, kalman: Any) -> None:  # noqa: ANN401
+    """The paper's own way: n + 3 RNEA calls a sample, then the observers sample by sample."""
+    terms = literal_momentum_terms(model, recording.q, recording.require("dq"))
+    mu = recording.require("torque") + terms.coriolis_transpose_dq - terms.gravity
+    first_order_loops(terms.p, mu, recording.step)
+    dense_kalman_loop(terms.p, mu, recording.step, kalman)
+    dense_kalman_loop(terms.p, mu, recording.step, kalman)
+
+
+def first_order_loops(p: Array, mu: Array, step: float, rate: float = 10.0) -> tuple[Array, Array]:
+    """FDO and GMO, one sample after another."""
+    a = 0.5 * rate * step
+    y1, y2, r = np.zeros(p.shape[1]), -rate * p[0], np.zeros(p.shape[1])
+    for k in range(1, len(p)):
+        y1 = (1 - a) / (1 + a) * y1 - a / (1 + a) * (mu[k] + mu[k - 1])
+        y2 = (1 - a) / (1 + a) * y2 - rate * a / (1 + a) * (p[k] + p[k - 1])
+        r = ((1 - a) * r + rate * (p[k] - p[k - 1]) - a * (mu[k] + mu[k - 1])) / (1 + a)
+    return y1 + y2 + rate * p[-1], r
+
+
+def dense_kalman_loop(p: Array, mu: Array, step: float, kalman: Any) -> Array:  # noqa: ANN401
+    """The 2n-state textbook Kalman filter with its covariance, one sample after another."""
+    n = p.shape[1]
+    model, prior = kalman.model(step, n), kalman.steady(step, n).prior
+    eye, zero = np.eye(n), np.zeros((n, n))
+    A = np.block([[eye, np.diag(model.a12)], [zero, np.diag(model.a22)]])
+    B, C = np.vstack([step * eye, zero]), np.hstack([eye, zero])
+    Q = np.block(
+        [[np.diag(model.q11), np.diag(model.q12)], [np.diag(model.q12), np.diag(model.q22)]]
+    )
+    R = np.diag(model.r)
+    P = np.block([[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]])
+    x, identity = np.concatenate([p[0], np.zeros(n)]), np.eye(2 * n)
+    for k in range(len(p)):
+        if k:
+            x = A @ x + B @ (0.5 * (mu[k] + mu[k - 1]))
+            P = A @ P @ A.T + Q
+        L = P @ C.T @ np.linalg.inv(C @ P @ C.T + R)
+        x = x + L @ (p[k] - C @ x)
+        I_LC = identity - L @ C
+        P = I_LC @ P @ I_LC.T + L @ R @ L.T
+    return x
+
+
+def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) -> dict[str, Any]:
+    """Measure the observers and the ratios of the project's bars.
+
+    Returns:
+        ``observers``: rows (name, total_s, per_sample_us, paper_s), dynamics included in none;
+        ``dynamics``: the batched terms; ``ratios``: core_over_rnea_loop, analytic_script_over_core,
+        literal_script_over_core; and what was run.
+    """
+    robot = load_robot(robot_name)
+    recording = circle(robot, samples)
+    setup = Setup(gains=robot.gains, settings={}, joints=robot.joints, step=recording.step,
+                  as_printed=False)
+    observers = {name: OBSERVERS[name].build(setup)[0] for name in DEFAULT}
+    timings = Timings()
+    run_rounds(timings, robot, recording, observers, rounds)
+    core = timings.median("core")
+    rows = [
+        {
+            "name": name,
+            "total_s": timings.median(name),
+            "per_sample_us": timings.median(name) / samples * 1e6,
+            "paper_s": PAPER_TABLE_2.get(name),
+        }
+        for name in observers
+    ]
+    return {
+        "robot": robot.name,
+        "samples": samples,
+        "rounds": rounds,
+        "observers": rows,
+        "dynamics": {
+            "total_s": timings.median("dynamics"),
+            "per_sample_us": timings.median("dynamics") / samples * 1e6,
+        },
+        "ratios": {
+            "core_over_rnea_loop": core / timings.median("rnea loop"),
+            "analytic_script_over_core": timings.median("analytic script") / core,
+            "literal_script_over_core": timings.median("literal script") / core,
+        },
+    }
+
+
+def run_rounds(
+    timings: Timings,
+    robot: Robot,
+    recording: Recording,
+    observers: dict[str, Observer],
+    rounds: int,
+) -> None:
+    """Run everything once unmeasured, then interleaved for `rounds` rounds."""
+    q, dq = np.array(recording.q), np.array(recording.require("dq"))
+    few = min(SCRIPT_SAMPLES, recording.samples)
+    short = recording.between(0.0, float(recording.t[few - 1]))
+    scale, model = recording.samples / few, robot.model
+    kalman = observers["kfo-zoh"]
+
+    def core() -> DynamicsTerms:
+        terms = dynamics_terms(recording, robot)
+        for observer in observers.values():
+            observer.estimate(terms)
+        return terms
+
+    terms = core()
+    momentum_terms(robot.loaded_chain, q, dq)
+    for _ in range(rounds):
+        timings.measure("core", core)
+        timings.measure("rnea loop", lambda: rnea_loop(model, q, dq))
+        timings.measure("dynamics", lambda: dynamics_terms(recording, robot))
+        for name, observer in observers.items():
+            timings.measure(name, lambda observer=observer: observer.estimate(terms))
+        timings.measure("analytic script", lambda: analytic_script(model, short, kalman), scale)
+        timings.measure("literal script", lambda: literal_script(model, short, kalman), scale)

@@ -1,0 +1,59 @@
+"""From a command's options to a Request, and the words every command prints alike."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from vftcli.analysis import Analysis
+    from vftcli.recording import Recording
+
+
+def command_line() -> str:
+    """The command as the user typed it, for `run.json` and the report."""
+    return shlex.join(["vftcli", *sys.argv[1:]])
+
+
+def say(text: str) -> None:
+    """Print words to stderr; tables go to stdout."""
+    typer.echo(text, err=True)
+
+
+def say_recording(recording: "Recording") -> None:
+    """One line on what was read, then what was repaired or looks odd."""
+    source = recording.source
+    rate = f", {1.0 / recording.step:.4g} Hz" if recording.samples > 1 else ""
+    say(
+        f"{recording.name}: {source.format}, {recording.joints} joints, {recording.samples} samples, "
+        f"{recording.duration:.1f} s{rate}"
+    )
+    for remark in (*source.repairs, *source.warnings):
+        say(f"  note: {remark}")
+
+
+def say_notes(analysis: "Analysis") -> None:
+    """What the reader of the numbers should know."""
+    reference = analysis.reference.notes if analysis.reference is not None else ()
+    own = [f"{e.name}: {note}" for e in analysis.estimates for note in e.notes]
+    for note in (*analysis.robot.notes, *analysis.notes, *own, *reference):
+        say(f"note: {note}")
+
+
+def paths(values: list[Path] | None) -> tuple[Path, ...]:
+    """A repeatable option's values."""
+    return tuple(values or ())
+
+
+def chosen(wanted: dict[str, bool], default: str) -> str:
+    """The one format whose flag is set, or the default.
+
+    Raises:
+        typer.BadParameter: If several are set.
+    """
+    names = [name for name, asked in wanted.items() if asked]
+    if len(names) > 1:
+        raise typer.BadParameter(f"choose one of {', '.join(f'--{name}' for name in names)}")
+    return names[0] if names else default

@@ -1,0 +1,41 @@
+"""`vftcli bench`: Table II on this machine."""
+
+from typing import Annotated
+
+import typer
+
+from vftcli.cli import options as opt
+
+
+def bench(
+    robot: Annotated[str, typer.Option(metavar="NAME|FILE", help="Whose dynamics.")] = "ur5",
+    samples: Annotated[int, typer.Option(min=100, help="Length of the log.")] = 30_060,
+    rounds: Annotated[int, typer.Option(min=1, help="Interleaved repetitions.")] = 7,
+    json: opt.Json = False,
+) -> None:
+    """Time the observers and print the ratios to a bare RNEA loop and to per-sample scripts.
+
+    Example: vftcli bench --rounds 3
+    """
+    import json as json_module
+
+    from vftcli.benchmark import benchmark
+
+    result = benchmark(robot, samples, rounds)
+    if json:
+        typer.echo(json_module.dumps(result, indent=2))
+        return
+    typer.echo(f"{result['robot']}, {samples} samples, median of {rounds} rounds")
+    typer.echo(f"{'':<10} {'total':>10} {'per sample':>12} {'paper, its laptop':>18}")
+    rows = [{"name": "dynamics", "paper_s": None, **result["dynamics"]}, *result["observers"]]
+    for row in rows:
+        paper = f"{row['paper_s']:.3f} s" if row["paper_s"] else ""
+        typer.echo(
+            f"{row['name']:<10} {row['total_s'] * 1e3:7.2f} ms {row['per_sample_us']:9.3f} µs "
+            f"{paper:>18}"
+        )
+    ratios = result["ratios"]
+    typer.echo("")
+    typer.echo(f"all observers with dynamics / one bare pin.rnea loop: {ratios['core_over_rnea_loop']:.2f}")
+    typer.echo(f"per-sample Pinocchio script / this: {ratios['analytic_script_over_core']:.0f}")
+    typer.echo(f"the paper's literal method / this: {ratios['literal_script_over_core']:.0f}")

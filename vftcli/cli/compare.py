@@ -1,0 +1,70 @@
+"""`vftcli compare`: errors of the observers against a reference."""
+
+from typing import Annotated
+
+import typer
+
+from vftcli.cli import options as opt
+
+
+def compare(
+    logs: opt.Logs,
+    reference: opt.RequiredReference,
+    robot: opt.RobotName = None,
+    format_: opt.Format = None,
+    columns: opt.Columns = None,
+    interval: opt.Interval = None,
+    observer: opt.Observers = None,
+    assignments: opt.Assignments = None,
+    friction: opt.Friction = "profile",
+    payload: opt.PayloadName = None,
+    as_printed: opt.AsPrinted = False,
+    free: opt.Free = None,
+    reference_columns: opt.ReferenceColumns = None,
+    json: opt.Json = False,
+    csv: Annotated[bool, typer.Option("--csv", help="One row per observer and joint.")] = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="A Markdown table.")] = False,
+    latex: Annotated[bool, typer.Option("--latex", help="A LaTeX table (booktabs).")] = False,
+) -> None:
+    """Print the RMSE of every observer against a reference, with the reference's own floor.
+
+    Example: vftcli compare fixtures/ur5_circle.csv --robot ur5 --reference zero --interval 0:4
+    """
+    import polars as pl
+
+    from vftcli.cli.asking import chosen, paths, say_notes, say_recording
+    from vftcli.observers import DEFAULT
+    from vftcli.outputs import tables
+    from vftcli.pipeline import Request, analyse, choose_robot, open_log
+
+    wanted = {"json": json, "csv": csv, "markdown": markdown, "latex": latex}
+    show = {
+        "terminal": tables.terminal,
+        "json": tables.to_json,
+        "csv": tables.to_csv,
+        "markdown": tables.to_markdown,
+        "latex": tables.to_latex,
+    }[chosen(wanted, default="terminal")]
+    request = Request(
+        format=format_,
+        columns=columns,
+        robot=robot,
+        interval=interval,
+        observers=tuple(observer or DEFAULT),
+        settings=tuple(assignments or ()),
+        friction=friction,
+        payload=payload,
+        as_printed=as_printed,
+        reference=reference,
+        free=paths(free),
+        reference_columns=reference_columns,
+    )
+    errors = []
+    for log in logs:
+        recording = open_log(log, request)
+        analysis = analyse(recording, choose_robot(request, recording), request)
+        if not json:
+            say_recording(recording)
+            say_notes(analysis)
+        errors.append(analysis.errors)
+    typer.echo(show(pl.concat([table for table in errors if table is not None])))

@@ -1,0 +1,61 @@
+"""`vftcli estimate`: a log becomes external torques."""
+
+from typing import Annotated
+
+import typer
+
+from vftcli.cli import options as opt
+
+
+def estimate(
+    log: opt.Log,
+    output: opt.Folder,
+    robot: opt.RobotName = None,
+    format_: opt.Format = None,
+    columns: opt.Columns = None,
+    interval: opt.Interval = None,
+    observer: opt.Observers = None,
+    assignments: opt.Assignments = None,
+    friction: opt.Friction = "profile",
+    payload: opt.PayloadName = None,
+    as_printed: opt.AsPrinted = False,
+    csv: Annotated[bool, typer.Option("--csv", help="Also write estimates.csv.")] = False,
+    mcap: Annotated[bool, typer.Option("--mcap", help="Also write estimates.mcap.")] = False,
+    rrd: Annotated[bool, typer.Option("--rrd", help="Also write recording.rrd.")] = False,
+    json: opt.Json = False,
+    force: opt.Force = False,
+) -> None:
+    """Estimate the external joint torques along a log.
+
+    Writes DIR/estimates.parquet (t, q/1…, tau_ext/OBSERVER/1…) and DIR/run.json.
+
+    Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5 -o out
+    """
+    from vftcli.cli.asking import command_line, say, say_notes, say_recording
+    from vftcli.observers import DEFAULT
+    from vftcli.outputs.estimates import write_estimate_folder
+    from vftcli.pipeline import Request, analyse, choose_robot, open_log
+
+    request = Request(
+        format=format_,
+        columns=columns,
+        robot=robot,
+        interval=interval,
+        observers=tuple(observer or DEFAULT),
+        settings=tuple(assignments or ()),
+        friction=friction,
+        payload=payload,
+        as_printed=as_printed,
+    )
+    recording = open_log(log, request)
+    analysis = analyse(recording, choose_robot(request, recording), request)
+    extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
+    record = write_estimate_folder(
+        output, analysis, command=command_line(), extras=extras, force=force
+    )
+    if json:
+        typer.echo(record)
+        return
+    say_recording(recording)
+    say_notes(analysis)
+    say(f"wrote {output}")

@@ -1,0 +1,113 @@
+"""`vftcli robots` and `vftcli observers`: what there is, with its sources."""
+
+from typing import Annotated, Any
+
+import typer
+
+from vftcli.cli import options as opt
+
+
+def robots(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME|FILE]", help="Show one robot in full.")
+    ] = None,
+    json: opt.Json = False,
+) -> None:
+    """List the robot profiles, or show one with its numbers and their sources.
+
+    Example: vftcli robots ur5
+    """
+    import json as json_module
+
+    from vftcli.robots import PROFILES, load_robot
+
+    if name is None:
+        rows = [robot_row(load_robot(profile)) for profile in PROFILES]
+        if json:
+            typer.echo(json_module.dumps(rows, indent=2))
+            return
+        for row in rows:
+            typer.echo(
+                f"{row['name']:<7} {row['title']:<28} {row['joints']} joints  "
+                f"{row['torque_source']:<12} {row['friction']}"
+            )
+        return
+    robot = load_robot(name)
+    if json:
+        typer.echo(json_module.dumps(robot.document or robot_row(robot), indent=2))
+        return
+    for line in robot_lines(robot):
+        typer.echo(line)
+
+
+def robot_row(robot: Any) -> dict[str, Any]:  # noqa: ANN401 - avoids importing Robot for --help
+    """One robot in a few words."""
+    models = sorted({f.model for f in robot.friction}) or ["no friction model"]
+    return {
+        "name": robot.name,
+        "title": robot.title,
+        "joints": robot.joints,
+        "torque_source": robot.torque_source,
+        "friction": ", ".join(models),
+        "observers": sorted(robot.gains),
+        "payloads": sorted(robot.payloads),
+    }
+
+
+def robot_lines(robot: Any) -> list[str]:  # noqa: ANN401
+    """One robot in full: joints, drives, friction, gains, sources."""
+    chain = robot.chain
+    lines = [
+        f"{robot.title} ({robot.name}): {robot.joints} joints, torque from {robot.torque_source}",
+        "",
+        f"{'joint':<16} {'mass':>8} {'rotor':>8} {'K':>9} {'tau_max':>8}  friction",
+        f"{'':<16} {'kg':>8} {'kg·m²':>8} {'N·m/A':>9} {'N·m':>8}",
+    ]
+    for j, joint in enumerate(chain.names):
+        constant = f"{robot.torque_constant[j]:9.4f}" if robot.torque_constant is not None else "-"
+        friction = robot.friction[j] if robot.friction else None
+        words = "none"
+        if friction is not None and friction.model != "none":
+            numbers = ", ".join(f"{k} {v:g}" for k, v in friction.parameters.items())
+            words = f"{friction.model} ({numbers}); {friction.confidence or 'no confidence stated'}"
+        lines.append(
+            f"{joint:<16} {chain.mass[j]:8.3f} {chain.rotor_inertia[j]:8.3f} {constant:>9} "
+            f"{robot.limits.tau_max[j]:8.1f}  {words}"
+        )
+    for observer, gains in robot.gains.items():
+        lines.append("")
+        lines.extend(f"{observer}.{key} = {value}" for key, value in gains.items())
+    lines += ["", *(f"note: {note}" for note in robot.notes)]
+    for source in robot.document.get("sources", []):
+        lines.append(f"source {source.get('id', '?')}: {source.get('what', '')}: {source.get('ref', '')}")
+    if robot.payloads:
+        lines.append(f"payloads: {', '.join(robot.payloads)} (--payload NAME)")
+    return lines
+
+
+def observers(json: opt.Json = False) -> None:
+    """List the observers, their equations and their parameters.
+
+    Example: vftcli observers
+    """
+    import json as json_module
+
+    from vftcli.observers import OBSERVERS
+    from vftcli.observers.settings import PARAMETERS
+
+    rows = [
+        {
+            "name": name,
+            "title": entry.title,
+            "equations": entry.equations,
+            "summary": entry.summary,
+            "parameters": [f"{entry.section}.{p}" for p in PARAMETERS[entry.section]],
+        }
+        for name, entry in OBSERVERS.items()
+    ]
+    if json:
+        typer.echo(json_module.dumps(rows, indent=2, ensure_ascii=False))
+        return
+    for row in rows:
+        typer.echo(f"{row['name']:<8} {row['title']} {row['equations']}")
+        typer.echo(f"{'':<8} {row['summary']}; --set {', '.join(row['parameters'])}")

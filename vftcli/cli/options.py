@@ -1,0 +1,93 @@
+"""Options that several commands share: declared once, so that they read alike everywhere."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Log = Annotated[
+    Path,
+    typer.Argument(metavar="LOG", help="A log file or a bag directory; recognised by content."),
+]
+Logs = Annotated[
+    list[Path],
+    typer.Argument(metavar="LOG...", help="Log files or bag directories."),
+]
+Format = Annotated[
+    str | None,
+    typer.Option(
+        "--format", metavar="NAME", help="Skip recognition; `vftcli formats` lists the names."
+    ),
+]
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SPEC",
+        help="Columns of a table: 't,q:6,dq:6,current:6' in file order, or "
+        "'q=joint_pos_{i},tau=eff_{i}' by header.",
+    ),
+]
+RobotName = Annotated[
+    str | None,
+    typer.Option("--robot", metavar="NAME|FILE", help="Profile, FILE.toml or FILE.urdf."),
+]
+Interval = Annotated[
+    str | None,
+    typer.Option(metavar="A:B", help="Use only this time span, in seconds from the first sample."),
+]
+Observers = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--observer", metavar="NAME", help="Repeatable. Default: fdo gmo kfo-fe kfo-zoh."
+    ),
+]
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="OBSERVER.PARAMETER=VALUE",
+        help="Repeatable: gmo.gain=30, gmo.gain=5,3,4,10,10,10, kfo.noise_convention=discrete.",
+    ),
+]
+Friction = Annotated[
+    str, typer.Option(metavar="profile|none", help="The robot's friction model, or none.")
+]
+PayloadName = Annotated[
+    str | None,
+    typer.Option("--payload", metavar="NAME", help="Mount a [payload.NAME] of the robot file."),
+]
+AsPrinted = Annotated[
+    bool,
+    typer.Option("--as-printed", help="The paper's printed formulas, errata and all."),
+]
+Reference = Annotated[
+    str | None,
+    typer.Option(
+        metavar="REF",
+        help="two-cycle (with --free), vendor, zero, or file:PATH.",
+    ),
+]
+RequiredReference = Annotated[
+    str,
+    typer.Option(
+        "--reference",
+        metavar="REF",
+        help="two-cycle (with --free), vendor, zero, or file:PATH.",
+    ),
+]
+Free = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="LOG",
+        help="A free run of the same trajectory; give two and they measure the floor.",
+    ),
+]
+ReferenceColumns = Annotated[
+    str | None,
+    typer.Option(metavar="SPEC", help="Columns of a reference file, as --columns: 't,tau_ext:6'."),
+]
+Folder = Annotated[
+    Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write into.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Overwrite what exists.")]
+Json = Annotated[bool, typer.Option("--json", help="Machine-readable output on stdout.")]

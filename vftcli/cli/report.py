@@ -1,0 +1,72 @@
+"""`vftcli report`: everything about a log in one folder."""
+
+import typer
+
+from vftcli.cli import options as opt
+
+
+def report(
+    logs: opt.Logs,
+    output: opt.Folder,
+    reference: opt.Reference = None,
+    robot: opt.RobotName = None,
+    format_: opt.Format = None,
+    columns: opt.Columns = None,
+    interval: opt.Interval = None,
+    observer: opt.Observers = None,
+    assignments: opt.Assignments = None,
+    friction: opt.Friction = "profile",
+    payload: opt.PayloadName = None,
+    as_printed: opt.AsPrinted = False,
+    free: opt.Free = None,
+    reference_columns: opt.ReferenceColumns = None,
+    json: opt.Json = False,
+    force: opt.Force = False,
+) -> None:
+    """Write a report page, a Rerun recording, tables and estimates of a log into one folder.
+
+    Writes index.html (opens offline), recording.rrd, estimates.parquet, errors.{csv,json,md,tex}
+    and run.json; several logs get a sub-folder each and an index.
+
+    Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
+    """
+    from vftcli.cli.asking import command_line, paths, say, say_notes, say_recording
+    from vftcli.observers import DEFAULT
+    from vftcli.outputs.report import write_report, write_reports
+    from vftcli.outputs.tables import terminal
+    from vftcli.pipeline import Request, analyse, choose_robot, open_log
+
+    request = Request(
+        format=format_,
+        columns=columns,
+        robot=robot,
+        interval=interval,
+        observers=tuple(observer or DEFAULT),
+        settings=tuple(assignments or ()),
+        friction=friction,
+        payload=payload,
+        as_printed=as_printed,
+        reference=reference,
+        free=paths(free),
+        reference_columns=reference_columns,
+    )
+    analyses = []
+    for log in logs:
+        recording = open_log(log, request)
+        analysis = analyse(recording, choose_robot(request, recording), request)
+        analyses.append(analysis)
+        if not json:
+            say_recording(recording)
+            say_notes(analysis)
+    command = command_line()
+    if len(analyses) == 1:
+        record = write_report(output, analyses[0], command=command, force=force)
+    else:
+        record = write_reports(output, analyses, command=command, force=force)
+    if json:
+        typer.echo(record)
+        return
+    for analysis in analyses:
+        if analysis.errors is not None:
+            typer.echo(terminal(analysis.errors))
+    say(f"wrote {output}: open {output / 'index.html'}; rerun {output / 'recording.rrd'}")

@@ -1,0 +1,167 @@
+"""The whole way from a log to its numbers, in the order the data flows."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vftcli.dynamics.terms import dynamics_terms
+from vftcli.errors import ParameterError, RobotError
+from vftcli.observers import DEFAULT, Observer, Setup, build_observers, observer_settings
+from vftcli.recording import Recording
+from vftcli.robots import PROFILES, Robot, load_robot
+
+if TYPE_CHECKING:
+    from vftcli.analysis import Analysis
+
+FRICTION = ("profile", "none")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What a user asks of one log: the options that estimate, compare and report share.
+
+    Attributes:
+        format: Name of the log's format, or None to recognise it.
+        columns: Description of a table's columns, or None.
+        robot: Profile name, TOML or URDF file, or None to take what the log settles.
+        interval: Span of the log to use, ``A:B`` in seconds from its first sample, or None.
+        observers: Names of the observers to run.
+        settings: ``observer.parameter=VALUE`` assignments.
+        friction: "profile" or "none".
+        payload: Name of a payload in the robot file, or None.
+        as_printed: Use the paper's printed formulas, and its numeric dynamics.
+        reference: Name of the reference, or None.
+        free: Logs of free runs for the two-cycle difference.
+        reference_columns: Column description of a reference file.
+    """
+
+    format: str | None = None
+    columns: str | None = None
+    robot: str | None = None
+    interval: str | None = None
+    observers: tuple[str, ...] = DEFAULT
+    settings: tuple[str, ...] = ()
+    friction: str = "profile"
+    payload: str | None = None
+    as_printed: bool = False
+    reference: str | None = None
+    free: tuple[Path, ...] = ()
+    reference_columns: str | None = None
+
+
+def open_log(path: Path, request: Request) -> Recording:
+    """Read a log and cut it to the asked interval."""
+    from vftcli.readers import read
+
+    recording = read(path, format=request.format, columns=request.columns)
+    if request.interval is None:
+        return recording
+    start, stop = parse_interval(request.interval)
+    return recording.between(start, stop)
+
+
+def parse_interval(text: str) -> tuple[float, float]:
+    """Read ``A:B``, where either end may be left out. [s]
+
+    Raises:
+        ParameterError: If it is malformed or ends before it starts.
+    """
+    left, colon, right = text.partition(":")
+    try:
+        start = float(left) if left.strip() else float("-inf")
+        stop = float(right) if right.strip() else float("inf")
+    except ValueError:
+        colon = ""
+    if not colon or not start < stop:
+        raise ParameterError(
+            f"interval {text!r} is not A:B with A < B, in seconds from the log's first sample"
+        )
+    return start, stop
+
+
+def choose_robot(request: Request, recording: Recording) -> Robot:
+    """Load the robot that is asked for, or the one the log settles.
+
+    Raises:
+        RobotError: If none is asked for and the log does not settle it.
+    """
+    name = request.robot or recording.robot_hint
+    if name is None:
+        fitting = [p for p in PROFILES if load_robot(p).joints == recording.joints]
+        raise RobotError(
+            f"{recording.name} does not say which arm it is; choose one with --robot: "
+            f"{', '.join(fitting) or ', '.join(PROFILES)}, or a FILE.toml or FILE.urdf of "
+            f"{recording.joints} joints"
+        )
+    robot = load_robot(name)
+    if request.friction not in FRICTION:
+        raise ParameterError(f"--friction {request.friction!r}; there is {', '.join(FRICTION)}")
+    if request.payload is not None:
+        robot = robot.with_payload(request.payload)
+    return robot.without_friction() if request.friction == "none" else robot
+
+
+def choose_observers(
+    request: Request, robot: Robot, recording: Recording
+) -> tuple[tuple[Observer, ...], tuple[str, ...]]:
+    """Build the observers that are asked for, with notes on gains that nobody gave."""
+    setup = Setup(
+        gains=robot.gains,
+        settings=observer_settings(request.settings),
+        joints=robot.joints,
+        step=recording.step,
+        as_printed=request.as_printed,
+    )
+    return build_observers(request.observers, setup)
+
+
+def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
+    """Go from a recording to estimates and, if a reference is asked for, their errors."""
+    from vftcli.analysis import Analysis
+
+    terms = dynamics_terms(recording, robot, literal=request.as_printed)
+    observers, notes = choose_observers(request, robot, recording)
+    estimates = tuple(observer.estimate(terms) for observer in observers)
+    tunings = {o.name: o.tuning(recording.step, robot.joints) for o in observers}
+    reference, errors = None, None
+    if request.reference is not None:
+        from vftcli.evaluation import evaluate
+        from vftcli.truth.reference import ReferenceRequest, make_reference
+
+        free = tuple(open_log(path, without_interval(request)) for path in request.free)
+        asked = ReferenceRequest(
+            name=request.reference, free=free, columns=request.reference_columns
+        )
+        reference = make_reference(recording, robot, asked)
+        errors = evaluate(recording.name, estimates, reference)
+    return Analysis(
+        recording=recording,
+        robot=robot,
+        terms=terms,
+        observers=observers,
+        estimates=estimates,
+        tunings=tunings,
+        reference=reference,
+        errors=errors,
+        notes=(*notes, *printed_note(request)),
+    )
+
+
+def analyse_log(path: Path, request: Request) -> "Analysis":
+    """Read a log, choose its robot, and analyse it."""
+    recording = open_log(path, request)
+    return analyse(recording, choose_robot(request, recording), request)
+
+
+def without_interval(request: Request) -> Request:
+    """The same request for a free run, which is read whole."""
+    from dataclasses import replace
+
+    return replace(request, interval=None)
+
+
+def printed_note(request: Request) -> tuple[str, ...]:
+    """A note on the printed formulas, if they are used."""
+    if not request.as_printed:
+        return ()
+    return ("as printed: the paper's formulas with their errata (docs/errata.md)",)

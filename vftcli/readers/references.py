@@ -1,0 +1,114 @@
+"""Reference files: a table with a clock and one external torque a joint, but no positions."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vftcli.arrays import Array, check_clock
+from vftcli.errors import LogError
+from vftcli.readers.aliases import _clock, _wrench, grouped
+from vftcli.readers.columns import parse_columns
+from vftcli.readers.delimited import TextTable
+from vftcli.readers.parquet import ParquetTable
+from vftcli.readers.reader import LogFile, Request, open_log
+from vftcli.readers.table import Pick, Picks, Table, listed, picked, picks_of
+
+TORQUE = "tau_ext"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReferenceTable:
+    """What a reference file holds.
+
+    Attributes:
+        t: Its stamps, on the clock of the log it belongs to. (T,) [s]
+        tau: External torque on the robot, or None. (T, n) [N·m]
+        wrench: Force then moment on the robot, or None. (T, 6) [N, N·m]
+        wrench_frame: Frame of the wrench as the columns' description gave it, or None.
+    """
+
+    t: Array
+    tau: Array | None
+    wrench: Array | None
+    wrench_frame: str | None
+
+
+def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
+    """Read a reference file: text, compressed text or Parquet.
+
+    Args:
+        path: The file.
+        columns: Its columns, in the grammar of ``--columns``; None to find ``t`` and the one group
+            of columns whose name ends in ``tau_ext``.
+
+    Raises:
+        LogError: If the file is no table, or its columns cannot be told.
+        ClockError: If its clock does not increase.
+    """
+    file = open_log(path)
+    table = opened(file)
+    picks = picks_of(table, parse_columns(columns), as_given) if columns else found(table)
+    raw = picked(table, picks, Request(signals=frozenset({TORQUE, "wrench"})))
+    t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
+    check_clock(t, str(path))
+    for name, values in raw.signals.items():
+        if not np.all(np.isfinite(values)):
+            row, column = np.argwhere(~np.isfinite(values))[0]
+            raise LogError(f"{path}: {name} {column + 1} is not a number in row {row + 1}.")
+    return ReferenceTable(
+        t=t,
+        tau=raw.signals.get(TORQUE),
+        wrench=raw.signals.get("wrench"),
+        wrench_frame=raw.wrench_frame,
+    )
+
+
+def opened(file: LogFile) -> Table:
+    """The file as a table.
+
+    Raises:
+        LogError: If it is none.
+    """
+    if file.head.startswith(b"PAR1"):
+        return ParquetTable(file.path, file.path)
+    if not file.lines:
+        raise LogError(f"{file.path}: not a text table or Parquet file; a reference is one of them.")
+    return TextTable(file)
+
+
+def as_given(table: Table, picks: Picks) -> Picks:
+    """Accept the picks of a reference: a torque or a wrench, and one column of time."""
+    signals = {pick.signal: pick for pick in picks.signals}
+    if not {TORQUE, "wrench"} & set(signals):
+        raise LogError(
+            f"{table.path}: --reference-columns names neither tau_ext nor a wrench, as in t,tau_ext:6."
+        )
+    if (wrench := signals.get("wrench")) and len(wrench.cells) != 6:
+        raise LogError(f"{table.path}: a wrench has 6 columns, not {len(wrench.cells)}.")
+    return picks
+
+
+def found(table: Table) -> Picks:
+    """Find the clock, the torques and the wrench by their names.
+
+    Raises:
+        LogError: If no group of columns, or more than one, can be the torques.
+    """
+    if table.names is None:
+        raise LogError(
+            f"{table.path}: a table without a header. Say what its {table.width} columns are with "
+            "--reference-columns, as in t,tau_ext:6."
+        )
+    groups = {name: g for name, g in grouped(table).items() if name.endswith(TORQUE)}
+    wrench = _wrench(table)
+    if len(groups) > 1 or not (groups or wrench):
+        there = " and ".join(groups) or f"no column ends in {TORQUE} among {listed(table.names)}"
+        raise LogError(
+            f"{table.path}: the reference torques cannot be told: {there}. Name them with "
+            "--reference-columns, as in t=time,tau_ext=true_tau_{i}."
+        )
+    picks = [Pick(signal=TORQUE, cells=group.cells) for group in groups.values()]
+    if wrench is not None:
+        picks.append(wrench)
+    return Picks(signals=tuple(picks), clock=_clock(table))

@@ -1,0 +1,105 @@
+"""The references a comparison can be made against: one table of names."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vftcli.errors import ReferenceTorqueError
+from vftcli.recording import Recording
+from vftcli.robots.robot import Robot
+from vftcli.torque import ExternalTorque
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReferenceRequest:
+    """Which reference, and what it is made from.
+
+    Attributes:
+        name: A key of `REFERENCES`, or ``file:PATH``.
+        free: Free runs of the same trajectory, already read, for ``two-cycle``.
+        columns: The column description of a reference file, or None to recognise its columns.
+    """
+
+    name: str
+    free: tuple[Recording, ...] = ()
+    columns: str | None = None
+
+
+def zero(recording: Recording, _robot: Robot, _request: ReferenceRequest) -> ExternalTorque:
+    """No contact at all: the reference of a free motion, exact if the motion really was free."""
+    shape = recording.q.shape
+    return ExternalTorque(
+        name="zero",
+        t=recording.t,
+        tau=np.zeros(shape),
+        floor=np.zeros(shape[1]),
+        notes=("reference zero: every estimate counts as error, so the motion must be free",),
+    )
+
+
+def vendor(recording: Recording, _robot: Robot, _request: ReferenceRequest) -> ExternalTorque:
+    """The vendor's own estimate in the log, torque on the robot; its error is not known."""
+    return ExternalTorque(
+        name="vendor",
+        t=recording.t,
+        tau=recording.require("tau_ext"),
+        notes=(
+            "reference vendor: the log's own external torque, itself an estimate unless the log was "
+            "simulated, so its floor is not known; the RMSE measures agreement, not accuracy",
+        ),
+    )
+
+
+def two_cycle(recording: Recording, robot: Robot, request: ReferenceRequest) -> ExternalTorque:
+    """The two-cycle difference against a free run in another log."""
+    from vftcli.truth.two_cycle import two_cycle_reference
+
+    if not request.free:
+        raise ReferenceTorqueError(
+            "two-cycle needs a free run of the same trajectory: give its log with --free"
+        )
+    return two_cycle_reference(recording, request.free, robot)
+
+
+def from_file(recording: Recording, _robot: Robot, request: ReferenceRequest) -> ExternalTorque:
+    """A table with t and one torque column a joint, on the log's own clock."""
+    from vftcli.truth.file import reference_from_file
+
+    path = Path(request.name.removeprefix("file:"))
+    return reference_from_file(path, recording, request.columns)
+
+
+REFERENCES: dict[str, Callable[[Recording, Robot, ReferenceRequest], ExternalTorque]] = {
+    "zero": zero,
+    "vendor": vendor,
+    "two-cycle": two_cycle,
+}
+"""Name at the command line → what makes it; ``file:PATH`` is the one name with a path in it."""
+
+
+def names() -> Sequence[str]:
+    """Every form `--reference` takes."""
+    return (*REFERENCES, "file:PATH")
+
+
+def make_reference(
+    recording: Recording, robot: Robot, request: ReferenceRequest
+) -> ExternalTorque:
+    """Make the reference a comparison asks for, on the recording's clock.
+
+    Raises:
+        ReferenceTorqueError: If there is no such reference, or it cannot be made from the log.
+    """
+    if request.name.startswith("file:"):
+        return from_file(recording, robot, request)
+    if request.name not in REFERENCES:
+        raise ReferenceTorqueError(
+            f"no reference {request.name!r}; there is {', '.join(names())}"
+        )
+    if request.free and request.name != "two-cycle":
+        raise ReferenceTorqueError(
+            f"--free goes with --reference two-cycle, not with {request.name}"
+        )
+    return REFERENCES[request.name](recording, robot, request)
