@@ -1,0 +1,108 @@
+"""`vftcli simulate`: an experiment as a log a robot would write, with the truth beside it."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vftcli.cli import options as opt
+
+Scenario = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENARIO", help="Name of a scenario (`vftcli simulate list`) or a FILE.toml."
+    ),
+]
+LogPath = Annotated[
+    Path, typer.Option("-o", "--output", metavar="PATH", help="The log file or bag folder.")
+]
+Seed = Annotated[
+    int | None,
+    typer.Option(min=0, help="Seed of everything drawn; default: the scenario's own."),
+]
+As = Annotated[
+    str,
+    typer.Option(
+        "--as",
+        metavar="FORMAT",
+        help="rtde, ur-rtde, libfranka, rosbag2 or parquet; default: the vendor's own.",
+    ),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Repeatable: servo.stiffness=soft, sensing.clock_drift=0.003, duration=8, robot=ur10e.",
+    ),
+]
+
+WIDTH = 30
+"""Width of the progress bar. [characters]"""
+QUICK = 1.0
+"""Runs shorter than this show no bar. [s]"""
+
+
+def simulate_log(
+    scenario: Scenario,
+    output: LogPath = Path(),
+    seed: Seed = None,
+    log_format: As = "",
+    settings: Settings = None,
+    force: opt.Force = False,
+    json: opt.Json = False,
+) -> None:
+    """Simulate an experiment: the log, PATH.truth.parquet and PATH.scenario.toml.
+
+    Example: vftcli simulate ur5-circle -o log.csv --seed 2
+    """
+    import json as json_module
+
+    from vftcli.simulation import load_scenario
+    from vftcli.simulation.load import listing
+    from vftcli.simulation.pairs import simulate_pair
+    from vftcli.simulation.saving import check_target, free_path, save
+
+    if scenario == "list":
+        for name, title in listing():
+            typer.echo(f"{name:<16} {title}")
+        return
+    setup = load_scenario(scenario, settings or ())
+    paths = [output, free_path(output)] if setup.pair else [output]
+    check_target(paths, force)
+    runs = simulate_pair(setup, seed, progress_bar())
+    files = [
+        str(file)
+        for path, run in zip(paths, runs, strict=True)
+        for file in save(run, path, log_format, force)
+    ]
+    if json:
+        about = {"scenario": setup.name, "seed": runs[0].seed, "files": files}
+        about |= {"samples": len(runs[0].measured.rows), "robot": setup.robot}
+        typer.echo(json_module.dumps(about, indent=2))
+        return
+    for file in files:
+        typer.echo(f"wrote {file}", err=True)
+
+
+def progress_bar() -> Callable[[int, int], None] | None:
+    """A line on stderr that says how far the run is, if somebody watches and it takes a while."""
+    import time
+
+    if not sys.stderr.isatty():
+        return None
+    begun = time.monotonic()
+
+    def show(done: int, total: int) -> None:
+        if time.monotonic() - begun < QUICK:
+            return
+        filled = WIDTH * done // max(total, 1)
+        typer.echo(
+            f"\r[{'#' * filled:<{WIDTH}}] {100 * done // max(total, 1)} %", err=True, nl=False
+        )
+        if done >= total:
+            typer.echo("\r" + " " * (WIDTH + 8) + "\r", err=True, nl=False)
+
+    return show

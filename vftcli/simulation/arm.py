@@ -1,0 +1,187 @@
+"""The simulated arm with its servo and its contacts, one inner step at a time."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.robots import Robot, load_robot
+from vftcli.simulation.mismatch import TrueArm, build_arm
+from vftcli.simulation.plant import Plant
+from vftcli.simulation.scenario import Scenario
+from vftcli.simulation.servo import Servo
+from vftcli.simulation.touch import Touching
+from vftcli.simulation.trajectories import Reference
+
+WARMING_STEPS = 250
+"""Inner steps between two updates of the friction's temperature."""
+
+
+@dataclass(kw_only=True)
+class History:
+    """What happened, one row an inner step; row k covers the time from k·step to (k+1)·step.
+
+    Attributes:
+        step: Inner step. [s]
+        q, v: State at the start of the step. (N, n) [rad, rad/s]
+        a: Acceleration over the step. (N, n) [rad/s²]
+        tau: Drive torque over the step. (N, n) [N·m]
+        friction: Friction torque over the step. (N, n) [N·m]
+        target_q, target_dq, target_ddq: The reference at the start of the step. (N, n)
+        wrenches: Wrench of each contact at the middle of the step. (N, C, 6) [N, N·m]
+        walk: Joint torque of the random walks. (N, n) [N·m]
+        rows: Steps made so far.
+    """
+
+    step: float
+    q: Array
+    v: Array
+    a: Array
+    tau: Array
+    friction: Array
+    target_q: Array
+    target_dq: Array
+    target_ddq: Array
+    wrenches: Array
+    walk: Array
+    rows: int = field(default=0)
+
+    @classmethod
+    def room(cls, step: float, steps: int, joints: int, contacts: int) -> "History":
+        """Return room for `steps` steps, and one more for the state after the last."""
+        room = (np.zeros((steps + 1, joints)) for _ in range(9))
+        q, v, a, tau, friction, target_q, target_dq, target_ddq, walk = room
+        return cls(
+            step=step,
+            q=q,
+            v=v,
+            a=a,
+            tau=tau,
+            friction=friction,
+            target_q=target_q,
+            target_dq=target_dq,
+            target_ddq=target_ddq,
+            wrenches=np.zeros((steps + 1, contacts, 6)),
+            walk=walk,
+        )
+
+
+class Arm:
+    """An arm under its servo, touched by its scenario's contacts.
+
+    A controller in the loop calls `step` with its command and reads `q`, `v` and the mean torque of
+    the last interval; `vftcli.simulation.simulate` does so with the scenario's own trajectory.
+
+    Attributes:
+        scenario: The experiment.
+        robot: The profile.
+        true: The arm as it is.
+        plant: Its dynamics.
+        servo: Its position controller.
+        touching: Its contacts.
+        history: What happened so far.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int, start: Reference, duration: float) -> None:
+        """Prepare a run.
+
+        Args:
+            scenario: The experiment.
+            seed: Seed of everything drawn.
+            start: The reference at the start, one row; the arm starts on it.
+            duration: Length of the run. [s]
+        """
+        if seed < 0:
+            raise ParameterError(f"the seed is {seed}; it must be zero or positive")
+        self.scenario, self.seed = scenario, seed
+        self.robot: Robot = load_robot(scenario.robot)
+        self.seeds: dict[str, Any] = dict(
+            zip(("arm", "contacts", "sensing"), np.random.SeedSequence(seed).spawn(3), strict=True)
+        )
+        rng = np.random.default_rng(self.seeds["arm"])
+        self.true: TrueArm = build_arm(scenario, self.robot, rng)
+        h = scenario.step
+        q, v = start.q[0], start.dq[0]
+        self.plant = Plant(self.true.chain.to_pinocchio(), self.true.friction, q, v, h)
+        self.servo = Servo(scenario.servo, self.true.nominal, q)
+        self.steps = int(np.ceil(duration / h - 1e-9))
+        self.touching = Touching(
+            scenario.contacts, self.robot.chain, self.steps, h, self.seeds["contacts"]
+        )
+        contacts = len(self.touching.mounted)
+        self.history = History.room(h, self.steps, self.robot.joints, contacts)
+
+    @property
+    def t(self) -> float:
+        """Time now. [s]"""
+        return self.history.rows * self.scenario.step
+
+    @property
+    def q(self) -> Array:
+        """True positions now. (n,) [rad]"""
+        return self.plant.q
+
+    @property
+    def v(self) -> Array:
+        """True velocities now. (n,) [rad/s]"""
+        return self.plant.v
+
+    def command(self, q_d: Array, dq_d: Array | None = None, ddq_d: Array | None = None) -> None:
+        """Make one inner step towards a commanded position, with the servo's own feed-forward.
+
+        Args:
+            q_d: Commanded positions. (n,) [rad]
+            dq_d: Commanded velocities, zero if not given. (n,) [rad/s]
+            ddq_d: Commanded accelerations, zero if not given. (n,) [rad/s²]
+        """
+        nothing = np.zeros_like(q_d)
+        rows = [q_d, nothing if dq_d is None else dq_d, nothing if ddq_d is None else ddq_d]
+        reference = Reference(*(np.asarray(row, dtype=float)[None] for row in rows))
+        forward = self.servo.feed_forward(reference)[0]
+        self.step(reference.q[0], reference.dq[0], reference.ddq[0], forward)
+
+    def step(self, q_d: Array, dq_d: Array, ddq_d: Array, forward: Array) -> None:
+        """Make one inner step with a feed-forward torque `forward` (n,) [N·m] already known."""
+        history, plant, k = self.history, self.plant, self.history.rows
+        if k >= self.steps:
+            raise ParameterError(f"the run was prepared for {self.steps} steps and has made them")
+        tau = self.servo.torque(forward, q_d, dq_d, plant.q, plant.v)
+        history.q[k], history.v[k], history.tau[k] = plant.q, plant.v, tau
+        history.target_q[k], history.target_dq[k], history.target_ddq[k] = q_d, dq_d, ddq_d
+        t = (k + 0.5) * plant.step
+        if self.scenario.friction.temperature_coefficient and k % WARMING_STEPS == 0:
+            self.warm(t)
+        if self.touching.anything(t):
+            plant.advance(tau, lambda m, data, v: self.touching.torque(t, m, data, v))
+            history.wrenches[k] = self.touching.wrenches
+        else:
+            plant.advance(tau)
+        history.a[k], history.friction[k] = plant.a, plant.friction
+        history.rows = k + 1
+
+    def warm(self, t: float) -> None:
+        """Let the viscous friction follow the joints' temperature."""
+        sensing = self.scenario.sensing
+        rise = sensing.warming * (1.0 - np.exp(-t / sensing.warming_time))
+        factor = 1.0 + self.scenario.friction.temperature_coefficient * rise
+        self.plant.true_friction = self.true.friction.warmed(max(factor, 0.0))
+
+    def finished(self) -> History:
+        """The history so far, with the state after the last step as its closing row."""
+        history, k = self.history, self.history.rows
+        history.q[k], history.v[k] = self.plant.q, self.plant.v
+        for name in ("target_q", "target_dq", "target_ddq", "tau", "friction", "a"):
+            array = getattr(history, name)
+            array[k] = array[k - 1]
+        for walk in self.touching.walks:
+            history.walk[:k] += walk.torque[:k]
+        return history
+
+    def mean_torque(self, interval: float) -> Array:
+        """Mean drive torque over the last `interval` [s], as the log measures it. (n,) [N·m]"""
+        rows = max(round(interval / self.scenario.step), 1)
+        k = self.history.rows
+        mean: Array = self.history.tau[max(k - rows, 0) : max(k, 1)].mean(axis=0)
+        return mean / self.true.gain + self.true.offset

@@ -1,0 +1,423 @@
+"""What touches the arm: force profiles, pushes drawn from the seed, a hand, a hung load, a stop.
+
+Each kind is a section ``[[contacts]]`` of a scenario with a `kind`. A contact acts at `point` of a
+link (`link` 0: the flange, else the link of that joint) with a wrench ON the robot in base axes.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple, Protocol
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+
+Vector = tuple[float, float, float]
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+class Place(NamedTuple):
+    """Where a contact's point is and how it moves, in base axes.
+
+    Attributes:
+        rotation: Orientation of the link (the flange for link 0). (3, 3)
+        position: The point. (3,) [m]
+        velocity: Its velocity. (3,) [m/s]
+        spin: Angular velocity of the link. (3,) [rad/s]
+    """
+
+    rotation: Array
+    position: Array
+    velocity: Array
+    spin: Array
+
+
+class Contact(Protocol):
+    """A contact during a run; it may remember where it took hold."""
+
+    def active(self, t: float) -> bool:
+        """Whether it may exert anything at time `t` [s]."""
+        ...
+
+    def wrench(self, t: float, place: Place) -> Array:
+        """Force and moment about the point ON the robot, in base axes. (6,) [N, N·m]"""
+        ...
+
+
+def ramp(t: float, start: float, rise: float, stop: float, fall: float) -> float:
+    """A rounded trapezoid: 0, up from `start` within `rise`, down by `stop` within `fall`."""
+    if t <= start or t >= stop:
+        return 0.0
+    up = 1.0 if rise <= 0 else min((t - start) / rise, 1.0)
+    down = 1.0 if fall <= 0 else min((stop - t) / fall, 1.0)
+    return 0.25 * (1.0 - math.cos(math.pi * up)) * (1.0 - math.cos(math.pi * down))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProfileSpec:
+    """A stated wrench, switched on and off smoothly at stated times.
+
+    Attributes:
+        name: Name of the contact.
+        spans: Start and end of each application. (K, 2) [s]
+        force: Force ON the robot. (3,) [N]
+        torque: Moment ON the robot about the point. (3,) [N·m]
+        rise: Time to the full wrench. [s]
+        fall: Time of the release. [s]
+        axes: "base" or "link": what the components refer to.
+        link: The link it acts on; 0 for the flange.
+        point: The point in the link's frame. (3,) [m]
+    """
+
+    KIND: ClassVar[str] = "profile"
+    name: str
+    spans: tuple[tuple[float, float], ...]
+    force: Vector = ORIGIN
+    torque: Vector = ORIGIN
+    rise: float = 0.2
+    fall: float = 0.2
+    axes: str = "base"
+    link: int = 0
+    point: Vector = ORIGIN
+
+    def start(self, rng: np.random.Generator, duration: float) -> "Segments":
+        """Make the contact ready to act; nothing is drawn."""
+        del rng, duration
+        check_choice("axes", self.axes, ("base", "link"))
+        wrench = np.concatenate([self.force, self.torque])
+        rows = [Push(a, b, self.rise, self.fall, wrench) for a, b in self.spans]
+        return Segments(rows, in_link=self.axes == "link")
+
+
+class Push(NamedTuple):
+    """One application of a wrench (6,) [N, N·m] from `start` to `stop` [s]."""
+
+    start: float
+    stop: float
+    rise: float
+    fall: float
+    wrench: Array
+
+
+class Segments:
+    """A sequence of pushes that do not overlap."""
+
+    def __init__(self, pushes: list[Push], in_link: bool = False) -> None:
+        self.pushes = sorted(pushes, key=lambda p: p.start)
+        self.in_link = in_link
+        self.next = 0
+
+    def current(self, t: float) -> Push | None:
+        """The push going on at `t`, or None. [s]"""
+        while self.next < len(self.pushes) and self.pushes[self.next].stop <= t:
+            self.next += 1
+        if self.next < len(self.pushes) and self.pushes[self.next].start < t:
+            return self.pushes[self.next]
+        return None
+
+    def active(self, t: float) -> bool:
+        """Whether a push is going on."""
+        return self.current(t) is not None
+
+    def wrench(self, t: float, place: Place) -> Array:
+        """The push's wrench in base axes. (6,) [N, N·m]"""
+        push = self.current(t)
+        if push is None:
+            return np.zeros(6)
+        size = ramp(t, push.start, push.rise, push.stop, push.fall)
+        wrench = size * push.wrench
+        if self.in_link:
+            return np.concatenate([place.rotation @ wrench[:3], place.rotation @ wrench[3:]])
+        return wrench
+
+
+class PushStyle(NamedTuple):
+    """Ranges from which pushes are drawn evenly.
+
+    Attributes:
+        length: Shortest and longest push. [s]
+        pause: Shortest and longest pause between pushes. [s]
+        force: Smallest and largest peak force. [N]
+        torque: Smallest and largest peak moment. [N·m]
+    """
+
+    length: tuple[float, float]
+    pause: tuple[float, float]
+    force: tuple[float, float]
+    torque: tuple[float, float]
+
+
+STYLES: dict[str, PushStyle] = {
+    "slow": PushStyle((0.8, 2.0), (0.3, 1.0), (20.0, 60.0), (0.0, 3.0)),
+    "taps": PushStyle((0.14, 0.40), (0.3, 0.9), (30.0, 136.0), (0.0, 4.0)),
+    "mixed": PushStyle((0.1, 1.5), (0.3, 1.0), (20.0, 90.0), (0.0, 4.0)),
+}
+"""Name of a style of pushing → what it draws from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PushesSpec:
+    """Pushes of random strength and direction, as a hand gives them, drawn from the seed.
+
+    Attributes:
+        name: Name of the contact.
+        style: "slow", "taps" or "mixed"; the ranges below override its own.
+        begin: No push before this. [s]
+        end: No push after this; 0 for the end of the log. [s]
+        length: Shortest and longest push. [s]
+        pause: Shortest and longest pause. [s]
+        force: Smallest and largest peak force. [N]
+        torque: Smallest and largest peak moment. [N·m]
+        vertical: Share of the force that may point along base z.
+        link: The link it acts on; 0 for the flange.
+        point: The point in the link's frame. (3,) [m]
+    """
+
+    KIND: ClassVar[str] = "pushes"
+    name: str
+    style: str = "slow"
+    begin: float = 0.0
+    end: float = 0.0
+    length: tuple[float, float] | None = None
+    pause: tuple[float, float] | None = None
+    force: tuple[float, float] | None = None
+    torque: tuple[float, float] | None = None
+    vertical: float = 0.5
+    link: int = 0
+    point: Vector = ORIGIN
+
+    def start(self, rng: np.random.Generator, duration: float) -> Segments:
+        """Draw the pushes."""
+        check_choice("style", self.style, STYLES)
+        given = {k: v for k in PushStyle._fields if (v := getattr(self, k)) is not None}
+        style = STYLES[self.style]._replace(**given)
+        if min(style.length[0], style.pause[0]) <= 0:
+            raise ParameterError(f"contacts.{self.name}: length and pause must be positive")
+        stop, t = self.end or duration, self.begin
+        pushes: list[Push] = []
+        while True:
+            t += rng.uniform(*style.pause)
+            length = rng.uniform(*style.length)
+            force = rng.uniform(*style.force) * direction(rng, self.vertical)
+            torque = rng.uniform(*style.torque) * direction(rng, 1.0)
+            if t + length > stop:
+                return Segments(pushes)
+            wrench = np.concatenate([force, torque])
+            pushes.append(Push(t, t + length, 0.5 * length, 0.5 * length, wrench))
+            t += length
+
+
+def direction(rng: np.random.Generator, vertical: float) -> Array:
+    """A random direction whose vertical part is scaled by `vertical`. (3,)"""
+    vector = rng.standard_normal(3) * np.array([1.0, 1.0, vertical])
+    unit: Array = vector / np.linalg.norm(vector)
+    return unit
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandSpec:
+    """A hand that grabs the handle, moves, and lets go: a spring and damper to a moving anchor.
+
+    Attributes:
+        name: Name of the contact.
+        spans: When it grabs and when it lets go, one pair a grab. (K, 2) [s]
+        moves: Displacement of the hand's anchor in each grab, in base axes. (K, 3) [m]
+        turns: Rotation vector of the anchor in each grab, in base axes. (K, 3) [rad]
+        reach: Time in which the hand makes its move. [s]
+        stiffness: Spring to the hand's position. [N/m]
+        damping: Damper. [N·s/m]
+        twist_stiffness: Spring to the hand's orientation. [N·m/rad]
+        twist_damping: Damper. [N·m·s/rad]
+        link: The link it holds; 0 for the flange.
+        point: The point in the link's frame. (3,) [m]
+    """
+
+    KIND: ClassVar[str] = "hand"
+    name: str
+    spans: tuple[tuple[float, float], ...]
+    moves: tuple[Vector, ...] = ()
+    turns: tuple[Vector, ...] = ()
+    reach: float = 0.6
+    stiffness: float = 200.0
+    damping: float = 15.0
+    twist_stiffness: float = 0.0
+    twist_damping: float = 0.0
+    link: int = 0
+    point: Vector = ORIGIN
+
+    def start(self, rng: np.random.Generator, duration: float) -> "Hand":
+        """Make the hand ready to grab; nothing is drawn."""
+        del rng, duration
+        for name in ("moves", "turns"):
+            if getattr(self, name) and len(getattr(self, name)) != len(self.spans):
+                raise ParameterError(
+                    f"contacts.{self.name}.{name} has {len(getattr(self, name))} rows; it must "
+                    f"have one for each of the {len(self.spans)} spans"
+                )
+        return Hand(self)
+
+
+class Hand:
+    """A hand during a run: it remembers where it took hold."""
+
+    def __init__(self, spec: HandSpec) -> None:
+        self.spec = spec
+        self.grip: int | None = None
+        self.held_at, self.held_as = np.zeros(3), np.eye(3)
+
+    def span(self, t: float) -> int | None:
+        """Index of the grab going on at `t` [s], or None."""
+        for k, (start, stop) in enumerate(self.spec.spans):
+            if start <= t < stop:
+                return k
+        return None
+
+    def active(self, t: float) -> bool:
+        """Whether the hand holds on."""
+        return self.span(t) is not None
+
+    def wrench(self, t: float, place: Place) -> Array:
+        """Spring and damper between the handle and the hand. (6,) [N, N·m]"""
+        k = self.span(t)
+        if k is None:
+            return np.zeros(6)
+        if k != self.grip:
+            self.grip, self.held_at, self.held_as = k, place.position, place.rotation
+        spec = self.spec
+        u = min((t - spec.spans[k][0]) / spec.reach, 1.0) if spec.reach > 0 else 1.0
+        way = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+        move = np.array(spec.moves[k]) if spec.moves else np.zeros(3)
+        turn = np.array(spec.turns[k]) if spec.turns else np.zeros(3)
+        gap = self.held_at + way * move - place.position
+        force = spec.stiffness * gap - spec.damping * place.velocity
+        torque = -spec.twist_damping * place.spin
+        if spec.twist_stiffness:
+            torque = torque + spec.twist_stiffness * self.twist(way * turn, place.rotation)
+        return np.concatenate([force, torque])
+
+    def twist(self, turn: Array, rotation: Array) -> Array:
+        """Rotation vector from the handle's orientation to the hand's, in base axes. (3,) [rad]"""
+        import pinocchio as pin
+
+        goal = pin.exp3(turn) @ self.held_as
+        error: Array = pin.log3(goal @ rotation.T)
+        return error
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadSpec:
+    """A load hung on a string: its weight, pulling straight down at the point.
+
+    Attributes:
+        name: Name of the contact.
+        weight: Weight. [N]
+        spans: When it hangs. (K, 2) [s]
+        rise: Time in which the string takes the load. [s]
+        fall: Time in which it comes off. [s]
+        link: The link it hangs on; 0 for the flange.
+        point: The point in the link's frame. (3,) [m]
+    """
+
+    KIND: ClassVar[str] = "load"
+    name: str
+    weight: float
+    spans: tuple[tuple[float, float], ...]
+    rise: float = 0.5
+    fall: float = 0.3
+    link: int = 0
+    point: Vector = ORIGIN
+
+    def start(self, rng: np.random.Generator, duration: float) -> Segments:
+        """Make the load ready to hang; nothing is drawn."""
+        del rng, duration
+        if self.weight < 0:
+            raise ParameterError(f"contacts.{self.name}.weight is negative")
+        down = np.array([0.0, 0.0, -self.weight, 0.0, 0.0, 0.0])
+        return Segments([Push(a, b, self.rise, self.fall, down) for a, b in self.spans])
+
+
+@dataclass(frozen=True, kw_only=True)
+class StopSpec:
+    """A hard stop: a plane that pushes back when the point goes beyond it.
+
+    Attributes:
+        name: Name of the contact.
+        through: A point of the plane in the base frame. (3,) [m]
+        normal: Its normal, pointing to the free side. (3,)
+        stiffness: Stiffness of the plane. [N/m]
+        damping: Damping while pressed. [N·s/m]
+        link: The link that meets it; 0 for the flange.
+        point: The point in the link's frame. (3,) [m]
+    """
+
+    KIND: ClassVar[str] = "stop"
+    name: str
+    through: Vector
+    normal: Vector = (0.0, 0.0, 1.0)
+    stiffness: float = 2e4
+    damping: float = 200.0
+    link: int = 0
+    point: Vector = ORIGIN
+
+    def start(self, rng: np.random.Generator, duration: float) -> "Stop":
+        """Make the stop ready; nothing is drawn."""
+        del rng, duration
+        return Stop(self)
+
+
+class Stop:
+    """A hard stop during a run."""
+
+    def __init__(self, spec: StopSpec) -> None:
+        self.spec = spec
+        length = float(np.linalg.norm(spec.normal))
+        if length == 0.0:
+            raise ParameterError(f"contacts.{spec.name}.normal has no length")
+        self.normal = np.array(spec.normal) / length
+
+    def active(self, t: float) -> bool:
+        """A stop is always there."""
+        del t
+        return True
+
+    def wrench(self, t: float, place: Place) -> Array:
+        """Push along the normal, never a pull. (6,) [N, N·m]"""
+        del t
+        depth = float(self.normal @ (np.array(self.spec.through) - place.position))
+        if depth <= 0.0:
+            return np.zeros(6)
+        speed = float(self.normal @ place.velocity)
+        size = max(self.spec.stiffness * depth - self.spec.damping * speed, 0.0)
+        return np.concatenate([size * self.normal, np.zeros(3)])
+
+
+@dataclass(frozen=True, kw_only=True)
+class RandomWalkSpec:
+    """Joint torques that walk at random, the disturbance model of the Kalman observers.
+
+    Attributes:
+        name: Name of the contact.
+        intensity: Variance gained a second: Q_τ; one number or one a joint. [(N·m)²/s]
+        initial: Standard deviation at the start. [N·m]
+        begin: The walk is zero before this. [s]
+    """
+
+    KIND: ClassVar[str] = "random-walk"
+    name: str
+    intensity: tuple[float, ...]
+    initial: float = 0.0
+    begin: float = 0.0
+
+
+WrenchSpec = ProfileSpec | PushesSpec | HandSpec | LoadSpec | StopSpec
+ContactSpec = WrenchSpec | RandomWalkSpec
+
+
+def check_choice(key: str, value: str, options: object) -> None:
+    """Raise unless `value` is one of the words a key takes."""
+    from vftcli.simulation.schema import unknown
+
+    words = list(options)  # type: ignore[call-overload]
+    if value not in words:
+        raise ParameterError(unknown(f"{key} {value!r}", value, words))

@@ -1,0 +1,156 @@
+"""One simulated experiment from scenario and seed to the log and its truth."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.recording import Recording, Source
+from vftcli.robots import Robot, load_robot
+from vftcli.simulation.arm import Arm
+from vftcli.simulation.force_sensor import read_force_sensor
+from vftcli.simulation.scenario import Scenario
+from vftcli.simulation.sensing import Measured, Samples, check_sensing, measure, sample
+from vftcli.simulation.trajectories import Reference, plan
+from vftcli.simulation.truth import Truth, tell_truth
+from vftcli.simulation.vendor import Vendor, vendor_view
+
+LONGEST = 3600.0
+"""Longest run. [s]"""
+REPORT_STEPS = 500
+"""Inner steps between two reports of progress."""
+
+Progress = Callable[[int, int], None]
+"""Called with the steps done and the steps in all."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulation:
+    """A finished run.
+
+    Attributes:
+        scenario: The experiment.
+        seed: The seed used.
+        robot: The profile.
+        nominal: The controller's robot: the profile with the payload it knows.
+        samples: True signals at the sampling instants.
+        measured: What the sensors report.
+        vendor: What the controller reports.
+        force_sensor: Reading of the flange sensor, sensor axes, ON the robot. (M, 6) [N, N·m]
+        truth: What really happened.
+    """
+
+    scenario: Scenario
+    seed: int
+    robot: Robot
+    nominal: Robot
+    samples: Samples
+    measured: Measured
+    vendor: Vendor
+    force_sensor: Array | None
+    truth: Truth
+
+    @property
+    def recording(self) -> Recording:
+        """The log as a reader would hand it over: repeats dropped, losses left as gaps."""
+        written = np.array(self.measured.rows)
+        rows = np.unique(written)
+        seen = self.measured
+        t = seen.stamp[rows] - seen.stamp[rows[0]]
+        duplicates = len(written) - len(rows)
+        repairs = (f"dropped {duplicates} repeated rows",) if duplicates else ()
+        in_current = seen.current is not None
+        current = self.vendor.target_current
+        return Recording(
+            t=t,
+            q=seen.q[rows],
+            dq=seen.dq[rows],
+            current=seen.current[rows] if seen.current is not None else None,
+            torque=None if in_current else seen.torque[rows],
+            target_q=self.samples.target_q[rows],
+            target_dq=self.samples.target_dq[rows],
+            target_current=current[rows] if current is not None else None,
+            target_torque=self.vendor.target_torque[rows],
+            tau_ext=None if in_current else self.vendor.tau_ext[rows],
+            temperature=seen.temperature[rows] if in_current else None,
+            wrench=None if self.force_sensor is None else self.force_sensor[rows],
+            wrench_frame=None if self.force_sensor is None else "sensor axes, force on the robot",
+            joint_names=self.robot.chain.names,
+            robot_hint=self.robot.name,
+            source=Source(
+                format="simulation",
+                clock="simulated controller clock",
+                rows=len(written),
+                duplicates=duplicates,
+                repairs=repairs,
+            ),
+        )
+
+
+def prepare(scenario: Scenario, seed: int) -> tuple[Arm, Reference]:
+    """Plan a scenario's motion and build its arm, ready for the first step.
+
+    Raises:
+        ParameterError: If the scenario is impossible.
+    """
+    check_sensing(scenario.sensing)
+    robot = load_robot(scenario.robot)
+    duration = scenario.duration or scenario.trajectory.motion(robot).duration
+    if not 0.0 < duration <= LONGEST:
+        raise ParameterError(f"duration is {duration:g} s; it must lie in 0 to {LONGEST:g} s")
+    if scenario.step <= 0:
+        raise ParameterError(f"step is {scenario.step:g} s; it must be positive")
+    steps = int(np.ceil(duration / scenario.step - 1e-9))
+    reference = plan(scenario.trajectory, robot, np.arange(steps + 1, dtype=float) * scenario.step)
+    arm = Arm(scenario, seed, Reference(*(rows[:1] for rows in reference)), duration)
+    return arm, reference
+
+
+def simulate(
+    scenario: Scenario,
+    seed: int | None = None,
+    progress: Progress | None = None,
+    noise_seed: int | None = None,
+) -> Simulation:
+    """Run an experiment: same scenario and seed, same numbers on the same platform.
+
+    Args:
+        scenario: The experiment.
+        seed: Seed of everything drawn; the scenario's own if not given.
+        progress: Told how far the run is.
+        noise_seed: Seed of the sensors alone, for another log of the same arm and contacts.
+
+    Raises:
+        ParameterError: If the scenario is impossible.
+    """
+    arm, reference = prepare(scenario, scenario.seed if seed is None else seed)
+    if noise_seed is not None:
+        arm.seeds["sensing"] = np.random.SeedSequence(noise_seed)
+    forward = arm.servo.feed_forward(reference)
+    for k in range(arm.steps):
+        arm.step(reference.q[k], reference.dq[k], reference.ddq[k], forward[k])
+        if progress is not None and k % REPORT_STEPS == 0:
+            progress(k, arm.steps)
+    if progress is not None:
+        progress(arm.steps, arm.steps)
+    return observe(arm)
+
+
+def observe(arm: Arm) -> Simulation:
+    """Turn a finished run, whoever commanded it, into its log and truth."""
+    samples = sample(arm)
+    measured = measure(arm, samples)
+    truth = tell_truth(arm, samples)
+    return Simulation(
+        scenario=arm.scenario,
+        seed=arm.seed,
+        robot=arm.robot,
+        nominal=arm.true.nominal,
+        samples=samples,
+        measured=measured,
+        vendor=vendor_view(arm, samples, measured),
+        force_sensor=read_force_sensor(arm, samples, truth),
+        truth=truth,
+    )

@@ -1,0 +1,92 @@
+"""Flange poses and the joint angles that reach them."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.robots import Robot
+
+ITERATIONS = 100
+REACHED = 1e-10
+"""A pose counts as reached when position and rotation error are below this. [m, rad]"""
+
+
+class FlangePose(NamedTuple):
+    """Orientation (3, 3) and origin (3,) [m] of the flange in the base frame."""
+
+    rotation: Array
+    translation: Array
+
+
+def flange_pose(model: Any, q: Array) -> FlangePose:  # noqa: ANN401 - Pinocchio is untyped
+    """Pose of the flange at joint positions `q` (n,) [rad]."""
+    import pinocchio as pin
+
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, np.asarray(q, dtype=float))
+    pose = data.oMf[model.getFrameId("flange")]
+    return FlangePose(np.array(pose.rotation), np.array(pose.translation))
+
+
+def reach(model: Any, pose: FlangePose, guess: Array) -> Array | None:  # noqa: ANN401
+    """Joint positions that bring the flange to `pose`, from a nearby guess, or None. (n,) [rad]
+
+    Gauss–Newton on the error twist log(T⁻¹ T_d) with damping that vanishes with the error, so that
+    redundant arms move by the least joint motion.
+    """
+    import pinocchio as pin
+
+    data, frame = model.createData(), model.getFrameId("flange")
+    goal = pin.SE3(np.array(pose.rotation), np.array(pose.translation))
+    q = np.array(guess, dtype=float)
+    for _ in range(ITERATIONS):
+        pin.framesForwardKinematics(model, data, q)
+        error = pin.log6(data.oMf[frame].inverse() * goal).vector
+        size = float(np.linalg.norm(error))
+        if size < REACHED:
+            return q
+        J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL)
+        damping = 1e-3 * min(size, 1.0) ** 2
+        q = q + J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), error)
+    return None
+
+
+def follow(robot: Robot, poses: list[FlangePose], start: Array, what: str) -> Array:
+    """Joint positions along a path of flange poses, each from the one before. (K, n) [rad]
+
+    Raises:
+        ParameterError: If a pose is out of reach or outside the joint limits.
+    """
+    q, path = np.array(start, dtype=float), []
+    for k, pose in enumerate(poses):
+        found = reach(robot.model, pose, q)
+        if found is None or np.max(np.abs(found - q)) > 1.0:
+            x, y, z = pose.translation
+            raise ParameterError(
+                f"{what}: the flange of {robot.name!r} cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m "
+                f"(point {k + 1} of {len(poses)}); choose a smaller motion or another start"
+            )
+        q = found
+        path.append(q)
+    return np.array(path)
+
+
+def check_limits(robot: Robot, q: Array, dq: Array, what: str) -> None:
+    """Raise a ParameterError unless a motion (T, n) stays inside the robot's limits."""
+    limits = robot.limits
+    for j in range(robot.joints):
+        low, high, fastest = limits.q_min[j], limits.q_max[j], limits.qd_max[j]
+        span = (float(np.min(q[:, j])), float(np.max(q[:, j])))
+        if span[0] < low or span[1] > high:
+            raise ParameterError(
+                f"{what}: joint {j + 1} of {robot.name!r} would move over {span[0]:.3f} to "
+                f"{span[1]:.3f} rad; its limits are {low:.3f} to {high:.3f}"
+            )
+        speed = float(np.max(np.abs(dq[:, j])))
+        if speed > fastest:
+            raise ParameterError(
+                f"{what}: joint {j + 1} of {robot.name!r} would move at {speed:.2f} rad/s; "
+                f"its limit is {fastest:.2f}"
+            )

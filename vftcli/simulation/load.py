@@ -1,0 +1,155 @@
+"""Scenarios by name or file, with the user's overrides, and back to TOML."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+from vftcli.errors import ParameterError
+from vftcli.simulation.scenario import Scenario
+from vftcli.simulation.schema import build, unknown
+
+FOLDER = Path(__file__).parent / "scenarios"
+
+
+def scenario_names() -> tuple[str, ...]:
+    """Names of the built-in scenarios."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+def listing() -> list[tuple[str, str]]:
+    """Name and title of each built-in scenario."""
+    return [(name, load_scenario(name).title) for name in scenario_names()]
+
+
+def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
+    """Read a built-in scenario or a user's TOML file and apply `key=value` overrides.
+
+    Args:
+        name: Name of a built-in scenario, or a file.
+        overrides: As ``servo.stiffness=soft`` or ``contacts.hand.style=taps``; values are TOML, a
+            bare word is a string.
+
+    Raises:
+        ParameterError: If there is no such scenario, key or kind, or a value has the wrong type.
+    """
+    path = FOLDER / f"{name}.toml"
+    if not path.is_file():
+        path = Path(name)
+        if path.suffix.lower() != ".toml":
+            names = scenario_names()
+            raise ParameterError(
+                unknown(f"scenario {str(name)!r}", str(name), names) + " Or give a FILE.toml."
+            )
+    table = read_table(path)
+    table.setdefault("name", path.stem)
+    for override in overrides:
+        apply(table, override)
+    return build(Scenario, table, "")
+
+
+def read_table(path: Path) -> dict[str, Any]:
+    """Return the parsed file."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not text"
+        raise ParameterError(f"{path}: cannot be read as a scenario ({reason})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ParameterError(f"{path}: not valid TOML: {error}") from None
+
+
+def apply(table: dict[str, Any], override: str) -> None:
+    """Put one `key=value` into the parsed file; contacts are addressed by name."""
+    key, equals, text = override.partition("=")
+    if not equals or not key.strip():
+        raise ParameterError(f"--set takes key=value, not {override!r}")
+    parts = key.strip().split(".")
+    node: Any = table
+    for depth, part in enumerate(parts[:-1]):
+        node = inner(node, part, ".".join(parts[: depth + 1]))
+    node[parts[-1]] = parse_value(text.strip())
+
+
+def inner(node: Any, part: str, where: str) -> Any:  # noqa: ANN401 - TOML values
+    """Return the section or the named contact `part` of a parsed table, made if not there."""
+    found = node.setdefault(part, {}) if isinstance(node, dict) else named(node, part, where)
+    if not isinstance(found, dict | list):
+        raise ParameterError(f"{where} is a value, not a section")
+    return found
+
+
+def named(contacts: list[Any], name: str, where: str) -> Any:  # noqa: ANN401
+    """Return the contact of a name."""
+    there = [str(c.get("name")) for c in contacts if isinstance(c, dict)]
+    if name not in there:
+        raise ParameterError(unknown(f"contact {where!r}", name, there or ["none"]))
+    return contacts[there.index(name)]
+
+
+def parse_value(text: str) -> Any:  # noqa: ANN401
+    """Return a TOML value; what is none is a string."""
+    try:
+        return tomllib.loads(f"x = {text}")["x"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def to_toml(scenario: Scenario, seed: int) -> str:
+    """Return a scenario as a TOML file that makes the same log again."""
+    table = as_table(scenario)
+    table["seed"] = seed
+    lines: list[str] = []
+    write_section(lines, "", table)
+    return "\n".join(lines) + "\n"
+
+
+def as_table(section: Any) -> dict[str, Any]:  # noqa: ANN401
+    """Return a dataclass as TOML would hold it, without what is None."""
+    table: dict[str, Any] = {"kind": section.KIND} if hasattr(section, "KIND") else {}
+    for field in fields(section):
+        value = getattr(section, field.name)
+        if value is None:
+            continue
+        if is_dataclass(value):
+            value = as_table(value)
+        elif isinstance(value, tuple) and value and is_dataclass(value[0]):
+            value = [as_table(v) for v in value]
+        table[field.name] = value
+    return table
+
+
+def write_section(lines: list[str], where: str, table: Mapping[str, Any]) -> None:
+    """Append a table's lines: its plain values first, then its sections."""
+    for key, value in table.items():
+        if not is_section(value):
+            lines.append(f"{key} = {literal(value)}")
+    for key, value in table.items():
+        name = f"{where}.{key}" if where else key
+        if isinstance(value, dict):
+            lines += ["", f"[{name}]"]
+            write_section(lines, name, value)
+        elif is_section(value):
+            for entry in value:
+                lines += ["", f"[[{name}]]"]
+                write_section(lines, name, entry)
+
+
+def is_section(value: Any) -> bool:  # noqa: ANN401
+    """Whether a value is a table or a list of tables."""
+    return isinstance(value, dict) or (
+        isinstance(value, list) and bool(value) and isinstance(value[0], dict)
+    )
+
+
+def literal(value: Any) -> str:  # noqa: ANN401
+    """Return a value as TOML writes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+        return f'"{escaped}"'
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(literal(v) for v in value) + "]"
+    return repr(value)

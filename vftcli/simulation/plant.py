@@ -1,0 +1,87 @@
+"""The arm itself: rigid-body dynamics with rotor inertia and true friction, integrated in time."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.simulation.friction import TrueFriction
+from vftcli.simulation.stiction import slide_or_stick
+
+LARGEST_STEP = 1e-3
+"""Largest inner step. [s]"""
+
+External = Callable[[Any, Any, Array], Array]
+"""Torque of the contacts (n,) [N·m] from the Pinocchio model and data (joint Jacobians and
+placements are current) and the velocities, at the middle of the step."""
+
+
+class Plant:
+    """State of the arm and one step of its motion.
+
+    Moreau's midpoint scheme: with q_m = q + h/2 v and v_m extrapolated half a step ahead,
+
+    (M(q_m) + h/2 D) (v⁺ − v) = h (τ + τ_ext − C v_m − g − f_smooth(v)) − λ,   q⁺ = q + h/2 (v + v⁺)
+
+    where λ is the impulse of dry friction (`stiction`) and D the slope of the smooth friction. It is
+    of second order in h while no joint changes between sticking and sliding.
+
+    Attributes:
+        q, v: Positions and velocities now. (n,) [rad, rad/s]
+        q_mid, v_mid, a: Positions, velocities and accelerations for which the last step's balance
+            M a + C v + g = τ + τ_ext − τ_f holds exactly. (n,)
+        friction: Friction torque over the last step, opposing positive motion if positive. (n,) [N·m]
+        external: Torque of the contacts over the last step. (n,) [N·m]
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        friction: TrueFriction,
+        q: Array,
+        v: Array,
+        step: float,  # noqa: ANN401
+    ) -> None:
+        import pinocchio as pin
+
+        if not 0.0 < step <= LARGEST_STEP:
+            raise ParameterError(
+                f"step is {step:g} s; the inner step must be positive and at most {LARGEST_STEP:g} s"
+            )
+        self.pin = pin
+        self.model, self.data = model, model.createData()
+        self.true_friction = friction
+        self.step = step
+        self.q, self.v = np.array(q, dtype=float), np.array(v, dtype=float)
+        self.v_before = self.v.copy()
+        self.q_mid, self.v_mid = self.q.copy(), self.v.copy()
+        self.a = np.zeros_like(self.q)
+        self.friction = np.zeros_like(self.q)
+        self.external = np.zeros_like(self.q)
+        self.signs = np.where(friction.coulomb > 0.0, np.sign(self.v), 1.0)
+
+    def advance(self, tau: Array, external: External | None = None) -> None:
+        """Move one step on under drive torques `tau` (n,) [N·m] and the contacts' torque."""
+        h, pin, model, data = self.step, self.pin, self.model, self.data
+        q_mid = self.q + 0.5 * h * self.v
+        v_mid = 1.5 * self.v - 0.5 * self.v_before
+        v_mid[self.signs == 0.0] = 0.0
+        bias = pin.nonLinearEffects(model, data, q_mid, v_mid)
+        M = pin.crba(model, data, q_mid)
+        smooth, slope = self.true_friction.smooth(self.v)
+        torque = tau - bias - smooth
+        if external is not None:
+            pin.computeJointJacobians(model, data, q_mid)
+            self.external = external(model, data, v_mid)
+            torque = torque + self.external
+        M.flat[:: len(slope) + 1] += 0.5 * h * slope
+        limit = h * self.true_friction.dry(self.v)
+        after, impulse, self.signs = slide_or_stick(M, h * torque, self.v, limit, self.signs)
+        change = after - self.v
+        self.a = change / h
+        self.friction = smooth + 0.5 * slope * change + impulse / h
+        self.q_mid, self.v_mid = q_mid, v_mid
+        self.q = self.q + 0.5 * h * (self.v + after)
+        self.v_before, self.v = self.v, after

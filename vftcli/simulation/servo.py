@@ -1,0 +1,74 @@
+"""The joint position controller: PD about the reference with the nominal model's feed-forward."""
+
+from typing import Any
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.dynamics.friction import friction_torque
+from vftcli.errors import ParameterError
+from vftcli.robots import Robot
+from vftcli.simulation.scenario import ServoSpec
+from vftcli.simulation.schema import unknown
+from vftcli.simulation.trajectories import Reference
+
+STIFFNESS = {"stiff": 90.0, "soft": 28.0}
+"""Natural frequency of the position loop by name. [rad/s]"""
+
+
+class Servo:
+    """τ = τ_ff + K_p (q_d − q) + K_d (q̇_d − q̇), saturated at the drives' limits.
+
+    K_p = ω² M_jj and K_d = 2ζω M_jj with the nominal inertia at the start pose, so that one number
+    sets the stiffness of every joint.
+
+    Attributes:
+        kp: Position gains. (n,) [N·m/rad]
+        kd: Velocity gains. (n,) [N·m·s/rad]
+        limit: Torque limits; infinite where unknown. (n,) [N·m]
+    """
+
+    def __init__(self, spec: ServoSpec, robot: Robot, start: Array) -> None:
+        import pinocchio as pin
+
+        if isinstance(spec.stiffness, str) and spec.stiffness not in STIFFNESS:
+            raise ParameterError(
+                unknown(f"servo.stiffness {spec.stiffness!r}", spec.stiffness, STIFFNESS)
+            )
+        omega = STIFFNESS[spec.stiffness] if isinstance(spec.stiffness, str) else spec.stiffness
+        if omega <= 0 or spec.damping < 0:
+            raise ParameterError("servo.stiffness must be positive and damping not negative")
+        self.spec, self.robot = spec, robot
+        self.model, self.data = robot.model, robot.model.createData()
+        inertia = np.diag(pin.crba(self.model, self.data, start)).copy()
+        self.kp, self.kd = omega**2 * inertia, 2.0 * spec.damping * omega * inertia
+        known = np.isfinite(robot.limits.tau_max) & spec.torque_limits
+        self.limit = np.where(known, robot.limits.tau_max, np.inf)
+
+    def feed_forward(self, reference: Reference) -> Array:
+        """Nominal torque along a reference: gravity, and inertia and friction if asked. (T, n) [N·m]"""
+        rest = np.zeros_like(reference.q)
+        full = self.spec.feed_forward
+        dq, ddq = (reference.dq, reference.ddq) if full else (rest, rest)
+        return self.rigid(Reference(reference.q, dq, ddq)) + friction_torque(
+            self.robot.friction, dq
+        )
+
+    def rigid(self, reference: Reference) -> Array:
+        """Nominal rigid-body torque along a reference. (T, n) [N·m]"""
+        return rigid_torque(self.model, reference)
+
+    def torque(self, forward: Array, q_d: Array, dq_d: Array, q: Array, dq: Array) -> Array:
+        """The commanded torque. (n,) [N·m]"""
+        tau: Array = forward + self.kp * (q_d - q) + self.kd * (dq_d - dq)
+        return np.minimum(np.maximum(tau, -self.limit), self.limit)
+
+
+def rigid_torque(model: Any, reference: Reference) -> Array:  # noqa: ANN401
+    """Inverse dynamics of a Pinocchio model along a motion. (T, n) [N·m]"""
+    import pinocchio as pin
+
+    data, out = model.createData(), np.empty_like(reference.q)
+    for k, (q, dq, ddq) in enumerate(zip(*reference, strict=True)):
+        out[k] = pin.rnea(model, data, q, dq, ddq)
+    return out

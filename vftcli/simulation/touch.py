@@ -1,0 +1,150 @@
+"""Contacts mounted on the arm: where they act, what they exert, and the joint torque of it."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.robots.chain import Chain
+from vftcli.simulation.contacts import Contact, ContactSpec, Place, RandomWalkSpec, WrenchSpec
+
+
+class Mounted(NamedTuple):
+    """A contact and the body it acts on.
+
+    Attributes:
+        name: The contact's name.
+        contact: What it exerts.
+        joint: The joint that carries the body, from 1.
+        turn: Orientation of the link's frame in the joint's frame. (3, 3)
+        point: The contact's point in the joint's frame. (3,) [m]
+        on_flange: Whether it acts on the flange.
+        lever: The point in flange axes from the flange origin, for contacts there. (3,) [m]
+    """
+
+    name: str
+    contact: Contact
+    joint: int
+    turn: Array
+    point: Array
+    on_flange: bool
+    lever: Array
+
+
+class Walk(NamedTuple):
+    """A random walk of the joint torques: its value at each inner step. (N, n) [N·m]"""
+
+    name: str
+    torque: Array
+
+
+def mount(spec: WrenchSpec, chain: Chain, rng: np.random.Generator, duration: float) -> Mounted:
+    """Put a contact on its link.
+
+    Raises:
+        ParameterError: If the arm has no such link.
+    """
+    if not 0 <= spec.link <= chain.joints:
+        raise ParameterError(
+            f"contacts.{spec.name}.link is {spec.link}; it is 0 (flange) to {chain.joints}"
+        )
+    contact: Contact = spec.start(rng, duration)
+    lever = np.array(spec.point)
+    if spec.link == 0:
+        point = chain.flange_rotation @ lever + chain.flange_translation
+        return Mounted(spec.name, contact, chain.joints, chain.flange_rotation, point, True, lever)
+    return Mounted(spec.name, contact, spec.link, np.eye(3), lever, False, lever)
+
+
+def draw_walk(
+    spec: RandomWalkSpec, joints: int, steps: int, step: float, rng: np.random.Generator
+) -> Walk:
+    """Draw a random walk of joint torques over `steps` inner steps of `step` [s].
+
+    Raises:
+        ParameterError: If there is neither one intensity nor one a joint, or one is negative.
+    """
+    if len(spec.intensity) not in {1, joints} or min(spec.intensity) < 0:
+        raise ParameterError(
+            f"contacts.{spec.name}.intensity has {len(spec.intensity)} numbers; it must have one "
+            f"or {joints}, none negative"
+        )
+    sizes = np.sqrt(np.broadcast_to(spec.intensity, joints) * step)
+    walk = np.cumsum(rng.standard_normal((steps, joints)) * sizes, axis=0)
+    walk += spec.initial * rng.standard_normal(joints)
+    late = np.arange(steps) * step >= spec.begin
+    begun = walk - (walk[np.argmax(late)] if spec.begin > 0 else 0.0)
+    return Walk(spec.name, begun * late[:, None])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross product of two 3-vectors, without NumPy's general machinery."""
+    return np.array(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
+
+
+class Touching:
+    """Everything that touches the arm during a run, evaluated at the middle of each step.
+
+    Attributes:
+        mounted: Contacts that exert wrenches.
+        walks: Contacts that exert joint torques.
+        wrenches: The last wrench of each mounted contact about its point, base axes. (C, 6)
+    """
+
+    def __init__(
+        self, specs: tuple[ContactSpec, ...], chain: Chain, steps: int, step: float, seed: Any
+    ) -> None:
+        names = [spec.name for spec in specs]
+        if doubled := {name for name in names if names.count(name) > 1}:
+            raise ParameterError(f"two contacts are named {doubled.pop()!r}; name each its own way")
+        rngs = [np.random.default_rng(s) for s in seed.spawn(len(specs))]
+        self.mounted: list[Mounted] = []
+        self.walks: list[Walk] = []
+        for spec, rng in zip(specs, rngs, strict=True):
+            if isinstance(spec, RandomWalkSpec):
+                self.walks.append(draw_walk(spec, chain.joints, steps, step, rng))
+            else:
+                self.mounted.append(mount(spec, chain, rng, steps * step))
+        self.wrenches = np.zeros((len(self.mounted), 6))
+        self.step = step
+
+    def anything(self, t: float) -> bool:
+        """Whether any contact may exert something at `t` [s]."""
+        return bool(self.walks) or any(m.contact.active(t) for m in self.mounted)
+
+    def torque(self, t: float, model: Any, data: Any, v: Array) -> Array:  # noqa: ANN401
+        """Joint torque of all contacts; the data's joint Jacobians are current. (n,) [N·m]"""
+        tau = np.zeros_like(v)
+        for walk in self.walks:
+            tau += walk.torque[min(int(t / self.step), len(walk.torque) - 1)]
+        for k, mounted in enumerate(self.mounted):
+            if mounted.contact.active(t):
+                J = joint_jacobian(model, data, mounted.joint)
+                tau += self.push(k, mounted, t, J, data.oMi[mounted.joint], v)
+            else:
+                self.wrenches[k] = 0.0
+        return tau
+
+    def push(self, k: int, mounted: Mounted, t: float, J: Array, pose: Any, v: Array) -> Array:  # noqa: ANN401
+        """Joint torque of one contact, its wrench kept. (n,) [N·m]"""
+        R, origin = pose.rotation, pose.translation
+        arm = R @ mounted.point
+        twist = J @ v
+        velocity = twist[:3] + cross(twist[3:], arm)
+        place = Place(R @ mounted.turn, origin + arm, velocity, twist[3:])
+        wrench = mounted.contact.wrench(t, place)
+        self.wrenches[k] = wrench
+        moment = wrench[3:] + cross(arm, wrench[:3])
+        tau: Array = J[:3].T @ wrench[:3] + J[3:].T @ moment
+        return tau
+
+
+def joint_jacobian(model: Any, data: Any, joint: int) -> Array:  # noqa: ANN401
+    """Jacobian of a joint's origin in base axes; the data's own are current. (6, n)"""
+    import pinocchio as pin
+
+    J: Array = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
+    return J

@@ -1,0 +1,61 @@
+"""What the vendor's own controller says of the run: targets, and its estimate of contact.
+
+The estimates are what the vendors' are: the measured torque less the nominal model's, low-passed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.dynamics.friction import friction_torque
+from vftcli.robots import Robot
+from vftcli.simulation.arm import Arm
+from vftcli.simulation.sensing import Measured, Samples, log_rate
+from vftcli.simulation.servo import rigid_torque
+from vftcli.simulation.trajectories import Reference
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vendor:
+    """The controller's own quantities at each sample.
+
+    Attributes:
+        target_torque: Nominal rigid-body torque of the reference. (M, n) [N·m]
+        target_current: That and the nominal friction as current, None without drive constants.
+            (M, n) [A]
+        tau_ext: Its estimate of the external torque ON the robot. (M, n) [N·m]
+    """
+
+    target_torque: Array
+    target_current: Array | None
+    tau_ext: Array
+
+
+def vendor_view(arm: Arm, samples: Samples, measured: Measured) -> Vendor:
+    """Evaluate the controller's nominal model along a run."""
+    nominal: Robot = arm.true.nominal
+    target = Reference(samples.target_q, samples.target_dq, samples.target_ddq)
+    target_torque = rigid_torque(nominal.model, target)
+    target_current = None
+    if nominal.torque_constant is not None:
+        full = target_torque + friction_torque(nominal.friction, samples.target_dq)
+        target_current = full / nominal.torque_constant
+    motion = Reference(measured.q, measured.dq, samples.target_ddq)
+    model_torque = rigid_torque(nominal.model, motion)
+    model_torque += friction_torque(nominal.friction, measured.dq)
+    spec = arm.scenario.sensing
+    step = 1.0 / log_rate(spec, arm.robot)
+    residual = low_passed(measured.torque - model_torque, spec.vendor_cutoff, step)
+    return Vendor(target_torque=target_torque, target_current=target_current, tau_ext=-residual)
+
+
+def low_passed(signal: Array, cutoff: float, step: float) -> Array:
+    """First-order low-pass at `cutoff` [Hz] of a signal (M, n) sampled every `step` [s]."""
+    share = 1.0 - np.exp(-2.0 * np.pi * cutoff * step)
+    out = np.empty_like(signal)
+    state = signal[0].copy()
+    for k, row in enumerate(signal):
+        state = state + share * (row - state)
+        out[k] = state
+    return out

@@ -1,0 +1,66 @@
+"""Cartesian quantities that vendors log: poses, speeds and force estimates of the flange."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.arrays import Array
+
+CUT = 0.05
+"""Singular values of J (lengths in units of 0.3 m) below which a direction is left out."""
+LENGTH = 0.3
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlangeSignals:
+    """The flange along a motion.
+
+    Attributes:
+        rotation: Orientation in the base. (M, 3, 3)
+        position: Origin in the base. (M, 3) [m]
+        twist: Linear and angular velocity in base axes. (M, 6) [m/s, rad/s]
+        jacobian: Jacobian in base axes about the flange. (M, 6, n)
+    """
+
+    rotation: Array
+    position: Array
+    twist: Array
+    jacobian: Array
+
+
+def flange_signals(model: Any, q: Array, dq: Array) -> FlangeSignals:  # noqa: ANN401
+    """Evaluate the flange at positions and velocities (M, n) [rad, rad/s]."""
+    import pinocchio as pin
+
+    data, frame, count = model.createData(), model.getFrameId("flange"), len(q)
+    rotation, position = np.empty((count, 3, 3)), np.empty((count, 3))
+    jacobian = np.empty((count, 6, q.shape[1]))
+    for k, row in enumerate(q):
+        pin.computeJointJacobians(model, data, row)
+        pose = pin.updateFramePlacement(model, data, frame)
+        rotation[k], position[k] = pose.rotation, pose.translation
+        jacobian[k] = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+    twist = np.einsum("kij,kj->ki", jacobian, dq)
+    return FlangeSignals(rotation=rotation, position=position, twist=twist, jacobian=jacobian)
+
+
+def rotation_vectors(rotation: Array) -> Array:
+    """Rotation vectors of orientations (M, 3, 3), as UR logs them. (M, 3) [rad]"""
+    import pinocchio as pin
+
+    return np.array([pin.log3(R) for R in rotation])
+
+
+def force_estimate(jacobian: Array, tau_ext: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """The wrench (M, 6) that explains joint torques (M, n), and where J is regular. (M,)
+
+    Least squares through Jᵀ with lengths scaled by 0.3 m.
+    """
+    scale = np.array([1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH])
+    U, s, Vt = np.linalg.svd(jacobian * scale[:, None], full_matrices=False)
+    inverse = np.where(s > CUT, 1.0 / np.maximum(s, CUT), 0.0)
+    parts = inverse * np.einsum("kij,kj->ki", Vt, tau_ext)
+    wrench: Array = np.einsum("kij,kj->ki", U, parts) * scale
+    return wrench, s[:, -1] > CUT

@@ -1,0 +1,53 @@
+"""Flat Parquet tables: the log under our own column names, and the truth file."""
+
+from pathlib import Path
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.simulation.experiment import Simulation
+from vftcli.simulation.truth import AXES, Truth
+
+
+def write_parquet(path: Path, simulation: Simulation) -> None:
+    """Write the log as one flat table, `t`, `q/1`, `dq/1` and so on."""
+    rows = np.array(simulation.measured.rows)
+    start = simulation.scenario.sensing.start
+    columns: dict[str, Array] = {"t": simulation.measured.stamp + start}
+    for name, values in signals(simulation).items():
+        labels = AXES if name == "wrench" else tuple(map(str, range(1, values.shape[1] + 1)))
+        columns |= {f"{name}/{a}": c for a, c in zip(labels, values.T, strict=True)}
+    write_columns(path, {name: values[rows] for name, values in columns.items()})
+
+
+def signals(simulation: Simulation) -> dict[str, Array]:
+    """Signal → its columns at every sample. (M, n) each"""
+    samples, measured, vendor = simulation.samples, simulation.measured, simulation.vendor
+    table = {"q": measured.q, "dq": measured.dq}
+    if measured.current is not None and vendor.target_current is not None:
+        table |= {"current": measured.current, "target_current": vendor.target_current}
+    else:
+        table["tau"] = measured.torque
+    table |= {
+        "target_q": samples.target_q,
+        "target_dq": samples.target_dq,
+        "target_torque": vendor.target_torque,
+        "tau_ext": vendor.tau_ext,
+        "temperature": measured.temperature,
+    }
+    if simulation.force_sensor is not None:
+        table["wrench"] = simulation.force_sensor
+    return table
+
+
+def write_truth(path: Path, truth: Truth, start: float) -> None:
+    """Write the truth beside a log whose first stamp is `start` [s]: the same clock."""
+    columns = truth.columns()
+    write_columns(path, columns | {"t": columns["t"] + start})
+
+
+def write_columns(path: Path, columns: dict[str, Array]) -> None:
+    """Write a flat table of doubles."""
+    import polars as pl
+
+    pl.DataFrame(columns).write_parquet(path, compression="zstd")

@@ -1,0 +1,162 @@
+"""UR's official RTDE client: one header row, single spaces, CR LF."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.simulation.experiment import Simulation
+from vftcli.simulation.writers.flange import flange_signals, force_estimate, rotation_vectors
+
+DIGITS = 9
+"""Decimals kept; the client prints all seventeen digits, noise included."""
+
+SHORT = (
+    "timestamp",
+    "target_q",
+    "target_qd",
+    "target_current",
+    "target_moment",
+    "actual_q",
+    "actual_qd",
+    "actual_current",
+)
+FULL = tuple(
+    "timestamp target_q target_qd target_qdd target_current target_moment actual_q actual_qd "
+    "actual_current joint_control_output actual_TCP_pose actual_TCP_speed actual_TCP_force "
+    "target_TCP_pose target_TCP_speed actual_digital_input_bits joint_temperatures "
+    "actual_execution_time robot_mode joint_mode safety_status actual_tool_accelerometer "
+    "speed_scaling target_speed_fraction actual_momentum actual_main_voltage actual_robot_voltage "
+    "actual_robot_current actual_joint_voltage actual_digital_output_bits runtime_state "
+    "joint_position_deviation_ratio".split()  # noqa: SIM905 - as in the client's XML
+)
+RECIPES: dict[str, Sequence[str]] = {"full": FULL, "short": SHORT}
+"""Name of a recipe → its fields. "full" is the default record_configuration.xml of the client."""
+
+CONSTANTS: dict[str, tuple[Any, ...]] = {
+    "actual_digital_input_bits": (0,),
+    "actual_execution_time": (0.0,),
+    "robot_mode": (7,),
+    "joint_mode": (253,) * 6,
+    "safety_status": (1,),
+    "safety_mode": (1,),
+    "speed_scaling": (1.0,),
+    "target_speed_fraction": (1.0,),
+    "actual_main_voltage": (48.0,),
+    "actual_robot_voltage": (48.0,),
+    "actual_robot_current": (0.0,),
+    "actual_joint_voltage": (48.0,) * 6,
+    "actual_digital_output_bits": (0,),
+    "runtime_state": (2,),
+    "joint_position_deviation_ratio": (0.0,),
+}
+"""Fields the simulation knows nothing of: robot mode RUNNING, joint mode RUNNING, safety NORMAL."""
+
+
+def write_rtde(path: Path, simulation: Simulation) -> None:
+    """Write the log as the official client's text CSV."""
+    columns = ur_columns(simulation, recipe(simulation))
+    write_table(path, columns, separator=" ", end="\r\n")
+
+
+def recipe(simulation: Simulation) -> list[str]:
+    """The fields of the scenario's recipe, with the raw wrench where a sensor is mounted.
+
+    Raises:
+        ParameterError: If there is no such recipe, or the robot is no six-joint current-driven arm.
+    """
+    name = simulation.scenario.columns
+    if name not in RECIPES:
+        raise ParameterError(f"columns is {name!r}; there is {', '.join(RECIPES)}")
+    extra = [] if simulation.force_sensor is None else ["ft_raw_wrench"]
+    return [*RECIPES[name], *extra]
+
+
+def ur_columns(simulation: Simulation, names: Sequence[str]) -> dict[str, list[Any]]:
+    """Columns of a UR log by name, every row of the log in it."""
+    current, target_current = simulation.measured.current, simulation.vendor.target_current
+    if current is None or target_current is None or simulation.robot.joints != 6:
+        raise ParameterError(
+            f"robot {simulation.robot.name!r} has no motor currents or not six joints and cannot "
+            "log in a UR format; choose libfranka, rosbag2 or parquet with --as"
+        )
+    known = joint_fields(simulation, current, target_current)
+    if any("TCP" in name or "tool" in name or "momentum" in name for name in names):
+        known |= tool_fields(simulation)
+    rows = np.array(simulation.measured.rows)
+    columns: dict[str, list[Any]] = {}
+    for name in names:
+        if name in CONSTANTS:
+            values = [[value] * len(rows) for value in CONSTANTS[name]]
+        else:
+            array = np.round(known[name][rows], DIGITS) + 0.0
+            values = array.reshape(len(rows), -1).T.tolist()
+        single = len(values) == 1
+        columns |= {name if single else f"{name}_{i}": v for i, v in enumerate(values)}
+    return columns
+
+
+def joint_fields(simulation: Simulation, current: Array, target_current: Array) -> dict[str, Array]:
+    """Fields known joint by joint. (M, n) each"""
+    samples, measured = simulation.samples, simulation.measured
+    fields = {
+        "timestamp": measured.stamp + simulation.scenario.sensing.start,
+        "target_q": samples.target_q,
+        "target_qd": samples.target_dq,
+        "target_qdd": samples.target_ddq,
+        "target_current": target_current,
+        "target_moment": simulation.vendor.target_torque,
+        "actual_q": measured.q,
+        "actual_qd": measured.dq,
+        "actual_current": current,
+        "joint_control_output": target_current,
+        "joint_temperatures": measured.temperature,
+    }
+    if simulation.force_sensor is not None:
+        fields["ft_raw_wrench"] = simulation.force_sensor
+    return fields
+
+
+def tool_fields(simulation: Simulation) -> dict[str, Array]:
+    """Cartesian fields, with no tool set: the TCP is the flange."""
+    samples, measured, model = simulation.samples, simulation.measured, simulation.nominal.model
+    actual = flange_signals(model, measured.q, measured.dq)
+    target = flange_signals(model, samples.target_q, samples.target_dq)
+    force, _ = force_estimate(actual.jacobian, simulation.vendor.tau_ext)
+    pose = np.hstack([actual.position, rotation_vectors(actual.rotation)])
+    target_pose = np.hstack([target.position, rotation_vectors(target.rotation)])
+    weightless = np.gradient(samples.target_dq, samples.time, axis=0)
+    felt = np.einsum("kij,kj->ki", target.jacobian[:, :3], weightless) - model.gravity.linear
+    return {
+        "actual_TCP_pose": pose,
+        "actual_TCP_speed": actual.twist,
+        "actual_TCP_force": force,
+        "target_TCP_pose": target_pose,
+        "target_TCP_speed": target.twist,
+        "actual_tool_accelerometer": np.einsum("kji,kj->ki", target.rotation, felt),
+        "actual_momentum": linear_momentum(simulation),
+    }
+
+
+def linear_momentum(simulation: Simulation) -> Array:
+    """Magnitude of the arm's linear momentum. (M,) [kg·m/s]"""
+    import pinocchio as pin
+
+    model, measured = simulation.nominal.model, simulation.measured
+    data = model.createData()
+    return np.array(
+        [
+            np.linalg.norm(pin.computeCentroidalMomentum(model, data, q, dq).linear)
+            for q, dq in zip(measured.q, measured.dq, strict=True)
+        ]
+    )
+
+
+def write_table(path: Path, columns: dict[str, list[Any]], separator: str, end: str) -> None:
+    """Write columns as text, each number in the shortest form that reads back the same."""
+    texts = [list(map(repr, values)) for values in columns.values()]
+    lines = [separator.join(columns), *map(separator.join, zip(*texts, strict=True))]
+    path.write_bytes((end.join(lines) + end).encode("ascii"))
