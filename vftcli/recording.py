@@ -1,5 +1,6 @@
 """Recording: one log, in SI units, on one strictly increasing clock."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -37,6 +38,28 @@ MEANINGS = {
 }
 
 
+class Awaited:
+    """A field that may be given as a function; it is called when the field is first read.
+
+    A digest is computed beside everything else, and nobody waits for it before it is written down.
+    """
+
+    def __set_name__(self, _owner: type, name: str) -> None:
+        self._key = f"_{name}"
+
+    def __get__(self, instance: object, _owner: type) -> str:
+        if instance is None:
+            return ""  # the field's default
+        value: str | Callable[[], str] = instance.__dict__[self._key]
+        if not isinstance(value, str):
+            value = value()
+            instance.__dict__[self._key] = value
+        return value
+
+    def __set__(self, instance: object, value: str | Callable[[], str]) -> None:
+        instance.__dict__[self._key] = value
+
+
 @dataclass(frozen=True, kw_only=True)
 class Source:
     """Where a recording came from and what was done to it on the way in.
@@ -44,7 +67,8 @@ class Source:
     Attributes:
         path: The file or bag directory, or None for a recording made in memory.
         format: The reader's name.
-        sha256: Hex digest of the file's bytes (of all files of a directory, in name order).
+        sha256: Hex digest of the file's bytes (of all files of a directory, in name order);
+            reading it waits until it is computed.
         clock: Which clock the stamps are from, in words.
         t0: The log's own stamp of the first sample. [s]
         t0_ns: The same stamp in whole nanoseconds where the log counts them. [ns]
@@ -56,7 +80,7 @@ class Source:
 
     path: Path | None = None
     format: str = "memory"
-    sha256: str = ""
+    sha256: Awaited = Awaited()  # noqa: RUF009 - a descriptor, which dataclasses support
     clock: str = "as given"
     t0: float = 0.0
     t0_ns: int | None = None

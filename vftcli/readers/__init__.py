@@ -1,11 +1,10 @@
 """Readers: a log in any known format becomes a Recording. The content decides, never the name."""
 
 from collections.abc import Collection
-from dataclasses import replace
 from pathlib import Path
 
 from vftcli.errors import LogError, UnknownFormatError
-from vftcli.readers import arrays_file, libfranka, lerobot, parquet, pickles, rtde, tables
+from vftcli.readers import arrays_file, lerobot, libfranka, parquet, pickles, rtde, tables
 from vftcli.readers.cleaning import cleaned
 from vftcli.readers.opening import Digest
 from vftcli.readers.reader import LogFile, RawLog, Reader, Request, open_log
@@ -55,10 +54,9 @@ def read(
     path = Path(path)
     file = open_log(path)
     reader = _reader(file, format, columns)
-    digest = Digest(path)
     request = Request(columns=columns, signals=frozenset(signals) if signals is not None else None)
-    recording = cleaned(reader.read(file, request), path, reader.name)
-    return replace(recording, source=replace(recording.source, sha256=digest.hexdigest()))
+    raw = reader.read(file, request)
+    return cleaned(raw, path, reader.name, Digest(path).hexdigest)
 
 
 def recognise(path: str | Path) -> Reader:

@@ -1,5 +1,6 @@
 """Cleaning: what every log goes through on its way to a Recording. Nothing is repaired silently."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -34,7 +35,9 @@ class Findings:
     duplicates: int = 0
 
 
-def cleaned(raw: RawLog, path: Path, format_name: str) -> Recording:
+def cleaned(
+    raw: RawLog, path: Path, format_name: str, sha256: str | Callable[[], str] = ""
+) -> Recording:
     """Make a Recording of what a reader found.
 
     In order: garbage of a misaligned packet at the start is dropped, values that are no numbers are
@@ -60,6 +63,7 @@ def cleaned(raw: RawLog, path: Path, format_name: str) -> Recording:
     source = Source(
         path=path,
         format=format_name,
+        sha256=sha256,
         clock=raw.clock,
         t0=float(raw.stamps[0]) * raw.tick,
         t0_ns=_nanoseconds(raw),

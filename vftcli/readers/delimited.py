@@ -15,7 +15,7 @@ from vftcli.readers.reader import LogFile
 from vftcli.readers.table import Column
 
 SEPARATORS = (",", ";", "\t", " ")
-TAIL_BYTES = 1024 * 1024
+TAIL_BYTES = 128 * 1024
 COMPARED_ROWS = 20
 """Rows before the last that tell whether its last number is whole."""
 
@@ -211,6 +211,8 @@ class TextTable:
         """Where the last row is cut, so that it has to go; None if it is whole."""
         content = self.file.content
         tail = bytes(content[-TAIL_BYTES:])
+        if len(re.split(rb"[\r\n]+", tail, maxsplit=3)) <= 3:
+            tail = bytes(content)  # very long rows
         stripped = tail.rstrip(b"\r\n")
         rows = [line for line in re.split(rb"[\r\n]+", stripped) if line.strip()]
         if len(rows) < 2:

@@ -38,8 +38,7 @@ def read_lerobot(file: LogFile, request: Request) -> RawLog:
     request = Request(
         columns=request.columns or default_columns(table, info), signals=request.signals
     )
-    raw = from_table(table, request, warnings=(note,))
-    return raw
+    return from_table(table, request, warnings=(note,))
 
 
 def default_columns(table: ParquetTable, info: dict[str, Any]) -> str:

@@ -11,7 +11,7 @@ from typing import Literal
 
 from vftcli.errors import LogError
 
-HEAD_BYTES = 256 * 1024
+HEAD_BYTES = 64 * 1024
 """Bytes that recognition looks at."""
 
 Wrapping = Literal["gzip", "zstd"]

@@ -13,6 +13,7 @@ import numpy as np
 from vftcli.errors import LogError
 from vftcli.readers.arrays_file import arrays_of_lists, read_arrays
 from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.table import Column
 
 PICKLE_LIMIT = 512 * 1024 * 1024
 """Larger pickles are refused: they have to be held in memory twice."""
@@ -151,7 +152,9 @@ def read_pickle(file: LogFile, request: Request) -> RawLog:
 def _read_frankapy(file: LogFile, log: dict[Any, Any], request: Request) -> RawLog:
     """Read frankapy's trajectory: times in seconds, positions, no torque."""
     arrays = arrays_of_lists(file, log)
-    kept = {name: arrays[name] for name in ("time", "q", "dq", "tau_J") if name in arrays}
+    kept: dict[str, Column] = {
+        name: arrays[name] for name in ("time", "q", "dq", "tau_J") if name in arrays
+    }
     columns = request.columns or ",".join(
         f"{signal}={name}"
         for signal, name in (("t[s]", "time"), ("q[rad]", "q"), ("dq", "dq"), ("tau", "tau_J"))

@@ -73,7 +73,9 @@ def opened(file: LogFile) -> Table:
     if file.head.startswith(b"PAR1"):
         return ParquetTable(file.path, file.path)
     if not file.lines:
-        raise LogError(f"{file.path}: not a text table or Parquet file; a reference is one of them.")
+        raise LogError(
+            f"{file.path}: not a text table or Parquet file; a reference is one of them."
+        )
     return TextTable(file)
 
 

@@ -1,0 +1,36 @@
+"""Recordings from arrays that a notebook already holds, cleaned like any log that is read."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vftcli.errors import MissingSignalError
+from vftcli.readers.cleaning import cleaned
+from vftcli.readers.reader import RawLog
+from vftcli.recording import JOINT_SIGNALS, Recording
+
+
+def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Recording:
+    """Make a Recording of arrays: repeated stamps are dropped and counted, gaps are reported.
+
+    Args:
+        t: Stamps, not decreasing. (T,) [s]
+        name: What to call the recording in tables.
+        signals: Fields of `Recording` by name, at least ``q``: (T, n) in SI units; ``wrench`` (T, 6).
+
+    Raises:
+        MissingSignalError: If there is no ``q``, or a name is not a signal of a Recording.
+        LogError: If a signal holds NaN or infinity.
+        ClockError: If the clock runs backwards.
+    """
+    known = (*JOINT_SIGNALS, "wrench")
+    if unknown := [key for key in signals if key not in known]:
+        raise MissingSignalError(f"no signal {unknown[0]!r}; a recording has {', '.join(known)}")
+    if "q" not in signals:
+        raise MissingSignalError(
+            "a recording needs joint positions: give q=… of shape (T, n) [rad]"
+        )
+    arrays = {key: np.asarray(value, dtype=np.float64) for key, value in signals.items()}
+    raw = RawLog(stamps=np.asarray(t, dtype=np.float64), tick=1.0, clock="as given", signals=arrays)
+    return cleaned(raw, Path(name), "arrays")
