@@ -1,0 +1,83 @@
+"""Honest decimation: of every stretch of a series its lowest and its highest sample stay."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.arrays import Array
+
+GAP_STEPS = 10.0
+"""A step this many times the median is drawn as a break in the line."""
+
+Index = NDArray[np.intp]
+
+
+class Line(NamedTuple):
+    """One series ready to be drawn; NaN where the line breaks.
+
+    Attributes:
+        t: Time. (P,) [s]
+        y: Value, in the series' own unit. (P,)
+    """
+
+    t: Array
+    y: Array
+
+
+def decimated(t: Array, values: Array, stretches: int) -> list[Line]:
+    """Draw each column with at most two samples a stretch, and the first and last of the log.
+
+    The lowest and highest sample of every stretch keep their own time and value, so that no spike
+    is lost and none is made. A log of at most twice as many samples is kept whole. Lines break
+    where a stretch holds no known value and where the clock has a gap.
+
+    Args:
+        t: Time. (T,) [s]
+        values: One column a series; NaN where not known. (T, n)
+        stretches: Number of stretches the log is cut into.
+    """
+    gaps = gaps_of(t)
+    if len(t) <= 2 * stretches:
+        everything = np.arange(len(t))
+        return [broken(t, column, everything, gaps) for column in values.T]
+    low, high = extremes(values, stretches)
+    ends = np.array([0, len(t) - 1], dtype=np.intp)
+    lines = []
+    for j, column in enumerate(values.T):
+        index = np.unique(np.concatenate([ends, low[:, j], high[:, j], gaps, gaps + 1]))
+        lines.append(broken(t, column, index, gaps))
+    return lines
+
+
+def extremes(values: Array, stretches: int) -> tuple[Index, Index]:
+    """Sample numbers of the lowest and highest known value of every stretch. (stretches, n)"""
+    samples, n = values.shape
+    width = -(-samples // stretches)
+    count = -(-samples // width)
+    padded = np.full((count * width, n), np.nan)
+    padded[:samples] = values
+    cut = padded.reshape(count, width, n)
+    unknown = np.isnan(cut)
+    start = (np.arange(count) * width)[:, None]
+    low = np.where(unknown, np.inf, cut).argmin(axis=1) + start
+    high = np.where(unknown, -np.inf, cut).argmax(axis=1) + start
+    return low, high
+
+
+def gaps_of(t: Array) -> Index:
+    """Numbers of the samples after which the clock makes a long step."""
+    steps = np.diff(t)
+    if steps.size == 0:
+        return np.zeros(0, dtype=np.intp)
+    return np.flatnonzero(steps > GAP_STEPS * np.median(steps))
+
+
+def broken(t: Array, column: Array, index: Index, gaps: Index) -> Line:
+    """The chosen samples of a column, with a NaN in every gap of the clock."""
+    x, y = t[index], column[index]
+    if gaps.size:
+        after = np.searchsorted(index, gaps, side="right")
+        middle = 0.5 * (t[gaps] + t[gaps + 1])
+        x, y = np.insert(x, after, middle), np.insert(y, after, np.nan)
+    return Line(x, y)

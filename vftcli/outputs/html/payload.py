@@ -1,0 +1,188 @@
+"""What the page's script draws: charts and their lines, as JSON with base64 float32 arrays."""
+
+import base64
+import json
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.analysis import Analysis
+from vftcli.arrays import Array
+from vftcli.dynamics.drive import drive_torque
+from vftcli.outputs.decimation import Line, decimated
+from vftcli.outputs.palette import DASHED, colours_of
+
+STRETCHES = 2000
+"""Stretches a long log is cut into: two samples a stretch are about what a wide screen can show."""
+
+FREQUENCIES = 240
+"""Points of a frequency response."""
+
+
+class Series(NamedTuple):
+    """One line of a chart, for every joint.
+
+    Attributes:
+        name: What the legend calls it.
+        values: One column a joint. (T, n)
+        colour: ``#rrggbb``, or "ink" for the page's own text colour.
+        dashed: Whether the line is dashed.
+    """
+
+    name: str
+    values: Array
+    colour: str = "ink"
+    dashed: bool = False
+
+
+class Chart(NamedTuple):
+    """One chart, for the joint that is chosen.
+
+    Attributes:
+        key: Its name on the page.
+        title: What it shows, in words.
+        unit: Unit of its vertical axis.
+        series: Its lines.
+        band: Half the width of a band about zero, one a joint, or None. (n,)
+        band_label: What the band is.
+        height: Relative height.
+    """
+
+    key: str
+    title: str
+    unit: str
+    series: tuple[Series, ...]
+    band: Array | None = None
+    band_label: str = ""
+    height: float = 1.0
+
+
+def payload(analysis: Analysis) -> str:
+    """JSON for a ``<script type="application/json">``: nothing in it can end the element."""
+    t = analysis.t
+    data = {
+        "joints": analysis.recording.joints,
+        "span": [float(t[0]), float(t[-1])],
+        "charts": [packed(chart, t) for chart in time_charts(analysis)],
+        "responses": responses(analysis),
+    }
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
+
+
+def is_decimated(analysis: Analysis) -> bool:
+    """Whether the page shows fewer samples than the log has."""
+    return analysis.recording.samples > 2 * STRETCHES
+
+
+def time_charts(analysis: Analysis) -> Iterator[Chart]:
+    """The charts over time, top to bottom."""
+    estimates = estimate_series(analysis)
+    floor = analysis.reference.floor if analysis.reference is not None else None
+    label = "± floor of the reference"
+    reference = reference_series(analysis)
+    yield Chart("tau", "External torque on the robot", "N·m", (*reference, *estimates), height=1.5)
+    if analysis.reference is not None:
+        truth = analysis.reference.tau
+        errors = tuple(s._replace(values=s.values - truth) for s in estimates)
+        yield Chart("error", "Estimate − reference", "N·m", errors, floor, label)
+    yield from motion_charts(analysis)
+
+
+def estimate_series(analysis: Analysis) -> tuple[Series, ...]:
+    """Every observer's torque in its colour."""
+    colours = colours_of(analysis.estimates)
+    return tuple(
+        Series(e.name, e.tau, colours[e.name], e.name in DASHED) for e in analysis.estimates
+    )
+
+
+def reference_series(analysis: Analysis) -> tuple[Series, ...]:
+    """The reference in the page's ink, if there is one."""
+    if analysis.reference is None:
+        return ()
+    return (Series(f"reference ({analysis.reference.name})", analysis.reference.tau),)
+
+
+def motion_charts(analysis: Analysis) -> Iterator[Chart]:
+    """What the log measured: drive torque, positions, velocities."""
+    recording = analysis.recording
+    torque = drive_torque(recording, analysis.robot)
+    yield Chart("drive", "Drive torque at the joint", "N·m", (Series("measured", torque),))
+    yield Chart("q", "Position", "rad", (Series("measured", recording.q),))
+    if recording.dq is not None:
+        yield Chart("dq", "Velocity", "rad/s", (Series("measured", recording.dq),))
+
+
+def packed(chart: Chart, t: Array) -> dict[str, Any]:
+    """A chart as JSON can hold it."""
+    return {
+        "key": chart.key,
+        "title": chart.title,
+        "unit": chart.unit,
+        "height": chart.height,
+        "band": known(chart.band),
+        "bandLabel": chart.band_label,
+        "series": [
+            {
+                "name": series.name,
+                "colour": series.colour,
+                "dashed": series.dashed,
+                "lines": [packed_line(line) for line in decimated(t, series.values, STRETCHES)],
+            }
+            for series in chart.series
+        ],
+    }
+
+
+def packed_line(line: Line) -> dict[str, str]:
+    """A line's times and values."""
+    return {"x": base64_float32(line.t), "y": base64_float32(line.y)}
+
+
+def base64_float32(values: Array) -> str:
+    """Little-endian float32 as base64: seven digits are more than a screen can show."""
+    return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
+
+
+def known(values: Array | None) -> list[float | None] | None:
+    """Numbers for JSON, None where they are not known."""
+    if values is None or not np.any(np.isfinite(values)):
+        return None
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def responses(analysis: Analysis) -> list[dict[str, Any]]:
+    """Gain and phase of every observer over frequency, up to half the sample rate."""
+    step, n = analysis.recording.step, analysis.recording.joints
+    frequency = np.geomspace(1e-2, 0.5 / step, FREQUENCIES)
+    gains, phases = [], []
+    colours = colours_of(analysis.estimates)
+    for observer in analysis.observers:
+        response = observer.frequency_response(frequency, step, n)
+        style = {
+            "name": observer.name,
+            "colour": colours[observer.name],
+            "dashed": observer.name in DASHED,
+        }
+        decibel = 20.0 * np.log10(np.maximum(np.abs(response), 1e-12))
+        phase = np.degrees(np.unwrap(np.angle(response), axis=0))
+        gains.append({**style, "lines": lines_over(frequency, decibel)})
+        phases.append({**style, "lines": lines_over(frequency, phase)})
+    shape = {"band": None, "bandLabel": "", "height": 1.0, "log": True}
+    return [
+        {
+            "key": "gain",
+            "title": "Gain from torque to estimate",
+            "unit": "dB",
+            **shape,
+            "series": gains,
+        },
+        {"key": "phase", "title": "Phase of the estimate", "unit": "°", **shape, "series": phases},
+    ]
+
+
+def lines_over(frequency: Array, values: Array) -> list[dict[str, str]]:
+    """One line a joint over frequency. (F, n)"""
+    return [packed_line(Line(frequency, column)) for column in values.T]

@@ -1,0 +1,40 @@
+"""Colours of the observers and of the reference, the same in the page and in the recording."""
+
+from collections.abc import Sequence
+
+from vftcli.torque import ExternalTorque
+
+COLOURS = {
+    "fdo": "#2f86d0",
+    "gmo": "#dd6415",
+    "kfo-fe": "#0c9f76",
+    "kfo-zoh": "#c95fa4",
+    "kfo-rts": "#b98900",
+    "kfo-auto": "#7a6fd6",
+    "rts-auto": "#a0522d",
+}
+"""Okabe and Ito's hues, in tones that stand out from white and from black paper alike."""
+
+SPARE = ("#2f86d0", "#dd6415", "#0c9f76", "#c95fa4", "#b98900", "#7a6fd6", "#a0522d", "#5b8c00")
+"""For estimates that have no colour of their own, in turn."""
+
+REFERENCE = "#8a929a"
+"""The reference in a viewer whose background is not known; the page uses the colour of its ink."""
+
+DASHED = ("kfo-zoh", "rts-auto")
+"""Drawn dashed: where they lie on their neighbour, both are seen."""
+
+
+def colours_of(estimates: Sequence[ExternalTorque]) -> dict[str, str]:
+    """One colour for each estimate's name; two get the same only when there are no more."""
+    names = [estimate.name for estimate in estimates]
+    taken = {COLOURS[name] for name in names if name in COLOURS}
+    free = [colour for colour in SPARE if colour not in taken] or list(SPARE)
+    others = [name for name in names if name not in COLOURS]
+    spare = {name: free[k % len(free)] for k, name in enumerate(others)}
+    return {name: COLOURS.get(name) or spare[name] for name in names}
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Red, green and blue of ``#rrggbb``."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
