@@ -7,6 +7,7 @@ whose speed drifts drifts for both sides. Medians over the rounds are reported.
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -72,7 +73,7 @@ def analytic_script(model: Any, recording: Recording, kalman: Any) -> None:  # n
     import pinocchio as pin
 
     q, dq, tau = recording.q, recording.require("dq"), recording.require("torque")
-    data, n, step = model.createData(), model.nv, recording.step
+    data, step = model.createData(), recording.step
     p, mu = np.empty_like(q), np.empty_like(q)
     for k in range(len(q)):
         M = pin.crba(model, data, q[k])
@@ -115,7 +116,9 @@ def dense_kalman_loop(p: Array, mu: Array, step: float, kalman: Any) -> Array:  
         [[np.diag(model.q11), np.diag(model.q12)], [np.diag(model.q12), np.diag(model.q22)]]
     )
     R = np.diag(model.r)
-    P = np.block([[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]])
+    P = np.block(
+        [[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]]
+    )
     x, identity = np.concatenate([p[0], np.zeros(n)]), np.eye(2 * n)
     for k in range(len(p)):
         if k:
@@ -138,8 +141,9 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
     """
     robot = load_robot(robot_name)
     recording = circle(robot, samples)
-    setup = Setup(gains=robot.gains, settings={}, joints=robot.joints, step=recording.step,
-                  as_printed=False)
+    setup = Setup(
+        gains=robot.gains, settings={}, joints=robot.joints, step=recording.step, as_printed=False
+    )
     observers = {name: OBSERVERS[name].build(setup)[0] for name in DEFAULT}
     timings = Timings()
     run_rounds(timings, robot, recording, observers, rounds)
@@ -197,6 +201,6 @@ def run_rounds(
         timings.measure("rnea loop", lambda: rnea_loop(model, q, dq))
         timings.measure("dynamics", lambda: dynamics_terms(recording, robot))
         for name, observer in observers.items():
-            timings.measure(name, lambda observer=observer: observer.estimate(terms))
+            timings.measure(name, partial(observer.estimate, terms))
         timings.measure("analytic script", lambda: analytic_script(model, short, kalman), scale)
         timings.measure("literal script", lambda: literal_script(model, short, kalman), scale)

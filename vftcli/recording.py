@@ -80,7 +80,7 @@ class Source:
 
     path: Path | None = None
     format: str = "memory"
-    sha256: Awaited = Awaited()  # noqa: RUF009 - a descriptor, which dataclasses support
+    sha256: Awaited = Awaited()
     clock: str = "as given"
     t0: float = 0.0
     t0_ns: int | None = None

@@ -27,8 +27,8 @@ def say_recording(recording: "Recording") -> None:
     source = recording.source
     rate = f", {1.0 / recording.step:.4g} Hz" if recording.samples > 1 else ""
     say(
-        f"{recording.name}: {source.format}, {recording.joints} joints, {recording.samples} samples, "
-        f"{recording.duration:.1f} s{rate}"
+        f"{recording.name}: {source.format}, {recording.joints} joints, "
+        f"{recording.samples} samples, {recording.duration:.1f} s{rate}"
     )
     for remark in (*source.repairs, *source.warnings):
         say(f"  note: {remark}")

@@ -36,6 +36,8 @@ def bench(
         )
     ratios = result["ratios"]
     typer.echo("")
-    typer.echo(f"all observers with dynamics / one bare pin.rnea loop: {ratios['core_over_rnea_loop']:.2f}")
+    typer.echo(
+        f"all observers with dynamics / one bare pin.rnea loop: {ratios['core_over_rnea_loop']:.2f}"
+    )
     typer.echo(f"per-sample Pinocchio script / this: {ratios['analytic_script_over_core']:.0f}")
     typer.echo(f"the paper's literal method / this: {ratios['literal_script_over_core']:.0f}")

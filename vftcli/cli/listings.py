@@ -79,7 +79,9 @@ def robot_lines(robot: Any) -> list[str]:  # noqa: ANN401
         lines.extend(f"{observer}.{key} = {value}" for key, value in gains.items())
     lines += ["", *(f"note: {note}" for note in robot.notes)]
     for source in robot.document.get("sources", []):
-        lines.append(f"source {source.get('id', '?')}: {source.get('what', '')}: {source.get('ref', '')}")
+        lines.append(
+            f"source {source.get('id', '?')}: {source.get('what', '')}: {source.get('ref', '')}"
+        )
     if robot.payloads:
         lines.append(f"payloads: {', '.join(robot.payloads)} (--payload NAME)")
     return lines

@@ -37,9 +37,7 @@ Interval = Annotated[
 ]
 Observers = Annotated[
     list[str] | None,
-    typer.Option(
-        "--observer", metavar="NAME", help="Repeatable. Default: fdo gmo kfo-fe kfo-zoh."
-    ),
+    typer.Option("--observer", metavar="NAME", help="Repeatable. Default: fdo gmo kfo-fe kfo-zoh."),
 ]
 Assignments = Annotated[
     list[str] | None,

@@ -60,7 +60,8 @@ def sigmoid(
         C. Gaz et al., "Dynamic identification of the Franka Emika Panda robot with retrieval of
         feasible parameters using penalty-based optimization", IEEE RA-L 2019, Sec. II.
     """
-    moving = amplitude / (1.0 + np.exp(-slope * (dq + shift)))
+    exponent = np.minimum(-slope * (dq + shift), 700.0)  # e^709 is the largest float64
+    moving = amplitude / (1.0 + np.exp(exponent))
     at_rest = amplitude / (1.0 + np.exp(-slope * np.asarray(shift)))
     torque: Array = moving - at_rest
     return torque

@@ -13,8 +13,8 @@ the composite momentum behind it, and no derivative of M is needed. One pass out
 γ₀ is the gravity vector itself, J the reflected rotor inertia. Every constant map is one small
 matrix; a chunk of samples is the other factor, so the work is done by BLAS.
 
-These are p of (8), Cᵀq̇ of (14) and G of (16), exactly rather than by differences; the tests hold them
-against Pinocchio's mass matrix, Coriolis matrix and gravity.
+These are p of (8), Cᵀq̇ of (14) and G of (16), exactly rather than by differences; the tests hold
+them against Pinocchio's mass matrix, Coriolis matrix and gravity.
 """
 
 from dataclasses import dataclass
@@ -67,7 +67,7 @@ class Maps:
 
 
 def interleave(rows: list[list[Array]]) -> Array:
-    """Arrange a 3×3 grid of 3×3 blocks so that x, y and z rows (and columns) lie together. (9, 9)"""
+    """Arrange a 3×3 grid of 3×3 blocks so that x, y and z rows and columns lie together. (9, 9)"""
     dense = np.block(rows)
     order = np.arange(9).reshape(3, 3).T.ravel()
     return np.ascontiguousarray(dense[np.ix_(order, order)])

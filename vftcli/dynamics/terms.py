@@ -48,9 +48,7 @@ class DynamicsTerms:
         return len(self.t)
 
 
-def dynamics_terms(
-    recording: Recording, robot: Robot, *, literal: bool = False
-) -> DynamicsTerms:
+def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False) -> DynamicsTerms:
     """Evaluate p and μ along a recording, chunk by chunk.
 
     Beside the recording and the two results it needs memory for one chunk only.

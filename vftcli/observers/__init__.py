@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.arrays import Array
 from vftcli.errors import ParameterError
 from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
 from vftcli.observers.kalman import KalmanObserver
@@ -55,7 +56,8 @@ class Entry(NamedTuple):
 def build_fdo(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
     """The filtered dynamics observer, its cutoff given or left over from the Kalman filter."""
     given = merged("fdo", "fdo", setup.gains, setup.settings)
-    omega, notes = given.get("omega"), ()
+    notes: tuple[str, ...] = ()
+    omega = given.get("omega")
     if omega is None:
         rate, origin = leftover_rate(setup)
         omega = float(1.0 / np.mean(1.0 / rate))
@@ -69,7 +71,8 @@ def build_fdo(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
 def build_gmo(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
     """The momentum observer, its gains given or left over from the Kalman filter."""
     given = merged("gmo", "gmo", setup.gains, setup.settings)
-    gain, notes = given.get("gain"), ()
+    notes: tuple[str, ...] = ()
+    gain = given.get("gain")
     if gain is None:
         gain, origin = leftover_rate(setup)
         listed = ", ".join(f"{k:.3g}" for k in gain)
@@ -158,7 +161,7 @@ def observer_settings(assignments: Sequence[str]) -> Settings:
     return parse_settings(assignments, sections())
 
 
-def leftover_rate(setup: Setup) -> tuple[np.ndarray[Any, np.dtype[np.float64]], str]:
+def leftover_rate(setup: Setup) -> tuple[Array, str]:
     """First-order gain where none was given: the Kalman filter's delay, else 10 1/s. (n,) [1/s]"""
     if "kfo" in setup.gains or "kfo" in setup.settings:
         kalman, _ = build_kfo("fe")(setup)
@@ -175,7 +178,8 @@ def build_observers(
     Raises:
         ParameterError: If a name or a parameter is not one there is, or is out of range.
     """
-    observers, notes = [], []
+    observers: list[Observer] = []
+    notes: list[str] = []
     for name in dict.fromkeys(names):
         if name not in OBSERVERS:
             raise ParameterError(f"no observer {name!r}; there is {', '.join(OBSERVERS)}")

@@ -8,7 +8,7 @@ from vftcli.observers.recursion import Steps
 
 
 def half_steps(rate: Array, steps: Steps) -> Array:
-    """a = rate·Ts/2: constant (1, n) on a uniform clock, else one a sample. (T, n)"""
+    """Return a = rate·Ts/2: constant (1, n) on a uniform clock, else one a sample. (T, n)"""
     dt = np.array([steps.median]) if steps.uniform else steps.dt
     half: Array = 0.5 * dt[:, None] * rate[None, :]
     return half

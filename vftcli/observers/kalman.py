@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array, frozen, handed_over
+from vftcli.arrays import Array, frozen
 from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.errors import ParameterError
 from vftcli.observers.kalman_gains import Covariance, Gains, Steady, gain_sequence, steady
@@ -73,7 +73,7 @@ class KalmanObserver:
             if not (np.all(np.isfinite(value)) and np.all(least_allowed)):
                 raise ParameterError(
                     f"kfo.{name} is {value.tolist()}; R and Q_τ must be positive, Q_p and the decay "
-                    "must not be negative"
+                    "decay must not be negative"
                 )
 
     @property

@@ -154,8 +154,10 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
             start[1:] = new
         if change <= SETTLED:
             break
-    flat = [a.transpose(1, 0, 2).reshape(blocks * length, n)[:samples] for a in
-            (gains.l1, gains.l2, *gains.posterior)]
+    flat = [
+        a.transpose(1, 0, 2).reshape(blocks * length, n)[:samples]
+        for a in (gains.l1, gains.l2, *gains.posterior)
+    ]
     return Gains(flat[0], flat[1], Covariance(*flat[2:]))
 
 
@@ -174,9 +176,7 @@ def run_blocks(model: Discrete, starts: Covariance, length: int) -> Gains:
     )
     state = starts
     for i in range(length):
-        step = update(
-            predict(state, Discrete(*(entry[i] for entry in model))), model.r[i]
-        )
+        step = update(predict(state, Discrete(*(entry[i] for entry in model))), model.r[i])
         write(gains, slice(i, i + 1), step)
         state = step.posterior
     return gains

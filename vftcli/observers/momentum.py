@@ -28,8 +28,8 @@ class MomentumObserver:
 
         rᵗ = [(1−a)rᵗ⁻¹ + K(pᵗ − pᵗ⁻¹) − a(μᵗ + μᵗ⁻¹)]/(1+a),  r⁰ = 0
 
-    (35) as printed feeds back r^{i−1} + r^{i−2}, which oscillates above K·Ts = 0.343 and is unstable
-    from 2 on; that form runs with `as_printed`.
+    (35) as printed feeds back r^{i−1} + r^{i−2}, which oscillates above K·Ts = 0.343 and is
+    unstable from 2 on; that form runs with `as_printed`.
 
     Attributes:
         gain: Bandwidth K, one number or one a joint. (n,) [1/s]
@@ -77,7 +77,7 @@ class MomentumObserver:
         F[:, 0, 0], F[:, 0, 1], F[:, 1, 0] = 1.0 - a, -a, 1.0
         with np.errstate(over="ignore", invalid="ignore"):
             tau = recursion(F[0] if len(a) == 1 else F, x, np.zeros((2, n)))[:, 0]
-        unstable = np.flatnonzero((2.0 * np.median(a, axis=0) >= 2.0))
+        unstable = np.flatnonzero(np.median(a, axis=0) >= 1.0)
         notes: tuple[str, ...] = ()
         if len(unstable):
             joints = ", ".join(f"J{j + 1}" for j in unstable)

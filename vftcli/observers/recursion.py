@@ -1,6 +1,6 @@
 """Linear recursions along time, without a Python loop over samples and without losing exactness.
 
-Every observer here is y_t = F_t y_{t−1} + x_t with a small state for each joint, where F_t may change
+Every observer here is y_t = F_t y_{t−1} + x_t with a small state for each joint; F_t may change
 with the sample time. The log is cut into blocks that are run side by side, each from zero; the
 states at the blocks' ends obey the same kind of recursion, once a block, and their effect is added
 back. That is the same sum in another order, so it agrees with a sample-by-sample loop to rounding,

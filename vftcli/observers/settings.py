@@ -52,7 +52,9 @@ def check_name(section: str, parameter: str, sections: Mapping[str, Sequence[str
     if section not in sections:
         close = get_close_matches(section, sections, n=1)
         hint = f" Did you mean {close[0]}?" if close else ""
-        raise ParameterError(f"no observer {section!r} to set.{hint} There is {', '.join(sections)}")
+        raise ParameterError(
+            f"no observer {section!r} to set.{hint} There is {', '.join(sections)}"
+        )
     if parameter not in sections[section]:
         close = get_close_matches(parameter, sections[section], n=1)
         hint = f" Did you mean {close[0]}?" if close else ""

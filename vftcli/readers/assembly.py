@@ -17,7 +17,7 @@ def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Rec
     Args:
         t: Stamps, not decreasing. (T,) [s]
         name: What to call the recording in tables.
-        signals: Fields of `Recording` by name, at least ``q``: (T, n) in SI units; ``wrench`` (T, 6).
+        signals: Fields of `Recording` by name, at least ``q``: (T, n) in SI units.
 
     Raises:
         MissingSignalError: If there is no ``q``, or a name is not a signal of a Recording.
@@ -31,6 +31,6 @@ def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Rec
         raise MissingSignalError(
             "a recording needs joint positions: give q=… of shape (T, n) [rad]"
         )
-    arrays = {key: np.asarray(value, dtype=np.float64) for key, value in signals.items()}
-    raw = RawLog(stamps=np.asarray(t, dtype=np.float64), tick=1.0, clock="as given", signals=arrays)
+    arrays = {key: np.array(value, dtype=np.float64) for key, value in signals.items()}
+    raw = RawLog(stamps=np.array(t, dtype=np.float64), tick=1.0, clock="as given", signals=arrays)
     return cleaned(raw, Path(name), "arrays")

@@ -84,7 +84,7 @@ def as_given(table: Table, picks: Picks) -> Picks:
     signals = {pick.signal: pick for pick in picks.signals}
     if not {TORQUE, "wrench"} & set(signals):
         raise LogError(
-            f"{table.path}: --reference-columns names neither tau_ext nor a wrench, as in t,tau_ext:6."
+            f"{table.path}: --reference-columns names no tau_ext or wrench, as in t,tau_ext:6."
         )
     if (wrench := signals.get("wrench")) and len(wrench.cells) != 6:
         raise LogError(f"{table.path}: a wrench has 6 columns, not {len(wrench.cells)}.")

@@ -8,7 +8,8 @@ from vftcli.robots.chain import Chain, Payload
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
 
 PROFILES: dict[str, Path] = {
-    name: Path(__file__).parent / f"{name}.toml" for name in ("ur5", "ur5e", "ur10e", "panda", "fr3")
+    name: Path(__file__).parent / f"{name}.toml"
+    for name in ("ur5", "ur5e", "ur10e", "panda", "fr3")
 }
 """Built-in profile name → its file."""
 

@@ -43,7 +43,7 @@ class RobotFile:
             raise RobotError(f"{path}: not valid TOML: {error}") from None
 
     def line(self, table: str, index: int | None, key: str) -> int | None:
-        """Line number of `key` in the `index`-th occurrence of `table`, from 1, or of its header."""
+        """Line of `key` in the `index`-th occurrence of `table`, from 1, or of its header."""
         lines = self.text.splitlines()
         seen, inside, header = -1, table == "", 1
         for number, line in enumerate(lines, start=1):
@@ -60,7 +60,9 @@ class RobotFile:
                 return number
         return header if seen >= 0 or table == "" else None
 
-    def refuse(self, message: str, table: str = "", index: int | None = None, key: str = "") -> NoReturn:
+    def refuse(
+        self, message: str, table: str = "", index: int | None = None, key: str = ""
+    ) -> NoReturn:
         """Raise a RobotError that names the file, the line and the joint."""
         line = self.line(table, index, key)
         where = f"{self.path}" + (f", line {line}" if line else "")
@@ -82,7 +84,9 @@ def load_profile(path: Path) -> Robot:
     file = RobotFile(path)
     doc = file.document
     if doc.get("schema", SCHEMA) != SCHEMA:
-        file.refuse(f"schema is {doc['schema']!r}; this version reads schema {SCHEMA}", key="schema")
+        file.refuse(
+            f"schema is {doc['schema']!r}; this version reads schema {SCHEMA}", key="schema"
+        )
     joints = checked_joints(file)
     convention = checked_convention(file, joints)
     chain = build_chain(file, joints, convention.kinematics(joints, doc))
@@ -101,7 +105,9 @@ def assemble(file: RobotFile, joints: Sequence[Mapping[str, Any]], chain: Chain)
     payloads = checked_payloads(file)
     gains = doc.get("observers", {})
     if not isinstance(gains, dict) or not all(isinstance(v, dict) for v in gains.values()):
-        file.refuse("[observers] must hold sections, as [observers.gmo] gain = 10.0", key="observers")
+        file.refuse(
+            "[observers] must hold sections, as [observers.gmo] gain = 10.0", key="observers"
+        )
     notes = doc.get("notes", "")
     return Robot(
         name=str(doc.get("name", file.path.stem)),
@@ -170,8 +176,12 @@ def build_chain(
     rotor = column(file, joints, "rotor_inertia", default=0.0)
     if np.any(rotor < 0):
         j = int(np.argmax(rotor < 0))
-        file.refuse(f"rotor_inertia is {rotor[j]:g} kg·m²; it must not be negative", "joints", j,
-                    "rotor_inertia")
+        file.refuse(
+            f"rotor_inertia is {rotor[j]:g} kg·m²; it must not be negative",
+            "joints",
+            j,
+            "rotor_inertia",
+        )
     gravity = vector(file, doc, "gravity", 3) if "gravity" in doc else np.array(UPRIGHT)
     return Chain(
         names=tuple(str(j.get("name", f"joint{i}")) for i, j in enumerate(joints, start=1)),
@@ -195,13 +205,20 @@ def checked_torque_constant(
     if len(missing) == len(joints) and source != "current":
         return None
     if missing:
-        file.refuse("torque_constant is missing; torque_source = current needs it in every joint",
-                    "joints", missing[0])
+        file.refuse(
+            "torque_constant is missing; torque_source = current needs it in every joint",
+            "joints",
+            missing[0],
+        )
     constant = column(file, joints, "torque_constant")
     if np.any(constant <= 0):
         j = int(np.argmax(constant <= 0))
-        file.refuse(f"torque_constant is {constant[j]:g} N·m/A; it must be positive", "joints", j,
-                    "torque_constant")
+        file.refuse(
+            f"torque_constant is {constant[j]:g} N·m/A; it must be positive",
+            "joints",
+            j,
+            "torque_constant",
+        )
     return constant
 
 
@@ -219,7 +236,9 @@ def checked_friction(
         if name not in FRICTION_KEYS:
             file.refuse(
                 f"friction model is {name!r}; it is one of {', '.join(FRICTION_KEYS)}",
-                "joints.friction", j, "model",
+                "joints.friction",
+                j,
+                "model",
             )
         required, optional = FRICTION_KEYS[name]
         values = {k: number(file, section, k, "joints.friction", j) for k in required}

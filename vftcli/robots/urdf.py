@@ -13,7 +13,12 @@ from vftcli.robots.chain import Chain, unphysical
 from vftcli.robots.profile import UPRIGHT, RobotFile, assemble, column
 from vftcli.robots.robot import Limits, Robot, SensorNoise
 
-FREE_JOINTS = ("JointModelRUBX", "JointModelRUBY", "JointModelRUBZ", "JointModelRevoluteUnboundedUnaligned")
+FREE_JOINTS = (
+    "JointModelRUBX",
+    "JointModelRUBY",
+    "JointModelRUBZ",
+    "JointModelRevoluteUnboundedUnaligned",
+)
 AXES = {
     "JointModelRX": (1.0, 0.0, 0.0),
     "JointModelRY": (0.0, 1.0, 0.0),
@@ -134,8 +139,8 @@ def joint_axis(joint: Any, name: str, owner: str) -> Array:  # noqa: ANN401
     if kind.startswith("JointModelRevolute"):
         return np.array(joint.extract().axis)
     raise RobotError(
-        f"{owner}: joint {name!r} is a {kind.removeprefix('JointModel')}, not revolute; only arms of "
-        "revolute joints are supported. Lock it (type fixed) if it belongs to a gripper."
+        f"{owner}: joint {name!r} is a {kind.removeprefix('JointModel')}, not revolute; only arms "
+        "of revolute joints are supported. Lock it (type fixed) if it belongs to a gripper."
     )
 
 
