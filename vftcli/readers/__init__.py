@@ -5,6 +5,7 @@ from pathlib import Path
 
 from vftcli.errors import LogError, UnknownFormatError
 from vftcli.readers import arrays_file, lerobot, libfranka, parquet, pickles, rtde, tables
+from vftcli.readers.bags import formats as bags
 from vftcli.readers.cleaning import cleaned
 from vftcli.readers.opening import Digest
 from vftcli.readers.reader import LogFile, RawLog, Reader, Request, open_log
@@ -26,6 +27,10 @@ READERS: dict[str, Reader] = {
         pickles.PICKLE,
         parquet.PARQUET,
         lerobot.LEROBOT,
+        bags.ROS1,
+        bags.ROS2,
+        bags.DB3,
+        bags.MCAP,
     )
 }
 """Every format by name: one reader, one line."""

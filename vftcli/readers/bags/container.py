@@ -1,0 +1,205 @@
+"""What every container of messages yields: channels, and batches of their messages."""
+
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.errors import LogError
+from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+
+Bytes = NDArray[np.uint8]
+Integers = NDArray[np.int64]
+Encoding = Literal["ros1", "cdr", "json", "protobuf", "other"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """One topic of one container.
+
+    Attributes:
+        topic: Its name.
+        type: Message type as package/Name, without the middle part that ROS 2 writes.
+        encoding: How its messages are serialised.
+        definition: Text of the message definition, or nothing if the container has none.
+        idl: Whether the definition is in IDL.
+    """
+
+    topic: str
+    type: str
+    encoding: Encoding
+    definition: str = ""
+    idl: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch:
+    """Messages of one channel that lie in one buffer.
+
+    Attributes:
+        channel: Whose messages they are.
+        buffer: The bytes they lie in.
+        offsets: Where each begins. (k,)
+        lengths: How long each is. (k,)
+        times: When each was recorded. (k,) [ns]
+    """
+
+    channel: Channel
+    buffer: Bytes
+    offsets: Integers
+    lengths: Integers
+    times: Integers
+
+
+@dataclass
+class Ingest:
+    """What reading a container may cost, and what had to be left behind.
+
+    Attributes:
+        path: The file, for messages.
+        size: Its size. [B]
+        repairs: What was left behind, one sentence each.
+    """
+
+    path: Path
+    size: int
+    repairs: list[str] = field(default_factory=list)
+    unpacked: int = 0
+
+    def claim(self, size: int) -> None:
+        """Count bytes that are about to be unpacked.
+
+        Raises:
+            LogError: If the file claims more than a log of its size can hold.
+        """
+        self.unpacked += size
+        limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * self.size)
+        if size < 0 or self.unpacked > limit:
+            raise LogError(
+                f"{self.path}: its chunks claim to unpack to more than {limit >> 20} MiB, more than "
+                "a log of this size can hold. It is damaged or made to fill memory."
+            )
+
+    def note(self, repair: str) -> None:
+        """Remember a repair once."""
+        if repair not in self.repairs:
+            self.repairs.append(repair)
+
+
+def type_name(name: str) -> str:
+    """A ROS message type without its middle part: sensor_msgs/msg/JointState → …/JointState."""
+    parts = name.replace("::", "/").split("/")
+    return f"{parts[0]}/{parts[-1]}" if len(parts) > 1 else name
+
+
+def unpack_chunk(ingest: Ingest, name: str, packed: memoryview, size: int) -> memoryview:
+    """Unpack one chunk of a bag or MCAP, bounded by the size that it claims.
+
+    Raises:
+        LogError: If the compression is unknown or the chunk is damaged.
+    """
+    if name in {"", "none"}:
+        return packed
+    unpacker = UNPACKERS.get(name)
+    if unpacker is None:
+        raise LogError(f"{ingest.path}: unknown chunk compression {name[:20]!r}.")
+    ingest.claim(size)
+    content = unpacker(packed, size)
+    if content is None or len(content) != size:
+        raise LogError(f"{ingest.path}: a {name} chunk is damaged; it does not unpack to {size} B.")
+    return memoryview(content)
+
+
+def _unlz4(packed: memoryview, size: int) -> bytes | None:
+    import lz4.frame
+
+    try:
+        unpacker = lz4.frame.LZ4FrameDecompressor()
+        content: bytes = unpacker.decompress(bytes(packed), max_length=size + 1)
+        while len(content) <= size and not unpacker.eof and not unpacker.needs_input:
+            content += unpacker.decompress(b"", max_length=size + 1 - len(content))
+    except (RuntimeError, EOFError, ValueError):
+        return None
+    return content
+
+
+def _unbz2(packed: memoryview, size: int) -> bytes | None:
+    import bz2
+
+    try:
+        return bz2.BZ2Decompressor().decompress(bytes(packed), max_length=size + 1)
+    except (OSError, ValueError, EOFError):
+        return None
+
+
+def _unzstd(packed: memoryview, size: int) -> bytes | None:
+    import zstandard
+
+    try:
+        with zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(
+            bytes(packed), read_across_frames=True
+        ) as reader:
+            content = b""
+            while len(content) <= size and (piece := reader.read(size + 1 - len(content))):
+                content += piece
+            return content
+    except zstandard.ZstdError:
+        return None
+
+
+UNPACKERS: dict[str, Callable[[memoryview, int], bytes | None]] = {
+    "lz4": _unlz4,
+    "bz2": _unbz2,
+    "zstd": _unzstd,
+}
+"""Name of a chunk's compression → a function that unpacks at most the stated size."""
+
+
+def equal_rows(buffer: Bytes, start: int, stride: int, ranges: Sequence[tuple[int, int]]) -> int:
+    """How many records of one stride in a row repeat the first one's bytes in some ranges.
+
+    Records of one topic are as long as one another, so a long run is found by comparing a few
+    columns of a matrix laid over the buffer instead of parsing every record.
+    """
+    total = (len(buffer) - start) // stride
+    count, step = 1, 16
+    while count < total:
+        rows = min(step, total - count)
+        view = np.lib.stride_tricks.as_strided(
+            buffer[start + count * stride :], shape=(rows, stride), strides=(stride, 1)
+        )
+        same = np.ones(rows, dtype=bool)
+        for a, b in ranges:
+            same &= (view[:, a:b] == buffer[start + a : start + b]).all(axis=1)
+        if not same.all():
+            return count + int(np.argmin(same))
+        count += rows
+        step *= 8
+    return count
+
+
+def strided(buffer: Bytes, offsets: Integers, a: int, b: int) -> Bytes:
+    """Bytes a to b of each message. (k, b − a)"""
+    if len(offsets) > 1:
+        stride = int(offsets[1] - offsets[0])
+        if stride > 0 and np.all(np.diff(offsets) == stride):
+            start = int(offsets[0]) + a
+            return np.lib.stride_tricks.as_strided(
+                buffer[start:], shape=(len(offsets), b - a), strides=(stride, 1)
+            )
+    picked: Bytes = buffer[offsets[:, None] + np.arange(a, b)]
+    return picked
+
+
+def u32(content: Any, offset: int) -> int:  # noqa: ANN401 - any buffer
+    """A little-endian 32-bit count."""
+    return int(struct.unpack_from("<I", content, offset)[0])
+
+
+def u64(content: Any, offset: int) -> int:  # noqa: ANN401
+    """A little-endian 64-bit count."""
+    return int(struct.unpack_from("<Q", content, offset)[0])

@@ -1,0 +1,216 @@
+"""Bulk decoding: messages of one layout become arrays at once, the odd ones one by one."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import LogError
+from vftcli.readers.bags.container import Batch, Channel, Ingest, Integers
+from vftcli.readers.bags.definitions import types_for
+from vftcli.readers.bags.kinds import KINDS, Kind, constant_in, paths_in
+from vftcli.readers.bags.layout import Layout, LayoutError, Types, Walker
+
+CHECKED_ROWS = 4
+"""Messages of each batch and layout that are walked one by one to confirm the layout."""
+
+
+@dataclass
+class Stream:
+    """Messages of one topic about the same joints, as arrays.
+
+    Attributes:
+        channel: The topic.
+        kind: What its type means.
+        names: The joints' names in the messages' order, or empty.
+        frame: Frame of its stamps' headers, or nothing.
+        receive: When each was recorded. (T,) [ns]
+        header: Stamp in each header. (T,) [ns]
+        robot: The robot's own clock, or None. (T,) [s]
+        signals: Signal → (T, k).
+        constants: Last value of each constant.
+        messages: How many messages.
+    """
+
+    channel: Channel
+    kind: Kind
+    names: tuple[str, ...]
+    frame: str
+    receive: Integers
+    header: Integers | None
+    robot: Array | None
+    signals: dict[str, Array]
+    constants: dict[str, tuple[float, ...]]
+
+    @property
+    def messages(self) -> int:
+        """Number of messages."""
+        return len(self.receive)
+
+
+@dataclass
+class _Part:
+    """Arrays of some messages of one stream."""
+
+    receive: Integers
+    header: Integers | None
+    robot: Array | None
+    signals: dict[str, Array]
+    order: Integers
+
+
+@dataclass
+class _Topic:
+    """What is known of a channel while its batches come in."""
+
+    types: Types
+    layouts: dict[int, list[Layout]] = field(default_factory=dict)
+    parts: dict[tuple[tuple[str, ...], str, tuple[str, ...]], list[_Part]] = field(
+        default_factory=dict
+    )
+    constants: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    seen: int = 0
+
+
+class Decoder:
+    """Turns batches into streams, keeping only the numbers a Recording can hold."""
+
+    def __init__(self, ingest: Ingest) -> None:
+        self.ingest = ingest
+        self.topics: dict[Channel, _Topic] = {}
+        self.others: dict[str, str] = {}
+
+    def take(self, batch: Batch) -> None:
+        """Decode one batch, or remember that its type carries nothing we hold.
+
+        Raises:
+            LogError: If the type's definition is missing or its messages do not fit it.
+        """
+        channel = batch.channel
+        if channel.type not in KINDS or channel.encoding not in {"ros1", "cdr"}:
+            self.others[channel.topic] = channel.type or channel.encoding
+            return
+        topic = self.topics.get(channel)
+        try:
+            if topic is None:
+                topic = self.topics[channel] = _Topic(types=types_for(channel))
+            for length in np.unique(batch.lengths):
+                self._of_length(batch, topic, int(length))
+            topic.seen += len(batch.offsets)
+        except LayoutError as error:
+            raise LogError(
+                f"{self.ingest.path}: a message of {channel.topic} does not fit the definition of "
+                f"{channel.type} ({error}). The bag is damaged, or was recorded with another version."
+            ) from None
+
+    def _of_length(self, batch: Batch, topic: _Topic, length: int) -> None:
+        rows = np.flatnonzero(batch.lengths == length)
+        known = topic.layouts.setdefault(length, [])
+        for layout in list(known):
+            rows = self._matching(batch, topic, layout, rows)
+        while rows.size:
+            layout = self._walked(batch, topic, int(rows[0]))
+            known.append(layout)
+            rows = self._matching(batch, topic, layout, rows)
+
+    def _matching(self, batch: Batch, topic: _Topic, layout: Layout, rows: Integers) -> Integers:
+        """Decode the rows that have a layout and return the others."""
+        if rows.size == 0:
+            return rows
+        fits = layout.fits(batch.buffer, batch.offsets[rows])
+        if fits.any():
+            self._decode(batch, topic, layout, rows[fits])
+        return rows[~fits]
+
+    def _walked(self, batch: Batch, topic: _Topic, row: int) -> Layout:
+        start = int(batch.offsets[row])
+        message = batch.buffer[start : start + int(batch.lengths[row])]
+        encoding = "ros1" if batch.channel.encoding == "ros1" else "cdr"
+        return Walker(topic.types, message, encoding).walk(batch.channel.type)
+
+    def _decode(self, batch: Batch, topic: _Topic, layout: Layout, rows: Integers) -> None:
+        for row in rows[:: max(1, len(rows) // CHECKED_ROWS)][:CHECKED_ROWS]:
+            if self._walked(batch, topic, int(row)).leaves != layout.leaves:
+                raise LayoutError("two walks of one message differ")
+        kind = KINDS[batch.channel.type]
+        offsets = batch.offsets[rows]
+        signals = {}
+        for signal in kind.signals:
+            paths = paths_in(kind, signal, layout.leaves)
+            columns = [layout.numbers(path, batch.buffer, offsets) for path in paths]
+            if columns and (value := np.hstack(columns)).shape[1]:
+                signals[signal] = value
+        for name in kind.constants:
+            if path := constant_in(kind, name, layout.leaves):
+                last = layout.numbers(path, batch.buffer, offsets[-1:])[0]
+                topic.constants[name] = tuple(float(value) for value in last)
+        names = next((layout.texts[p] for p in kind.names if p in layout.texts), ())
+        frame = "".join(layout.texts.get(kind.frame, ()))
+        robot = None
+        if kind.robot_time in layout.leaves:
+            robot = layout.numbers(kind.robot_time, batch.buffer, offsets)[:, 0]
+        part = _Part(
+            receive=batch.times[rows],
+            header=_stamps(layout, batch, offsets),
+            robot=robot,
+            signals=signals,
+            order=topic.seen + rows,
+        )
+        topic.parts.setdefault((names, frame, tuple(signals)), []).append(part)
+
+    def streams(self) -> list[Stream]:
+        """All streams that were decoded, each in the order of recording."""
+        return [
+            _joined(channel, topic, key, parts)
+            for channel, topic in self.topics.items()
+            for key, parts in topic.parts.items()
+        ]
+
+
+def _stamps(layout: Layout, batch: Batch, offsets: Integers) -> Integers | None:
+    """Header stamps in nanoseconds, or None if the type has no header. (k,)"""
+    if "header.stamp.sec" not in layout.leaves or "header.stamp.nanosec" not in layout.leaves:
+        return None
+    seconds = layout.whole_numbers("header.stamp.sec", batch.buffer, offsets)
+    return seconds * 1_000_000_000 + layout.whole_numbers(
+        "header.stamp.nanosec", batch.buffer, offsets
+    )
+
+
+def _joined(
+    channel: Channel,
+    topic: _Topic,
+    key: tuple[tuple[str, ...], str, tuple[str, ...]],
+    parts: Iterable[_Part],
+) -> Stream:
+    """One stream of its parts, in the order in which the messages were recorded."""
+    parts = list(parts)
+    names, frame, signals = key
+    widths = {name: {part.signals[name].shape[1] for part in parts} for name in signals}
+    order = np.argsort(np.concatenate([part.order for part in parts]), kind="stable")
+    straight = bool(np.all(order == np.arange(len(order))))
+
+    def whole(arrays: list[Array]) -> Array:
+        if len(arrays) == 1 and straight:
+            return arrays[0]
+        joined: Array = np.concatenate(arrays)
+        return joined if straight else joined[order]
+
+    headers = [part.header for part in parts]
+    robots = [part.robot for part in parts]
+    return Stream(
+        channel=channel,
+        kind=KINDS[channel.type],
+        names=names,
+        frame=frame,
+        receive=np.concatenate([part.receive for part in parts])[order],
+        header=None if any(h is None for h in headers) else np.concatenate(headers)[order],
+        robot=None if any(r is None for r in robots) else whole(robots),
+        signals={
+            name: whole([part.signals[name] for part in parts])
+            for name in signals
+            if len(widths[name]) == 1
+        },
+        constants=topic.constants,
+    )

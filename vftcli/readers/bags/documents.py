@@ -1,0 +1,237 @@
+"""MCAP channels without ROS: JSON documents, and Foxglove's JointStates in protobuf."""
+
+import json
+import struct
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from vftcli.errors import LogError
+from vftcli.readers.bags.container import Batch, Channel, Ingest
+from vftcli.readers.joints import kinematic_order, robot_of
+from vftcli.readers.reader import LogFile, RawLog, Request
+from vftcli.readers.table import Column
+from vftcli.readers.tables import ArrayTable, from_table
+
+FOXGLOVE = "foxglove.JointStates"
+MAX_DEPTH = 8
+MAX_VALUES = 4096
+
+
+class DocumentError(ValueError):
+    """A message is not the document it claims to be."""
+
+
+class Documents:
+    """Documents of all channels, flattened as they come in."""
+
+    def __init__(self, ingest: Ingest) -> None:
+        self.ingest = ingest
+        self.rows: dict[Channel, list[dict[str, Any]]] = {}
+        self.times: dict[Channel, list[int]] = {}
+
+    def take(self, batch: Batch) -> bool:
+        """Take up a batch of JSON or JointStates; False if it is neither.
+
+        Raises:
+            LogError: If a message is damaged.
+        """
+        channel = batch.channel
+        json_like = channel.encoding == "json"
+        if not json_like and not (channel.encoding == "protobuf" and channel.type == FOXGLOVE):
+            return False
+        rows = self.rows.setdefault(channel, [])
+        times = self.times.setdefault(channel, [])
+        for offset, length, time in zip(batch.offsets, batch.lengths, batch.times, strict=True):
+            message = batch.buffer[offset : offset + length].tobytes()
+            try:
+                rows.append(flattened(_json(message) if json_like else joint_states(message)))
+            except DocumentError as error:
+                raise LogError(
+                    f"{self.ingest.path}: message {len(rows) + 1} of {channel.topic} is damaged "
+                    f"({error})"
+                ) from None
+            times.append(int(time))
+        return True
+
+
+def _json(message: bytes) -> Any:  # noqa: ANN401
+    try:
+        return json.loads(message)
+    except (ValueError, RecursionError) as error:
+        raise DocumentError(str(error)[:60]) from None
+
+
+def joint_states(message: bytes) -> dict[str, Any]:
+    """A foxglove.JointStates message: timestamp = 1, joints = 2 {name 1, position 2, …}."""
+    document: dict[str, Any] = {"joints": []}
+    for number, value in fields(message):
+        if number == 1 and isinstance(value, bytes):
+            stamp = dict(fields(value))
+            document["timestamp"] = {"sec": stamp.get(1, 0), "nsec": stamp.get(2, 0)}
+        elif number == 2 and isinstance(value, bytes):
+            document["joints"].append(_joint(value))
+    return document
+
+
+def _joint(message: bytes) -> dict[str, Any]:
+    names = {2: "position", 3: "velocity", 4: "acceleration", 5: "effort"}
+    joint: dict[str, Any] = {}
+    for number, value in fields(message):
+        if number == 1 and isinstance(value, bytes):
+            joint["name"] = value.decode("utf-8", "replace")
+        elif number in names and isinstance(value, float):
+            joint[names[number]] = value
+    return joint
+
+
+def fields(message: bytes) -> Iterator[tuple[int, int | float | bytes]]:
+    """Field numbers and values of a protobuf message, one level deep.
+
+    Raises:
+        DocumentError: If the message is cut or holds an unknown kind of field.
+    """
+    position = 0
+    while position < len(message):
+        key, position = _varint(message, position)
+        kind = key & 7
+        if kind == 0:
+            value, position = _varint(message, position)
+            yield key >> 3, value
+            continue
+        size, position = (
+            _varint(message, position) if kind == 2 else ({1: 8, 5: 4}.get(kind, -1), position)
+        )
+        if size < 0 or position + size > len(message):
+            raise DocumentError("a field ends outside its message")
+        raw = message[position : position + size]
+        position += size
+        yield key >> 3, raw if kind == 2 else struct.unpack("<d" if kind == 1 else "<f", raw)[0]
+
+
+def _varint(message: bytes, position: int) -> tuple[int, int]:
+    value = shift = 0
+    while True:
+        if position >= len(message) or shift > 63:
+            raise DocumentError("a number ends outside its message")
+        byte = message[position]
+        value |= (byte & 127) << shift
+        position, shift = position + 1, shift + 7
+        if byte < 128:
+            return value, position
+
+
+def flattened(document: Any) -> dict[str, Any]:  # noqa: ANN401
+    """A document as dotted paths; joints given one object each become lists by field.
+
+    Raises:
+        DocumentError: If it is no object, or nested or long beyond any message of joints.
+    """
+    if not isinstance(document, dict):
+        raise DocumentError("not an object")
+    flat: dict[str, Any] = {}
+    _flatten(document, "", flat, 0)
+    return flat
+
+
+def _flatten(value: Any, path: str, flat: dict[str, Any], depth: int) -> None:  # noqa: ANN401
+    if depth > MAX_DEPTH or len(flat) > MAX_VALUES:
+        raise DocumentError("nested or long beyond any message of joints")
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _flatten(inner, f"{path}.{key}" if path else str(key), flat, depth + 1)
+    elif isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
+        for key in ("name", "position", "velocity", "effort"):
+            found = [v[key] for v in value if key in v]
+            if len(found) == len(value):
+                flat[key] = found
+    elif isinstance(value, list | int | float | str | bool):
+        flat[path] = value
+
+
+def read_documents(file: LogFile, documents: Documents, request: Request) -> RawLog:
+    """Read the channel whose documents hold joint positions.
+
+    Raises:
+        LogError: If none does; the message says what each holds.
+    """
+    failures = []
+    for channel, rows in documents.rows.items():
+        try:
+            return _read(file, channel, rows, documents.times[channel], request)
+        except LogError as error:
+            failures.append((len(rows), str(error).partition(": ")[2], channel.topic))
+    if not failures:
+        raise LogError(f"{file.path}: no messages of a kind that is known.")
+    _, reason, topic = max(failures)
+    raise LogError(f"{file.path}: topic {topic}: {reason}")
+
+
+def _read(
+    file: LogFile, channel: Channel, rows: list[dict[str, Any]], times: list[int], request: Request
+) -> RawLog:
+    columns: dict[str, Column] = {}
+    for key, first in rows[0].items():
+        values = [row.get(key) for row in rows]
+        if (column := _column(first, values)) is not None:
+            columns[key] = column
+    names = _names(rows[0])
+    if names:
+        columns = {k: _ordered(v, names) for k, v in columns.items()}
+    clock = "log time of the recorder"
+    columns = {
+        k: v
+        for k, v in columns.items()
+        if not k.lower().startswith(("timestamp", "stamp", "header"))
+    }
+    if (stamps := _stamps(rows)) is not None:
+        clock, columns["timestamp"] = f"stamps in the messages of {channel.topic}", stamps
+    else:
+        columns["timestamp"] = np.array(times, dtype=np.int64)
+    table = ArrayTable(path=file.path, columns=columns)
+    ordered = tuple(names[k] for k in kinematic_order(names))
+    more: dict[str, Any] = {"clock_name": clock}
+    if request.columns is None and ordered:
+        raw = from_table(table, request, **more)
+        from dataclasses import replace
+
+        return replace(raw, joint_names=ordered, robot_hint=robot_of(ordered))
+    return from_table(table, request, **more)
+
+
+def _names(row: dict[str, Any]) -> tuple[str, ...]:
+    names = row.get("name", [])
+    good = isinstance(names, list) and all(isinstance(name, str) for name in names)
+    return tuple(names) if good else ()
+
+
+def _ordered(column: Column, names: Sequence[str]) -> Column:
+    if column.ndim != 2 or column.shape[1] != len(names):
+        return column
+    return column[:, list(kinematic_order(names))]
+
+
+def _column(first: Any, values: list[Any]) -> Column | None:  # noqa: ANN401
+    """Values of all messages as an array, or None if they are not numbers of one shape."""
+    if isinstance(first, str | bool) or (isinstance(first, list) and not first):
+        return None
+    try:
+        column = np.array(values, dtype=np.float64)
+    except (ValueError, TypeError, OverflowError):
+        return None
+    return column if column.ndim in {1, 2} else None
+
+
+def _stamps(rows: list[dict[str, Any]]) -> Column | None:
+    """Stamps in the documents, in nanoseconds, or as they are if they are one number."""
+    for base in ("timestamp", "header.stamp", "stamp"):
+        for sec in ("sec", "seconds"):
+            for nsec in ("nsec", "nanos", "nanosec"):
+                if f"{base}.{sec}" in rows[0] and f"{base}.{nsec}" in rows[0]:
+                    pairs = [(row.get(f"{base}.{sec}"), row.get(f"{base}.{nsec}")) for row in rows]
+                    if all(isinstance(s, int) and isinstance(n, int) for s, n in pairs):
+                        return np.array([s * 10**9 + n for s, n in pairs], dtype=np.int64)
+        if isinstance(rows[0].get(base), int | float):
+            return _column(0.0, [row.get(base) for row in rows])
+    return None

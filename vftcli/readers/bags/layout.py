@@ -1,0 +1,242 @@
+"""Layouts: where the numbers of a serialised ROS message lie, found once and used for thousands.
+
+A layout is found by walking one message along its definition. Another message has the same layout
+if and only if it is as long and all its length prefixes are equal; strings are required to be equal
+too, so that joint names hold for every message of a group.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.readers.bags.container import Bytes, Integers, strided
+
+MAX_DEPTH = 24
+MAX_LEAVES = 20_000
+
+SIZES = {
+    "bool": "u1", "byte": "u1", "octet": "u1", "char": "u1", "uint8": "u1", "int8": "i1",
+    "uint16": "u2", "int16": "i2", "uint32": "u4", "int32": "i4", "uint64": "u8", "int64": "i8",
+    "float32": "f4", "float64": "f8",
+}  # fmt: skip
+"""Primitive type → NumPy's code for it."""
+
+
+class Field(NamedTuple):
+    """One field of a message type.
+
+    Attributes:
+        name: Its name.
+        type: A primitive, `string`, or another message type as package/Name.
+        many: How many: None for one, a number for a fixed array, −1 for a sequence.
+    """
+
+    name: str
+    type: str
+    many: int | None
+
+
+Types = Mapping[str, Sequence[Field]]
+
+
+class LayoutError(ValueError):
+    """A message does not fit its definition."""
+
+
+class Leaf(NamedTuple):
+    """Numbers in a message: where, of which type, how many."""
+
+    offset: int
+    code: str
+    count: int
+
+
+@dataclass
+class Layout:
+    """Where everything lies in messages of one shape.
+
+    Attributes:
+        leaves: Dotted path → numbers.
+        texts: Dotted path → strings, one or several.
+        fixed: Ranges of bytes that have to be equal for a message to have this layout.
+        length: Length of the message. [B]
+        expected: The bytes of those ranges, one after another.
+    """
+
+    leaves: dict[str, Leaf] = field(default_factory=dict)
+    texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    fixed: list[tuple[int, int]] = field(default_factory=list)
+    length: int = 0
+    expected: list[Bytes] = field(default_factory=list)
+
+    def settle(self, message: Bytes) -> None:
+        """Merge the fixed ranges and note their bytes."""
+        merged: list[tuple[int, int]] = []
+        for a, b in self.fixed:
+            if merged and merged[-1][1] >= a:
+                merged[-1] = (merged[-1][0], b)
+            else:
+                merged.append((a, b))
+        self.fixed = merged
+        self.expected = [message[a:b].copy() for a, b in merged]
+        self.length = len(message)
+
+    def fits(self, buffer: Bytes, offsets: Integers) -> NDArray[np.bool_]:
+        """Which messages, all of this layout's length, have this layout. (k,)"""
+        same = np.ones(len(offsets), dtype=bool)
+        for (a, b), expected in zip(self.fixed, self.expected, strict=True):
+            same &= (strided(buffer, offsets, a, b) == expected).all(axis=1)
+        return same
+
+    def numbers(self, path: str, buffer: Bytes, offsets: Integers) -> NDArray[np.float64]:
+        """The numbers at a path of each message. (k, count)"""
+        leaf = self.leaves[path]
+        dtype = np.dtype(leaf.code)
+        raw = strided(buffer, offsets, leaf.offset, leaf.offset + leaf.count * dtype.itemsize)
+        return np.ascontiguousarray(raw).view(dtype).astype(np.float64)
+
+    def whole_numbers(self, path: str, buffer: Bytes, offsets: Integers) -> Integers:
+        """The whole numbers at a path of each message, one each. (k,)"""
+        leaf = self.leaves[path]
+        dtype = np.dtype(leaf.code)
+        raw = strided(buffer, offsets, leaf.offset, leaf.offset + dtype.itemsize)
+        return np.ascontiguousarray(raw).view(dtype)[:, 0].astype(np.int64)
+
+
+class Walker:
+    """Walks one message along its definition and writes down where everything lies."""
+
+    def __init__(self, types: Types, message: Bytes, encoding: Literal["ros1", "cdr"]) -> None:
+        self.types = types
+        self.message = message
+        self.cdr = encoding == "cdr"
+        self.layout = Layout()
+        self.order = "<"
+        self.position = 0
+        if self.cdr:
+            self._encapsulation()
+
+    def walk(self, root: str) -> Layout:
+        """Walk the whole message.
+
+        Raises:
+            LayoutError: If the message is shorter or longer than its definition says.
+        """
+        self._message("", root, 0)
+        if len(self.message) - self.position > (8 if self.cdr else 0):
+            raise LayoutError(f"{len(self.message) - self.position} bytes too many")
+        self.layout.settle(self.message)
+        return self.layout
+
+    def _encapsulation(self) -> None:
+        """The four bytes before CDR: representation and byte order."""
+        if len(self.message) < 4 or self.message[0] != 0 or self.message[1] > 1:
+            raise LayoutError("unknown encapsulation")
+        self.order = "<" if self.message[1] == 1 else ">"
+        self.layout.fixed.append((0, 2))
+        self.position = 4
+
+    def _message(self, path: str, name: str, depth: int) -> None:
+        if depth > MAX_DEPTH:
+            raise LayoutError("nested too deeply")
+        if name not in self.types:
+            raise LayoutError(f"no definition of {name}")
+        for part in self.types[name]:
+            self._field(f"{path}.{part.name}" if path else part.name, part, depth)
+
+    def _field(self, path: str, part: Field, depth: int) -> None:
+        many = part.many
+        if many == -1:
+            many = self._count()
+        if part.type in SIZES:
+            self._numbers(path, SIZES[part.type], 1 if many is None else many)
+        elif part.type == "string":
+            self._texts(path, 1 if many is None else many)
+        elif many is None:
+            self._message(path, part.type, depth + 1)
+        else:
+            for k in range(many):
+                if self.position >= len(self.message) and self.types.get(part.type):
+                    raise LayoutError("a sequence longer than the message")
+                self._message(f"{path}[{k}]", part.type, depth + 1)
+
+    def _numbers(self, path: str, code: str, count: int) -> None:
+        dtype = np.dtype(code)
+        if self.cdr and count:
+            self.position = 4 + (self.position - 4 + dtype.itemsize - 1) // dtype.itemsize * (
+                dtype.itemsize
+            )
+        end = self.position + count * dtype.itemsize
+        if end > len(self.message) or len(self.layout.leaves) > MAX_LEAVES:
+            raise LayoutError(f"{path} lies outside the message")
+        self.layout.leaves[path] = Leaf(self.position, self.order + code, count)
+        self.position = end
+
+    def _count(self) -> int:
+        """A length prefix, which every message of this layout must repeat."""
+        if self.cdr:
+            self.position = 4 + (self.position - 1) // 4 * 4
+        start, self.position = self.position, self.position + 4
+        if self.position > len(self.message):
+            raise LayoutError("a length lies outside the message")
+        self.layout.fixed.append((start, self.position))
+        count = int(self.message[start : self.position].view(f"{self.order}u4")[0])
+        if count > len(self.message):
+            raise LayoutError("a count larger than the message")
+        return count
+
+    def _texts(self, path: str, count: int) -> None:
+        texts = []
+        for _ in range(count):
+            length = self._count()
+            start, self.position = self.position, self.position + length
+            if self.position > len(self.message):
+                raise LayoutError(f"{path} lies outside the message")
+            self.layout.fixed.append((start, self.position))
+            raw = self.message[start : self.position].tobytes()
+            texts.append(raw.removesuffix(b"\0").decode("utf-8", "replace"))
+        self.layout.texts[path] = tuple(texts)
+
+
+def types_of(definition: str, name: str, *, idl: bool) -> dict[str, tuple[Field, ...]]:
+    """Parse a message definition with rosbags' parsers. Type → fields.
+
+    Raises:
+        LayoutError: If the text is no message definition.
+    """
+    from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
+
+    if len(definition) > 1 << 20:
+        raise LayoutError("a definition of more than a megabyte")
+    try:
+        parsed = get_types_from_idl(definition) if idl else get_types_from_msg(definition, name)
+    except (TypesysError, ValueError, KeyError, TypeError, RecursionError, AssertionError) as error:
+        raise LayoutError(f"no message definition ({error!s:.60})") from None
+    return {short(kind): fields_of(fields) for kind, (_, fields) in parsed.items()}
+
+
+def fields_of(fields: Any) -> tuple[Field, ...]:  # noqa: ANN401 - rosbags' nested tuples
+    """Fields as rosbags describes them, in our terms."""
+    return tuple(Field(str(name), *_described(kind)) for name, kind in fields)
+
+
+def _described(kind: Any) -> tuple[str, int | None]:  # noqa: ANN401
+    node, inner = int(kind[0]), kind[1]
+    if node == 1:  # a primitive with a bound
+        return str(inner[0]), None
+    if node == 2:  # another message
+        return short(str(inner)), None
+    element, bound = inner
+    name, many = _described(element)
+    if many is not None:
+        raise LayoutError("an array of arrays")
+    return name, int(bound) if node == 3 else -1
+
+
+def short(name: str) -> str:
+    """A type's name without the middle part: std_msgs/msg/Header → std_msgs/Header."""
+    parts = name.split("/")
+    return f"{parts[0]}/{parts[-1]}"

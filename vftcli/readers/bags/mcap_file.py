@@ -1,0 +1,192 @@
+"""MCAP files: records walked from the start, so that a cut file reads up to its last whole chunk.
+
+Format: https://mcap.dev/spec. A record is an opcode, a 64-bit length and the content.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.errors import LogError
+from vftcli.readers.bags.container import (
+    Batch,
+    Bytes,
+    Channel,
+    Encoding,
+    Ingest,
+    equal_rows,
+    type_name,
+    u32,
+    u64,
+    unpack_chunk,
+)
+
+MAGIC = b"\x89MCAP0\r\n"
+SCHEMA, CHANNEL, MESSAGE, CHUNK, FOOTER, DATA_END = 3, 4, 5, 6, 2, 15
+HEADER = 9
+"""Bytes before a record's content: opcode and length."""
+MESSAGE_HEAD = 22
+"""Bytes of a message before its data: channel, sequence, log time, publish time."""
+RUN_AFTER = 3
+
+ENCODINGS: dict[str, Encoding] = {
+    "cdr": "cdr", "ros1": "ros1", "json": "json", "protobuf": "protobuf",
+}  # fmt: skip
+
+
+class Run(NamedTuple):
+    """Messages of one channel at one stride."""
+
+    start: int
+    stride: int
+    count: int
+    length: int
+
+
+class Catalogue:
+    """Schemas and channels met so far."""
+
+    def __init__(self, ingest: Ingest) -> None:
+        self.ingest = ingest
+        self.schemas: dict[int, tuple[str, str, bytes]] = {}
+        self.channels: dict[int, Channel] = {}
+
+    def schema(self, content: memoryview) -> None:
+        """Take up a schema record."""
+        name, position = self._text(content, 2)
+        encoding, position = self._text(content, position)
+        size = u32(content, position)
+        data = bytes(content[position + 4 : position + 4 + size])
+        self.schemas[int(struct.unpack_from("<H", content)[0])] = (name, encoding, data)
+
+    def channel(self, content: memoryview) -> None:
+        """Take up a channel record."""
+        number, schema = struct.unpack_from("<HH", content)
+        topic, position = self._text(content, 4)
+        encoding, _ = self._text(content, position)
+        name, kind, data = self.schemas.get(schema, ("", "", b""))
+        text = data.decode("utf-8", "replace") if kind in {"ros1msg", "ros2msg", "ros2idl"} else ""
+        self.channels[number] = Channel(
+            topic=topic,
+            type=type_name(name) if text else name,
+            encoding=ENCODINGS.get(encoding, "other"),
+            definition=text,
+            idl=kind == "ros2idl",
+        )
+
+    @staticmethod
+    def _text(content: memoryview, position: int) -> tuple[str, int]:
+        end = position + 4 + u32(content, position)
+        if end > len(content):
+            raise struct.error
+        return bytes(content[position + 4 : end]).decode("utf-8", "replace"), end
+
+
+def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
+    """Messages of an MCAP file, chunk by chunk, up to the last whole chunk.
+
+    Raises:
+        LogError: If a chunk or a record is damaged.
+    """
+    catalogue = Catalogue(ingest)
+    start, position, ended = len(MAGIC), len(MAGIC), False
+    loose: dict[int, list[Run]] = {}
+    try:
+        while position + HEADER <= len(content):
+            opcode, end = content[position], position + HEADER + u64(content, position + 1)
+            if end > len(content) or content[position : position + 8] == MAGIC:
+                break
+            if opcode == CHUNK:
+                yield from _chunk(content[position + HEADER : end], catalogue)
+            elif opcode == MESSAGE:
+                _message(content, position, end, loose)
+            elif opcode in {SCHEMA, CHANNEL} and not ended:
+                _take(catalogue, opcode, content[position + HEADER : end])
+            elif opcode in {DATA_END, FOOTER}:
+                ended = True
+                if opcode == FOOTER:
+                    break
+            position = end
+    except struct.error:
+        raise LogError(f"{ingest.path}: a record is damaged at byte {position}.") from None
+    buffer = np.frombuffer(content, dtype=np.uint8)
+    yield from _yielded(loose, buffer, catalogue)
+    if not ended:
+        left = len(content) - position
+        ingest.note(
+            f"the file is cut: read up to the last whole chunk, {left} bytes left behind"
+            if left > 0 and start != position
+            else "the file was not closed by its recorder"
+        )
+
+
+def _take(catalogue: Catalogue, opcode: int, content: memoryview) -> None:
+    if opcode == SCHEMA:
+        catalogue.schema(content)
+    else:
+        catalogue.channel(content)
+
+
+def _message(content: memoryview, position: int, end: int, found: dict[int, list[Run]]) -> None:
+    length = end - position - HEADER - MESSAGE_HEAD
+    if length < 0:
+        raise struct.error
+    channel = int(struct.unpack_from("<H", content, position + HEADER)[0])
+    start = position + HEADER + MESSAGE_HEAD
+    found.setdefault(channel, []).append(Run(start, end - position, 1, length))
+
+
+def _chunk(content: memoryview, catalogue: Catalogue) -> Iterator[Batch]:
+    ingest = catalogue.ingest
+    size, checksum = u64(content, 16), u32(content, 24)
+    compression, position = Catalogue._text(content, 28)
+    stored = u64(content, position)
+    packed = content[position + 8 : position + 8 + stored]
+    if len(packed) != stored:
+        raise struct.error
+    chunk = unpack_chunk(ingest, compression, packed, size)
+    if checksum and zlib.crc32(chunk) != checksum:
+        raise LogError(f"{ingest.path}: a chunk does not match its checksum; the file is damaged.")
+    buffer = np.frombuffer(chunk, dtype=np.uint8)
+    yield from _yielded(_walk(chunk, buffer, catalogue), buffer, catalogue)
+
+
+def _walk(chunk: memoryview, buffer: Bytes, catalogue: Catalogue) -> dict[int, list[Run]]:
+    """Find the messages of a chunk. Channel → runs of its messages."""
+    found: dict[int, list[Run]] = {}
+    position, alike, before = 0, 0, (-1, -1)
+    while position < len(chunk):
+        opcode, length = struct.unpack_from("<BQ", chunk, position)
+        stride = HEADER + length
+        if position + stride > len(chunk):
+            raise LogError(f"{catalogue.ingest.path}: a record ends outside its chunk; damaged.")
+        if opcode != MESSAGE:
+            if opcode in {SCHEMA, CHANNEL}:
+                _take(catalogue, opcode, chunk[position + HEADER : position + stride])
+            position += stride
+            continue
+        if length < MESSAGE_HEAD:
+            raise struct.error
+        channel = int(struct.unpack_from("<H", chunk, position + HEADER)[0])
+        alike = alike + 1 if before == (channel, stride) else 0
+        before, count = (channel, stride), 1
+        if alike >= RUN_AFTER:
+            count = equal_rows(buffer, position, stride, ((0, HEADER + 2),))
+        run = Run(position + HEADER + MESSAGE_HEAD, stride, count, length - MESSAGE_HEAD)
+        found.setdefault(channel, []).append(run)
+        position += stride * count
+    return found
+
+
+def _yielded(found: dict[int, list[Run]], buffer: Bytes, catalogue: Catalogue) -> Iterator[Batch]:
+    for number, runs in found.items():
+        if (channel := catalogue.channels.get(number)) is None:
+            continue
+        offsets = np.concatenate([r.start + r.stride * np.arange(r.count) for r in runs])
+        lengths = np.repeat([r.length for r in runs], [r.count for r in runs])
+        stamps = buffer[(offsets - MESSAGE_HEAD + 6)[:, None] + np.arange(8)]
+        times = stamps.view("<u8")[:, 0].astype(np.int64)
+        yield Batch(channel=channel, buffer=buffer, offsets=offsets, lengths=lengths, times=times)

@@ -1,0 +1,253 @@
+"""ROS 1 bags, version 2.0: records walked from the start, so that an unclosed bag reads too.
+
+Format: http://wiki.ros.org/Bags/Format/2.0. A record is a header length, header fields
+`name=value`, a data length and the data; chunks hold connection and message records.
+"""
+
+import struct
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.errors import LogError
+from vftcli.readers.bags.container import (
+    Batch,
+    Bytes,
+    Channel,
+    Ingest,
+    equal_rows,
+    type_name,
+    u32,
+    unpack_chunk,
+)
+
+MAGIC = b"#ROSBAG V2.0\n"
+OP_MESSAGE, OP_BAG, OP_INDEX, OP_CHUNK, OP_CHUNK_INFO, OP_CONNECTION = 2, 3, 4, 5, 6, 7
+MAX_HEADER = 64 * 1024
+RUN_AFTER = 3
+"""Messages of one kind in a row after which a longer run is looked for at once."""
+
+Header = dict[bytes, bytes]
+
+
+class Record(NamedTuple):
+    """One record: its parsed header, and where its data lies."""
+
+    header: Header
+    data: int
+    end: int
+
+    @property
+    def op(self) -> int:
+        """The record's kind, or −1."""
+        code = self.header.get(b"op", b"")
+        return code[0] if len(code) == 1 else -1
+
+
+class Template(NamedTuple):
+    """The header of a connection's messages, all alike but for the time in it."""
+
+    connection: int
+    length: int
+    before: bytes
+    time: int
+    after: bytes
+
+
+class Cut(Exception):  # noqa: N818 - not an error: the end of what can be read
+    """The content ends inside a record."""
+
+
+def parse_header(content: memoryview, start: int, end: int) -> Header:
+    """Fields of a record header; a malformed field ends it.
+
+    Raises:
+        Cut: If a field is longer than the header.
+    """
+    fields = {}
+    while start < end:
+        if start + 4 > end:
+            raise Cut
+        length = u32(content, start)
+        if length > end - start - 4:
+            raise Cut
+        name, _, value = bytes(content[start + 4 : start + 4 + length]).partition(b"=")
+        fields[name] = value
+        start += 4 + length
+    return fields
+
+
+def record_at(content: memoryview, start: int) -> Record:
+    """The record that begins at an offset.
+
+    Raises:
+        Cut: If it does not end inside the content.
+    """
+    if start + 8 > len(content):
+        raise Cut
+    size = u32(content, start)
+    if size > MAX_HEADER or start + 8 + size > len(content):
+        raise Cut
+    header = parse_header(content, start + 4, start + 4 + size)
+    data = start + 8 + size
+    end = data + u32(content, start + 4 + size)
+    if end > len(content):
+        raise Cut
+    return Record(header, data, end)
+
+
+def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
+    """Messages of a bag, chunk by chunk, up to the last whole chunk.
+
+    Raises:
+        LogError: If a chunk is damaged or the bag is encrypted.
+    """
+    connections: dict[int, Channel] = {}
+    position, indexed = len(MAGIC), False
+    while position < len(content):
+        try:
+            record = record_at(content, position)
+        except Cut:
+            ingest.note(
+                "the bag is cut: read up to the last whole chunk, "
+                f"{len(content) - position} bytes left behind"
+            )
+            return
+        if record.op == OP_BAG:
+            indexed = record.header.get(b"index_pos", bytes(8)) != bytes(8)
+            if record.header.get(b"encryptor"):
+                raise LogError(f"{ingest.path}: the bag is encrypted. Decrypt it first.")
+        elif record.op == OP_CONNECTION:
+            _connect(connections, content, record)
+        elif record.op == OP_CHUNK:
+            yield from _chunk(content, record, connections, ingest)
+        position = record.end
+    if not indexed:
+        ingest.note("the bag was not closed by its recorder: read without its index")
+
+
+def _connect(connections: dict[int, Channel], content: memoryview, record: Record) -> None:
+    number = record.header.get(b"conn", b"")
+    if len(number) != 4:
+        return
+    try:
+        fields = parse_header(content, record.data, record.end)
+    except Cut:
+        return
+    topic = record.header.get(b"topic", fields.get(b"topic", b""))
+    connections[u32(number, 0)] = Channel(
+        topic=topic.decode("utf-8", "replace"),
+        type=type_name(fields.get(b"type", b"").decode("utf-8", "replace")),
+        encoding="ros1",
+        definition=fields.get(b"message_definition", b"").decode("utf-8", "replace"),
+    )
+
+
+def _chunk(
+    content: memoryview, record: Record, connections: dict[int, Channel], ingest: Ingest
+) -> Iterator[Batch]:
+    size = record.header.get(b"size", b"")
+    if len(size) != 4:
+        raise LogError(f"{ingest.path}: a chunk without its size; the bag is damaged.")
+    name = record.header.get(b"compression", b"none").decode("ascii", "replace")
+    packed = content[record.data : record.end]
+    chunk = unpack_chunk(ingest, name, packed, u32(size, 0))
+    found = _walk(chunk, connections, ingest)
+    buffer = np.frombuffer(chunk, dtype=np.uint8)
+    for connection, runs in found.items():
+        if connection in connections:
+            yield _batch(connections[connection], buffer, runs)
+
+
+class Run(NamedTuple):
+    """Messages of one connection at one stride."""
+
+    start: int
+    stride: int
+    count: int
+    length: int
+    time: int
+
+
+def _batch(channel: Channel, buffer: Bytes, runs: list[Run]) -> Batch:
+    """One batch of all runs of a connection: offsets, lengths and receive times."""
+    offsets = np.concatenate([r.start + r.stride * np.arange(r.count) for r in runs])
+    lengths = np.repeat([r.length for r in runs], [r.count for r in runs])
+    back = np.repeat([r.time for r in runs], [r.count for r in runs])
+    stamps = buffer[(offsets - back)[:, None] + np.arange(8)].view("<u4").astype(np.int64)
+    times = stamps[:, 0] * 1_000_000_000 + stamps[:, 1]
+    return Batch(channel=channel, buffer=buffer, offsets=offsets, lengths=lengths, times=times)
+
+
+def _walk(
+    chunk: memoryview, connections: dict[int, Channel], ingest: Ingest
+) -> dict[int, list[Run]]:
+    """Find the messages of a chunk. Connection → runs of its messages.
+
+    Raises:
+        LogError: If the chunk's records do not fill it.
+    """
+    buffer = np.frombuffer(chunk, dtype=np.uint8)
+    found: dict[int, list[Run]] = {}
+    templates: list[Template] = []
+    position, alike, before = 0, 0, (-1, -1)
+    while position < len(chunk):
+        template = _known(chunk, position, templates)
+        if template is None:
+            try:
+                record = record_at(chunk, position)
+            except Cut:
+                raise LogError(
+                    f"{ingest.path}: a chunk ends inside a record; the bag is damaged."
+                ) from None
+            if record.op == OP_CONNECTION:
+                _connect(connections, chunk, record)
+            template = _template(chunk, position, record) if record.op == OP_MESSAGE else None
+            if template is None:
+                position = record.end
+                continue
+            templates.insert(0, template)
+        data = position + 8 + template.length
+        length = u32(chunk, data - 4)
+        if data + length > len(chunk):
+            raise LogError(f"{ingest.path}: a message ends outside its chunk; the bag is damaged.")
+        stride = 8 + template.length + length
+        alike = alike + 1 if before == (template.connection, stride) else 0
+        before = (template.connection, stride)
+        count = 1
+        if alike >= RUN_AFTER:
+            after = template.time + 8
+            count = equal_rows(
+                buffer, position, stride, ((0, template.time), (after, 8 + template.length))
+            )
+        run = Run(data, stride, count, length, data - position - template.time)
+        found.setdefault(template.connection, []).append(run)
+        position += stride * count
+    return found
+
+
+def _known(chunk: memoryview, position: int, templates: list[Template]) -> Template | None:
+    for template in templates:
+        time = position + template.time
+        if (
+            chunk[position:time] == template.before
+            and chunk[time + 8 : position + 4 + template.length] == template.after
+            and position + 8 + template.length <= len(chunk)
+        ):
+            return template
+    return None
+
+
+def _template(chunk: memoryview, position: int, record: Record) -> Template | None:
+    """The pattern of a message record's header, with the place of its time."""
+    connection, time = record.header.get(b"conn", b""), record.header.get(b"time", b"")
+    if len(connection) != 4 or len(time) != 8:
+        return None
+    length = u32(chunk, position)
+    raw = bytes(chunk[position : position + 4 + length])
+    place = raw.find(struct.pack("<I", 13) + b"time=" + time)
+    if place < 0:
+        return None
+    place += 9
+    return Template(u32(connection, 0), length, raw[:place], place, raw[place + 8 :])

@@ -1,0 +1,287 @@
+"""Several topics on one clock: which topic leads, which clock counts, what is interpolated."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import LogError
+from vftcli.readers.aliases import TURNED_NOTE
+from vftcli.readers.bags.container import Integers
+from vftcli.readers.bags.decode import Stream
+from vftcli.readers.columns import SIGNALS, parse_columns
+from vftcli.readers.joints import UR_NAMES, kinematic_order, robot_of
+from vftcli.readers.reader import RawLog, Request
+
+TARGETS = re.compile(r"desired|command|target|goal|reference", re.IGNORECASE)
+VENDOR_WRENCH = re.compile(r"franka|F_ext$|external_wrench", re.IGNORECASE)
+NEAR = 3.0
+"""A wrench further than this many of its own sample times from a pose is not taken for it."""
+
+EFFORT_IS_CURRENT = (
+    "effort of UR joints taken as motor current [A], as the UR drivers publish it (a simulator "
+    "publishes torque: --columns tau=effort)"
+)
+
+
+@dataclass
+class Notes:
+    """What was chosen, and what looks suspicious."""
+
+    repairs: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+
+def aligned(
+    streams: Sequence[Stream], path: Path, request: Request, others: dict[str, str]
+) -> RawLog:
+    """Put the topics of a bag on the clock of the one with the joints' positions.
+
+    Raises:
+        LogError: If no topic has joint positions, or --columns names what is not there.
+    """
+    notes = Notes()
+    lead = leading(streams, path, others)
+    stamps, tick, clock, times = clock_of(lead)
+    signals, names = _joint_signals(lead, notes, request)
+    for stream in streams:
+        if stream is not lead and _same_arm(stream, lead):
+            _supplement(signals, stream, lead, times, notes)
+    frame = lead.kind.wrench_frame
+    if (sensor := _sensor(streams, lead)) is not None and "wrench" not in _chosen(request):
+        values = interpolated(sensor, "wrench", lead, times, notes)
+        if values is not None:
+            signals["wrench"] = values
+            frame = (
+                f"axes {sensor.frame or 'unknown'}, as force on the robot ({sensor.channel.topic})"
+            )
+    left = sorted({s.channel.topic for s in streams} - {lead.channel.topic} - _taken(notes))
+    if left:
+        notes.repairs.append(f"left out {', '.join(left[:6])}: other joints, targets, or repeated")
+    hint = robot_of(names) or next((h for s in streams if (h := robot_of(s.names))), None)
+    wanted = {name: value for name, value in signals.items() if request.wants(name)}
+    return RawLog(
+        stamps=stamps,
+        tick=tick,
+        clock=clock,
+        signals=wanted,
+        wrench_frame=frame,
+        joint_names=names,
+        robot_hint=hint,
+        repairs=tuple(notes.repairs),
+        warnings=tuple(notes.warnings),
+        payload_mass=next(iter(lead.constants.get("mass", ())), None),
+        payload_com=lead.constants.get("com"),
+    )
+
+
+def _taken(notes: Notes) -> set[str]:
+    return {word for note in notes.repairs for word in re.findall(r"/[\w/]+", note)}
+
+
+def leading(streams: Sequence[Stream], path: Path, others: dict[str, str]) -> Stream:
+    """The topic whose positions lead: measured ones, of most messages; a robot state breaks ties.
+
+    Raises:
+        LogError: If there is none, or if two arms were recorded in one bag.
+    """
+    found = [
+        s for s in streams
+        if "q" in s.signals and s.messages > 1 and not TARGETS.search(s.channel.topic)
+    ]  # fmt: skip
+    found = [s for s in found if s.signals["q"].shape[1] > 2] or found
+    if not found:
+        there = [f"{s.channel.topic} ({s.channel.type})" for s in streams]
+        there += [f"{topic} ({kind})" for topic, kind in others.items()]
+        raise LogError(
+            f"{path}: no topic with joint positions among {', '.join(there[:12]) or 'no topics'}. "
+            "Record a JointState, FrankaState or FrankaRobotState topic."
+        )
+    most = max(s.messages for s in found)
+    near = [s for s in found if s.messages >= 0.9 * most]
+    best = max(near, key=lambda s: (s.kind.rank, "effort" in s.signals, s.messages))
+    rivals = [s for s in near if s is not best and s.kind is best.kind and _rivals(s, best)]
+    if rivals:
+        topics = ", ".join(s.channel.topic for s in (best, *rivals))
+        raise LogError(
+            f"{path}: two arms were recorded: {topics} "
+            f"({', '.join(best.names[:2])}… and {', '.join(rivals[0].names[:2])}…). Say which with "
+            f"--columns 'q={best.channel.topic}.position'."
+        )
+    return best
+
+
+def _rivals(one: Stream, other: Stream) -> bool:
+    """Whether two streams of one type are about different arms of equally many joints."""
+    same_width = one.signals["q"].shape[1] == other.signals["q"].shape[1]
+    return same_width and bool(one.names) and set(one.names) != set(other.names)
+
+
+def clock_of(stream: Stream) -> tuple[Array, float, str, Integers]:
+    """A stream's best clock: the robot's own, else its header's, else the recorder's.
+
+    Returns:
+        The stamps, the length of their tick [s], which clock they are, and the header or receive
+        stamps [ns] on which other topics are aligned.
+    """
+    host, words = host_times(stream)
+    robot = stream.robot
+    if robot is not None and np.all(np.isfinite(robot)) and np.all(np.diff(robot) >= 0):
+        if len(robot) < 2 or robot[-1] > robot[0]:
+            milliseconds = np.rint(robot * 1e3)
+            if np.all(np.abs(robot * 1e3 - milliseconds) < 1e-3) and abs(robot[-1]) < 1e12:
+                ticks: Array = milliseconds.astype(np.int64)  # type: ignore[assignment]
+                return ticks, 1e-3, f"robot clock (time of {stream.channel.topic})", host
+            return robot, 1.0, f"robot clock (time of {stream.channel.topic})", host
+    return host.astype(np.int64), 1e-9, words, host  # type: ignore[return-value]
+
+
+def host_times(stream: Stream) -> tuple[Integers, str]:
+    """Header stamps if they are set and never run back, else receive stamps. (T,) [ns]"""
+    header = stream.header
+    topic = stream.channel.topic
+    if header is not None and header[0] > 0 and np.all(np.diff(header) >= 0):
+        if len(header) < 2 or header[-1] > header[0]:
+            return header, f"header stamps of {topic}"
+    return stream.receive, f"receive stamps of {topic} (its header stamps are unset or run back)"
+
+
+def _joint_signals(
+    lead: Stream, notes: Notes, request: Request
+) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """The leading topic's signals, joints in kinematic order and further joints set aside."""
+    order = kinematic_order(lead.names) if lead.names else ()
+    names = tuple(lead.names[k] for k in order)
+    if order and order != tuple(range(len(lead.names))):
+        aside = len(lead.names) - len(order)
+        notes.repairs.append(
+            f"put the joints of {lead.channel.topic} in kinematic order by name"
+            + (f", {aside} further joints set aside" if aside else "")
+        )
+    width = lead.signals["q"].shape[1]
+    signals = {}
+    for signal, value in lead.signals.items():
+        sign = -1.0 if signal in lead.kind.turned else 1.0
+        if signal == "wrench":
+            signals[signal] = value
+        elif value.shape[1] == width and not _empty(signal, value, notes):
+            picked = value[:, list(order)] if order else value
+            signals[signal] = picked if sign > 0 else 0.0 - picked
+    if lead.kind.turned & set(signals):
+        notes.repairs.append(TURNED_NOTE)
+    return _with_effort(signals, lead, names, notes, request), names
+
+
+def _empty(signal: str, value: Array, notes: Notes) -> bool:
+    """Whether a signal is NaN throughout, as drivers publish what they do not measure."""
+    if np.isnan(value[0]).all() and np.isnan(value).all():
+        notes.repairs.append(f"left out {signal}: NaN in every message, so not measured")
+        return True
+    return False
+
+
+def _chosen(request: Request) -> dict[str, tuple[str, float]]:
+    """Signal → message field and factor, as --columns says: -tau=effort, current[mA]=effort."""
+    if request.columns is None:
+        return {}
+    spec = parse_columns(request.columns)
+    return {
+        SIGNALS[item.signal]: (item.pattern or "", item.factor)
+        for item in spec.items
+        if item.signal in SIGNALS
+    }
+
+
+FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}
+
+
+def _with_effort(
+    signals: dict[str, Array], lead: Stream, names: tuple[str, ...], notes: Notes, request: Request
+) -> dict[str, Array]:
+    """Decide what effort is: what --columns says, else current for UR joints, torque for others."""
+    found = dict(signals)
+    for signal, (pattern, factor) in _chosen(request).items():
+        last = pattern.rpartition(".")[2]
+        source = FIELDS.get(last, last)
+        if source not in signals:
+            there = [next((f for f, s in FIELDS.items() if s == name), name) for name in signals]
+            raise LogError(
+                f"--columns: {lead.channel.topic} has no field {last!r}; it has {', '.join(there)}."
+            )
+        found.pop(source, None)
+        found[signal] = signals[source] * factor + 0.0
+        turned = "with its sign turned " if factor < 0 else ""
+        notes.repairs.append(f"took {last} as {signal} {turned}(--columns)")
+    if "effort" in found:
+        is_ur = all(name.endswith(UR_NAMES) for name in names) and len(names) == len(UR_NAMES)
+        found["current" if is_ur else "torque"] = found.pop("effort")
+        if is_ur:
+            notes.repairs.append(EFFORT_IS_CURRENT)
+    return found
+
+
+def _same_arm(stream: Stream, lead: Stream) -> bool:
+    """Whether a stream is about the leading topic's joints, or about no joints by name."""
+    if "q" not in stream.signals and "effort" not in stream.signals:
+        return False
+    if not stream.names or not lead.names:
+        return stream.signals.get("q", lead.signals["q"]).shape[1] == lead.signals["q"].shape[1]
+    return set(stream.names) >= set(lead.names) and not TARGETS.search(stream.channel.topic)
+
+
+def _supplement(
+    signals: dict[str, Array], stream: Stream, lead: Stream, times: Integers, notes: Notes
+) -> None:
+    """Add the signals that only another topic about the same joints has, interpolated."""
+    order = kinematic_order(stream.names) if stream.names else ()
+    for signal in stream.signals:
+        if signal in signals or signal == "effort":
+            continue
+        values = interpolated(stream, signal, lead, times, notes)
+        if values is None:
+            continue
+        if signal != "wrench" and order:
+            values = values[:, list(order)]
+        signals[signal] = 0.0 - values if signal in stream.kind.turned else values
+
+
+def _sensor(streams: Sequence[Stream], lead: Stream) -> Stream | None:
+    """The wrench topic to take: a sensor's before the vendor's estimate; the fullest of several."""
+    found = [s for s in streams if s.channel.type == "geometry_msgs/WrenchStamped"]
+    sensors = [s for s in found if not VENDOR_WRENCH.search(s.channel.topic)]
+    if not sensors and "wrench" in lead.signals:
+        return None
+    return max(sensors or found, key=lambda s: s.messages, default=None)
+
+
+def interpolated(
+    stream: Stream, signal: str, lead: Stream, times: Integers, notes: Notes
+) -> Array | None:
+    """A smooth signal of another topic at the leading topic's times, held at the ends. (T, k)
+
+    None, and a warning, where the other topic does not cover the leading one's time.
+    """
+    own, _ = host_times(stream)
+    if (lead.header is None or times is not lead.header) and own is not stream.receive:
+        own = stream.receive  # one of the two has receive stamps only: compare like with like
+    elif own is stream.receive and times is lead.header:
+        times = lead.receive
+    fresh = np.concatenate([[True], np.diff(own) > 0])
+    own, values = own[fresh], stream.signals[signal][fresh]
+    topic = stream.channel.topic
+    usual = float(np.median(np.diff(own))) if len(own) > 1 else 0.0
+    outside = (times < own[0] - NEAR * usual) | (times > own[-1] + NEAR * usual)
+    if len(own) < 2 or np.mean(outside) > 0.05 or np.any(np.diff(own) < 0):
+        notes.warnings.append(f"left out {signal} of {topic}: it does not cover the joints' time")
+        return None
+    start = int(own[0])
+    x, xp = (times - start) * 1e-9, (own - start) * 1e-9
+    result: Array = np.column_stack([np.interp(x, xp, column) for column in values.T])
+    notes.repairs.append(
+        f"interpolated {signal} of {topic} ({1e9 / usual:.4g} Hz) at the times of "
+        f"{lead.channel.topic}"
+    )
+    return result
