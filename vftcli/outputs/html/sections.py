@@ -112,7 +112,7 @@ def meaning(found: Sequence[Block]) -> str:
     if any(np.any(np.isfinite(block.floor)) for block in found):
         text += (
             " The floor is the error the reference itself is known to have: an RMSE within "
-            f"{AT_FLOOR:g} × the floor is <em>at the floor</em>, and the reference can tell no more."
+            f"{AT_FLOOR:g} × the floor is <em>at the floor</em>; the reference can tell no more."
         )
     return f'<p class="soft">{text}</p>'
 
@@ -147,9 +147,9 @@ def series(analysis: Analysis) -> str:
     count = analysis.recording.samples
     if is_decimated(analysis):
         drawn = (
-            f"The log has {count} samples. The page keeps the lowest and the highest sample of each "
-            f"of {STRETCHES} equal stretches, at their own times, so that no spike is lost; every "
-            "sample is in <code>estimates.parquet</code>."
+            f"The log has {count} samples. The page keeps the lowest and the highest sample of "
+            f"each of {STRETCHES} equal stretches, at their own times, so that no spike is lost; "
+            "every sample is in <code>estimates.parquet</code>."
         )
     else:
         drawn = f"All {count} samples are drawn."
@@ -163,7 +163,7 @@ def series(analysis: Analysis) -> str:
         '<div id="legend" role="group" aria-label="Series"><span class="name">Series</span></div>'
         '<div class="buttons"><button type="button" id="all">Whole span</button></div></div>'
         '<div id="overview"></div><div id="detail"></div>'
-        "<noscript><p><strong>The charts need JavaScript; the tables do not.</strong></p></noscript>"
+        "<noscript><p>The charts need JavaScript; the tables do not.</p></noscript>"
     )
 
 

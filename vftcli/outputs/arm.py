@@ -1,0 +1,124 @@
+"""The arm as something to look at: capsules from the chain's own geometry, and where they are."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.dynamics.kinematics import flange_jacobian, link_poses
+from vftcli.robots.chain import Chain
+
+THICKNESS = (0.048, 0.030)
+"""Radius of the first and of the last link, as a share of the arm's length."""
+
+SHORTEST = 0.02
+"""A link shorter than this share of the arm's length is not drawn: its joints are. """
+
+LEVER = 0.3
+"""Length that makes a moment comparable with a force when a pose is judged. [m]"""
+
+LEAST_SINGULAR = 0.05
+"""A pose whose smallest singular value is below this cannot tell the force at the flange."""
+
+
+class Capsule(NamedTuple):
+    """A cylinder with round ends, in the axes of the frame it moves with.
+
+    Attributes:
+        start: Centre of one end. (3,) [m]
+        direction: From one end's centre to the other's. (3,) [m]
+        radius: Radius. [m]
+        joint: Whether it stands for a joint rather than for a link.
+    """
+
+    start: Array
+    direction: Array
+    radius: float
+    joint: bool
+
+
+class Motion(NamedTuple):
+    """Poses of the links over time.
+
+    Attributes:
+        t: Time. (S,) [s]
+        translation: Origins in the base frame, the flange last. (S, n+1, 3) [m]
+        quat_xyzw: Orientations as unit quaternions. (S, n+1, 4)
+        q: Joint positions. (S, n) [rad]
+    """
+
+    t: Array
+    translation: Array
+    quat_xyzw: Array
+    q: Array
+
+
+def arm_length(chain: Chain) -> float:
+    """Length of the stretched arm, base to flange. [m]"""
+    offsets = np.vstack([chain.translation, chain.flange_translation])
+    return float(np.linalg.norm(offsets, axis=1).sum())
+
+
+def capsules(chain: Chain) -> list[list[Capsule]]:
+    """What moves with the base and with each link: n + 1 lists, base first."""
+    n, length = chain.joints, arm_length(chain)
+    offsets = np.vstack([chain.translation, chain.flange_translation])
+    radii = length * np.linspace(*THICKNESS, n + 1)
+    shapes: list[list[Capsule]] = []
+    for j in range(n + 1):
+        shapes.append([])
+        if j > 0:
+            half = 1.1 * radii[j]
+            axis = np.array([0.0, 0.0, 2.0 * half])
+            shapes[j].append(Capsule(-0.5 * axis, axis, 1.18 * radii[j], joint=True))
+        if np.linalg.norm(offsets[j]) > SHORTEST * length:
+            shapes[j].append(Capsule(np.zeros(3), offsets[j], radii[j], joint=False))
+    return shapes
+
+
+def motion(chain: Chain, t: Array, q: Array, rate: float) -> Motion:
+    """Poses of all links at about `rate` samples a second. [Hz]"""
+    every = max(1, int(len(t) / max(float(t[-1] - t[0]) * rate, 1.0)))
+    t, q = t[::every], np.ascontiguousarray(q[::every])
+    poses = link_poses(chain, q)
+    return Motion(t, poses.translation, quat_xyzw(poses.rotation), q)
+
+
+def quat_xyzw(rotation: Array) -> Array:
+    """Unit quaternions of rotation matrices, scalar last. (..., 3, 3) → (..., 4)
+
+    Of the four ways to take a quaternion from a matrix the one with the largest divisor is used for
+    each matrix (Shepperd, J. Guidance and Control 1(3), 1978).
+    """
+    R = rotation
+    xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
+    squares = np.stack([xx - yy - zz, yy - zz - xx, zz - xx - yy, xx + yy + zz], axis=-1)
+    sums = np.empty((*R.shape[:-2], 4, 4))
+    for i in range(3):
+        for j in range(3):
+            sums[..., i, j] = R[..., i, j] + R[..., j, i]
+        sums[..., i, i] = 1.0 + squares[..., i]
+    skew = (R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1])
+    for i, difference in enumerate(skew):
+        sums[..., i, 3] = sums[..., 3, i] = difference
+    sums[..., 3, 3] = 1.0 + squares[..., 3]
+    largest = np.argmax(squares, axis=-1)
+    row = np.take_along_axis(sums, largest[..., None, None], axis=-2)[..., 0, :]
+    unit: Array = row / np.linalg.norm(row, axis=-1, keepdims=True)
+    return unit
+
+
+def flange_force(chain: Chain, q: Array, tau: Array) -> Array:
+    """Force on the robot at the flange in base axes, by the pseudo-inverse of Jᵀ. (S, 3) [N]
+
+    NaN where the pose cannot tell it, or the torque is not known.
+    """
+    J = flange_jacobian(chain, q)
+    scaled = J * np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])[:, None]
+    told = np.linalg.svd(scaled, compute_uv=False)[:, -1] >= LEAST_SINGULAR
+    told &= np.all(np.isfinite(tau), axis=1)
+    force = np.full((len(q), 3), np.nan)
+    if chain.joints >= 6 and np.any(told):
+        inverse = np.linalg.pinv(J[told].transpose(0, 2, 1))
+        force[told] = np.einsum("sij,sj->si", inverse, tau[told])[:, :3]
+    return force

@@ -1,0 +1,260 @@
+"""recording.rrd: torques, residuals, motion and the arm, arranged for the Rerun viewer.
+
+Every plot is one entity holding one scalar a line: `/tau_ext/J1` … (every observer, then the
+reference), `/residual/J1` … (every estimate minus the reference), `/drive_torque`, `/q` and `/dq`
+(one line a joint). All of it stands on the timeline `t`, in seconds from the log's first sample.
+"""
+
+import gc
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.analysis import Analysis
+from vftcli.arrays import Array
+from vftcli.dynamics.drive import drive_torque
+from vftcli.outputs.arm import arm_length, capsules, flange_force, motion
+from vftcli.outputs.palette import REFERENCE, SPARE, colours_of, rgb
+from vftcli.outputs.rerun_blueprint import Plot, Tab, arrangement
+from vftcli.outputs.rerun_text import drawable
+from vftcli.outputs.run import CONVENTIONS, all_notes
+from vftcli.outputs.tables import escape_markdown, to_markdown
+from vftcli.torque import ExternalTorque
+
+ARM_RATE = 50.0
+"""Poses a second of the arm. [Hz]"""
+
+NEWTON_PER_METRE = 100.0
+"""Length of the force arrow: 100 N are 1 m."""
+
+LINK, JOINT, FORCE = (176, 184, 192), (78, 92, 106), (221, 100, 21)
+"""Colours of links, joints and the force arrow."""
+
+Stream = Any
+
+
+class Lines(NamedTuple):
+    """The lines of one plot.
+
+    Attributes:
+        path: The entity.
+        names: One a line.
+        colours: ``#rrggbb``, one a line.
+        widths: One a line. [px]
+        values: One column a line. (T, k)
+    """
+
+    path: str
+    names: list[str]
+    colours: list[str]
+    widths: list[float]
+    values: Array
+
+
+def write_rrd(path: Path, analysis: Analysis) -> None:
+    """Write the recording with its blueprint, so that it opens arranged.
+
+    Args:
+        path: Where to; an existing file is replaced.
+        analysis: What to show.
+    """
+    import rerun as rr
+
+    stream = rr.RecordingStream("vftcli")
+    blueprint = arrangement(tabs(analysis), arm_length(analysis.robot.chain))
+    stream.save(str(path), default_blueprint=blueprint)
+    stream.send_recording_name(drawable(analysis.recording.name))
+    for lines in torque_lines(analysis):
+        send_lines(stream, analysis.t, lines)
+    for lines in motion_lines(analysis):
+        send_lines(stream, analysis.t, lines)
+    send_words(stream, analysis)
+    send_arm(stream, analysis)
+    stream.flush()
+    stream.disconnect()
+    del stream
+    gc.collect()  # the footer is written when the last reference goes
+
+
+def tabs(analysis: Analysis) -> tuple[Tab, ...]:
+    """The plots, tab by tab."""
+    n = analysis.recording.joints
+    torque = tuple(Plot(f"/tau_ext/J{j}", f"J{j} external torque [N·m]") for j in range(1, n + 1))
+    residual = tuple(
+        Plot(f"/residual/J{j}", f"J{j} estimate − reference [N·m]") for j in range(1, n + 1)
+    )
+    moving = [Plot("/q", "position [rad]"), Plot("/drive_torque", "drive torque [N·m]")]
+    if analysis.recording.dq is not None:
+        moving.insert(1, Plot("/dq", "velocity [rad/s]"))
+    found = [Tab("External torque", torque), Tab("Motion", tuple(moving))]
+    if analysis.reference is not None:
+        found.insert(1, Tab("Residual", residual))
+    return tuple(found)
+
+
+def torque_lines(analysis: Analysis) -> list[Lines]:
+    """External torques joint by joint, and residuals if there is a reference."""
+    reference = analysis.reference
+    found = [joint_lines("tau_ext", analysis, j, reference, 0.0) for j in joints(analysis)]
+    if reference is not None:
+        found += [
+            joint_lines("residual", analysis, j, None, reference.tau[:, j])
+            for j in joints(analysis)
+        ]
+    return found
+
+
+def joints(analysis: Analysis) -> range:
+    """Joint indices, from 0."""
+    return range(analysis.recording.joints)
+
+
+def joint_lines(
+    group: str, analysis: Analysis, j: int, reference: ExternalTorque | None, minus: Array | float
+) -> Lines:
+    """All estimates of one joint less something, and the reference first if it is wanted."""
+    colours = colours_of(analysis.estimates)
+    names = [e.name for e in analysis.estimates]
+    columns = [e.tau[:, j] - minus for e in analysis.estimates]
+    shades, widths = [colours[name] for name in names], [1.5] * len(names)
+    if reference is not None:
+        names, columns = [f"reference ({reference.name})", *names], [reference.tau[:, j], *columns]
+        shades, widths = [REFERENCE, *shades], [2.5, *widths]
+    return Lines(f"/{group}/J{j + 1}", names, shades, widths, np.column_stack(columns))
+
+
+def motion_lines(analysis: Analysis) -> list[Lines]:
+    """Positions, velocities and drive torques, one line a joint."""
+    recording = analysis.recording
+    signals = {"/q": recording.q, "/drive_torque": drive_torque(recording, analysis.robot)}
+    if recording.dq is not None:
+        signals["/dq"] = recording.dq
+    names = [f"J{j + 1}" for j in joints(analysis)]
+    colours = [SPARE[j % len(SPARE)] for j in joints(analysis)]
+    widths = [1.5] * len(names)
+    return [Lines(path, names, colours, widths, values) for path, values in signals.items()]
+
+
+def send_lines(stream: Stream, t: Array, lines: Lines) -> None:
+    """Send one plot: names and colours once, then all samples in one batch."""
+    import rerun as rr
+
+    style = rr.SeriesLines(
+        names=[drawable(name) for name in lines.names],
+        colors=[rgb(c) for c in lines.colours],
+        widths=lines.widths,
+    )
+    stream.log(lines.path, style, static=True)
+    samples, count = lines.values.shape
+    scalars = rr.Scalars.columns(scalars=lines.values.ravel()).partition(np.full(samples, count))
+    stream.send_columns(lines.path, [rr.TimeColumn("t", duration=t)], scalars)
+
+
+def send_words(stream: Stream, analysis: Analysis) -> None:
+    """Send the summary and the error tables as Markdown."""
+    import rerun as rr
+
+    def document(path: str, text: str) -> None:
+        stream.log(path, rr.TextDocument(drawable(text), media_type="text/markdown"), static=True)
+
+    document("/summary", summary(analysis))
+    table = to_markdown(analysis.errors) if analysis.errors is not None else ""
+    document("/errors", table or "No reference was given, so no errors can be told.")
+
+
+def summary(analysis: Analysis) -> str:
+    """Which log, which robot, what the numbers and the arrow mean."""
+    recording, robot = analysis.recording, analysis.robot
+    force = force_source(analysis.estimates)
+    source = recording.source
+    lines = [
+        f"# {escape_markdown(recording.name)}",
+        f"{escape_markdown(robot.title or robot.name)}, {recording.samples} samples in "
+        f"{recording.duration:.3f} s at {1.0 / recording.step:.4g} Hz; format {source.format}.",
+        "",
+        *(f"- **{name}**: {escape_markdown(text)}" for name, text in CONVENTIONS.items()),
+    ]
+    if force is not None:
+        lines.append(
+            f"- **orange arrow**: force on the robot at the flange from {force.name} by the "
+            f"pseudo-inverse of Jᵀ; 1 m is {NEWTON_PER_METRE:g} N; none where the pose cannot tell"
+        )
+    remarks = [*source.repairs, *source.warnings, *all_notes(analysis)]
+    lines += ["", "## Notes", *(f"- {escape_markdown(note)}" for note in remarks)]
+    lines += ["", f"Log sha256 {source.sha256 or 'unknown'}"]
+    return "\n".join(lines) + "\n"
+
+
+def force_source(estimates: Sequence[ExternalTorque]) -> ExternalTorque | None:
+    """The estimate the force arrow is made from: the first Kalman filter's, else the first."""
+    kalman = [estimate for estimate in estimates if estimate.name.startswith("kfo")]
+    return next(iter([*kalman, *estimates]), None)
+
+
+def send_arm(stream: Stream, analysis: Analysis) -> None:
+    """Send the arm's shape once and its poses over time."""
+    import rerun as rr
+
+    chain = analysis.robot.chain
+    poses = motion(chain, analysis.t, analysis.recording.q, ARM_RATE)
+    stream.log("/robot", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    time = rr.TimeColumn("t", duration=poses.t)
+    for j, shapes in enumerate(capsules(chain)):
+        path = f"/robot/link_{j}" if j else "/robot/base"
+        if shapes:
+            stream.log(path, capsule_batch(shapes), static=True)
+        if j:
+            columns = rr.Transform3D.columns(
+                translation=poses.translation[:, j - 1], quaternion=poses.quat_xyzw[:, j - 1]
+            )
+            stream.send_columns(path, [time], columns)
+    force = force_source(analysis.estimates)
+    if force is not None and chain.joints >= 6:
+        sampled = np.searchsorted(analysis.t, poses.t)
+        send_force(
+            stream,
+            poses.t,
+            poses.translation[:, -1],
+            flange_force(chain, poses.q, force.tau[sampled]),
+        )
+
+
+def capsule_batch(shapes: Sequence[Any]) -> Any:  # noqa: ANN401 - Rerun is untyped
+    """Capsules in the axes of the link they move with; Rerun's own lie along z from one end."""
+    import rerun as rr
+
+    directions = np.array([shape.direction for shape in shapes])
+    lengths = np.linalg.norm(directions, axis=1)
+    return rr.Capsules3D(
+        lengths=lengths,
+        radii=[shape.radius for shape in shapes],
+        translations=np.array([shape.start for shape in shapes]),
+        quaternions=[turn_from_z(d / s) for d, s in zip(directions, lengths, strict=True)],
+        colors=[JOINT if shape.joint else LINK for shape in shapes],
+        fill_mode="solid",
+    )
+
+
+def turn_from_z(unit: Array) -> Array:
+    """Quaternion (x, y, z, w) that turns z to a unit vector the short way. (4,)"""
+    if unit[2] < -1.0 + 1e-9:
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    turn = np.array([-unit[1], unit[0], 0.0, 1.0 + unit[2]])
+    turned: Array = turn / np.linalg.norm(turn)
+    return turned
+
+
+def send_force(stream: Stream, t: Array, origin: Array, force: Array) -> None:
+    """Send the arrow; where the force is not known there is none."""
+    import rerun as rr
+
+    told = np.all(np.isfinite(force), axis=1)
+    columns = rr.Arrows3D.columns(
+        origins=origin[told],
+        vectors=force[told] / NEWTON_PER_METRE,
+        radii=np.full(int(told.sum()), 0.012),
+        colors=np.tile(np.array([*FORCE, 255], dtype=np.uint8), (int(told.sum()), 1)),
+    ).partition(told.astype(int))
+    stream.send_columns("/robot/flange_force", [rr.TimeColumn("t", duration=t)], columns)
