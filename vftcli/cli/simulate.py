@@ -35,7 +35,7 @@ Settings = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Repeatable: servo.stiffness=soft, sensing.clock_drift=0.003, duration=8, robot=ur10e.",
+        help="Repeatable: servo.stiffness=soft, sensing.clock_drift=0.003, duration=8.",
     ),
 ]
 

@@ -9,11 +9,11 @@ from vftcli.arrays import Array
 from vftcli.errors import ParameterError
 from vftcli.robots import Robot, load_robot
 from vftcli.simulation.mismatch import TrueArm, build_arm
+from vftcli.simulation.motion import Reference
 from vftcli.simulation.plant import Plant
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.servo import Servo
 from vftcli.simulation.touch import Touching
-from vftcli.simulation.trajectories import Reference
 
 WARMING_STEPS = 250
 """Inner steps between two updates of the friction's temperature."""

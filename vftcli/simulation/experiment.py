@@ -11,9 +11,10 @@ from vftcli.recording import Recording, Source
 from vftcli.robots import Robot, load_robot
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.force_sensor import read_force_sensor
+from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import Measured, Samples, check_sensing, measure, sample
-from vftcli.simulation.trajectories import Reference, plan
+from vftcli.simulation.trajectories import plan
 from vftcli.simulation.truth import Truth, tell_truth
 from vftcli.simulation.vendor import Vendor, vendor_view
 

@@ -12,6 +12,12 @@ ITERATIONS = 100
 REACHED = 1e-10
 """A pose counts as reached when position and rotation error are below this. [m, rad]"""
 
+HOMES: dict[int, tuple[float, ...]] = {
+    6: (0.0, -1.35, 1.9, -2.1208, -1.5708, 0.0),
+    7: (0.0, -0.7854, 0.0, -2.3562, 0.0, 1.5708, 0.7854),
+}
+"""Number of joints → a pose from which such an arm can work, the flange looking down. [rad]"""
+
 
 class FlangePose(NamedTuple):
     """Orientation (3, 3) and origin (3,) [m] of the flange in the base frame."""
@@ -90,3 +96,18 @@ def check_limits(robot: Robot, q: Array, dq: Array, what: str) -> None:
                 f"{what}: joint {j + 1} of {robot.name!r} would move at {speed:.2f} rad/s; "
                 f"its limit is {fastest:.2f}"
             )
+
+
+def check_start(robot: Robot, start: tuple[float, ...]) -> Array:
+    """Return a start pose, the usual one if none is given. (n,) [rad]
+
+    Raises:
+        ParameterError: If it has the wrong number of joints.
+    """
+    start = start or HOMES.get(robot.joints, (0.0,) * robot.joints)
+    if len(start) != robot.joints:
+        raise ParameterError(
+            f"trajectory.start has {len(start)} angles; robot {robot.name!r} has {robot.joints} "
+            "joints"
+        )
+    return np.array(start, dtype=float)

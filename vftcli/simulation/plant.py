@@ -25,30 +25,30 @@ class Plant:
 
     (M(q_m) + h/2 D) (v⁺ − v) = h (τ + τ_ext − C v_m − g − f_smooth(v)) − λ,   q⁺ = q + h/2 (v + v⁺)
 
-    where λ is the impulse of dry friction (`stiction`) and D the slope of the smooth friction. It is
-    of second order in h while no joint changes between sticking and sliding.
+    where λ is the impulse of dry friction (`stiction`) and D the slope of the smooth friction. It
+    is of second order in h while no joint changes between sticking and sliding.
 
     Attributes:
         q, v: Positions and velocities now. (n,) [rad, rad/s]
         q_mid, v_mid, a: Positions, velocities and accelerations for which the last step's balance
             M a + C v + g = τ + τ_ext − τ_f holds exactly. (n,)
-        friction: Friction torque over the last step, opposing positive motion if positive. (n,) [N·m]
+        friction: Friction torque over the last step, against positive motion. (n,) [N·m]
         external: Torque of the contacts over the last step. (n,) [N·m]
     """
 
     def __init__(
         self,
-        model: Any,
+        model: Any,  # noqa: ANN401 - Pinocchio is untyped
         friction: TrueFriction,
         q: Array,
         v: Array,
-        step: float,  # noqa: ANN401
+        step: float,
     ) -> None:
         import pinocchio as pin
 
         if not 0.0 < step <= LARGEST_STEP:
             raise ParameterError(
-                f"step is {step:g} s; the inner step must be positive and at most {LARGEST_STEP:g} s"
+                f"step is {step:g} s; the inner step must be above 0, at most {LARGEST_STEP:g} s"
             )
         self.pin = pin
         self.model, self.data = model, model.createData()

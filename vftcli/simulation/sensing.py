@@ -176,7 +176,7 @@ def known(size: Array) -> Array:
 
 
 def jittered(stamp: Array, size: float, rng: np.random.Generator) -> Array:
-    """Stamps with normal jitter, cut at 0.45 of the interval so that they still increase. (M,) [s]"""
+    """Stamps with normal jitter, cut so that they still increase. (M,) [s]"""
     draw = rng.standard_normal(len(stamp))
     if size == 0 or len(stamp) < 2:
         return stamp

@@ -8,9 +8,9 @@ from vftcli.arrays import Array
 from vftcli.dynamics.friction import friction_torque
 from vftcli.errors import ParameterError
 from vftcli.robots import Robot
+from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import ServoSpec
 from vftcli.simulation.schema import unknown
-from vftcli.simulation.trajectories import Reference
 
 STIFFNESS = {"stiff": 90.0, "soft": 28.0}
 """Natural frequency of the position loop by name. [rad/s]"""
@@ -46,7 +46,7 @@ class Servo:
         self.limit = np.where(known, robot.limits.tau_max, np.inf)
 
     def feed_forward(self, reference: Reference) -> Array:
-        """Nominal torque along a reference: gravity, and inertia and friction if asked. (T, n) [N·m]"""
+        """Nominal torque along a reference; gravity only if so asked. (T, n) [N·m]"""
         rest = np.zeros_like(reference.q)
         full = self.spec.feed_forward
         dq, ddq = (reference.dq, reference.ddq) if full else (rest, rest)

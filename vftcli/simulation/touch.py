@@ -7,7 +7,8 @@ import numpy as np
 from vftcli.arrays import Array
 from vftcli.errors import ParameterError
 from vftcli.robots.chain import Chain
-from vftcli.simulation.contacts import Contact, ContactSpec, Place, RandomWalkSpec, WrenchSpec
+from vftcli.simulation.contact import Contact, Place
+from vftcli.simulation.contacts import ContactSpec, RandomWalkSpec, WrenchSpec
 
 
 class Mounted(NamedTuple):
@@ -95,7 +96,12 @@ class Touching:
     """
 
     def __init__(
-        self, specs: tuple[ContactSpec, ...], chain: Chain, steps: int, step: float, seed: Any
+        self,
+        specs: tuple[ContactSpec, ...],
+        chain: Chain,
+        steps: int,
+        step: float,
+        seed: np.random.SeedSequence,
     ) -> None:
         names = [spec.name for spec in specs]
         if doubled := {name for name in names if names.count(name) > 1}:

@@ -82,11 +82,11 @@ def tell_truth(arm: Arm, samples: Samples) -> Truth:
 
 
 def one_sample(
-    model: Any,
-    data: Any,
+    model: Any,  # noqa: ANN401 - Pinocchio is untyped
+    data: Any,  # noqa: ANN401
     q: Array,
     mounted: list[Mounted],
-    wrenches: Array,  # noqa: ANN401
+    wrenches: Array,
 ) -> tuple[Array, Array]:
     """Joint torque of all contacts (n,) [N·m] and the wrench of those on the flange (6,)."""
     import pinocchio as pin

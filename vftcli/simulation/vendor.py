@@ -11,9 +11,9 @@ from vftcli.arrays import Array
 from vftcli.dynamics.friction import friction_torque
 from vftcli.robots import Robot
 from vftcli.simulation.arm import Arm
+from vftcli.simulation.motion import Reference
 from vftcli.simulation.sensing import Measured, Samples, log_rate
 from vftcli.simulation.servo import rigid_torque
-from vftcli.simulation.trajectories import Reference
 
 
 @dataclass(frozen=True, kw_only=True)

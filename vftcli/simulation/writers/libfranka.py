@@ -7,6 +7,8 @@ import numpy as np
 from vftcli.arrays import Array
 from vftcli.errors import ParameterError
 from vftcli.simulation.experiment import Simulation
+from vftcli.simulation.motion import Reference
+from vftcli.simulation.servo import rigid_torque
 from vftcli.simulation.writers.flange import flange_signals
 
 GROUPS = (
@@ -26,9 +28,10 @@ GROUPS = (
 
 
 def write_libfranka(path: Path, simulation: Simulation) -> None:
-    """Write the log as `franka::logToCSV` does; tau_ext_hat_filtered is minus the torque ON the arm.
+    """Write the log as `franka::logToCSV` does.
 
-    The command of a row belongs to the state of the next one; the last command is repeated.
+    tau_ext_hat_filtered is minus the torque ON the arm. The command of a row belongs to the state
+    of the next one; the last command is repeated.
 
     Raises:
         ParameterError: If the robot has not seven joints.
@@ -80,8 +83,5 @@ def following(values: Array) -> Array:
 
 def gravity_torque(simulation: Simulation, q: Array) -> Array:
     """Nominal gravity torque at positions (M, n) [rad]. (M, n) [N·m]"""
-    from vftcli.simulation.servo import rigid_torque
-    from vftcli.simulation.trajectories import Reference
-
     still = np.zeros_like(q)
     return rigid_torque(simulation.nominal.model, Reference(q, still, still))

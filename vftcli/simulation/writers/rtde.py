@@ -24,14 +24,39 @@ SHORT = (
     "actual_qd",
     "actual_current",
 )
-FULL = tuple(
-    "timestamp target_q target_qd target_qdd target_current target_moment actual_q actual_qd "
-    "actual_current joint_control_output actual_TCP_pose actual_TCP_speed actual_TCP_force "
-    "target_TCP_pose target_TCP_speed actual_digital_input_bits joint_temperatures "
-    "actual_execution_time robot_mode joint_mode safety_status actual_tool_accelerometer "
-    "speed_scaling target_speed_fraction actual_momentum actual_main_voltage actual_robot_voltage "
-    "actual_robot_current actual_joint_voltage actual_digital_output_bits runtime_state "
-    "joint_position_deviation_ratio".split()  # noqa: SIM905 - as in the client's XML
+FULL = (
+    "timestamp",
+    "target_q",
+    "target_qd",
+    "target_qdd",
+    "target_current",
+    "target_moment",
+    "actual_q",
+    "actual_qd",
+    "actual_current",
+    "joint_control_output",
+    "actual_TCP_pose",
+    "actual_TCP_speed",
+    "actual_TCP_force",
+    "target_TCP_pose",
+    "target_TCP_speed",
+    "actual_digital_input_bits",
+    "joint_temperatures",
+    "actual_execution_time",
+    "robot_mode",
+    "joint_mode",
+    "safety_status",
+    "actual_tool_accelerometer",
+    "speed_scaling",
+    "target_speed_fraction",
+    "actual_momentum",
+    "actual_main_voltage",
+    "actual_robot_voltage",
+    "actual_robot_current",
+    "actual_joint_voltage",
+    "actual_digital_output_bits",
+    "runtime_state",
+    "joint_position_deviation_ratio",
 )
 RECIPES: dict[str, Sequence[str]] = {"full": FULL, "short": SHORT}
 """Name of a recipe → its fields. "full" is the default record_configuration.xml of the client."""

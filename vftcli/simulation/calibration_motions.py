@@ -1,0 +1,161 @@
+"""Motions for identification: poses at rest, single-joint sweeps, optimised excitation."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.robots import Robot
+from vftcli.simulation.kinematics import check_start, flange_pose
+from vftcli.simulation.motion import Motion, Periodic, Stretches
+
+TABLE = 0.15
+"""Least height of the flange in poses that are drawn. [m]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PosesSpec:
+    """Joint poses approached one after the other and held.
+
+    Attributes:
+        poses: Joint positions; empty draws `count` of them. (K, n) [rad]
+        move: Time of each move. [s]
+        dwell: Rest at each pose. [s]
+        count: How many poses are drawn.
+        spread: How far they lie from the usual pose, evenly to both sides. [rad]
+        draw: Seed of the drawing.
+    """
+
+    KIND: ClassVar[str] = "poses"
+    poses: tuple[tuple[float, ...], ...] = ()
+    move: float = 2.5
+    dwell: float = 2.0
+    count: int = 12
+    spread: float = 0.7
+    draw: int = 1
+
+    def motion(self, robot: Robot) -> Motion:
+        """Straight joint-space moves between the poses."""
+        if self.move <= 0 or self.dwell < 0 or self.count < 2:
+            raise ParameterError(
+                "trajectory.move must be positive, dwell not negative, and count at least 2"
+            )
+        points = [check_start(robot, pose) for pose in self.poses] or self.drawn(robot)
+        starts = self.dwell + np.arange(max(len(points) - 1, 1)) * (self.move + self.dwell)
+        pairs = list(pairwise(points)) or [(points[0], points[0])]
+        return Stretches(
+            times=np.column_stack([starts, starts + self.move]),
+            paths=tuple(np.vstack([0.5 * (a + b), 0.5 * (b - a)]) for a, b in pairs),
+            duration=float(starts[-1] + self.move + self.dwell),
+        )
+
+    def drawn(self, robot: Robot) -> list[Array]:
+        """Poses about the usual one, inside the limits and with the flange above the table."""
+        rng, home = np.random.default_rng(self.draw), check_start(robot, ())
+        low = np.where(np.isfinite(robot.limits.q_min), robot.limits.q_min + 0.05, -np.pi)
+        high = np.where(np.isfinite(robot.limits.q_max), robot.limits.q_max - 0.05, np.pi)
+        points: list[Array] = []
+        for _ in range(100 * self.count):
+            pose = np.clip(home + rng.uniform(-self.spread, self.spread, robot.joints), low, high)
+            if flange_pose(robot.model, pose).translation[2] > TABLE:
+                points.append(pose)
+            if len(points) == self.count:
+                return points
+        raise ParameterError(
+            f"trajectory.spread {self.spread:g} leaves robot {robot.name!r} no {self.count} poses "
+            "above the table; make it smaller, or list the poses"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointwiseSpec:
+    """One joint at a time swept back and forth at several speeds, the others at rest.
+
+    Attributes:
+        start: Joint positions at the middle of the sweeps. (n,) [rad]
+        amplitude: Sweep to each side. [rad]
+        speeds: Mean speeds of the sweeps. [rad/s]
+        joints: Joints swept, from 1; empty for all.
+        rest: Rest between sweeps. [s]
+    """
+
+    KIND: ClassVar[str] = "jointwise"
+    start: tuple[float, ...] = ()
+    amplitude: float = 0.4
+    speeds: tuple[float, ...] = (0.1, 0.2, 0.4, 0.7)
+    joints: tuple[int, ...] = ()
+    rest: float = 0.3
+
+    def motion(self, robot: Robot) -> Motion:
+        """Each sweep as a pair of minimum-jerk moves out and back."""
+        start = check_start(robot, self.start)
+        joints = self.joints or tuple(range(1, robot.joints + 1))
+        if min(self.speeds, default=0.0) <= 0 or not all(1 <= j <= robot.joints for j in joints):
+            raise ParameterError(
+                f"trajectory.speeds must be positive and joints lie in 1 to {robot.joints}"
+            )
+        t, times, paths = self.rest, [], []
+        for joint in joints:
+            axis = np.eye(robot.joints)[joint - 1] * self.amplitude
+            for speed in self.speeds:
+                legs = [(0 * axis, axis), (axis, -axis), (-axis, 0 * axis)]
+                for a, b in legs:
+                    length = max(float(np.sum(np.abs(b - a))) / speed, 0.2)
+                    times.append((t, t + length))
+                    paths.append(np.vstack([start + 0.5 * (a + b), 0.5 * (b - a)]))
+                    t += length
+                t += self.rest
+        return Stretches(times=np.array(times), paths=tuple(paths), duration=t)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExcitationSpec:
+    """A persistently exciting Fourier trajectory; the built-in ones are optimised for a robot.
+
+    Attributes:
+        period: Time of one round; 0 takes the optimised one. [s]
+        cycles: Rounds.
+        mean: Mean positions; empty takes the optimised ones. (n,) [rad]
+        cosine: Cosine coefficients, one row a harmonic. (H, n) [rad]
+        sine: Sine coefficients. (H, n) [rad]
+    """
+
+    KIND: ClassVar[str] = "excitation"
+    period: float = 0.0
+    cycles: float = 2.0
+    mean: tuple[float, ...] = ()
+    cosine: tuple[tuple[float, ...], ...] = ()
+    sine: tuple[tuple[float, ...], ...] = ()
+
+    def motion(self, robot: Robot) -> Motion:
+        """The stated series, or the one optimised for `robot`."""
+        if not self.mean:
+            from vftcli.simulation.excitation import optimised
+
+            best = optimised(robot.name)
+            period = self.period or best.period
+            return Periodic(
+                period=period,
+                cycles=self.cycles,
+                mean=best.mean,
+                cosine=best.cosine,
+                sine=best.sine,
+            )
+        check_start(robot, self.mean)
+        shape = (len(self.cosine), robot.joints)
+        cosine, sine = np.array(self.cosine), np.array(self.sine)
+        if cosine.shape != shape or sine.shape != shape or self.period <= 0:
+            raise ParameterError(
+                "trajectory.cosine and trajectory.sine must have one row a harmonic and one "
+                "number a joint, and trajectory.period must be positive"
+            )
+        return Periodic(
+            period=self.period,
+            cycles=self.cycles,
+            mean=np.array(self.mean),
+            cosine=cosine,
+            sine=sine,
+        )

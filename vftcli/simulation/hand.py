@@ -1,0 +1,104 @@
+"""A hand that holds the arm by a spring and a damper."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.simulation.contact import ORIGIN, Place, Vector
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandSpec:
+    """A hand that grabs the handle, moves, and lets go: a spring and damper to a moving anchor.
+
+    Attributes:
+        name: Name of the contact.
+        spans: When it grabs and when it lets go, one pair a grab. (K, 2) [s]
+        moves: Displacement of the hand's anchor in each grab, in base axes. (K, 3) [m]
+        turns: Rotation vector of the anchor in each grab, in base axes. (K, 3) [rad]
+        reach: Time in which the hand makes its move. [s]
+        release: Time in which the hand lets go, before the end of each span. [s]
+        stiffness: Spring to the hand's position. [N/m]
+        damping: Damper. [N·s/m]
+        twist_stiffness: Spring to the hand's orientation. [N·m/rad]
+        twist_damping: Damper. [N·m·s/rad]
+        link: The link it holds; 0 for the flange.
+        point: The point in the link's frame. (3,) [m]
+    """
+
+    KIND: ClassVar[str] = "hand"
+    name: str
+    spans: tuple[tuple[float, float], ...]
+    moves: tuple[Vector, ...] = ()
+    turns: tuple[Vector, ...] = ()
+    reach: float = 0.6
+    release: float = 0.08
+    stiffness: float = 200.0
+    damping: float = 15.0
+    twist_stiffness: float = 0.0
+    twist_damping: float = 0.0
+    link: int = 0
+    point: Vector = ORIGIN
+
+    def start(self, rng: np.random.Generator, duration: float) -> "Hand":
+        """Make the hand ready to grab; nothing is drawn."""
+        del rng, duration
+        for name in ("moves", "turns"):
+            if getattr(self, name) and len(getattr(self, name)) != len(self.spans):
+                raise ParameterError(
+                    f"contacts.{self.name}.{name} has {len(getattr(self, name))} rows; it must "
+                    f"have one for each of the {len(self.spans)} spans"
+                )
+        return Hand(self)
+
+
+class Hand:
+    """A hand during a run: it remembers where it took hold."""
+
+    def __init__(self, spec: HandSpec) -> None:
+        self.spec = spec
+        self.grip: int | None = None
+        self.held_at, self.held_as = np.zeros(3), np.eye(3)
+
+    def span(self, t: float) -> int | None:
+        """Index of the grab going on at `t` [s], or None."""
+        for k, (start, stop) in enumerate(self.spec.spans):
+            if start <= t < stop:
+                return k
+        return None
+
+    def active(self, t: float) -> bool:
+        """Whether the hand holds on."""
+        return self.span(t) is not None
+
+    def wrench(self, t: float, place: Place) -> Array:
+        """Spring and damper between the handle and the hand. (6,) [N, N·m]"""
+        k = self.span(t)
+        if k is None:
+            return np.zeros(6)
+        if k != self.grip:
+            self.grip, self.held_at, self.held_as = k, place.position, place.rotation
+        spec = self.spec
+        u = min((t - spec.spans[k][0]) / spec.reach, 1.0) if spec.reach > 0 else 1.0
+        way = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+        move = np.array(spec.moves[k]) if spec.moves else np.zeros(3)
+        turn = np.array(spec.turns[k]) if spec.turns else np.zeros(3)
+        gap = self.held_at + way * move - place.position
+        force = spec.stiffness * gap - spec.damping * place.velocity
+        torque = -spec.twist_damping * place.spin
+        if spec.twist_stiffness:
+            torque = torque + spec.twist_stiffness * self.twist(way * turn, place.rotation)
+        left = spec.spans[k][1] - t
+        hold = min(left / spec.release, 1.0) if spec.release > 0 else 1.0
+        return hold * np.concatenate([force, torque])
+
+    def twist(self, turn: Array, rotation: Array) -> Array:
+        """Rotation vector from the handle's orientation to the hand's, in base axes. (3,) [rad]"""
+        import pinocchio as pin
+
+        goal = pin.exp3(turn) @ self.held_as
+        error: Array = pin.log3(goal @ rotation.T)
+        return error

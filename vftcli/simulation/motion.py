@@ -1,0 +1,109 @@
+"""Commanded joint motions with exact first and second derivatives."""
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from vftcli.arrays import Array
+
+
+class Reference(NamedTuple):
+    """Commanded positions, velocities and accelerations. (T, n) each [rad, rad/s, rad/s²]"""
+
+    q: Array
+    dq: Array
+    ddq: Array
+
+
+class Motion(Protocol):
+    """A commanded motion of known length."""
+
+    @property
+    def duration(self) -> float:
+        """Its own length. [s]"""
+        ...
+
+    def at(self, t: Array) -> Reference:
+        """The reference at times `t` (T,) [s]; before its start and after its end it rests."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Periodic:
+    """Joint positions as a Fourier series in the phase 2πt/period.
+
+    Attributes:
+        period: Time of one round. [s]
+        cycles: Rounds.
+        mean: Mean positions. (n,) [rad]
+        cosine: Cosine coefficients. (H, n) [rad]
+        sine: Sine coefficients. (H, n) [rad]
+    """
+
+    period: float
+    cycles: float
+    mean: Array
+    cosine: Array
+    sine: Array
+
+    @property
+    def duration(self) -> float:
+        """Its own length. [s]"""
+        return self.period * self.cycles
+
+    def at(self, t: Array) -> Reference:
+        """The reference at times `t` (T,) [s]."""
+        order = 2.0 * np.pi / self.period * np.arange(1, len(self.sine) + 1)
+        c, s = np.cos(np.outer(t, order)), np.sin(np.outer(t, order))
+        a, b, w = self.cosine, self.sine, order[:, None]
+        return Reference(
+            self.mean + c @ a + s @ b,
+            c @ (w * b) - s @ (w * a),
+            -(c @ (w**2 * a)) - s @ (w**2 * b),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stretches:
+    """Rest-to-rest stretches, each a path q(s) run through with minimum jerk, rests between them.
+
+    Attributes:
+        times: Start and end of each stretch, in order. (K, 2) [s]
+        paths: Chebyshev coefficients of q over s in [−1, 1], one a stretch. (D, n) [rad]
+        duration: Length with the rest at the end. [s]
+    """
+
+    times: Array
+    paths: tuple[Array, ...]
+    duration: float
+
+    def at(self, t: Array) -> Reference:
+        """The reference at times `t` (T,) [s]."""
+        from numpy.polynomial import chebyshev
+
+        t = np.asarray(t, dtype=float)
+        which = np.clip(np.searchsorted(self.times[:, 0], t, side="right") - 1, 0, None)
+        n = self.paths[0].shape[1]
+        out = Reference(*(np.zeros((len(t), n)) for _ in range(3)))
+        for k, path in enumerate(self.paths):
+            rows = np.flatnonzero(which == k)
+            length = float(self.times[k, 1] - self.times[k, 0])
+            u = np.clip((t[rows] - self.times[k, 0]) / length, 0.0, 1.0)
+            s, ds, dds = minimum_jerk(u, length)
+            first, second = chebyshev.chebder(path), chebyshev.chebder(path, 2)
+            x = 2.0 * s - 1.0
+            slope = 2.0 * chebyshev.chebval(x, first).T
+            curve = 4.0 * chebyshev.chebval(x, second).T
+            out.q[rows] = chebyshev.chebval(x, path).T
+            out.dq[rows] = slope * ds[:, None]
+            out.ddq[rows] = slope * dds[:, None] + curve * (ds**2)[:, None]
+        return out
+
+
+def minimum_jerk(u: Array, length: float) -> tuple[Array, Array, Array]:
+    """Way 10u³ − 15u⁴ + 6u⁵ from 0 to 1 over u in [0, 1], with its time derivatives."""
+    way = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    speed = 30.0 * u**2 * (1.0 - u) ** 2 / length
+    acceleration = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / length**2
+    return way, speed, acceleration

@@ -1,0 +1,203 @@
+"""Wrenches that do not depend on the arm: stated profiles, hung loads, pushes drawn at random."""
+
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.simulation.contact import ORIGIN, Place, Vector, check_choice, ramp
+
+
+class Push(NamedTuple):
+    """One application of a wrench (6,) [N, N·m] from `start` to `stop` [s]."""
+
+    start: float
+    stop: float
+    rise: float
+    fall: float
+    wrench: Array
+
+
+class Segments:
+    """A sequence of pushes that do not overlap."""
+
+    def __init__(self, pushes: list[Push], in_link: bool = False) -> None:
+        self.pushes = sorted(pushes, key=lambda p: p.start)
+        self.in_link = in_link
+        self.next = 0
+
+    def current(self, t: float) -> Push | None:
+        """The push going on at `t`, or None. [s]"""
+        while self.next < len(self.pushes) and self.pushes[self.next].stop <= t:
+            self.next += 1
+        if self.next < len(self.pushes) and self.pushes[self.next].start < t:
+            return self.pushes[self.next]
+        return None
+
+    def active(self, t: float) -> bool:
+        """Whether a push is going on."""
+        return self.current(t) is not None
+
+    def wrench(self, t: float, place: Place) -> Array:
+        """The push's wrench in base axes. (6,) [N, N·m]"""
+        push = self.current(t)
+        if push is None:
+            return np.zeros(6)
+        size = ramp(t, push.start, push.rise, push.stop, push.fall)
+        wrench = size * push.wrench
+        if self.in_link:
+            return np.concatenate([place.rotation @ wrench[:3], place.rotation @ wrench[3:]])
+        return wrench
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProfileSpec:
+    """A stated wrench, switched on and off smoothly at stated times.
+
+    Attributes:
+        name: Name of the contact.
+        spans: Start and end of each application. (K, 2) [s]
+        force: Force ON the robot. (3,) [N]
+        torque: Moment ON the robot about the point. (3,) [N·m]
+        rise: Time to the full wrench. [s]
+        fall: Time of the release. [s]
+        axes: "base" or "link": what the components refer to.
+        link: The link it acts on; 0 for the flange.
+        point: The point in the link's frame. (3,) [m]
+    """
+
+    KIND: ClassVar[str] = "profile"
+    name: str
+    spans: tuple[tuple[float, float], ...]
+    force: Vector = ORIGIN
+    torque: Vector = ORIGIN
+    rise: float = 0.2
+    fall: float = 0.2
+    axes: str = "base"
+    link: int = 0
+    point: Vector = ORIGIN
+
+    def start(self, rng: np.random.Generator, duration: float) -> Segments:
+        """Make the contact ready to act; nothing is drawn."""
+        del rng, duration
+        check_choice("axes", self.axes, ("base", "link"))
+        wrench = np.concatenate([self.force, self.torque])
+        rows = [Push(a, b, self.rise, self.fall, wrench) for a, b in self.spans]
+        return Segments(rows, in_link=self.axes == "link")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadSpec:
+    """A load hung on a string: its weight, pulling straight down at the point.
+
+    Attributes:
+        name: Name of the contact.
+        weight: Weight. [N]
+        spans: When it hangs. (K, 2) [s]
+        rise: Time in which the string takes the load. [s]
+        fall: Time in which it comes off. [s]
+        link: The link it hangs on; 0 for the flange.
+        point: The point in the link's frame. (3,) [m]
+    """
+
+    KIND: ClassVar[str] = "load"
+    name: str
+    weight: float
+    spans: tuple[tuple[float, float], ...]
+    rise: float = 0.5
+    fall: float = 0.3
+    link: int = 0
+    point: Vector = ORIGIN
+
+    def start(self, rng: np.random.Generator, duration: float) -> Segments:
+        """Make the load ready to hang; nothing is drawn."""
+        del rng, duration
+        if self.weight < 0:
+            raise ParameterError(f"contacts.{self.name}.weight is negative")
+        down = np.array([0.0, 0.0, -self.weight, 0.0, 0.0, 0.0])
+        return Segments([Push(a, b, self.rise, self.fall, down) for a, b in self.spans])
+
+
+class PushStyle(NamedTuple):
+    """Ranges from which pushes are drawn evenly.
+
+    Attributes:
+        length: Shortest and longest push. [s]
+        pause: Shortest and longest pause between pushes. [s]
+        force: Smallest and largest peak force. [N]
+        torque: Smallest and largest peak moment. [N·m]
+    """
+
+    length: tuple[float, float]
+    pause: tuple[float, float]
+    force: tuple[float, float]
+    torque: tuple[float, float]
+
+
+STYLES: dict[str, PushStyle] = {
+    "slow": PushStyle((0.8, 2.0), (0.3, 1.0), (20.0, 60.0), (0.0, 3.0)),
+    "taps": PushStyle((0.14, 0.40), (0.3, 0.9), (30.0, 136.0), (0.0, 4.0)),
+    "mixed": PushStyle((0.1, 1.5), (0.3, 1.0), (20.0, 90.0), (1.0, 6.0)),
+}
+"""Name of a style of pushing → what it draws from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PushesSpec:
+    """Pushes of random strength and direction, as a hand gives them, drawn from the seed.
+
+    Attributes:
+        name: Name of the contact.
+        style: "slow", "taps" or "mixed"; the ranges below override its own.
+        begin: No push before this. [s]
+        end: No push after this; 0 for the end of the log. [s]
+        length: Shortest and longest push. [s]
+        pause: Shortest and longest pause. [s]
+        force: Smallest and largest peak force. [N]
+        torque: Smallest and largest peak moment. [N·m]
+        vertical: Share of the force that may point along base z.
+        link: The link it acts on; 0 for the flange.
+        point: The point in the link's frame. (3,) [m]
+    """
+
+    KIND: ClassVar[str] = "pushes"
+    name: str
+    style: str = "slow"
+    begin: float = 0.0
+    end: float = 0.0
+    length: tuple[float, float] | None = None
+    pause: tuple[float, float] | None = None
+    force: tuple[float, float] | None = None
+    torque: tuple[float, float] | None = None
+    vertical: float = 0.5
+    link: int = 0
+    point: Vector = ORIGIN
+
+    def start(self, rng: np.random.Generator, duration: float) -> Segments:
+        """Draw the pushes."""
+        check_choice("style", self.style, STYLES)
+        given = {k: v for k in PushStyle._fields if (v := getattr(self, k)) is not None}
+        style = STYLES[self.style]._replace(**given)
+        if min(style.length[0], style.pause[0]) <= 0:
+            raise ParameterError(f"contacts.{self.name}: length and pause must be positive")
+        stop, t = self.end or duration, self.begin
+        pushes: list[Push] = []
+        while True:
+            t += rng.uniform(*style.pause)
+            length = rng.uniform(*style.length)
+            force = rng.uniform(*style.force) * direction(rng, self.vertical)
+            torque = rng.uniform(*style.torque) * direction(rng, 1.0)
+            if t + length > stop:
+                return Segments(pushes)
+            wrench = np.concatenate([force, torque])
+            pushes.append(Push(t, t + length, 0.5 * length, 0.5 * length, wrench))
+            t += length
+
+
+def direction(rng: np.random.Generator, vertical: float) -> Array:
+    """A random direction whose vertical part is scaled by `vertical`. (3,)"""
+    vector = rng.standard_normal(3) * np.array([1.0, 1.0, vertical])
+    unit: Array = vector / np.linalg.norm(vector)
+    return unit
