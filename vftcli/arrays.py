@@ -1,5 +1,7 @@
 """Arrays: one alias, read-only copies, and the checks every type makes at its door."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -12,19 +14,23 @@ Array = NDArray[np.float64]
 def frozen(value: ArrayLike) -> Array:
     """Return a read-only float64 array that nobody else can write to.
 
-    An array that already is float64, read-only and owns its data is returned as it is, so that a
-    large log is not copied each time it passes from one type to the next.
+    An array that already is float64 and read-only, down to the memory it is a view of, is returned
+    as it is, so that a large log is not copied each time it passes from one type to the next. A
+    copy keeps the order in memory.
     """
-    if (
-        isinstance(value, np.ndarray)
-        and value.dtype == np.float64
-        and not value.flags.writeable
-        and value.base is None
-    ):
+    if isinstance(value, np.ndarray) and value.dtype == np.float64 and is_sealed(value):
         return value
-    copy = np.array(value, dtype=np.float64, order="C")
+    copy = np.array(value, dtype=np.float64, order="K")
     copy.setflags(write=False)
     return copy
+
+
+def is_sealed(value: NDArray[Any]) -> bool:
+    """Whether neither an array nor the array it is a view of can be written to."""
+    owner = value.base
+    if owner is None:
+        return not value.flags.writeable
+    return isinstance(owner, np.ndarray) and not value.flags.writeable and is_sealed(owner)
 
 
 def handed_over(value: Array) -> Array:
@@ -33,7 +39,14 @@ def handed_over(value: Array) -> Array:
     Only for arrays that the caller made itself and will not write to again.
     """
     value.setflags(write=False)
+    if isinstance(value.base, np.ndarray):
+        value.base.setflags(write=False)
     return value
+
+
+def empty_series(samples: int, columns: int) -> Array:
+    """An uninitialised (T, n) array whose columns are contiguous: series are read along time."""
+    return np.empty((columns, samples)).T
 
 
 def check_clock(t: Array, what: str) -> None:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
+from vftcli.arrays import Array, empty_series
 from vftcli.robots.chain import Chain
 
 CHUNK = 4096
@@ -54,7 +54,7 @@ class Maps:
         outward: Motion state of frame j−1 → frame j before it turns. (n, 9, 9)
         back: Motion state of frame j beside the turned momentum state of frame j+1 → momentum
             state of frame j. (n, 9, 18)
-        first_moment: What the composite masses add to a momentum state. (n, 9, 1)
+        first_moment: What the composite masses add to the rows of h. (n, 3, 1)
         rotor_inertia: Reflected rotor inertia. (n, 1) [kg·m²]
         start: Motion state of the base: gravity alone. (9, 1)
     """
@@ -82,7 +82,7 @@ def cross_matrix(v: Array) -> Array:
 def maps_of(chain: Chain) -> Maps:
     """Prepare a chain's constants for `momentum_terms`."""
     n, zero = chain.joints, np.zeros((3, 3))
-    outward, back, first_moment = np.empty((n, 9, 9)), np.zeros((n, 9, 18)), np.zeros((n, 9, 1))
+    outward, back, first_moment = np.empty((n, 9, 9)), np.zeros((n, 9, 18)), np.zeros((n, 3, 1))
     behind = np.append(np.cumsum(chain.mass[::-1])[::-1], 0.0)
     for j in range(n):
         R, r = chain.rotation[j], cross_matrix(chain.translation[j])
@@ -97,20 +97,23 @@ def maps_of(chain: Chain) -> Maps:
             R, r = chain.rotation[j + 1], cross_matrix(chain.translation[j + 1])
             back[j, :, 9:] = interleave([[R, zero, zero], [r @ R, R, zero], [zero, zero, R]])
             moment = moment + behind[j + 1] * chain.translation[j + 1]
-        first_moment[j, 2::3, 0] = moment
+        first_moment[j, :, 0] = moment
     start = np.zeros((9, 1))
     start[2::3, 0] = chain.gravity
     return Maps(outward, back, first_moment, chain.rotor_inertia[:, None].copy(), start)
 
 
 class Workspace:
-    """Buffers of one chunk, made once and used for every chunk of a log."""
+    """Buffers of one chunk, made once and used for every chunk of a log.
+
+    Attributes:
+        state: Motion state of each frame above the momentum state behind it. (n+1, 18, N)
+        room: For products of three rows. (2, 3, N)
+    """
 
     def __init__(self, joints: int, samples: int) -> None:
-        self.state = np.empty((joints, 18, samples))
-        self.turned = np.empty((9, samples))
-        self.momentum = np.empty((9, samples))
-        self.product = np.empty((3, samples))
+        self.state = np.empty((joints + 1, 18, samples))
+        self.room = np.empty((2, 3, samples))
 
 
 def momentum_chunk(
@@ -118,56 +121,72 @@ def momentum_chunk(
 ) -> None:
     """Fill `p`, `coriolis` and `gravity`, all (n, N), for one chunk of `q` and `dq`. (n, N)"""
     n, count = q.shape
-    cosine, sine = np.cos(q), np.sin(q)
-    product, turned = space.product[:, :count], space.turned[:, :count]
-    parent = np.broadcast_to(maps.start, (9, count))
+    cosine, sine = cosine_and_sine(q)
+    room, base = space.room[:, :, :count], space.state[0, :9, :count]
+    base[:] = maps.start
     for j in range(n):
-        state = space.state[j, :9, :count]
-        if j == 0:
-            turned[:] = maps.outward[0] @ maps.start
-        else:
-            np.matmul(maps.outward[j], parent, out=turned)
-        turn(turned, cosine[j], -sine[j], state, product)
+        parent, state = space.state[j, :9, :count], space.state[j + 1, :9, :count]
+        np.matmul(maps.outward[j], parent, out=state)
+        turn(state, cosine[j], -sine[j], room)
         state[6] += dq[j]
-        parent = state
-    momentum = space.momentum[:, :count]
     for j in range(n - 1, -1, -1):
-        state = space.state[j, :, :count]
+        below = space.state[j + 1, :, :count]
+        momentum = space.state[j, 9:, :count]
         if j == n - 1:
-            np.matmul(maps.back[j, :, :9], state[:9], out=momentum)
+            np.matmul(maps.back[j, :, :9], below[:9], out=momentum)
         else:
-            turn(momentum, cosine[j + 1], sine[j + 1], state[9:], product)
-            np.matmul(maps.back[j], state, out=momentum)
-        momentum += maps.first_moment[j]
-        np.multiply(dq[j], maps.rotor_inertia[j], out=p[j])
-        p[j] += momentum[7]
-        cross_z(state, momentum, coriolis[j], product)
-        np.multiply(momentum[5], state[2], out=gravity[j])
-        np.multiply(momentum[2], state[5], out=product[0])
-        gravity[j] -= product[0]
+            np.matmul(maps.back[j], below, out=momentum)
+        momentum[2::3] += maps.first_moment[j]
+        project(below, momentum, p[j], coriolis[j], gravity[j], room[0, 0])
+        p[j] += maps.rotor_inertia[j] * dq[j]
+        turn(momentum, cosine[j], sine[j], room)
 
 
-def turn(vectors: Array, cosine: Array, sine: Array, out: Array, product: Array) -> None:
-    """Rotate three vectors at a time about z: x' = c·x − s·y, y' = s·x + c·y, z' = z. (9, N)"""
+def turn(vectors: Array, cosine: Array, sine: Array, room: Array) -> None:
+    """Rotate three vectors about z in place: x ← c·x − s·y, y ← s·x + c·y. (9, N)"""
     x, y = vectors[:3], vectors[3:6]
-    np.multiply(x, cosine, out=out[:3])
-    np.multiply(y, sine, out=product)
-    out[:3] -= product
-    np.multiply(x, sine, out=out[3:6])
-    np.multiply(y, cosine, out=product)
-    out[3:6] += product
-    out[6:] = vectors[6:]
+    np.multiply(x, sine, out=room[0])
+    np.multiply(y, sine, out=room[1])
+    x *= cosine
+    y *= cosine
+    x -= room[1]
+    y += room[0]
 
 
-def cross_z(state: Array, momentum: Array, out: Array, product: Array) -> None:
-    """(Cᵀq̇)_j = v_y l_x − v_x l_y + ω_y k_x − ω_x k_y. (N,)"""
-    np.multiply(state[4], momentum[0], out=out)
-    np.multiply(state[3], momentum[1], out=product[0])
-    out += product[0]
-    np.multiply(state[1], momentum[3], out=product[0])
-    out -= product[0]
-    np.multiply(state[0], momentum[4], out=product[0])
-    out -= product[0]
+def project(
+    state: Array, momentum: Array, p: Array, coriolis: Array, gravity: Array, room: Array
+) -> None:
+    """Take the joint's own components out of the composite momentum. (N,) each
+
+    p = k_z, Cᵀq̇ = v_y l_x − v_x l_y + ω_y k_x − ω_x k_y, g = h_y γ_x − h_x γ_y.
+    """
+    p[:] = momentum[7]
+    np.multiply(state[4], momentum[0], out=coriolis)
+    np.multiply(state[3], momentum[1], out=room)
+    coriolis += room
+    np.multiply(state[1], momentum[3], out=room)
+    coriolis -= room
+    np.multiply(state[0], momentum[4], out=room)
+    coriolis -= room
+    np.multiply(momentum[5], state[2], out=gravity)
+    np.multiply(momentum[2], state[5], out=room)
+    gravity -= room
+
+
+def cosine_and_sine(q: Array) -> tuple[Array, Array]:
+    """Cosine and sine through the tangent of half the angle. Like `q` [rad]
+
+    With t = tan(q/2), cos q = (1 − t²)/(1 + t²) and sin q = 2t/(1 + t²), good to some 1e-16: one
+    transcendental function instead of two, and the one that NumPy vectorises best.
+    """
+    t = np.tan(0.5 * q)
+    square = t * t
+    share = 1.0 / (1.0 + square)
+    t *= 2.0
+    t *= share
+    np.subtract(1.0, square, out=square)
+    square *= share
+    return square, t
 
 
 def momentum_terms(chain: Chain, q: Array, dq: Array) -> MomentumTerms:
@@ -180,7 +199,7 @@ def momentum_terms(chain: Chain, q: Array, dq: Array) -> MomentumTerms:
     """
     samples, n = q.shape
     maps = maps_of(chain)
-    out = [np.empty((samples, n)) for _ in range(3)]
+    out = [empty_series(samples, n) for _ in range(3)]
     space = Workspace(n, min(CHUNK, samples))
     rows = np.empty((3, n, min(CHUNK, samples)))
     for start in range(0, samples, CHUNK):

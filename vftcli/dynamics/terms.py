@@ -5,7 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array, check_clock, check_shape, frozen, handed_over
+from vftcli.arrays import (
+    Array,
+    check_clock,
+    check_shape,
+    empty_series,
+    frozen,
+    handed_over,
+)
 from vftcli.dynamics.drive import check_joints, drive_torque, uses_current
 from vftcli.dynamics.friction import friction_torque
 from vftcli.dynamics.kernels import CHUNK, Workspace, maps_of, momentum_chunk
@@ -65,22 +72,24 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
     check_joints(recording, robot)
     q, dq = recording.q, recording.require("dq")
     effort, scale = effort_of(recording, robot)
-    p, mu = np.empty(q.shape), np.empty(q.shape)
+    p, mu = empty_series(*q.shape), empty_series(*q.shape)
     chunks = literal_chunks if literal else kernel_chunks
-    for span, momentum, free_torque in chunks(robot, q, dq):
+    for span, velocity, momentum, free_torque in chunks(robot, q, dq):
         p[span] = momentum
-        np.multiply(effort[span], scale, out=mu[span])
+        mu[span] = effort[span]
+        mu[span] *= scale
         mu[span] += free_torque
         if robot.friction:
-            mu[span] -= friction_torque(robot.friction, dq[span])
+            mu[span] -= friction_torque(robot.friction, velocity)
     return DynamicsTerms(t=recording.t, p=handed_over(p), mu=handed_over(mu))
 
 
-Chunk = tuple[slice, Array, Array]
+Chunk = tuple[slice, Array, Array, Array]
+"""Which samples, and their velocity, momentum p and Cᵀq̇ − g, each (N, n) with its columns whole."""
 
 
 def kernel_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
-    """Yield p and Cᵀq̇ − g of one chunk of samples after another, by the batched kernels."""
+    """Yield one chunk of samples after another, by the batched kernels."""
     samples, n = q.shape
     maps, size = maps_of(robot.loaded_chain), min(CHUNK, samples)
     space, rows = Workspace(n, size), np.empty((3, n, size))
@@ -90,15 +99,15 @@ def kernel_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
         columns = np.ascontiguousarray(q[span].T), np.ascontiguousarray(dq[span].T)
         momentum_chunk(maps, space, *columns, momentum, coriolis, gravity)
         coriolis -= gravity
-        yield span, momentum.T, coriolis.T
+        yield span, columns[1].T, momentum.T, coriolis.T
 
 
 def literal_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
-    """Yield p and Cᵀq̇ − g of the whole log at once, by the paper's numeric method."""
+    """Yield the whole log at once, by the paper's numeric method."""
     from vftcli.dynamics.literal import literal_momentum_terms
 
     p, coriolis, gravity = literal_momentum_terms(robot.model, q, dq)
-    yield slice(0, len(q)), p, coriolis - gravity
+    yield slice(0, len(q)), dq, p, coriolis - gravity
 
 
 def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]:

@@ -16,6 +16,7 @@ from vftcli.observers.first_order import (
 )
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.recursion import recursion, steps_of
+from vftcli.observers.steady_filter import steady_filter
 from vftcli.torque import ExternalTorque
 
 
@@ -64,8 +65,11 @@ class FilteredDynamicsObserver:
         p, mu = terms.p, terms.mu
         x = np.empty_like(p)
         x[0] = 0.0 if self.as_printed else -self.omega * p[0]
-        x[1:] = tail(k3) * (p[1:] + p[:-1])
-        x[1:] -= tail(k2) * (mu[1:] + mu[:-1])
+        np.add(p[1:], p[:-1], out=x[1:])
+        x[1:] *= tail(k3)
+        both = mu[1:] + mu[:-1]
+        both *= tail(k2)
+        x[1:] -= both
         fresh, notes = restarts(a, rate, steps)
         if notes:
             k1, x = np.where(fresh, 0.0, k1), np.where(fresh, -self.omega * p, x)
@@ -88,8 +92,9 @@ def tail(coefficient: Array) -> Array:
 
 
 def scalar_recursion(decay: Array, x: Array) -> Array:
-    """y_t = decay_t y_{t−1} + x_t from zero, for each column. (T, k)"""
-    columns = x.shape[1]
-    constant = len(decay) == 1
-    F = decay.reshape(1, 1, columns) if constant else decay.reshape(-1, 1, 1, columns)
-    return recursion(F, x[:, None, :], np.zeros((1, columns)))[:, 0]
+    """Run y_t = decay_t y_{t−1} + x_t from zero, for each joint. (T, n)"""
+    n = x.shape[1]
+    start = np.zeros((1, n))
+    if len(decay) == 1:
+        return steady_filter(decay.reshape(1, 1, n), np.ones((1, n)), x, start, wanted=0)
+    return recursion(decay.reshape(-1, 1, 1, n), x[:, None, :], start)[:, 0]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array, frozen
+from vftcli.arrays import Array, frozen, handed_over
 from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.errors import ParameterError
 from vftcli.observers.kalman_gains import Covariance, Gains, Steady, gain_sequence, steady
@@ -17,6 +17,7 @@ from vftcli.observers.kalman_model import (
 )
 from vftcli.observers.observer import Complex, Tuning, per_joint
 from vftcli.observers.recursion import Steps, recursion, steps_of
+from vftcli.observers.steady_filter import steady_filter
 from vftcli.torque import ExternalTorque
 
 
@@ -72,7 +73,7 @@ class KalmanObserver:
             least_allowed = value > 0 if name in {"r_diag", "q_tau_diag"} else value >= 0
             if not (np.all(np.isfinite(value)) and np.all(least_allowed)):
                 raise ParameterError(
-                    f"kfo.{name} is {value.tolist()}; R and Q_τ must be positive, Q_p and the decay "
+                    f"kfo.{name} is {value.tolist()}; R and Q_τ must be positive, Q_p and "
                     "decay must not be negative"
                 )
 
@@ -100,14 +101,10 @@ class KalmanObserver:
         """Run over a whole log; `sd` is √P₂₂, the filter's own account of its error."""
         n, steps = terms.joints, steps_of(terms.t)
         gains, a12, a22 = self.gains(steps, terms.samples, n)
-        state = filtered(terms, gains, a12, a22, steps, trapezoid=not self.as_printed)
-        variance = np.broadcast_to(gains.posterior.p22, terms.p.shape)
-        return ExternalTorque(
-            name=self.name,
-            t=terms.t,
-            tau=state[:, 1],
-            sd=np.sqrt(variance),
-        )
+        change = momentum_change(terms, steps, trapezoid=not self.as_printed)
+        tau = filtered(change, gains, a12, a22)
+        sd = np.broadcast_to(np.sqrt(gains.posterior.p22), tau.shape)
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=sd)
 
     def gains(self, steps: Steps, samples: int, joints: int) -> tuple[Gains, Array, Array]:
         """Gains, A₁₂ and A₂₂: one row (n,) if nothing changes along the log, else one a sample."""
@@ -173,29 +170,37 @@ def transition(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array, Arra
     return rest, rest * a12, -gains.l2, a22 - gains.l2 * a12
 
 
-def filtered(
-    terms: DynamicsTerms,
-    gains: Gains,
-    a12: Array,
-    a22: Array,
-    steps: Steps,
-    *,
-    trapezoid: bool = True,
-) -> Array:
-    """x̂ᵗ = (I−LC)(A x̂ᵗ⁻¹ + B u) + L pᵗ from x̂⁰ = [p⁰; 0]. (T, 2, n)
+def momentum_change(terms: DynamicsTerms, steps: Steps, *, trapezoid: bool = True) -> Array:
+    """d = pᵗ − pᵗ⁻¹ − Ts·u, the change of momentum that the model leaves unexplained. (T, n)
 
-    The first sample has no innovation. u is ½(μᵗ + μᵗ⁻¹), or μᵗ alone without `trapezoid`.
+    u is ½(μᵗ + μᵗ⁻¹), or μᵗ alone without `trapezoid` (40); the first sample has none.
     """
-    samples, n = terms.p.shape
-    rows = gains.l1.ndim == 2
-    l1, l2 = (g[1:] if rows else g for g in (gains.l1, gains.l2))
-    dt = steps.median if steps.uniform else steps.dt[1:, None]
-    moved = 0.5 * (terms.mu[1:] + terms.mu[:-1]) if trapezoid else terms.mu[1:].copy()
-    moved *= dt
-    x = np.empty((samples, 2, n))
-    x[0, 0], x[0, 1] = terms.p[0], 0.0
-    x[1:, 0] = (1.0 - l1) * moved + l1 * terms.p[1:]
-    x[1:, 1] = l2 * (terms.p[1:] - moved)
-    F = np.stack(transition(gains, a12, a22), axis=-2)
-    F = F.reshape(*F.shape[:-2], 2, 2, n)
-    return recursion(F, x, np.zeros((2, n)))
+    p, mu = terms.p, terms.mu
+    d = np.empty_like(p)
+    d[0] = 0.0
+    step = steps.median if steps.uniform else steps.dt[1:, None]
+    explained = mu[1:] + mu[:-1] if trapezoid else mu[1:].copy()
+    explained *= 0.5 * step if trapezoid else step
+    np.subtract(p[1:], p[:-1], out=d[1:])
+    d[1:] -= explained
+    return d
+
+
+def filtered(d: Array, gains: Gains, a12: Array, a22: Array) -> Array:
+    """τ̂ᵗ of the Kalman filter, run on its error e = p − p̂ instead of on p̂ itself. (T, n)
+
+    Subtracting p from x̂ᵗ = (I−LC)(A x̂ᵗ⁻¹ + B u) + L pᵗ leaves one input, d:
+
+        eᵗ = (1−L₁)(eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹),  τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂(eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹)
+
+    from e⁰ = 0, τ̂⁰ = 0, which is x̂⁰ = [p⁰; 0]. It is the same filter without the cancellation of
+    two large momenta.
+    """
+    rest, l2 = 1.0 - gains.l1, gains.l2
+    F = np.stack([rest, -rest * a12, l2, a22 - l2 * a12], axis=-2)
+    F = F.reshape(*F.shape[:-2], 2, 2, F.shape[-1])
+    g = np.stack([rest, l2], axis=-2)
+    start = np.zeros((2, d.shape[1]))
+    if F.ndim == 3:
+        return steady_filter(F, g, d, start, wanted=1)
+    return np.ascontiguousarray(recursion(F, g * d[:, None, :], start)[:, 1])

@@ -1,6 +1,8 @@
 """The disturbance Kalman filter's discrete model: A, B, Q and R at a sample time (36)–(44).
 
-State x = [p; τ_ext] of one joint, input μ, output p: ẋ = A_c x + B_c μ + w, A_c = [[0, 1], [0, −a]].
+For one joint: state x = [p; τ_ext], input μ, output p, ẋ = A_c x + B_c μ + w with
+A_c = [[0, 1], [0, −a]].
+
 With diagonal R and Q an n-joint filter is n independent two-state filters.
 """
 

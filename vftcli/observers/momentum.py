@@ -59,8 +59,13 @@ class MomentumObserver:
         p, mu = terms.p, terms.mu
         if self.as_printed:
             return self._as_printed(terms, gain, a)
-        x = np.zeros_like(p)
-        x[1:] = (gain * (p[1:] - p[:-1]) - tail(a) * (mu[1:] + mu[:-1])) / (1.0 + tail(a))
+        x = np.empty_like(p)
+        x[0] = 0.0
+        np.subtract(p[1:], p[:-1], out=x[1:])
+        x[1:] *= gain / (1.0 + tail(a))
+        both = mu[1:] + mu[:-1]
+        both *= tail(a) / (1.0 + tail(a))
+        x[1:] -= both
         decay = (1.0 - a) / (1.0 + a)
         fresh, notes = restarts(a, gain, steps)
         if notes:
