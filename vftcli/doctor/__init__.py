@@ -1,0 +1,7 @@
+"""The log doctor: what is wrong with a log, how one sees it, what it does, what to do."""
+
+from vftcli.doctor.examination import Examination, examine
+from vftcli.doctor.findings import Finding
+from vftcli.doctor.fit import Fit
+
+__all__ = ["Examination", "Finding", "Fit", "examine"]
