@@ -16,7 +16,7 @@ from vftcli.arrays import Array
 from vftcli.dynamics.kernels import momentum_terms
 from vftcli.dynamics.literal import literal_momentum_terms
 from vftcli.dynamics.terms import DynamicsTerms, dynamics_terms
-from vftcli.observers import DEFAULT, OBSERVERS, Observer, Setup
+from vftcli.observers import DEFAULT, OBSERVERS, KalmanObserver, Observer, Setup
 from vftcli.recording import Recording
 from vftcli.robots import Robot, load_robot
 
@@ -68,7 +68,7 @@ def rnea_loop(model: Any, q: Array, dq: Array) -> None:  # noqa: ANN401
         pin.rnea(model, data, q[k], dq[k], zero)
 
 
-def analytic_script(model: Any, recording: Recording, kalman: Any) -> None:  # noqa: ANN401
+def analytic_script(model: Any, recording: Recording, kalman: KalmanObserver) -> None:  # noqa: ANN401
     """What one would write at first: Pinocchio a sample, and a dense Kalman filter."""
     import pinocchio as pin
 
@@ -85,13 +85,18 @@ def analytic_script(model: Any, recording: Recording, kalman: Any) -> None:  # n
     dense_kalman_loop(p, mu, step, kalman)
 
 
-def literal_script(model: Any, recording: Recording, kalman: Any) -> None:  # noqa: ANN401
-    """The paper's own way: n + 3 RNEA calls a sample, then the observers sample by sample."""
+def literal_script(model: Any, recording: Recording, kalman: KalmanObserver) -> None:  # noqa: ANN401
+    """The paper's own way, (7)–(16) and (19)–(44) sample by sample.
+
+    n + 3 RNEA calls a sample, FDO, GMO, the Kalman filter by forward Euler, and the one by
+    zero-order hold with its matrices made anew at every sample from fifth-order Taylor series, as
+    Sec. II-D describes.
+    """
     terms = literal_momentum_terms(model, recording.q, recording.require("dq"))
     mu = recording.require("torque") + terms.coriolis_transpose_dq - terms.gravity
     first_order_loops(terms.p, mu, recording.step)
     dense_kalman_loop(terms.p, mu, recording.step, kalman)
-    dense_kalman_loop(terms.p, mu, recording.step, kalman)
+    dense_kalman_loop(terms.p, mu, recording.step, kalman, rebuild=True)
 
 
 def first_order_loops(p: Array, mu: Array, step: float, rate: float = 10.0) -> tuple[Array, Array]:
@@ -105,10 +110,43 @@ def first_order_loops(p: Array, mu: Array, step: float, rate: float = 10.0) -> t
     return y1 + y2 + rate * p[-1], r
 
 
-def dense_kalman_loop(p: Array, mu: Array, step: float, kalman: Any) -> Array:  # noqa: ANN401
-    """The 2n-state textbook Kalman filter with its covariance, one sample after another."""
+def taylor_exponential(A: Array, order: int = 5) -> Array:
+    """exp(A) by its Taylor series, as the paper approximates it."""
+    term = total = np.eye(len(A))
+    for k in range(1, order + 1):
+        term = term @ A / k
+        total = total + term
+    return total
+
+
+def held_matrices(step: float, q_p: Array, q_tau: Array) -> tuple[Array, Array, Array]:
+    """A, B (43) and Q (44, corrected) of the zero-order hold, by Taylor series."""
+    n = len(q_p)
+    eye, zero = np.eye(n), np.zeros((n, n))
+    A_c = np.block([[zero, eye], [zero, zero]])
+    B_c = np.vstack([eye, zero])
+    both = taylor_exponential(np.block([[A_c, B_c], [np.zeros((n, 3 * n))]]) * step)
+    Q_c = np.diag(np.concatenate([q_p, q_tau]))
+    M = taylor_exponential(np.block([[A_c, Q_c], [np.zeros_like(A_c), -A_c.T]]) * step)
+    Q = M[: 2 * n, 2 * n :] @ M[: 2 * n, : 2 * n].T
+    return both[: 2 * n, : 2 * n], both[: 2 * n, 2 * n :], Q
+
+
+def dense_kalman_loop(
+    p: Array,
+    mu: Array,
+    step: float,
+    kalman: KalmanObserver,
+    *,
+    rebuild: bool = False,
+) -> Array:
+    """The 2n-state textbook Kalman filter with its covariance, one sample after another.
+
+    With `rebuild` its matrices are made anew at every sample.
+    """
     n = p.shape[1]
     model, prior = kalman.model(step, n), kalman.steady(step, n).prior
+    densities = kalman.densities(n)
     eye, zero = np.eye(n), np.zeros((n, n))
     A = np.block([[eye, np.diag(model.a12)], [zero, np.diag(model.a22)]])
     B, C = np.vstack([step * eye, zero]), np.hstack([eye, zero])
@@ -121,6 +159,8 @@ def dense_kalman_loop(p: Array, mu: Array, step: float, kalman: Any) -> Array:  
     )
     x, identity = np.concatenate([p[0], np.zeros(n)]), np.eye(2 * n)
     for k in range(len(p)):
+        if rebuild:
+            A, B, Q = held_matrices(step, densities.q_p, densities.q_tau)
         if k:
             x = A @ x + B @ (0.5 * (mu[k] + mu[k - 1]))
             P = A @ P @ A.T + Q
@@ -186,7 +226,7 @@ def run_rounds(
     few = min(SCRIPT_SAMPLES, recording.samples)
     short = recording.between(0.0, float(recording.t[few - 1]))
     scale, model = recording.samples / few, robot.model
-    kalman = observers["kfo-zoh"]
+    kalman = KalmanObserver(discretisation="zoh", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
 
     def core() -> DynamicsTerms:
         terms = dynamics_terms(recording, robot)

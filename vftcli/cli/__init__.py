@@ -1,5 +1,6 @@
 """The command line: one file a command; parse, call, print. Nothing else prints or exits."""
 
+import os
 import sys
 from typing import Annotated
 
@@ -44,6 +45,9 @@ def vftcli(
 
 def main() -> None:
     """Run the app; turn what a user can mend into one line on stderr and exit code 1."""
+    for library in ("OPENBLAS", "OMP", "MKL"):
+        # The matrices here are small: threads of a linear algebra library only wait for each other.
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     try:
         app()
     except VftError as error:

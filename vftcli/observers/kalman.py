@@ -171,7 +171,7 @@ def transition(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array, Arra
 
 
 def momentum_change(terms: DynamicsTerms, steps: Steps, *, trapezoid: bool = True) -> Array:
-    """d = pᵗ − pᵗ⁻¹ − Ts·u, the change of momentum that the model leaves unexplained. (T, n)
+    """Return d = pᵗ − pᵗ⁻¹ − Ts·u, the change of momentum that the model leaves unexplained. (T, n)
 
     u is ½(μᵗ + μᵗ⁻¹), or μᵗ alone without `trapezoid` (40); the first sample has none.
     """

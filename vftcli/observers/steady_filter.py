@@ -1,10 +1,10 @@
 """Filters whose coefficients do not change along the log, as products with short Toeplitz matrices.
 
-s_t = F s_{t−1} + g d_t with a scalar input d and a small state for each joint, of which one entry is
-wanted. Within a block of samples the wanted entry is a lower-triangular Toeplitz matrix of the
-impulse response times the block's inputs, plus what the state at the block's start still
-contributes; BLAS does that for all blocks at once. The states at the blocks' ends obey the same
-kind of recursion, once a block. It is the plain loop's sum in another order, to rounding.
+s_t = F s_{t−1} + g d_t, with a scalar input d and a small state for each joint of which one entry
+is wanted. Within a block of samples the wanted entry is a triangular Toeplitz matrix of the impulse
+response times the block's inputs, plus what the state at the block's start still contributes; BLAS
+does that for all blocks at once. The states at the blocks' ends obey the same kind of recursion,
+once a block. It is the plain loop's sum in another order, to rounding.
 """
 
 import numpy as np
@@ -65,7 +65,7 @@ class Kernel:
 def piece(F: Array, kernels: list[Kernel], d: Array, state: Array, out: Array) -> Array:
     """Filter one piece into `out` and return the state at its end. (m, n)"""
     samples = len(d)
-    m, whole = len(state), samples // BLOCK
+    whole = samples // BLOCK
     covered = whole * BLOCK
     if whole:
         made = [
