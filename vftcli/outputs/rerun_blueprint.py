@@ -11,10 +11,14 @@ class Plot(NamedTuple):
     Attributes:
         path: The entity it shows.
         name: Its title, with the unit.
+        low: Lower end of its vertical axis, in its unit.
+        high: Upper end.
     """
 
     path: str
     name: str
+    low: float
+    high: float
 
 
 class Tab(NamedTuple):
@@ -29,14 +33,24 @@ class Tab(NamedTuple):
     plots: tuple[Plot, ...]
 
 
-def arrangement(tabs: tuple[Tab, ...], size: float) -> Any:  # noqa: ANN401 - Rerun is untyped
-    """The blueprint for plots and an arm of a certain size. [m]"""
+class Scene(NamedTuple):
+    """Where to look from.
+
+    Attributes:
+        eye: Position of the eye in the base frame. [m]
+        centre: What it looks at. [m]
+    """
+
+    eye: tuple[float, ...]
+    centre: tuple[float, ...]
+
+
+def arrangement(tabs: tuple[Tab, ...], scene: Scene) -> Any:  # noqa: ANN401 - Rerun is untyped
+    """The blueprint for plots and an arm in its space."""
     import rerun.blueprint as rrb
 
-    eye = rrb.EyeControls3D(
-        position=(1.3 * size, -1.5 * size, 1.0 * size), look_target=(0.0, 0.0, 0.3 * size)
-    )
-    scene = rrb.Spatial3DView(
+    eye = rrb.EyeControls3D(position=scene.eye, look_target=scene.centre)
+    view = rrb.Spatial3DView(
         origin="/robot",
         contents="/robot/**",
         name="Arm",
@@ -49,7 +63,7 @@ def arrangement(tabs: tuple[Tab, ...], size: float) -> Any:  # noqa: ANN401 - Re
         active_tab=0,
     )
     plots = rrb.Tabs(*(grid(tab) for tab in tabs), active_tab=0)
-    left = rrb.Vertical(scene, words, row_shares=[3, 2])
+    left = rrb.Vertical(view, words, row_shares=[3, 2])
     return rrb.Blueprint(
         rrb.Horizontal(left, plots, column_shares=[2, 5]),
         rrb.TimePanel(timeline="t", state="collapsed", play_state="paused"),
@@ -61,20 +75,21 @@ def arrangement(tabs: tuple[Tab, ...], size: float) -> Any:  # noqa: ANN401 - Re
 
 
 def grid(tab: Tab) -> Any:  # noqa: ANN401 - Rerun is untyped
-    """One tab: its plots below one another, in two columns if there are many."""
+    """One tab, in two columns if there are many plots; the first one's legend holds for all."""
     import rerun.blueprint as rrb
 
-    views = [time_plot(plot) for plot in tab.plots]
+    views = [time_plot(plot, legend=plot is tab.plots[0]) for plot in tab.plots]
     return rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=tab.name)
 
 
-def time_plot(plot: Plot) -> Any:  # noqa: ANN401 - Rerun is untyped
+def time_plot(plot: Plot, legend: bool) -> Any:  # noqa: ANN401 - Rerun is untyped
     """One plot whose time axis moves with all the others."""
     import rerun.blueprint as rrb
 
     return rrb.TimeSeriesView(
         origin=plot.path,
         name=drawable(plot.name),
-        plot_legend=rrb.PlotLegend(visible=True),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
         axis_x=rrb.archetypes.TimeAxis(link="LinkToGlobal"),
+        axis_y=rrb.ScalarAxis(range=(plot.low, plot.high)),
     )

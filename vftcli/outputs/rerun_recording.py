@@ -6,6 +6,7 @@ reference), `/residual/J1` … (every estimate minus the reference), `/drive_tor
 """
 
 import gc
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,9 +16,9 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.arrays import Array
 from vftcli.dynamics.drive import drive_torque
-from vftcli.outputs.arm import arm_length, capsules, flange_force, motion
+from vftcli.outputs.arm import Motion, capsules, flange_force, motion
 from vftcli.outputs.palette import REFERENCE, SPARE, colours_of, rgb
-from vftcli.outputs.rerun_blueprint import Plot, Tab, arrangement
+from vftcli.outputs.rerun_blueprint import Plot, Scene, Tab, arrangement
 from vftcli.outputs.rerun_text import drawable
 from vftcli.outputs.run import CONVENTIONS, all_notes
 from vftcli.outputs.tables import escape_markdown, to_markdown
@@ -40,6 +41,7 @@ class Lines(NamedTuple):
 
     Attributes:
         path: The entity.
+        title: What the plot shows, with its unit.
         names: One a line.
         colours: ``#rrggbb``, one a line.
         widths: One a line. [px]
@@ -47,6 +49,7 @@ class Lines(NamedTuple):
     """
 
     path: str
+    title: str
     names: list[str]
     colours: list[str]
     widths: list[float]
@@ -62,57 +65,60 @@ def write_rrd(path: Path, analysis: Analysis) -> None:
     """
     import rerun as rr
 
+    groups = line_groups(analysis)
+    plots = tuple(Tab(name, tuple(map(plot_of, lines))) for name, lines in groups.items())
+    poses = motion(analysis.robot.chain, analysis.t, analysis.recording.q, ARM_RATE)
     stream = rr.RecordingStream("vftcli")
-    blueprint = arrangement(tabs(analysis), arm_length(analysis.robot.chain))
-    stream.save(str(path), default_blueprint=blueprint)
+    stream.save(str(path), default_blueprint=arrangement(plots, scene_of(poses)))
     stream.send_recording_name(drawable(analysis.recording.name))
-    for lines in torque_lines(analysis):
-        send_lines(stream, analysis.t, lines)
-    for lines in motion_lines(analysis):
+    for lines in itertools.chain.from_iterable(groups.values()):
         send_lines(stream, analysis.t, lines)
     send_words(stream, analysis)
-    send_arm(stream, analysis)
+    send_arm(stream, analysis, poses)
     stream.flush()
     stream.disconnect()
     del stream
     gc.collect()  # the footer is written when the last reference goes
 
 
-def tabs(analysis: Analysis) -> tuple[Tab, ...]:
-    """The plots, tab by tab."""
-    n = analysis.recording.joints
-    torque = tuple(Plot(f"/tau_ext/J{j}", f"J{j} external torque [N·m]") for j in range(1, n + 1))
-    residual = tuple(
-        Plot(f"/residual/J{j}", f"J{j} estimate − reference [N·m]") for j in range(1, n + 1)
-    )
-    moving = [Plot("/q", "position [rad]"), Plot("/drive_torque", "drive torque [N·m]")]
-    if analysis.recording.dq is not None:
-        moving.insert(1, Plot("/dq", "velocity [rad/s]"))
-    found = [Tab("External torque", torque), Tab("Motion", tuple(moving))]
-    if analysis.reference is not None:
-        found.insert(1, Tab("Residual", residual))
-    return tuple(found)
-
-
-def torque_lines(analysis: Analysis) -> list[Lines]:
-    """External torques joint by joint, and residuals if there is a reference."""
-    reference = analysis.reference
-    found = [joint_lines("tau_ext", analysis, j, reference, 0.0) for j in joints(analysis)]
+def line_groups(analysis: Analysis) -> dict[str, list[Lines]]:
+    """All plots, tab by tab: external torques and residuals joint by joint, then the motion."""
+    reference, joints = analysis.reference, range(analysis.recording.joints)
+    groups = {"External torque": [joint_lines("tau_ext", analysis, j, reference) for j in joints]}
     if reference is not None:
-        found += [
-            joint_lines("residual", analysis, j, None, reference.tau[:, j])
-            for j in joints(analysis)
+        groups["Residual"] = [
+            joint_lines("residual", analysis, j, None, reference.tau[:, j]) for j in joints
         ]
-    return found
+    return {**groups, "Motion": motion_lines(analysis)}
 
 
-def joints(analysis: Analysis) -> range:
-    """Joint indices, from 0."""
-    return range(analysis.recording.joints)
+def plot_of(lines: Lines) -> Plot:
+    """A plot that shows all of its lines."""
+    known = lines.values[np.isfinite(lines.values)]
+    low, high = (known.min(), known.max()) if known.size else (-1.0, 1.0)
+    room = max(0.05 * (high - low), 1e-3)
+    return Plot(lines.path, lines.title, float(low - room), float(high + room))
+
+
+def scene_of(poses: Motion) -> Scene:
+    """An eye that sees the base and all places where the links have been."""
+    corners = poses.translation.reshape(-1, 3)
+    low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
+    centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    eye = centre + 1.9 * radius * np.array([0.62, -0.66, 0.42])
+    return Scene(tuple(eye.tolist()), tuple(centre.tolist()))
+
+
+TITLES = {"tau_ext": "external torque [N·m]", "residual": "estimate − reference [N·m]"}
+"""Group of entities → what its plots show."""
 
 
 def joint_lines(
-    group: str, analysis: Analysis, j: int, reference: ExternalTorque | None, minus: Array | float
+    group: str,
+    analysis: Analysis,
+    j: int,
+    reference: ExternalTorque | None,
+    minus: Array | float = 0.0,
 ) -> Lines:
     """All estimates of one joint less something, and the reference first if it is wanted."""
     colours = colours_of(analysis.estimates)
@@ -122,19 +128,21 @@ def joint_lines(
     if reference is not None:
         names, columns = [f"reference ({reference.name})", *names], [reference.tau[:, j], *columns]
         shades, widths = [REFERENCE, *shades], [2.5, *widths]
-    return Lines(f"/{group}/J{j + 1}", names, shades, widths, np.column_stack(columns))
+    path, title = f"/{group}/J{j + 1}", f"J{j + 1} {TITLES[group]}"
+    return Lines(path, title, names, shades, widths, np.column_stack(columns))
 
 
 def motion_lines(analysis: Analysis) -> list[Lines]:
     """Positions, velocities and drive torques, one line a joint."""
-    recording = analysis.recording
-    signals = {"/q": recording.q, "/drive_torque": drive_torque(recording, analysis.robot)}
+    recording, n = analysis.recording, analysis.recording.joints
+    signals = [("/q", "position [rad]", recording.q)]
     if recording.dq is not None:
-        signals["/dq"] = recording.dq
-    names = [f"J{j + 1}" for j in joints(analysis)]
-    colours = [SPARE[j % len(SPARE)] for j in joints(analysis)]
-    widths = [1.5] * len(names)
-    return [Lines(path, names, colours, widths, values) for path, values in signals.items()]
+        signals.append(("/dq", "velocity [rad/s]", recording.dq))
+    torque = drive_torque(recording, analysis.robot)
+    signals.append(("/drive_torque", "drive torque [N·m]", torque))
+    names, widths = [f"J{j}" for j in range(1, n + 1)], [1.5] * n
+    colours = [SPARE[j % len(SPARE)] for j in range(n)]
+    return [Lines(path, title, names, colours, widths, x) for path, title, x in signals]
 
 
 def send_lines(stream: Stream, t: Array, lines: Lines) -> None:
@@ -145,6 +153,7 @@ def send_lines(stream: Stream, t: Array, lines: Lines) -> None:
         names=[drawable(name) for name in lines.names],
         colors=[rgb(c) for c in lines.colours],
         widths=lines.widths,
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,  # an average hides spikes
     )
     stream.log(lines.path, style, static=True)
     samples, count = lines.values.shape
@@ -193,12 +202,11 @@ def force_source(estimates: Sequence[ExternalTorque]) -> ExternalTorque | None:
     return next(iter([*kalman, *estimates]), None)
 
 
-def send_arm(stream: Stream, analysis: Analysis) -> None:
+def send_arm(stream: Stream, analysis: Analysis, poses: Motion) -> None:
     """Send the arm's shape once and its poses over time."""
     import rerun as rr
 
     chain = analysis.robot.chain
-    poses = motion(chain, analysis.t, analysis.recording.q, ARM_RATE)
     stream.log("/robot", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     time = rr.TimeColumn("t", duration=poses.t)
     for j, shapes in enumerate(capsules(chain)):
