@@ -1,0 +1,141 @@
+"""The variable-parameter law (47), the energy that falls along it, and the printed one that rises.
+
+In the recovery phase an axis has K = αK_d e^{|v|/v₀}, M = M_d e^{−|v|/v₀}/α, B = 2ξ√(MK), so that
+B = 2ξ√(M_d K_d) is constant. The traditional controller is the same law with α = 1, no dependence
+on speed and B = B_d.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vftcli.admittance.parameters import Admittance
+from vftcli.arrays import Array, check_shape, frozen
+from vftcli.errors import ParameterError
+
+KINDS = ("traditional", "variable")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller:
+    """One controller of a comparison: what its recovery phase is made of. Arrays are (6,).
+
+    Attributes:
+        kind: "traditional" or "variable".
+        alpha: α; 1 for the traditional one.
+        rate: 1/v₀; 0 for the traditional one. [s/m, s/rad]
+        damping: Damping of the recovery phase. [N·s/m, N·m·s/rad]
+        parameters: What it was built from.
+    """
+
+    kind: str
+    alpha: Array
+    rate: Array
+    damping: Array
+    parameters: Admittance
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "rate", "damping"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+            check_shape(getattr(self, name), (6,), name, "the controller")
+
+    @property
+    def name(self) -> str:
+        """A label: ``traditional``, ``α = 1.6``, or ``α = 6 / 3`` for position and rotation."""
+        if self.kind == "traditional":
+            return "traditional"
+        distinct = list(dict.fromkeys(f"{a:g}" for a in self.alpha))
+        return f"α = {' / '.join(distinct)}"
+
+    @property
+    def xi(self) -> Array:
+        """Damping ratio ξ of the recovery phase. (6,)"""
+        own: Array = self.damping / (
+            2.0 * np.sqrt(self.parameters.mass * self.parameters.stiffness)
+        )
+        return own
+
+
+def traditional(parameters: Admittance) -> Controller:
+    """Constant parameters (45) in both phases."""
+    return Controller(
+        kind="traditional",
+        alpha=np.ones(6),
+        rate=np.zeros(6),
+        damping=parameters.damping,
+        parameters=parameters,
+    )
+
+
+def variable(parameters: Admittance) -> Controller:
+    """The variable law (47) in the recovery phase."""
+    return Controller(
+        kind="variable",
+        alpha=parameters.alpha,
+        rate=1.0 / np.asarray(parameters.speed_scale),
+        damping=parameters.recovery_damping,
+        parameters=parameters,
+    )
+
+
+def controllers(
+    parameters: Admittance, kinds: Sequence[str] = (), alphas: Sequence[float] = ()
+) -> tuple[Controller, ...]:
+    """The controllers of a comparison, the traditional one first.
+
+    Args:
+        parameters: The robot's.
+        kinds: Which kinds; both if empty.
+        alphas: One variable controller for each; the parameters' own α if empty.
+
+    Raises:
+        ParameterError: If a kind is unknown or an α is not positive.
+    """
+    if unknown := [kind for kind in kinds if kind not in KINDS]:
+        raise ParameterError(f"no controller {unknown[0]!r}; there is {', '.join(KINDS)}")
+    wanted = kinds or KINDS
+    found = [traditional(parameters)] if "traditional" in wanted else []
+    if "variable" in wanted:
+        variants = [parameters.with_alpha(a) for a in dict.fromkeys(alphas)] or [parameters]
+        found += [variable(variant) for variant in variants]
+    return tuple(found)
+
+
+def kinetic_shape(u: Array) -> Array:
+    """φ(u) = ¼[1 − (1 + 2u)e^{−2u}], which is ½u² for small u and never exceeds ¼."""
+    small = u < 1e-3
+    shape = 0.25 * (1.0 - (1.0 + 2.0 * u) * np.exp(-2.0 * u))
+    return np.where(small, u**2 * (0.5 - u * (2.0 / 3.0 - 0.5 * u)), shape)
+
+
+def energy(controller: Controller, x: Array, v: Array) -> Array:
+    """The Lyapunov function of each axis in a recovery phase. (…, 6) [J]
+
+    W = ½K_d x² + (M_d v₀²/α²) φ(|v|/v₀), with Ẇ = −B e^{−|v|/v₀} v²/α ≤ 0; for the traditional
+    controller ½K_d x² + ½M_d v². For rotation the sum over three axes of equal K_d falls, since x is
+    the rotation vector log(R R_dᵀ) and v the angular velocity.
+
+    Args:
+        controller: Whose recovery phase it is.
+        x: Deviations. (…, 6) [m, rad]
+        v: Velocities. (…, 6) [m/s, rad/s]
+    """
+    p = controller.parameters
+    potential = 0.5 * p.stiffness * x**2
+    moving = np.where(controller.rate > 0.0, controller.rate, 1.0)
+    varied = kinetic_shape(np.abs(v) * moving) / moving**2
+    kinetic = p.mass * np.where(controller.rate > 0.0, varied, 0.5 * v**2) / controller.alpha**2
+    total: Array = potential + kinetic
+    return total
+
+
+def printed_energy(controller: Controller, x: Array, v: Array) -> Array:
+    """V = ½M_dva v² + ½K_dva x² of (52), axis by axis: its proof drops Ṁ and K̇. (…, 6) [J]"""
+    p = controller.parameters
+    swell = np.exp(np.abs(v) * controller.rate)
+    V: Array = (
+        0.5 * p.mass / (controller.alpha * swell) * v**2
+        + 0.5 * controller.alpha * p.stiffness * swell * x**2
+    )
+    return V

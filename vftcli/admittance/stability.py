@@ -1,0 +1,157 @@
+"""Stability before motion: what can be said of a law's parameters without running it.
+
+Two things can go wrong. Semi-implicit Euler (49)–(51) is stable for mass M, damping B and stiffness K
+only if 2TsB/M + Ts²K/M < 4, and the variable law's M shrinks and its K grows with speed. And without
+a speed limit the law itself escapes: K grows with e^{|v|}, M shrinks, and from a deviation large
+enough the speed becomes infinite in finite time, at any control period.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.admittance.law import Controller
+from vftcli.admittance.parameters import AXES
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+
+DISCRETE_BOUND = 4.0
+"""Where 2TsB/M + Ts²K/M has to stay below: det(zI − A) = 0 then has both roots inside |z| = 1."""
+
+UNITS = ("m", "m", "m", "rad", "rad", "rad")
+
+
+class UnstableError(ParameterError):
+    """The law would not be stable with these parameters."""
+
+
+class Verdict(NamedTuple):
+    """Stability of one controller. Arrays are (6,).
+
+    Attributes:
+        controller: Whose.
+        drag: 2TsB/M + Ts²K/M of the drag phase.
+        recovery: The same in the recovery phase at the speed limit; infinite without one.
+        escape: Largest deviation from which a release at rest does not escape if there is no speed
+            limit; infinite for the traditional controller. [m, rad]
+        limited: Whether the axis has a speed limit.
+    """
+
+    controller: Controller
+    drag: Array
+    recovery: Array
+    escape: Array
+    limited: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+    @property
+    def complaints(self) -> tuple[str, ...]:
+        """What makes it unstable, one sentence each with the number that breaks."""
+        found = []
+        for phase, numbers in (("drag", self.drag), ("recovery", self.recovery)):
+            for k in np.flatnonzero(numbers >= DISCRETE_BOUND):
+                if phase == "recovery" and not self.limited[k]:
+                    continue
+                at = " at the speed limit" if phase == "recovery" else ""
+                found.append(
+                    f"{self.controller.name}, axis {AXES[k]}, {phase} phase{at}: "
+                    f"2TsB/M + Ts²K/M = {numbers[k]:.3g}, and it must be below 4"
+                )
+        for k in np.flatnonzero(~self.limited & np.isfinite(self.escape)):
+            found.append(
+                f"{self.controller.name}, axis {AXES[k]} has no speed limit: the law escapes in "
+                f"finite time when released at rest from beyond {self.escape[k]:.3g} {UNITS[k]}"
+            )
+        return tuple(found)
+
+
+def discrete_number(mass: Array, damping: Array, stiffness: Array, period: float) -> Array:
+    """2TsB/M + Ts²K/M, below 4 where semi-implicit Euler is stable.
+
+    Args:
+        mass: M. [kg, kg·m²]
+        damping: B. [N·s/m, N·m·s/rad]
+        stiffness: K. [N/m, N·m/rad]
+        period: Ts. [s]
+    """
+    number: Array = (2.0 * period * damping + period**2 * stiffness) / mass
+    return number
+
+
+def escape_factor(xi: float) -> float:
+    """Y*(ξ): the release Y*·v₀√(M_d/K_d)/α from rest is the last that does not escape.
+
+    In y = xα√(K_d/M_d)/v₀ and u = |v|/v₀ the law without force is du/ds = e^u(e^u y − 2ξu),
+    dy/ds = −u. With z = e^u y its paths obey dz/du = z − u/(z − 2ξu); the one between those that turn
+    back and those that escape comes from infinity along z(z − 2ξu) = u. Followed back to u = 0, where
+    it attracts its neighbours, it ends at z = y = Y*. Y*(0) = 1/√2, the bound that holds for every ξ.
+
+    Args:
+        xi: Damping ratio, at least 0.
+    """
+    far = 12.0 * min(1.0, 5.0 / max(xi, 1e-12))
+    steps = int(max(2000.0, 8.0 * (xi * far) ** 2))  # the path attracts at up to 4ξ²u
+    h = -far / steps
+    z = xi * far + np.sqrt((xi * far) ** 2 + far)
+
+    def slope(u: float, z: float) -> float:
+        return z - u / max(z - 2.0 * xi * u, 1e-300)
+
+    for k in range(steps):
+        u = far + k * h
+        k1 = slope(u, z)
+        k2 = slope(u + h / 2, z + h / 2 * k1)
+        k3 = slope(u + h / 2, z + h / 2 * k2)
+        k4 = slope(u + h, z + h * k3)
+        z += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return float(z)
+
+
+def escape_bound(controller: Controller) -> Array:
+    """Deviation up to which a release at rest is safe with no speed limit at all. (6,) [m, rad]"""
+    p = controller.parameters
+    factors = {xi: escape_factor(xi) for xi in set(controller.xi.tolist())}
+    factor = np.array([factors[xi] for xi in controller.xi.tolist()])
+    scale = np.sqrt(p.mass / p.stiffness) / controller.alpha
+    with np.errstate(divide="ignore"):
+        bound: Array = factor * scale / controller.rate
+    return bound
+
+
+def judge(controller: Controller) -> Verdict:
+    """Everything that can be said of a controller before it runs."""
+    p = controller.parameters
+    limit = np.asarray(p.speed_limit)
+    with np.errstate(over="ignore", invalid="ignore"):
+        swell = controller.alpha * np.exp(np.where(controller.rate > 0, limit * controller.rate, 0))
+    drag = discrete_number(p.mass, p.damping, p.stiffness, p.period)
+    recovery = discrete_number(
+        p.mass / swell, controller.damping, p.stiffness * swell, p.period
+    )
+    return Verdict(controller, drag, recovery, escape_bound(controller), np.isfinite(limit))
+
+
+def check_stable(
+    controllers: Sequence[Controller], *, force_unstable: bool = False
+) -> tuple[tuple[Verdict, ...], tuple[str, ...]]:
+    """Judge controllers before they run, and refuse what would be unstable.
+
+    Args:
+        controllers: The controllers.
+        force_unstable: Run them all the same, for study.
+
+    Returns:
+        A verdict for each, and what is wrong with them, one sentence each.
+
+    Raises:
+        UnstableError: If one is unstable and `force_unstable` is not set.
+    """
+    verdicts = tuple(judge(controller) for controller in controllers)
+    complaints = tuple(text for verdict in verdicts for text in verdict.complaints)
+    if complaints and not force_unstable:
+        more = f" (and {len(complaints) - 1} more)" if len(complaints) > 1 else ""
+        raise UnstableError(
+            f"unstable: {complaints[0]}{more}. Change the parameters, or study it with "
+            "--force-unstable."
+        )
+    return verdicts, complaints

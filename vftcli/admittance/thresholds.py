@@ -1,0 +1,52 @@
+"""Which axis is dragged when, and the force that moves it: hard and soft thresholds, hysteresis."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.admittance.parameters import Admittance
+from vftcli.arrays import Array
+
+Flags = NDArray[np.bool_]
+
+
+class Phases(NamedTuple):
+    """Algorithm 1's phases along a force record.
+
+    Attributes:
+        dragged: Whether each axis is in the drag phase. (T, 6)
+        force: Force and moment that enter the law; zero in the recovery phase. (T, 6) [N, N·m]
+    """
+
+    dragged: Flags
+    force: Array
+
+
+def phases(wrench: Array, parameters: Admittance) -> Phases:
+    """Split a record into drag and recovery phases, axis by axis.
+
+    An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i. "hard" passes
+    the whole force, "soft" what exceeds the threshold in force, F − F_tsd·sign(F), so that the force
+    starts from zero. An unknown (NaN) force counts as none.
+
+    Args:
+        wrench: Force and moment on the flange. (T, 6) [N, N·m]
+        parameters: Thresholds, hysteresis and mode.
+    """
+    wrench = np.nan_to_num(wrench, nan=0.0)
+    size = np.abs(wrench)
+    release = parameters.threshold * (1.0 - np.asarray(parameters.hysteresis))
+    dragged = latched(size > parameters.threshold, size <= release)
+    force = wrench
+    if parameters.threshold_mode == "soft":
+        force = np.sign(wrench) * np.maximum(size - parameters.threshold, 0.0)
+    return Phases(dragged, np.where(dragged, force, 0.0))
+
+
+def latched(on: Flags, off: Flags) -> Flags:
+    """True from where `on` is until `off` is, False before the first of them. (T, 6)"""
+    rows = np.arange(len(on))[:, None]
+    last = np.maximum.accumulate(np.where(on | off, rows, -1), axis=0)
+    state = np.take_along_axis(on, np.maximum(last, 0), axis=0)
+    return np.where(last >= 0, state, False)
