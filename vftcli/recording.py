@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.arrays import Array, check_clock, check_shape, frozen
+from vftcli.arrays import Array, check_clock, check_shape, frozen, median
 from vftcli.errors import ClockError, MissingSignalError, ShapeError
 
 JOINT_SIGNALS = (
@@ -170,7 +170,7 @@ class Recording:
         """Median time between samples, the nominal sample time. [s]"""
         if self.samples < 2:
             raise ClockError(f"{self.name}: one sample has no sample time")
-        return float(np.median(np.diff(self.t)))
+        return median(np.diff(self.t))
 
     @property
     def name(self) -> str:

@@ -1,5 +1,6 @@
 """The command line: one file a command; parse, call, print. Nothing else prints or exits."""
 
+import gc
 import os
 import sys
 from typing import Annotated
@@ -48,6 +49,7 @@ def main() -> None:
     for library in ("OPENBLAS", "OMP", "MKL"):
         # The matrices here are small: threads of a linear algebra library only wait for each other.
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    gc.set_threshold(200_000)  # a command is short: collecting while it imports is a tenth of it
     try:
         app()
     except VftError as error:

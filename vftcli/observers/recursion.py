@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array
+from vftcli.arrays import Array, is_uniform, median
 
 BLOCK = 32
 """Samples in a block: the Python loop has this length, once a level."""
@@ -123,12 +123,10 @@ class Steps:
 
 def steps_of(t: Array) -> Steps:
     """Sample times of a clock. A single sample has a nominal step of 1 s, which nothing uses."""
-    from vftcli.arrays import is_uniform
-
     if len(t) < 2:
         return Steps(np.ones(len(t)), True, 1.0)
     dt = np.diff(t)
-    median = float(np.median(dt))
+    usual = median(dt)
     if uniform := is_uniform(t):
-        median = float((t[-1] - t[0]) / (len(t) - 1))
-    return Steps(np.concatenate([[median], dt]), uniform, median)
+        usual = float((t[-1] - t[0]) / (len(t) - 1))
+    return Steps(np.concatenate([[usual], dt]), uniform, usual)

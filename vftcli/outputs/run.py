@@ -3,9 +3,10 @@
 import hashlib
 import json
 import platform
+import sys
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +28,19 @@ CONVENTIONS = {
 }
 """What every number in an output means."""
 
-PACKAGES = ("numpy", "scipy", "polars", "pin")
-"""Packages whose versions are recorded beside Python's; none is imported for it."""
+NUMBERS = re.compile(r"\[\n[^\[\]{}\"]*\n\s*\]")
+"""A list without words, which is better read on one line."""
+
+PACKAGES = {
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "polars": "polars",
+    "pin": "pinocchio",
+    "rerun-sdk": "rerun",
+    "rosbags": "rosbags",
+    "mcap": "mcap",
+}
+"""Package → its module, whose version is recorded if it is loaded; none is imported for it."""
 
 
 def run_record(
@@ -61,7 +73,8 @@ def run_record(
 
 def to_json(record: Mapping[str, Any]) -> str:
     """A record as JSON text; what is not a finite number becomes null."""
-    return json.dumps(plain(record), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    text = json.dumps(plain(record), indent=2, ensure_ascii=False, allow_nan=False)
+    return NUMBERS.sub(lambda found: " ".join(found.group().split()), text) + "\n"
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
@@ -90,13 +103,15 @@ def shell_line(words: Sequence[str]) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Versions of the program and of what computes its numbers, by name."""
+    """Versions of the program and of the packages that took part in this run, by name.
+
+    A package that was not imported had no part in the numbers, and looking its version up would
+    cost more than they did.
+    """
     found = {"vftcli": vftcli.__version__, "python": platform.python_version()}
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed"
+    for package, module in PACKAGES.items():
+        if (loaded := sys.modules.get(module)) is not None:
+            found[package] = str(getattr(loaded, "__version__", "unknown"))
     return found
 
 
@@ -181,5 +196,9 @@ def all_notes(analysis: Analysis) -> list[str]:
     """Notes of the run, of every estimate and of the reference, each once."""
     notes = [*analysis.notes]
     for torque in analysis.torques:
-        notes += [f"{torque.name}: {note}" for note in torque.notes if note not in analysis.notes]
+        notes += [
+            note if torque.name in note else f"{torque.name}: {note}"
+            for note in torque.notes
+            if note not in analysis.notes
+        ]
     return list(dict.fromkeys(notes))
