@@ -8,6 +8,7 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.arrays import Array
+from vftcli.wrench.wrench import AXES
 
 if TYPE_CHECKING:
     import polars as pl
@@ -17,7 +18,10 @@ def estimates_table(analysis: Analysis) -> "pl.DataFrame":
     """Time, motion, every observer's torque and the reference's, one flat column each.
 
     Columns: ``t`` [s]; ``q/1``… [rad]; ``dq/1``… [rad/s]; ``tau_ext/<observer>/1``… [N·m];
-    ``sd/<observer>/1``… [N·m] where the observer gives one; ``tau_ext/reference/1``… [N·m].
+    ``sd/<observer>/1``… [N·m] where the observer gives one; ``tau_ext/reference/1``… [N·m];
+    where a wrench is asked for, ``wrench/<observer>/fx``…``mz`` [N, N·m], null where the pose
+    cannot tell it, ``wrench_sd/<observer>/fx``…, ``null_space/<observer>`` [N·m] and
+    ``sigma_min`` [m].
     What is not known is null.
     """
     import polars as pl
@@ -42,12 +46,32 @@ def columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
         yield from per_joint("tau_ext/reference", analysis.reference.tau)
         if analysis.reference.sd is not None:
             yield from per_joint("sd/reference", analysis.reference.sd)
+    yield from wrench_columns(analysis)
 
 
 def per_joint(name: str, values: Array) -> Iterator[tuple[str, Array]]:
     """One contiguous column a joint, named from 1."""
     for j, column in enumerate(np.ascontiguousarray(values.T), start=1):
         yield f"{name}/{j}", column
+
+
+def wrench_columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
+    """The wrenches, their standard deviations and what the pose can tell, where asked for."""
+    for wrench in analysis.wrenches:
+        yield from per_axis(f"wrench/{wrench.name}", wrench.known)
+        if wrench.known_sd is not None:
+            yield from per_axis(f"wrench_sd/{wrench.name}", wrench.known_sd)
+        if wrench.null_space is not None:
+            yield f"null_space/{wrench.name}", wrench.null_space
+    sigma = next((w.sigma_min for w in analysis.wrenches if w.sigma_min is not None), None)
+    if sigma is not None:
+        yield "sigma_min", sigma
+
+
+def per_axis(name: str, values: Array) -> Iterator[tuple[str, Array]]:
+    """One contiguous column an axis, fx to mz."""
+    for axis, column in zip(AXES, np.ascontiguousarray(values.T), strict=True):
+        yield f"{name}/{axis}", column
 
 
 def write_estimates(path: Path, analysis: Analysis) -> None:
@@ -57,5 +81,5 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
 
 
 def write_csv(path: Path, analysis: Analysis) -> None:
-    """Write the table as CSV with nine significant digits after the point; unknown is empty."""
+    """Write the table as CSV with nine digits after the point; unknown is empty."""
     estimates_table(analysis).write_csv(path, float_precision=9)

@@ -180,7 +180,8 @@
       const [a, b] = state.view[this.axis], ink = colour === "ink";
       const from = Math.max(0, below(line.x, a) - 1), to = Math.min(line.x.length, below(line.x, b) + 1);
       c.strokeStyle = ink ? css("--ink") : colour;
-      c.lineWidth = this.small ? 1 : ink ? 1.6 : 1.4;
+      c.lineWidth = this.small ? 1 : 1.4;
+      c.globalAlpha = ink && this.spec.series.length > 1 ? 0.62 : 1; // the reference lies under the estimates
       c.lineJoin = "round"; c.setLineDash(dashed ? [7, 5] : []);
       c.beginPath();
       let pen = false;
@@ -190,7 +191,7 @@
         const px = this.left(line.x[k]), py = this.top(y);
         if (pen) c.lineTo(px, py); else { c.moveTo(px, py); pen = true; }
       }
-      c.stroke(); c.setLineDash([]);
+      c.stroke(); c.setLineDash([]); c.globalAlpha = 1;
     }
 
     // ---- the pointer -------------------------------------------------------------------------
@@ -268,10 +269,10 @@
         c.strokeStyle = css("--soft"); c.lineWidth = 1;
         c.beginPath(); c.moveTo(at, t); c.lineTo(at, t + h); c.stroke();
       }
-      if (seen && this.pointed && !this.small) this.read(x); else if (this.box_) { this.box_.remove(); this.box_ = null; }
+      if (seen && this.pointed && !this.small) this.read(x); else if (this.readout) { this.readout.remove(); this.readout = null; }
     }
     read(x) {
-      if (!this.box_) { this.box_ = node("div", "readout"); this.area.append(this.box_); }
+      if (!this.readout) { this.readout = node("div", "readout"); this.area.append(this.readout); }
       const rows = this.lines().map(({ name, line, colour }) => {
         let k = below(line.x, x);
         if (k > 0 && (k === line.x.length || x - line.x[k - 1] < line.x[k] - x)) k--;
@@ -284,11 +285,11 @@
         row.append(label, number); list.append(row);
       }
       const where = this.spec.log ? `${significant(x)} Hz` : `${x.toFixed(3)} s`;
-      this.box_.replaceChildren(node("div", "", where), list);
+      this.readout.replaceChildren(node("div", "", where), list);
       const at = this.left(x), right = at > this.box.l + this.box.w / 2;
-      this.box_.style.top = `${this.box.t + 6}px`;
-      this.box_.style.left = right ? "" : `${at + 12}px`;
-      this.box_.style.right = right ? `${this.area.clientWidth - at + 12}px` : "";
+      this.readout.style.top = `${this.box.t + 6}px`;
+      this.readout.style.left = right ? "" : `${at + 12}px`;
+      this.readout.style.right = right ? `${this.area.clientWidth - at + 12}px` : "";
     }
   }
 

@@ -47,7 +47,7 @@ def render_index(analyses: Sequence[tuple[str, Analysis]]) -> str:
     """
     rows = [index_row(folder, analysis) for folder, analysis in analyses]
     header = ["Log", "Robot", "Reference", "Span [s]", "Samples", "Best mean RMSE [N·m]", "Floor"]
-    overview = sections.html_table("Every log has its own page", header, rows)
+    overview = sections.html_table("Every log has its own page", header, rows, words=3)
     tables = "".join(
         f"<h2>{link(folder, analysis.recording.name)}</h2>"
         f"{''.join(sections.rmse_table(block) for block in blocks(analysis.errors))}"

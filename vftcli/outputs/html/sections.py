@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -94,9 +96,11 @@ def observer_head(name: str) -> str:
     return f'<th scope="row" data-swatch="{escape(name)}">{escape(name)}</th>'
 
 
-def html_table(caption: str, header: Sequence[str], rows: Iterable[str]) -> str:
-    """A table that scrolls by itself where the page is narrow."""
-    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in header)
+def html_table(caption: str, header: Sequence[str], rows: Iterable[str], words: int = 1) -> str:
+    """A table that scrolls by itself where the page is narrow; its first columns hold words."""
+    kinds = [' class="text"'] * words + [""] * (len(header) - words)
+    cells = zip(kinds, header, strict=True)
+    head = "".join(f'<th scope="col"{kind}>{escape(name)}</th>' for kind, name in cells)
     return (
         f'<div class="scroll"><table><caption>{escape(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
@@ -178,6 +182,7 @@ def observers(analysis: Analysis) -> str:
         "What the parameters mean at this log's sample time; one value a joint where they differ",
         header,
         [shown],
+        words=2,
     )
     parameters = "".join(parameter_row(analysis, o.name) for o in analysis.observers)
     return (
@@ -200,11 +205,18 @@ def observer_cells(analysis: Analysis, name: str) -> str:
 
 
 def joint_values(values: Array) -> str:
-    """One number where all joints agree to three digits, else one line a joint."""
+    """One number where all joints agree to three digits, else one line a run of equal joints."""
     texts = [significant(float(value)) for value in values]
     if len(set(texts)) == 1:
         return texts[0]
-    return "<br>".join(f"J{j} {text}" for j, text in enumerate(texts, start=1))
+    numbered = groupby(enumerate(texts, start=1), key=itemgetter(1))
+    runs = [(text, [j for j, _ in members]) for text, members in numbered]
+    return "<br>".join(f'<span class="which">{joint_range(js)}</span> {text}' for text, js in runs)
+
+
+def joint_range(joints: Sequence[int]) -> str:
+    """J2, or J1–J3."""
+    return f"J{joints[0]}" if len(joints) == 1 else f"J{joints[0]}–J{joints[-1]}"
 
 
 def parameter_row(analysis: Analysis, name: str) -> str:
