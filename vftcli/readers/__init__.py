@@ -6,7 +6,7 @@ from pathlib import Path
 from vftcli.errors import LogError, UnknownFormatError
 from vftcli.readers import arrays_file, lerobot, libfranka, parquet, pickles, rtde, tables
 from vftcli.readers.bags import formats as bags
-from vftcli.readers.cleaning import cleaned
+from vftcli.readers.cleaning import RestartError, cleaned
 from vftcli.readers.opening import Digest
 from vftcli.readers.reader import LogFile, RawLog, Reader, Request, open_log
 from vftcli.recording import Recording
@@ -64,6 +64,23 @@ def read(
     return cleaned(raw, path, reader.name, Digest(path).hexdigest)
 
 
+def read_first_recording(
+    path: str | Path,
+    *,
+    format: str | None = None,  # noqa: A002
+    columns: str | None = None,
+) -> Recording:
+    """Read a log as `read` does; of a file that holds several recordings, the first.
+
+    For examining a log, where looking at a part and saying so tells more than refusing.
+    """
+    try:
+        return read(path, format=format, columns=columns)
+    except RestartError:
+        segment = f"{columns},segment=1" if columns else "segment=1"
+        return read(path, format=format, columns=segment)
+
+
 def recognise(path: str | Path) -> Reader:
     """Return the reader that a path's content calls for.
 
@@ -103,4 +120,4 @@ def _recognise(file: LogFile) -> Reader:
     )
 
 
-__all__ = ["READERS", "LogFile", "RawLog", "Reader", "Request", "read", "recognise"]
+__all__ = ["READERS", "LogFile", "RawLog", "Reader", "Request", "read", "read_first_recording", "recognise"]

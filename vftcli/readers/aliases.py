@@ -8,8 +8,11 @@ from vftcli.errors import LogError
 from vftcli.readers.joints import kinematic_order
 from vftcli.readers.table import Cell, Pick, Picks, Table, checked, listed
 
-CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "seconds", "t_src_ns")
+CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "seconds")
 """Names of the clock; a unit may follow, as in time_ms."""
+
+OWN_STAMPS = "t_src_ns"
+"""The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes them."""
 
 ALIASES: dict[str, tuple[str, ...]] = {
     "q": (
@@ -84,7 +87,9 @@ def picks_by_alias(table: Table) -> tuple[Picks, tuple[str, ...]]:
         signals.append(wrench)
     joints = next((len(p.cells) for p in signals if p.signal == "q"), 0)
     signals = [p for p in signals if len(p.cells) == joints or p.signal in {"q", "wrench"}]
-    picks = checked(table, Picks(signals=tuple(signals), clock=_clock(table)))
+    names_there = table.names or ()
+    origin = names_there.index(OWN_STAMPS) if names_there.count(OWN_STAMPS) == 1 else None
+    picks = checked(table, Picks(signals=tuple(signals), clock=_clock(table), origin=origin))
     names = next((g.joints for g in groups.values() if g.joints), ())
     return picks, names
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.arrays import Array, handed_over
+from vftcli.arrays import Array, handed_over, median
 from vftcli.errors import ClockError, LogError
 from vftcli.readers.reader import RawLog
 from vftcli.recording import Recording, Source
@@ -22,6 +22,9 @@ DENORMAL = 1e-300
 
 GAP_STEPS = 4.0
 """A step this many times the median is reported as a gap."""
+
+SEGMENT_ROWS = 20
+"""A stretch between two restarts of the clock that is shorter is not a recording of its own."""
 
 Mask = NDArray[np.bool_]
 
@@ -52,6 +55,8 @@ def cleaned(
     rows = len(raw.stamps)
     if rows == 0:
         raise ClockError(f"{path}: no samples; the log holds a header only.")
+    if raw.segment is not None:
+        raw = segment_of(raw, raw.segment, path)
     raw = without_leading_garbage(raw, findings)
     refuse_unknown_numbers(raw, path)
     refuse_backward_steps(raw, path)
@@ -65,7 +70,7 @@ def cleaned(
         format=format_name,
         sha256=sha256,
         clock=raw.clock,
-        t0=float(raw.stamps[0]) * raw.tick,
+        t0=float(raw.stamps[0]) * raw.tick + raw.origin,
         t0_ns=_nanoseconds(raw),
         rows=rows,
         duplicates=findings.duplicates,
@@ -92,7 +97,7 @@ def seconds(raw: RawLog) -> Array:
 
 
 def _nanoseconds(raw: RawLog) -> int | None:
-    if raw.stamps.dtype.kind not in "iu":
+    if raw.stamps.dtype.kind not in "iu" or raw.origin:
         return None
     per_tick = round(raw.tick * 1e9)
     return int(raw.stamps[0]) * per_tick if per_tick >= 1 else None
@@ -165,18 +170,59 @@ def refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
         )
 
 
+class RestartError(ClockError):
+    """A file holds several recordings one after another, each with its own clock.
+
+    Attributes:
+        rows: Number of rows before each restart of the clock.
+    """
+
+    def __init__(self, message: str, rows: tuple[int, ...]) -> None:
+        self.rows = rows
+        super().__init__(message)
+
+
 def refuse_backward_steps(raw: RawLog, path: Path) -> None:
-    """Raise a ClockError that names the first sample whose stamp lies before the one before."""
+    """Raise a ClockError that names the first sample whose stamp lies before the one before.
+
+    Raises:
+        RestartError: If the clock starts anew, so that the file holds several recordings.
+        ClockError: If it runs backwards in any other way.
+    """
     backward = np.diff(raw.stamps) < 0
     if not backward.any():
         return
-    k = int(np.argmax(backward)) + 1
-    t = seconds(raw)
+    restarts = np.flatnonzero(backward) + 1
+    k, t = int(restarts[0]), seconds(raw)
+    where = f"at sample {raw.first_row + k} (from {t[k - 1]:.6f} to {t[k]:.6f} s)"
+    usual = float(np.median(np.diff(t)))
+    lengths = np.diff([0, *restarts, len(t)])
+    if np.all(np.abs(t[restarts]) <= 3 * usual) and lengths.min() >= SEGMENT_ROWS:
+        raise RestartError(
+            f"{path}: the clock starts anew {len(restarts)}×, first {where}: the file holds "
+            f"{len(lengths)} recordings one after another. Split it, or take one by its number: "
+            "--columns segment=1 (with the other columns, if they need describing).",
+            tuple(int(row) for row in restarts),
+        )
     raise ClockError(
-        f"{path}: time runs backwards {int(backward.sum())}×, first at sample {raw.first_row + k} "
-        f"(from {t[k - 1]:.6f} to {t[k]:.6f} s). Two logs in one file, or rows out of order: "
-        "split or sort it first."
+        f"{path}: time runs backwards {int(backward.sum())}×, first {where}. Two logs in one file, "
+        "or rows out of order: split or sort it first."
     )
+
+
+def segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
+    """One of several recordings in a file, counted from 1; the clock's restarts part them.
+
+    Raises:
+        ClockError: If there is no such recording.
+    """
+    edges = [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(raw.stamps) < 0)), len(raw.stamps)]
+    if not 1 <= number < len(edges):
+        raise ClockError(f"{path}: there is no segment {number}; the file holds {len(edges) - 1}.")
+    first, last = edges[number - 1], edges[number]
+    note = f"took recording {number} of {len(edges) - 1}, rows {first + 1} to {last} (segment)"
+    taken = kept(raw, slice(first, last))
+    return replace(taken, first_row=raw.first_row + first, repairs=(*raw.repairs, note))
 
 
 def without_repeats(raw: RawLog, findings: Findings) -> RawLog:
@@ -206,7 +252,7 @@ def report_gaps(t: Array, findings: Findings) -> None:
     if len(t) < 3:
         return
     steps = np.diff(t)
-    usual = float(np.median(steps))
+    usual = median(steps)
     gaps = np.flatnonzero(steps > GAP_STEPS * usual)
     if gaps.size:
         k = int(gaps[np.argmax(steps[gaps])])

@@ -72,10 +72,14 @@ class Item:
 
 @dataclass(frozen=True, kw_only=True)
 class ColumnSpec:
-    """A parsed --columns text: the items, and whether they name columns or count them."""
+    """A parsed --columns text: the items, and whether they name columns or count them.
+
+    `segment` is the number of the recording that is wanted of a file that holds several.
+    """
 
     items: tuple[Item, ...]
     named: bool
+    segment: int | None = None
 
     def item(self, signal: str) -> Item | None:
         """The item of a signal, or None."""
@@ -95,7 +99,8 @@ def parse_columns(text: str) -> ColumnSpec:
     """
     if not _split(text):
         raise LogError("--columns is empty. Say which column is which, as in t,q:6,dq:6,current:6.")
-    items = tuple(_parse_item(part) for part in _split(text))
+    parts, segment = _without_segment(_split(text))
+    items = tuple(_parse_item(part) for part in parts)
     named = any(item.pattern is not None for item in items)
     for item in items:
         if named and item.pattern is None and item.rate is None:
@@ -107,15 +112,25 @@ def parse_columns(text: str) -> ColumnSpec:
     for name in names:
         if names.count(name) > 1:
             raise LogError(f"--columns: {name} is given twice. Skip the other columns with _.")
-    if "q" not in names and not named:
+    if items and "q" not in names and not named:
         raise LogError("--columns: no q; a log needs joint positions, as in t,q:6,dq:6,current:6.")
-    return ColumnSpec(items=items, named=named)
+    return ColumnSpec(items=items, named=named, segment=segment)
 
 
 def _split(text: str) -> list[str]:
     """Split at the commas that stand outside brackets."""
     parts = re.split(r",(?![^\[]*\])", text)
     return [part.strip() for part in parts if part.strip()]
+
+
+def _without_segment(parts: list[str]) -> tuple[list[str], int | None]:
+    """The items but for segment=N, and that number."""
+    numbers = [part.removeprefix("segment=") for part in parts if part.startswith("segment=")]
+    if not numbers:
+        return parts, None
+    if len(numbers) > 1 or not numbers[0].isascii() or not numbers[0].isdigit():
+        raise LogError(f"--columns: segment={numbers[0]} must be one whole number, from 1.")
+    return [part for part in parts if not part.startswith("segment=")], int(numbers[0][:9])
 
 
 def _parse_item(part: str) -> Item:

@@ -1,6 +1,8 @@
 """Parquet tables: flat columns, or columns of lists as LeRobot writes them."""
 
+import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -49,6 +51,19 @@ class ParquetTable:
     def repairs(self) -> tuple[str, ...]:
         """Nothing is ever mended here."""
         return ()
+
+    def told(self) -> dict[str, Any]:
+        """What vftcli convert wrote beside the columns; nothing for files of other programs."""
+        import polars as pl
+
+        with guarded(self.path):
+            text = pl.read_parquet_metadata(self._seekable()).get("vftcli", "{}")
+        try:
+            told = json.loads(text)
+        except (ValueError, RecursionError):
+            return {}
+        good = isinstance(told, dict) and isinstance(told.get("joint_names", []), list)
+        return told if good else {}
 
     @cached_property
     def lists(self) -> Mapping[int, int]:
@@ -136,7 +151,15 @@ def read_parquet(file: LogFile, request: Request) -> RawLog:
     table = ParquetTable(file.path, source)
     if EPISODE in (table.names or ()):
         refuse_episodes(table)
-    return from_table(table, request)
+    raw = from_table(table, request)
+    told = table.told()
+    names = tuple(str(name) for name in told.get("joint_names") or ())
+    return replace(
+        raw,
+        wrench_frame=raw.wrench_frame or told.get("wrench_frame"),
+        joint_names=raw.joint_names or names,
+        robot_hint=raw.robot_hint or told.get("robot"),
+    )
 
 
 def refuse_episodes(table: ParquetTable) -> None:

@@ -65,7 +65,9 @@ class RawLog:
     Attributes:
         stamps: Time stamps in ticks of `tick`; whole numbers stay whole. (T,)
         tick: Length of one tick. [s]
+        origin: What has to be added to the stamps to be on the log's own clock. [s]
         clock: Which clock the stamps are from, in words.
+        segment: Which of several recordings in the file is wanted, from 1; None for all.
         signals: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
         first_row: Number in the file of the first sample, counted from 1, for messages.
         wrench_frame: Frame, axes and sign of the wrench, in words.
@@ -81,7 +83,9 @@ class RawLog:
 
     stamps: Array
     tick: float = 1.0
+    origin: float = 0.0
     clock: str
+    segment: int | None = None
     signals: Mapping[str, Array]
     first_row: int = 1
     wrench_frame: str | None = None

@@ -77,13 +77,15 @@ class Pick:
 class Picks:
     """All signals of a table and its clock, or its rate [Hz] where it has no clock.
 
-    `constants` are columns of which the last value counts.
+    `constants` are columns of which the last value counts; `origin` is the column of the log's own
+    stamps [ns] in a table whose clock starts at zero.
     """
 
     signals: tuple[Pick, ...]
     clock: Pick | None
     rate: float | None = None
     constants: tuple[int, ...] = ()
+    origin: int | None = None
 
 
 def picked(
@@ -109,11 +111,14 @@ def picked(
     signals = tuple(p for p in picks.signals if request.wants(p.signal))
     clock = picks.clock.cells[0] if picks.clock else None
     wanted = {cell.column for pick in signals for cell in pick.cells} | set(picks.constants)
+    wanted |= set() if picks.origin is None else {picks.origin}
     if clock is not None:
         wanted.add(clock.column)
     loaded = table.load(sorted(wanted), clock.column if clock else None)
     arrays = {pick.signal: _stacked(pick, loaded) for pick in signals}
     stamps, tick, words = _stamps(table, picks, loaded, clock_name)
+    if picks.origin is not None and len(stamps):
+        more["origin"] = float(loaded[picks.origin][0]) * 1e-9 - float(stamps[0]) * tick
     warnings = tuple(more.pop("warnings", ()))
     notes = tuple(pick.note for pick in signals if pick.note)
     wrench = next((pick for pick in signals if pick.signal == "wrench"), None)

@@ -23,8 +23,10 @@ def from_table(table: Table, request: Request, **more: Any) -> RawLog:  # noqa: 
     Raises:
         LogError: If the columns cannot be told.
     """
-    if request.columns is not None:
-        spec = parse_columns(request.columns)
+    spec = parse_columns(request.columns) if request.columns is not None else None
+    if spec is not None:
+        more["segment"] = spec.segment
+    if spec is not None and spec.items:
         stated = (item := spec.item("q")) is not None and item.unit is not None
         return picked(table, picks_of(table, spec), request, degrees_possible=not stated, **more)
     if table.names is None:

@@ -21,6 +21,9 @@ VENDOR_WRENCH = re.compile(r"franka|F_ext$|external_wrench", re.IGNORECASE)
 NEAR = 3.0
 """A wrench further than this many of its own sample times from a pose is not taken for it."""
 
+OWN = "/vftcli/"
+"""Topics that vftcli itself writes."""
+
 EFFORT_IS_CURRENT = (
     "effort of UR joints taken as motor current [A], as the UR drivers publish it (a simulator "
     "publishes torque: --columns tau=effort)"
@@ -48,17 +51,23 @@ def aligned(
     stamps, tick, clock, times = clock_of(lead)
     signals, names = _joint_signals(lead, notes, request)
     for stream in streams:
-        if stream is not lead and _same_arm(stream, lead):
+        if stream.channel.topic.startswith(OWN):
+            _own_topic(signals, stream, lead, times)
+        elif stream is not lead and _same_arm(stream, lead):
             _supplement(signals, stream, lead, times, notes)
     frame = lead.kind.wrench_frame
-    if (sensor := _sensor(streams, lead)) is not None and "wrench" not in _chosen(request):
+    sensor = _sensor(streams, lead)
+    if sensor is not None and sensor.channel.topic.startswith(OWN):
+        frame = sensor.frame
+    elif sensor is not None and "wrench" not in _chosen(request):
         values = interpolated(sensor, "wrench", lead, times, notes)
         if values is not None:
             signals["wrench"] = values
             frame = (
                 f"axes {sensor.frame or 'unknown'}, as force on the robot ({sensor.channel.topic})"
             )
-    left = sorted({s.channel.topic for s in streams} - {lead.channel.topic} - _taken(notes))
+    topics = {s.channel.topic for s in streams if not s.channel.topic.startswith(OWN)}
+    left = sorted(topics - {lead.channel.topic} - _taken(notes))
     if left:
         notes.repairs.append(f"left out {', '.join(left[:6])}: other joints, targets, or repeated")
     hint = robot_of(names) or next((h for s in streams if (h := robot_of(s.names))), None)
@@ -76,6 +85,21 @@ def aligned(
         payload_mass=next(iter(lead.constants.get("mass", ())), None),
         payload_com=lead.constants.get("com"),
     )
+
+
+def _own_topic(signals: dict[str, Array], stream: Stream, lead: Stream, times: Integers) -> None:
+    """Take up a topic of an MCAP that vftcli convert wrote: /vftcli/SIGNAL, sample by sample."""
+    name = stream.channel.topic.removeprefix(OWN)
+    value = stream.signals.get("wrench" if name == "wrench" else "effort")
+    same = stream.messages == lead.messages and np.array_equal(host_times(stream)[0], times)
+    if value is None or not same or (name != "wrench" and name not in SIGNALS):
+        return
+    field_name = SIGNALS.get(name, name)
+    if field_name in {"current", "torque"} and lead.kind.names:
+        for other in {"current", "torque"} & set(signals):
+            if np.array_equal(signals[other], value):
+                del signals[other]  # the effort of /joint_states said the same without its kind
+    signals[field_name] = value
 
 
 def _taken(notes: Notes) -> set[str]:
