@@ -101,4 +101,4 @@ def is_uniform(t: Array, tolerance: float = 1e-6) -> bool:
     if steps.size == 0:
         return True
     usual = median(steps)
-    return bool(np.max(np.abs(steps - median)) <= tolerance * usual)
+    return bool(np.max(np.abs(steps - usual)) <= tolerance * usual)
