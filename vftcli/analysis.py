@@ -1,7 +1,7 @@
 """Analysis: everything one run over one log made, ready to be shown."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import polars as pl
@@ -12,6 +12,8 @@ from vftcli.observers.observer import Observer, Tuning
 from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
 from vftcli.torque import ExternalTorque
+from vftcli.wrench.measurement import Measurement
+from vftcli.wrench.wrench import Wrench
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +29,7 @@ class Analysis:
         tunings: What each observer's parameters mean at this log's sample time, by name.
         reference: What the estimates are judged by, or None.
         errors: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
+        virtual_sensor: The wrenches and what is known of them, or None where none was asked for.
         notes: What the reader of the numbers should know, one sentence each.
         run: The command, versions and conventions, as `run.json` holds them.
     """
@@ -39,6 +42,7 @@ class Analysis:
     tunings: Mapping[str, Tuning]
     reference: ExternalTorque | None = None
     errors: pl.DataFrame | None = None
+    virtual_sensor: Measurement | None = None
     notes: tuple[str, ...] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
 
@@ -48,6 +52,16 @@ class Analysis:
         if self.reference is None:
             return self.estimates
         return (*self.estimates, self.reference)
+
+    @property
+    def wrenches(self) -> tuple[Wrench, ...]:
+        """One an observer, and the reference's last under the name "reference" if there is one."""
+        if self.virtual_sensor is None:
+            return ()
+        reference = self.virtual_sensor.reference
+        if reference is None:
+            return self.virtual_sensor.wrenches
+        return (*self.virtual_sensor.wrenches, replace(reference, name="reference"))
 
     @property
     def t(self) -> Array:

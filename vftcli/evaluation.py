@@ -8,6 +8,8 @@ import polars as pl
 from vftcli.arrays import Array
 from vftcli.errors import ShapeError
 from vftcli.torque import ExternalTorque
+from vftcli.wrench.measurement import Measurement
+from vftcli.wrench.wrench import AXES, Wrench
 
 SCHEMA: dict[str, type[pl.DataType]] = {
     "recording": pl.String,
@@ -82,6 +84,58 @@ def evaluate(
                 }
             )
     return pl.DataFrame(rows, schema=SCHEMA)
+
+
+WRENCH_SCHEMA: dict[str, type[pl.DataType]] = {
+    **SCHEMA,
+    "axis": pl.String,
+    "rmse_N": pl.Float64,
+    "bias_N": pl.Float64,
+    "max_N": pl.Float64,
+}
+"""Columns where wrenches are compared: `axis` fx…mz, `joint` null; forces fill rmse_N."""
+
+
+def evaluate_wrenches(
+    recording: str, wrenches: Iterable[Wrench], reference: Wrench
+) -> pl.DataFrame:
+    """One row per observer and axis, over the samples where the pose can tell both.
+
+    Args:
+        recording: The log's name, for the first column.
+        wrenches: The observers' wrenches, on the reference's clock and in its frame.
+        reference: What they are judged by.
+    """
+    rows: list[dict[str, object]] = []
+    for wrench in wrenches:
+        overall = rmse(wrench.known, reference.known)
+        for k, axis in enumerate(AXES):
+            x, y = wrench.known[:, k], reference.known[:, k]
+            known = np.isfinite(x) & np.isfinite(y)
+            error, unit = (x - y)[known], "N" if k < 3 else "Nm"
+            some = len(error) > 0
+            rows.append(
+                {
+                    "recording": recording,
+                    "observer": wrench.name,
+                    "axis": axis,
+                    f"rmse_{unit}": number(overall[k]),
+                    f"bias_{unit}": number(error.mean()) if some else None,
+                    f"max_{unit}": number(np.max(np.abs(error))) if some else None,
+                    "correlation": number(correlation(x[known], y[known])) if some else None,
+                    "reference": reference.name,
+                    "samples": len(error),
+                }
+            )
+    return pl.DataFrame(rows, schema=WRENCH_SCHEMA)
+
+
+def with_wrenches(errors: pl.DataFrame, recording: str, sensed: Measurement) -> pl.DataFrame:
+    """The joints' errors, and below them the wrenches' where a reference wrench is known."""
+    if sensed.reference is None:
+        return errors
+    rows = evaluate_wrenches(recording, sensed.wrenches, sensed.reference)
+    return pl.concat([errors, rows], how="diagonal")
 
 
 def number(value: float) -> float | None:

@@ -1,6 +1,6 @@
 """The whole way from a log to its numbers, in the order the data flows."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,9 +9,13 @@ from vftcli.errors import ParameterError, RobotError
 from vftcli.observers import DEFAULT, Observer, Setup, build_observers, observer_settings
 from vftcli.recording import Recording
 from vftcli.robots import PROFILES, Robot, load_robot
+from vftcli.wrench.frames import Mounting
+from vftcli.wrench.measurement import Measurement, Unloaded, WrenchRequest, measure, unloaded_from
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
+    from vftcli.torque import ExternalTorque
+    from vftcli.truth.reference import ReferenceRequest
 
 FRICTION = ("profile", "none")
 
@@ -33,6 +37,7 @@ class Request:
         reference: Name of the reference, or None.
         free: Logs of free runs for the two-cycle difference.
         reference_columns: Column description of a reference file.
+        wrench: What is asked of the virtual force/torque sensor, None for joint torques alone.
     """
 
     format: str | None = None
@@ -47,6 +52,7 @@ class Request:
     reference: str | None = None
     free: tuple[Path, ...] = ()
     reference_columns: str | None = None
+    wrench: WrenchRequest | None = None
 
 
 def open_log(path: Path, request: Request) -> Recording:
@@ -123,17 +129,29 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
     observers, notes = choose_observers(request, robot, recording)
     estimates = tuple(observer.estimate(terms) for observer in observers)
     tunings = {o.name: o.tuning(recording.step, robot.joints) for o in observers}
-    reference, errors = None, None
+    reference, errors, asked = None, None, None
     if request.reference is not None:
         from vftcli.evaluation import evaluate
         from vftcli.truth.reference import ReferenceRequest, make_reference
 
         free = tuple(open_log(path, without_interval(request)) for path in request.free)
         asked = ReferenceRequest(
-            name=request.reference, free=free, columns=request.reference_columns
+            name=request.reference,
+            free=free,
+            columns=request.reference_columns,
+            mounting=request.wrench.mounting(robot) if request.wrench else Mounting(),
         )
         reference = make_reference(recording, robot, asked)
         errors = evaluate(recording.name, estimates, reference)
+    virtual_sensor = None
+    if request.wrench is not None:
+        unloaded = unloaded_run(recording, robot, request)
+        virtual_sensor = measure(recording, robot, estimates, request.wrench, unloaded)
+        if reference is not None and asked is not None and errors is not None:
+            from vftcli.evaluation import with_wrenches
+
+            virtual_sensor = referred(virtual_sensor, recording, robot, reference, asked)
+            errors = with_wrenches(errors, recording.name, virtual_sensor)
     return Analysis(
         recording=recording,
         robot=robot,
@@ -143,8 +161,44 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
         tunings=tunings,
         reference=reference,
         errors=errors,
+        virtual_sensor=virtual_sensor,
         notes=(*notes, *printed_note(request)),
     )
+
+
+def referred(
+    virtual_sensor: Measurement,
+    recording: Recording,
+    robot: Robot,
+    reference: "ExternalTorque",
+    asked: "ReferenceRequest",
+) -> Measurement:
+    """The virtual sensor's measurement with the reference's wrench beside it."""
+    from vftcli.truth.wrench_reference import reference_wrench
+
+    wrench = reference_wrench(recording, robot, reference, virtual_sensor.sensor, asked)
+    return replace(virtual_sensor, reference=wrench)
+
+
+def unloaded_run(recording: Recording, robot: Robot, request: Request) -> Unloaded | None:
+    """What the observers read in the free run of ``--zero LOG``, None if none is given.
+
+    Where it is the same trajectory, their torque at the same place of it is taken; else its mean.
+    """
+    if request.wrench is None or request.wrench.zero_log is None:
+        return None
+    from vftcli.errors import ReferenceTorqueError
+    from vftcli.truth.alignment import align
+
+    free = open_log(request.wrench.zero_log, without_interval(request))
+    terms = dynamics_terms(free, robot, literal=request.as_printed)
+    observers, _ = choose_observers(request, robot, free)
+    estimates = tuple(observer.estimate(terms) for observer in observers)
+    try:
+        shift = align(recording, free).shift
+    except ReferenceTorqueError:
+        return unloaded_from(free.name, estimates, None, recording.t)
+    return unloaded_from(free.name, estimates, shift, recording.t)
 
 
 def analyse_log(path: Path, request: Request) -> "Analysis":
@@ -155,8 +209,6 @@ def analyse_log(path: Path, request: Request) -> "Analysis":
 
 def without_interval(request: Request) -> Request:
     """The same request for a free run, which is read whole."""
-    from dataclasses import replace
-
     return replace(request, interval=None)
 
 

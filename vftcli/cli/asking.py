@@ -10,6 +10,7 @@ import typer
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.recording import Recording
+    from vftcli.wrench.measurement import Measurement
 
 
 def command_line() -> str:
@@ -40,6 +41,22 @@ def say_notes(analysis: "Analysis") -> None:
     own = [f"{e.name}: {note}" for e in analysis.estimates for note in e.notes]
     for note in (*analysis.robot.notes, *analysis.notes, *own, *reference):
         say(f"note: {note}")
+    if analysis.virtual_sensor is not None:
+        say_wrenches(analysis.virtual_sensor)
+
+
+def say_wrenches(sensed: "Measurement") -> None:
+    """Frame, zero drift and remarks of the virtual sensor."""
+    from vftcli.wrench.frames import FRAMES
+    from vftcli.wrench.zero import drift_table
+
+    say(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.sensor.solver}")
+    if sensed.drifts:
+        say(drift_table(sensed.drifts).rstrip())
+    for note in sensed.notes:
+        say(f"note: {note}")
+    for warning in sensed.warnings:
+        say(f"warning: {warning}")
 
 
 def paths(values: list[Path] | None) -> tuple[Path, ...]:

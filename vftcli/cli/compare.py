@@ -21,6 +21,13 @@ def compare(
     as_printed: opt.AsPrinted = False,
     free: opt.Free = None,
     reference_columns: opt.ReferenceColumns = None,
+    wrench: opt.WrenchFlag = False,
+    frame: opt.Frame = None,
+    solver: opt.Solver = None,
+    tool: opt.Tool = None,
+    sensor_pose: opt.SensorPose = None,
+    zero: opt.Zero = None,
+    torque_sd: opt.TorqueSd = None,
     json: opt.Json = False,
     csv: Annotated[bool, typer.Option("--csv", help="One row per observer and joint.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="A Markdown table.")] = False,
@@ -33,6 +40,7 @@ def compare(
     import polars as pl
 
     from vftcli.cli.asking import chosen, paths, say_notes, say_recording
+    from vftcli.cli.wrench_options import wrench_request
     from vftcli.observers import DEFAULT
     from vftcli.outputs import tables
     from vftcli.pipeline import Request, analyse, choose_robot, open_log
@@ -55,6 +63,7 @@ def compare(
         friction=friction,
         payload=payload,
         as_printed=as_printed,
+        wrench=wrench_request(wrench, frame, solver, tool, sensor_pose, zero, torque_sd),
         reference=reference,
         free=paths(free),
         reference_columns=reference_columns,
@@ -67,4 +76,4 @@ def compare(
             say_recording(recording)
             say_notes(analysis)
         errors.append(analysis.errors)
-    typer.echo(show(pl.concat([table for table in errors if table is not None])))
+    typer.echo(show(pl.concat([table for table in errors if table is not None], how="diagonal")))

@@ -22,6 +22,13 @@ def estimate(
     csv: Annotated[bool, typer.Option("--csv", help="Also write estimates.csv.")] = False,
     mcap: Annotated[bool, typer.Option("--mcap", help="Also write estimates.mcap.")] = False,
     rrd: Annotated[bool, typer.Option("--rrd", help="Also write recording.rrd.")] = False,
+    wrench: opt.WrenchFlag = False,
+    frame: opt.Frame = None,
+    solver: opt.Solver = None,
+    tool: opt.Tool = None,
+    sensor_pose: opt.SensorPose = None,
+    zero: opt.Zero = None,
+    torque_sd: opt.TorqueSd = None,
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
@@ -32,6 +39,7 @@ def estimate(
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5 -o out
     """
     from vftcli.cli.asking import command_line, say, say_notes, say_recording
+    from vftcli.cli.wrench_options import wrench_request
     from vftcli.observers import DEFAULT
     from vftcli.outputs.estimates import write_estimate_folder
     from vftcli.pipeline import Request, analyse, choose_robot, open_log
@@ -46,6 +54,7 @@ def estimate(
         friction=friction,
         payload=payload,
         as_printed=as_printed,
+        wrench=wrench_request(wrench, frame, solver, tool, sensor_pose, zero, torque_sd),
     )
     recording = open_log(log, request)
     analysis = analyse(recording, choose_robot(request, recording), request)

@@ -62,7 +62,7 @@ Reference = Annotated[
     str | None,
     typer.Option(
         metavar="REF",
-        help="two-cycle (with --free), vendor, zero, or file:PATH.",
+        help="two-cycle (with --free), sensor, vendor, zero, or file:PATH.",
     ),
 ]
 RequiredReference = Annotated[
@@ -70,7 +70,7 @@ RequiredReference = Annotated[
     typer.Option(
         "--reference",
         metavar="REF",
-        help="two-cycle (with --free), vendor, zero, or file:PATH.",
+        help="two-cycle (with --free), sensor, vendor, zero, or file:PATH.",
     ),
 ]
 Free = Annotated[
@@ -83,6 +83,55 @@ Free = Annotated[
 ReferenceColumns = Annotated[
     str | None,
     typer.Option(metavar="SPEC", help="Columns of a reference file, as --columns: 't,tau_ext:6'."),
+]
+WrenchFlag = Annotated[
+    bool, typer.Option("--wrench", help="Also the Cartesian wrench, as force on the robot.")
+]
+Frame = Annotated[
+    str | None,
+    typer.Option(
+        metavar="flange|base|tool|sensor",
+        help="Frame of the wrench (default flange; base: base axes, moment about the flange "
+        "point). Implies --wrench.",
+    ),
+]
+Solver = Annotated[
+    str | None,
+    typer.Option(
+        metavar="pinv|damped|map",
+        help="How torques become a wrench: least squares (default), damped, or with a prior of "
+        "50 N and 10 N·m. Implies --wrench.",
+    ),
+]
+Tool = Annotated[
+    str | None,
+    typer.Option(
+        metavar="POSE|NAME",
+        help="The tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or [tool.NAME] of the robot "
+        "file.",
+    ),
+]
+SensorPose = Annotated[
+    str | None,
+    typer.Option(
+        metavar="POSE|NAME|fit",
+        help="The force/torque sensor on the flange, likewise; fit estimates it from the log.",
+    ),
+]
+Zero = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="A:B|start|LOG",
+        help="Unloaded span whose mean wrench is removed, the unloaded start, or a free run. "
+        "Repeat A:B to see the drift between spans. Implies --wrench.",
+    ),
+]
+TorqueSd = Annotated[
+    str | None,
+    typer.Option(
+        metavar="own|NUMBER(S)",
+        help="Joint torque error behind the wrench's band [N·m]; own: the observer's covariance.",
+    ),
 ]
 Folder = Annotated[
     Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write into.")

@@ -20,6 +20,13 @@ def report(
     as_printed: opt.AsPrinted = False,
     free: opt.Free = None,
     reference_columns: opt.ReferenceColumns = None,
+    wrench: opt.WrenchFlag = False,
+    frame: opt.Frame = None,
+    solver: opt.Solver = None,
+    tool: opt.Tool = None,
+    sensor_pose: opt.SensorPose = None,
+    zero: opt.Zero = None,
+    torque_sd: opt.TorqueSd = None,
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
@@ -31,6 +38,7 @@ def report(
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
     """
     from vftcli.cli.asking import command_line, paths, say, say_notes, say_recording
+    from vftcli.cli.wrench_options import wrench_request
     from vftcli.observers import DEFAULT
     from vftcli.outputs.report import write_report, write_reports
     from vftcli.outputs.tables import terminal
@@ -46,6 +54,7 @@ def report(
         friction=friction,
         payload=payload,
         as_printed=as_printed,
+        wrench=wrench_request(wrench, frame, solver, tool, sensor_pose, zero, torque_sd),
         reference=reference,
         free=paths(free),
         reference_columns=reference_columns,

@@ -10,6 +10,7 @@ from vftcli.errors import ReferenceTorqueError
 from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
 from vftcli.torque import ExternalTorque
+from vftcli.wrench.frames import NOTHING, Mounting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,11 +21,13 @@ class ReferenceRequest:
         name: A key of `REFERENCES`, or ``file:PATH``.
         free: Free runs of the same trajectory, already read, for ``two-cycle``.
         columns: The column description of a reference file, or None to recognise its columns.
+        mounting: Where tool and sensor sit on the flange, for ``sensor``.
     """
 
     name: str
     free: tuple[Recording, ...] = ()
     columns: str | None = None
+    mounting: Mounting = NOTHING
 
 
 def zero(recording: Recording, _robot: Robot, _request: ReferenceRequest) -> ExternalTorque:
@@ -63,11 +66,23 @@ def two_cycle(recording: Recording, robot: Robot, request: ReferenceRequest) -> 
     return two_cycle_reference(recording, request.free, robot)
 
 
-def from_file(recording: Recording, _robot: Robot, request: ReferenceRequest) -> ExternalTorque:
+def sensor(recording: Recording, robot: Robot, request: ReferenceRequest) -> ExternalTorque:
+    """The log's own wrench through the transposed flange Jacobian."""
+    from vftcli.truth.sensor import sensor_reference
+
+    return sensor_reference(recording, robot, request.mounting)
+
+
+def from_file(recording: Recording, robot: Robot, request: ReferenceRequest) -> ExternalTorque:
     """A table with t and one torque column a joint, on the log's own clock."""
+    from vftcli.readers.references import read_reference
     from vftcli.truth.file import reference_from_file
+    from vftcli.truth.wrench_reference import torque_of_file
 
     path = Path(request.name.removeprefix("file:"))
+    table = read_reference(path, request.columns)
+    if table.tau is None and table.wrench is not None:
+        return torque_of_file(recording, robot, path, request)
     return reference_from_file(path, recording, request.columns)
 
 
@@ -75,6 +90,7 @@ REFERENCES: dict[str, Callable[[Recording, Robot, ReferenceRequest], ExternalTor
     "zero": zero,
     "vendor": vendor,
     "two-cycle": two_cycle,
+    "sensor": sensor,
 }
 """Name at the command line → what makes it; ``file:PATH`` is the one name with a path in it."""
 
@@ -84,9 +100,7 @@ def names() -> Sequence[str]:
     return (*REFERENCES, "file:PATH")
 
 
-def make_reference(
-    recording: Recording, robot: Robot, request: ReferenceRequest
-) -> ExternalTorque:
+def make_reference(recording: Recording, robot: Robot, request: ReferenceRequest) -> ExternalTorque:
     """Make the reference a comparison asks for, on the recording's clock.
 
     Raises:
@@ -95,9 +109,7 @@ def make_reference(
     if request.name.startswith("file:"):
         return from_file(recording, robot, request)
     if request.name not in REFERENCES:
-        raise ReferenceTorqueError(
-            f"no reference {request.name!r}; there is {', '.join(names())}"
-        )
+        raise ReferenceTorqueError(f"no reference {request.name!r}; there is {', '.join(names())}")
     if request.free and request.name != "two-cycle":
         raise ReferenceTorqueError(
             f"--free goes with --reference two-cycle, not with {request.name}"

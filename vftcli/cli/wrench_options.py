@@ -1,0 +1,57 @@
+"""From the wrench options of a command to a WrenchRequest."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from vftcli.wrench.measurement import WrenchRequest
+
+START = "start"
+"""The word for the unloaded start of the log."""
+
+
+def wrench_request(
+    asked: bool,
+    frame: str | None,
+    solver: str | None,
+    tool: str | None,
+    sensor_pose: str | None,
+    zero: Sequence[str] | None,
+    torque_sd: str | None,
+) -> "WrenchRequest | None":
+    """What is asked of the virtual sensor, None where no option asks for a wrench.
+
+    Raises:
+        ParameterError: If a frame or solver does not exist, or a zero is malformed.
+    """
+    options = (frame, solver, tool, sensor_pose, zero or None, torque_sd)
+    if not asked and all(option is None for option in options):
+        return None
+    from vftcli.errors import ParameterError
+    from vftcli.pipeline import parse_interval
+    from vftcli.wrench.frames import check_frame
+    from vftcli.wrench.measurement import WrenchRequest
+    from vftcli.wrench.solvers import check_solver
+
+    spans, logs = [], []
+    for text in zero or ():
+        if text == START:
+            continue
+        if Path(text).exists():
+            logs.append(Path(text))
+        else:
+            spans.append(parse_interval(text))
+    start = START in (zero or ())
+    if len(logs) > 1 or (spans and start):
+        raise ParameterError("--zero takes one free run, and either start or spans A:B")
+    return WrenchRequest(
+        frame=check_frame(frame or "flange"),
+        solver=check_solver(solver or "pinv"),
+        tool=tool,
+        sensor_pose=sensor_pose,
+        zero=tuple(spans),
+        zero_start=start,
+        zero_log=logs[0] if logs else None,
+        torque_sd=torque_sd,
+    )
