@@ -3,8 +3,8 @@
 import hashlib
 import json
 import platform
-import sys
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
