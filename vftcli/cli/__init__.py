@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from vftcli.cli import bench, compare, estimate, listings, report
+from vftcli.cli import bench, compare, convert, estimate, formats, inspect, listings, report
 from vftcli.errors import VftError
 
 app = typer.Typer(
@@ -20,9 +20,12 @@ app = typer.Typer(
 app.command("estimate")(estimate.estimate)
 app.command("compare")(compare.compare)
 app.command("report")(report.report)
+app.command("inspect")(inspect.inspect_log)
+app.command("convert")(convert.convert_log)
 app.command("bench")(bench.bench)
 app.command("robots")(listings.robots)
 app.command("observers")(listings.observers)
+app.command("formats")(formats.list_formats)
 
 
 def show_version(asked: bool) -> None:

@@ -106,7 +106,9 @@ def lines_of(examination: "Examination") -> list[str]:
     if recording.payload_mass is not None:
         lines.append(f"  payload   {recording.payload_mass:.3g} kg, as the controller was told")
     lines.append(f"  robot     {recording.robot_hint or 'not settled by the log'}")
-    lines += [f"  fit       {fit}{'' if fit.fits else ': does not fit'}" for fit in examination.robots]
+    lines += [
+        f"  fit       {fit}{'' if fit.fits else ': does not fit'}" for fit in examination.robots
+    ]
     lines += [f"  repair    {repair}" for repair in source.repairs]
     lines += [f"  suspect   {warning}" for warning in source.warnings]
     for finding in examination.findings:

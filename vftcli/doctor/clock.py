@@ -51,7 +51,9 @@ def _length_and_rate(recording: Recording) -> Iterator[Finding]:
             severity="warning",
             evidence=f"{rate:.3g} samples a second",
             consequence="Contacts shorter than a few samples are missed and inertia is misjudged",
-            remedy="Record at the controller's rate: 125 Hz (CB3), 500 Hz (e-Series), 1 kHz (Franka)",
+            remedy=(
+                "Record at the controller's rate: 125 Hz (CB3), 500 Hz (e-Series), 1 kHz (Franka)"
+            ),
         )
 
 

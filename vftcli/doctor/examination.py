@@ -13,6 +13,12 @@ from vftcli.doctor.signals import inverted_joints, signal_findings
 from vftcli.recording import Recording
 from vftcli.robots import PROFILES, Robot, load_robot
 
+MISTAKEN = 0.08
+"""Misfit up to which an effort counts as something else than it was taken for.
+
+Lower than for what the log says it is: a small arm's torques times a drive constant resemble a
+large arm's.
+"""
 TOOL = 0.4
 """Mass of a load from which it is worth telling. [kg]"""
 
@@ -105,7 +111,7 @@ def _contradicted(recording: Recording, fits: tuple[Fit, ...]) -> Iterator[Findi
         yield Finding(
             name="other-robot",
             severity="warning",
-            evidence=f"the joints are called {hint}'s but the torques fit {fits[0]} and not {hinted}",
+            evidence=f"the joints are {hint}'s by name but the torques fit {fits[0]}, not {hinted}",
             consequence="The wrong profile shows gravity as contact",
             remedy=f"Check the arm; use --robot {fits[0].robot}",
         )
@@ -131,15 +137,17 @@ def hypotheses(recording: Recording, robot: Robot) -> Iterator[Evidence]:
     """What the effort may be besides what it was taken for."""
     torque, current, constant = recording.torque, recording.current, robot.torque_constant
     if torque is not None:
-        yield Evidence("torque of the other sign", -torque, 0.2, friction=True)
+        yield Evidence("torque of the other sign", -torque, MISTAKEN, friction=True)
         if constant is not None:
-            yield Evidence("motor current [A]", torque * constant, 0.2, friction=True)
-            yield Evidence("motor current [mA]", torque * constant / 1e3, 0.2, friction=True)
+            yield Evidence("motor current [A]", torque * constant, MISTAKEN, friction=True)
+            yield Evidence("motor current [mA]", torque * constant / 1e3, MISTAKEN, friction=True)
     elif current is not None:
-        yield Evidence("joint torque [N·m]", current, 0.2, friction=True)
+        yield Evidence("joint torque [N·m]", current, MISTAKEN, friction=True)
         if constant is not None:
-            yield Evidence("current of the other sign", -current * constant, 0.2, friction=True)
-            yield Evidence("current in mA", current * constant / 1e3, 0.2, friction=True)
+            yield Evidence(
+                "current of the other sign", -current * constant, MISTAKEN, friction=True
+            )
+            yield Evidence("current in mA", current * constant / 1e3, MISTAKEN, friction=True)
 
 
 def _none_fits(recording: Recording, fits: tuple[Fit, ...]) -> Finding:

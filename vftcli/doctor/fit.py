@@ -115,7 +115,7 @@ def best_fit(
 
 
 def evidences(recording: Recording, robot: Robot) -> Iterator[Evidence]:
-    """The torques of a log that a model should explain: what was measured only if nothing better."""
+    """The torques of a log that a model should explain; measured ones if nothing is better."""
     torque, vendor = recording.torque, recording.tau_ext
     if recording.target_torque is not None and np.any(recording.target_torque):
         yield Evidence("the controller's own model", recording.target_torque, 0.1, friction=False)

@@ -12,7 +12,7 @@ from vftcli.robots import Robot
 REST = 2e-3
 """Speed below which a joint counts as resting. [rad/s]"""
 MISMATCH = 4.0
-"""Torque between expected and measured at rest, on two joints, that stiction hardly explains. [N·m]"""
+"""Difference at rest, on two joints, that stiction hardly explains. [N·m]"""
 RATIO = 0.05
 """Relative difference between the log's own drive constants and the profile's that is reported."""
 
@@ -70,8 +70,8 @@ def _payload(recording: Recording, constants: Array | None) -> Iterator[Finding]
     if heavy.size < 2:
         return
     told = ", ".join(
-        f"J{j + 1} {np.mean(current[rest, j]):.3g} A for {np.mean(expected[rest, j]):.3g} A expected "
-        f"({torque[j]:+.3g} N·m)"
+        f"J{j + 1} {np.mean(current[rest, j]):.3g} A for {np.mean(expected[rest, j]):.3g} A "
+        f"expected ({torque[j]:+.3g} N·m)"
         for j in heavy
     )
     stated = (
@@ -98,6 +98,6 @@ def _constants(constants: Array, robot: Robot) -> Iterator[Finding]:
             name="drive-constants",
             severity="warning",
             evidence=f"target_torque over target_current at rest is {told} N·m/A in {robot.name}",
-            consequence=f"Torques from currents are off by up to {100 * np.nanmax(np.abs(ratio)):.0f} %",
+            consequence=f"Torques are off by up to {100 * np.nanmax(np.abs(ratio)):.0f} %",
             remedy="Put the log's own constants into a copy of the profile (torque_constant)",
         )

@@ -1,6 +1,6 @@
 """Findings about the signals: units, signs, saturation, joints that never move, empty fields."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -32,7 +32,7 @@ def signal_findings(recording: Recording) -> Iterator[Finding]:
     yield from _zeros(recording)
 
 
-def named(joints: Array | list[int]) -> str:
+def named(joints: Iterable[int]) -> str:
     """Joints for a sentence, counted from one."""
     return ", ".join(f"J{int(j) + 1}" for j in joints)
 
@@ -201,7 +201,7 @@ def _still_joints(recording: Recording) -> Iterator[Finding]:
             name="at-rest",
             severity="note",
             evidence=f"no joint moves by more than {1e3 * travel.max():.2g} mrad",
-            consequence="Stiction hides torques up to the breakaway torque; nothing can be identified",
+            consequence="Stiction hides torques up to breakaway; nothing can be identified",
             remedy="Use it for held poses only",
         )
     elif still.size:
@@ -258,7 +258,7 @@ def _zeros(recording: Recording) -> Iterator[Finding]:
             evidence=f"{name} is zero in every sample"
             + (", while tau_ext is not" if other else ""),
             consequence=(
-                "libfranka reports zeros near singularities; as a reference it would be silently wrong"
+                "libfranka reports zeros near singularities; as a reference it would be wrong"
                 if name == "wrench"
                 else "It was not measured, or its recorder was not running"
             ),

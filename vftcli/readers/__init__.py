@@ -67,7 +67,7 @@ def read(
 def read_first_recording(
     path: str | Path,
     *,
-    format: str | None = None,  # noqa: A002
+    format: str | None = None,
     columns: str | None = None,
 ) -> Recording:
     """Read a log as `read` does; of a file that holds several recordings, the first.
@@ -120,4 +120,13 @@ def _recognise(file: LogFile) -> Reader:
     )
 
 
-__all__ = ["READERS", "LogFile", "RawLog", "Reader", "Request", "read", "read_first_recording", "recognise"]
+__all__ = [
+    "READERS",
+    "LogFile",
+    "RawLog",
+    "Reader",
+    "Request",
+    "read",
+    "read_first_recording",
+    "recognise",
+]

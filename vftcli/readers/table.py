@@ -342,7 +342,8 @@ def checked(table: Table, picks: Picks) -> Picks:
         there = listed(table.names) if table.names else f"{table.width} columns without names"
         raise LogError(
             f"{table.path}: no joint positions (q) among {there}. Name their columns with "
-            "--columns, as in q=joint_pos_{i}; a table without positions is no log of an arm."
+            "--columns, as in q=joint_pos_{i}; a table without positions is no log of an arm "
+            "(a reference goes to --reference file:PATH)."
         )
     for pick in picks.signals:
         expected = 6 if pick.signal == "wrench" else joints

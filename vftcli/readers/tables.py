@@ -29,6 +29,11 @@ def from_table(table: Table, request: Request, **more: Any) -> RawLog:  # noqa: 
     if spec is not None and spec.items:
         stated = (item := spec.item("q")) is not None and item.unit is not None
         return picked(table, picks_of(table, spec), request, degrees_possible=not stated, **more)
+    if table.names is None and table.width == 1:
+        raise LogError(
+            f"{table.path}: a single column of numbers: one signal in a file of its own. Join the "
+            "files into one table, or build the log through the API: vftcli.Recording(t=…, q=…)."
+        )
     if table.names is None:
         raise LogError(
             f"{table.path}: a table of {table.width} columns without a header. Say what they are "

@@ -80,8 +80,8 @@ class Ingest:
         limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * self.size)
         if size < 0 or self.unpacked > limit:
             raise LogError(
-                f"{self.path}: its chunks claim to unpack to more than {limit >> 20} MiB, more than "
-                "a log of this size can hold. It is damaged or made to fill memory."
+                f"{self.path}: its chunks claim to unpack to more than {limit >> 20} MiB, more "
+                "than a log of this size can hold. It is damaged or made to fill memory."
             )
 
     def note(self, repair: str) -> None:

@@ -1,4 +1,4 @@
-"""ROS 2 bags in SQLite: topics and messages, with or without definitions, zstd by message or not."""
+"""ROS 2 bags in SQLite: with or without message definitions, compressed by message or not."""
 
 import sqlite3
 from collections.abc import Iterator

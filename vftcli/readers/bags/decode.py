@@ -101,7 +101,7 @@ class Decoder:
         except LayoutError as error:
             raise LogError(
                 f"{self.ingest.path}: a message of {channel.topic} does not fit the definition of "
-                f"{channel.type} ({error}). The bag is damaged, or was recorded with another version."
+                f"{channel.type} ({error}). The bag is damaged, or its definition is another's."
             ) from None
 
     def _of_length(self, batch: Batch, topic: _Topic, length: int) -> None:
@@ -126,8 +126,8 @@ class Decoder:
     def _walked(self, batch: Batch, topic: _Topic, row: int) -> Layout:
         start = int(batch.offsets[row])
         message = batch.buffer[start : start + int(batch.lengths[row])]
-        encoding = "ros1" if batch.channel.encoding == "ros1" else "cdr"
-        return Walker(topic.types, message, encoding).walk(batch.channel.type)
+        cdr = batch.channel.encoding == "cdr"
+        return Walker(topic.types, message, cdr=cdr).walk(batch.channel.type)
 
     def _decode(self, batch: Batch, topic: _Topic, layout: Layout, rows: Integers) -> None:
         for row in rows[:: max(1, len(rows) // CHECKED_ROWS)][:CHECKED_ROWS]:
@@ -197,16 +197,16 @@ def _joined(
         joined: Array = np.concatenate(arrays)
         return joined if straight else joined[order]
 
-    headers = [part.header for part in parts]
-    robots = [part.robot for part in parts]
+    headers = [part.header for part in parts if part.header is not None]
+    robots = [part.robot for part in parts if part.robot is not None]
     return Stream(
         channel=channel,
         kind=KINDS[channel.type],
         names=names,
         frame=frame,
         receive=np.concatenate([part.receive for part in parts])[order],
-        header=None if any(h is None for h in headers) else np.concatenate(headers)[order],
-        robot=None if any(r is None for r in robots) else whole(robots),
+        header=np.concatenate(headers)[order] if len(headers) == len(parts) else None,
+        robot=whole(robots) if len(robots) == len(parts) else None,
         signals={
             name: whole([part.signals[name] for part in parts])
             for name in signals

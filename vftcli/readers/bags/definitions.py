@@ -81,8 +81,8 @@ def types_for(channel: Channel) -> dict[str, tuple[Field, ...]]:
         known["builtin_interfaces/Duration"] = TIME
     if channel.type not in known:
         raise LogError(
-            f"topic {channel.topic}: the bag holds no definition of {channel.type}. Convert it with "
-            "ros2 bag convert on a machine that has the package."
+            f"topic {channel.topic}: the bag holds no definition of {channel.type}. Convert it "
+            "with ros2 bag convert on a machine that has the package."
         )
     return known
 

@@ -230,8 +230,11 @@ def _stamps(rows: list[dict[str, Any]]) -> Column | None:
             for nsec in ("nsec", "nanos", "nanosec"):
                 if f"{base}.{sec}" in rows[0] and f"{base}.{nsec}" in rows[0]:
                     pairs = [(row.get(f"{base}.{sec}"), row.get(f"{base}.{nsec}")) for row in rows]
-                    if all(isinstance(s, int) and isinstance(n, int) for s, n in pairs):
-                        return np.array([s * 10**9 + n for s, n in pairs], dtype=np.int64)
+                    whole = [
+                        s * 10**9 + n for s, n in pairs if isinstance(s, int) and isinstance(n, int)
+                    ]
+                    if len(whole) == len(pairs) and all(abs(w) < 2**62 for w in whole):
+                        return np.array(whole, dtype=np.int64)
         if isinstance(rows[0].get(base), int | float):
             return _column(0.0, [row.get(base) for row in rows])
     return None

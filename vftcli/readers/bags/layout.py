@@ -7,7 +7,7 @@ too, so that joint names hold for every message of a group.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +51,7 @@ class Leaf(NamedTuple):
 
     offset: int
     code: str
-    count: int
+    numbers: int
 
 
 @dataclass
@@ -95,7 +95,7 @@ class Layout:
         """The numbers at a path of each message. (k, count)"""
         leaf = self.leaves[path]
         dtype = np.dtype(leaf.code)
-        raw = strided(buffer, offsets, leaf.offset, leaf.offset + leaf.count * dtype.itemsize)
+        raw = strided(buffer, offsets, leaf.offset, leaf.offset + leaf.numbers * dtype.itemsize)
         return np.ascontiguousarray(raw).view(dtype).astype(np.float64)
 
     def whole_numbers(self, path: str, buffer: Bytes, offsets: Integers) -> Integers:
@@ -109,10 +109,10 @@ class Layout:
 class Walker:
     """Walks one message along its definition and writes down where everything lies."""
 
-    def __init__(self, types: Types, message: Bytes, encoding: Literal["ros1", "cdr"]) -> None:
+    def __init__(self, types: Types, message: Bytes, *, cdr: bool) -> None:
         self.types = types
         self.message = message
-        self.cdr = encoding == "cdr"
+        self.cdr = cdr
         self.layout = Layout()
         self.order = "<"
         self.position = 0

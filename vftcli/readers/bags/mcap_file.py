@@ -42,7 +42,7 @@ class Run(NamedTuple):
 
     start: int
     stride: int
-    count: int
+    messages: int
     length: int
 
 
@@ -185,8 +185,8 @@ def _yielded(found: dict[int, list[Run]], buffer: Bytes, catalogue: Catalogue) -
     for number, runs in found.items():
         if (channel := catalogue.channels.get(number)) is None:
             continue
-        offsets = np.concatenate([r.start + r.stride * np.arange(r.count) for r in runs])
-        lengths = np.repeat([r.length for r in runs], [r.count for r in runs])
+        offsets = np.concatenate([r.start + r.stride * np.arange(r.messages) for r in runs])
+        lengths = np.repeat([r.length for r in runs], [r.messages for r in runs])
         stamps = buffer[(offsets - MESSAGE_HEAD + 6)[:, None] + np.arange(8)]
         times = stamps.view("<u8")[:, 0].astype(np.int64)
         yield Batch(channel=channel, buffer=buffer, offsets=offsets, lengths=lengths, times=times)

@@ -165,16 +165,16 @@ class Run(NamedTuple):
 
     start: int
     stride: int
-    count: int
+    messages: int
     length: int
     time: int
 
 
 def _batch(channel: Channel, buffer: Bytes, runs: list[Run]) -> Batch:
     """One batch of all runs of a connection: offsets, lengths and receive times."""
-    offsets = np.concatenate([r.start + r.stride * np.arange(r.count) for r in runs])
-    lengths = np.repeat([r.length for r in runs], [r.count for r in runs])
-    back = np.repeat([r.time for r in runs], [r.count for r in runs])
+    offsets = np.concatenate([r.start + r.stride * np.arange(r.messages) for r in runs])
+    lengths = np.repeat([r.length for r in runs], [r.messages for r in runs])
+    back = np.repeat([r.time for r in runs], [r.messages for r in runs])
     stamps = buffer[(offsets - back)[:, None] + np.arange(8)].view("<u4").astype(np.int64)
     times = stamps[:, 0] * 1_000_000_000 + stamps[:, 1]
     return Batch(channel=channel, buffer=buffer, offsets=offsets, lengths=lengths, times=times)

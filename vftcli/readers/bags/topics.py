@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -144,7 +145,7 @@ def _rivals(one: Stream, other: Stream) -> bool:
     return same_width and bool(one.names) and set(one.names) != set(other.names)
 
 
-def clock_of(stream: Stream) -> tuple[Array, float, str, Integers]:
+def clock_of(stream: Stream) -> tuple[Any, float, str, Integers]:
     """A stream's best clock: the robot's own, else its header's, else the recorder's.
 
     Returns:
@@ -153,23 +154,27 @@ def clock_of(stream: Stream) -> tuple[Array, float, str, Integers]:
     """
     host, words = host_times(stream)
     robot = stream.robot
-    if robot is not None and np.all(np.isfinite(robot)) and np.all(np.diff(robot) >= 0):
-        if len(robot) < 2 or robot[-1] > robot[0]:
-            milliseconds = np.rint(robot * 1e3)
-            if np.all(np.abs(robot * 1e3 - milliseconds) < 1e-3) and abs(robot[-1]) < 1e12:
-                ticks: Array = milliseconds.astype(np.int64)  # type: ignore[assignment]
-                return ticks, 1e-3, f"robot clock (time of {stream.channel.topic})", host
-            return robot, 1.0, f"robot clock (time of {stream.channel.topic})", host
-    return host.astype(np.int64), 1e-9, words, host  # type: ignore[return-value]
+    if robot is None or not runs(robot):
+        return host, 1e-9, words, host
+    words = f"robot clock (time of {stream.channel.topic})"
+    milliseconds = np.rint(robot * 1e3)
+    if np.all(np.abs(robot * 1e3 - milliseconds) < 1e-3) and abs(robot[-1]) < 1e12:
+        return milliseconds.astype(np.int64), 1e-3, words, host
+    return robot, 1.0, words, host
+
+
+def runs(stamps: Any) -> bool:  # noqa: ANN401 - whole numbers or seconds
+    """Whether stamps are set and never run back."""
+    good = bool(np.all(np.isfinite(stamps))) and bool(np.all(np.diff(stamps) >= 0))
+    return good and (len(stamps) < 2 or bool(stamps[-1] > stamps[0]))
 
 
 def host_times(stream: Stream) -> tuple[Integers, str]:
     """Header stamps if they are set and never run back, else receive stamps. (T,) [ns]"""
     header = stream.header
     topic = stream.channel.topic
-    if header is not None and header[0] > 0 and np.all(np.diff(header) >= 0):
-        if len(header) < 2 or header[-1] > header[0]:
-            return header, f"header stamps of {topic}"
+    if header is not None and header[0] > 0 and runs(header):
+        return header, f"header stamps of {topic}"
     return stream.receive, f"receive stamps of {topic} (its header stamps are unset or run back)"
 
 
@@ -252,7 +257,9 @@ def _same_arm(stream: Stream, lead: Stream) -> bool:
     if "q" not in stream.signals and "effort" not in stream.signals:
         return False
     if not stream.names or not lead.names:
-        return stream.signals.get("q", lead.signals["q"]).shape[1] == lead.signals["q"].shape[1]
+        return bool(
+            stream.signals.get("q", lead.signals["q"]).shape[1] == lead.signals["q"].shape[1]
+        )
     return set(stream.names) >= set(lead.names) and not TARGETS.search(stream.channel.topic)
 
 
