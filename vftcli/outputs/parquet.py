@@ -9,7 +9,6 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.arrays import Array
 from vftcli.wrench.wrench import AXES
-from vftcli.wrench.wrench import AXES
 
 if TYPE_CHECKING:
     import polars as pl
@@ -47,9 +46,6 @@ def columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
         yield from per_joint("tau_ext/reference", analysis.reference.tau)
         if analysis.reference.sd is not None:
             yield from per_joint("sd/reference", analysis.reference.sd)
-    for wrench in analysis.wrenches:
-        for axis, column in zip(AXES, np.ascontiguousarray(wrench.known.T), strict=True):
-            yield f"wrench/{wrench.name}/{axis}", column
     yield from wrench_columns(analysis)
 
 
