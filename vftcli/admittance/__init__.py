@@ -1,1 +1,21 @@
-"""Admittance."""
+"""Admittance: the paper's variable-parameter law, replayed on recorded forces and in closed loop."""
+
+from vftcli.admittance.law import Controller, controllers, traditional, variable
+from vftcli.admittance.motion import Motion, release, run
+from vftcli.admittance.parameters import AXES, Admittance, from_document
+from vftcli.admittance.stability import UnstableError, check_stable
+
+__all__ = [
+    "AXES",
+    "Admittance",
+    "Controller",
+    "Motion",
+    "UnstableError",
+    "check_stable",
+    "controllers",
+    "from_document",
+    "release",
+    "run",
+    "traditional",
+    "variable",
+]

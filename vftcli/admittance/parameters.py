@@ -295,3 +295,29 @@ def is_admittance_setting(assignment: str) -> bool:
     """Whether an assignment of the command line speaks of the admittance, not of an observer."""
     section, dot, _ = assignment.partition("=")[0].strip().rpartition(".")
     return not dot or section in GROUPS
+
+
+def release_deviation(assignments: Sequence[str]) -> Array:
+    """Deviation of a release from ``axis=value`` assignments. (6,) [m, rad]
+
+    Raises:
+        ParameterError: If an axis is unknown, or a value is no finite number.
+    """
+    x = np.zeros(6)
+    for part in ",".join(assignments).split(","):
+        axis, equals, text = part.partition("=")
+        try:
+            value = float(text)
+        except ValueError:
+            value = np.nan
+        if not equals or axis.strip() not in AXES or not np.isfinite(value):
+            raise ParameterError(
+                f"--release {part!r} is not AXIS=VALUE with an axis of {', '.join(AXES)}, as x=0.3 "
+                "[m] or rz=0.5 [rad]"
+            )
+        x[AXES.index(axis.strip())] = value
+    if np.any(np.linalg.norm(x[3:]) >= np.pi):
+        raise ParameterError(
+            f"--release turns by {np.linalg.norm(x[3:]):.3g} rad; a rotation vector is shorter than π"
+        )
+    return x

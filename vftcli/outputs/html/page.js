@@ -19,6 +19,8 @@
   const whole = { time: data.span, frequency: [0.01, nyquist] };
   const state = { joint: 0, hidden: new Set(), view: { ...whole }, cursor: { time: null, frequency: null } };
   const charts = [];
+  const label = (j) => (data.labels ? data.labels[j] : `J${j + 1}`);
+  const unit = (spec, j) => (spec.units ? spec.units[j] : spec.unit);
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const node = (tag, className, text) => {
     const made = document.createElement(tag);
@@ -126,11 +128,11 @@
       this.hover();
     }
     heading() {
-      this.title.textContent = this.small ? `J${this.joint + 1}` : `${this.spec.title}, J${this.at + 1}`;
+      this.title.textContent = this.small ? label(this.joint) : `${this.spec.title}, ${label(this.at)}`;
       const band = this.spec.band && this.spec.band[this.at];
-      this.note.textContent = this.small ? "" : band ? `grey: ${this.spec.bandLabel}, ${significant(band)} ${this.spec.unit}` : "";
+      this.note.textContent = this.small ? "" : band ? `grey: ${this.spec.bandLabel}, ${significant(band)} ${unit(this.spec, this.at)}` : "";
       this.figure.classList.toggle("chosen", this.small && this.joint === state.joint);
-      this.over.setAttribute("aria-label", `${this.title.textContent} [${this.spec.unit}]`);
+      this.over.setAttribute("aria-label", `${this.title.textContent} [${unit(this.spec, this.at)}]`);
     }
     axes(c) {
       const { l, t, w, h } = this.box, soft = css("--soft"), grid = css("--grid");
@@ -154,7 +156,7 @@
       if (this.small) return;
       c.fillText(this.spec.log ? "frequency [Hz]" : "time [s]", l + w / 2, t + h + 22);
       c.save(); c.translate(13, t + h / 2); c.rotate(-Math.PI / 2); c.textBaseline = "middle";
-      c.fillText(`[${this.spec.unit}]`, 0, 0); c.restore();
+      c.fillText(`[${unit(this.spec, this.at)}]`, 0, 0); c.restore();
     }
     xticks() {
       const [a, b] = state.view[this.axis];
@@ -280,7 +282,7 @@
       });
       const list = node("table");
       for (const { name, colour, value } of rows) {
-        const row = node("tr"), label = node("td", "", name), number = node("td", "", `${significant(value)} ${this.spec.unit}`);
+        const row = node("tr"), label = node("td", "", name), number = node("td", "", `${significant(value)} ${unit(this.spec, this.at)}`);
         label.style.color = colour === "ink" ? css("--ink") : colour;
         row.append(label, number); list.append(row);
       }
@@ -318,7 +320,7 @@
   };
   const joints = document.getElementById("joints"), legend = document.getElementById("legend");
   for (let j = 0; j < data.joints; j++) {
-    const button = node("button", "", `J${j + 1}`);
+    const button = node("button", "", label(j));
     button.type = "button"; button.setAttribute("aria-pressed", String(j === 0));
     button.addEventListener("click", () => choose(j));
     joints.append(button);

@@ -1,0 +1,180 @@
+"""From flange poses to joint positions: damped least squares, each sample started from the last."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vftcli.admittance.rotation import exp_matrix
+from vftcli.admittance.thresholds import Flags
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.robots.robot import Robot
+
+ITERATIONS = 12
+REACHED = 1e-6
+"""A pose counts as reached when position and rotation error are below this. [m, rad]"""
+DAMPING = 1e-3
+"""λ² of the damped step is this times the error, so that it vanishes where the pose is reached."""
+STALLED = 0.7
+"""If the error after three steps is still this share of what it was, the pose is out of reach."""
+LARGEST_STEP = 0.2
+"""Longest joint step of one iteration. [rad]"""
+
+
+class FlangeSolver:
+    """Joint positions that bring the flange to a pose, inside the joint limits.
+
+    Attributes:
+        robot: The arm.
+        lower, upper: Joint limits, infinite where unknown. (n,) [rad]
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        import pinocchio as pin
+        from scipy.linalg.lapack import dposv
+
+        if robot.joints < 6:
+            raise ParameterError(
+                f"{robot.name} has {robot.joints} joints; Cartesian admittance needs at least 6"
+            )
+        self.robot, self.pin, self.solve = robot, pin, dposv
+        self.model: Any = robot.model
+        self.data: Any = self.model.createData()
+        self.frame = self.model.getFrameId("flange")
+        limits = robot.limits
+        self.lower = np.where(np.isfinite(limits.q_min), limits.q_min, -np.inf)
+        self.upper = np.where(np.isfinite(limits.q_max), limits.q_max, np.inf)
+
+    def pose(self, q: Array) -> tuple[Array, Array]:
+        """Orientation (3, 3) and origin (3,) [m] of the flange in the base at `q` (n,) [rad]."""
+        self.pin.framesForwardKinematics(self.model, self.data, np.asarray(q, dtype=np.float64))
+        place = self.data.oMf[self.frame]
+        return np.array(place.rotation), np.array(place.translation)
+
+    def check_start(self, q: Array) -> Array:
+        """Return a start pose.
+
+        Raises:
+            ParameterError: If it has another number of joints or lies outside the limits.
+        """
+        q = np.asarray(q, dtype=np.float64)
+        if q.shape != (self.robot.joints,):
+            raise ParameterError(
+                f"the start pose has {q.size} joints; {self.robot.name} has {self.robot.joints}"
+            )
+        if np.any(wrong := ~((q >= self.lower) & (q <= self.upper))):
+            j = int(np.argmax(wrong))
+            raise ParameterError(
+                f"the start pose is outside the joint limits of {self.robot.name}: joint {j + 1} is "
+                f"at {q[j]:.4g} rad and may be from {self.lower[j]:.4g} to {self.upper[j]:.4g} rad"
+            )
+        return q
+
+    def reach(self, rotation: Array, translation: Array, guess: Array) -> tuple[Array, bool]:
+        """Joint positions at a pose, from a guess nearby, and whether the pose is reached.
+
+        A step is Jᵀ(JJᵀ + λ²I)⁻¹e in base axes, cut at the joint limits; where the pose is not
+        reached the joints are those of the last step.
+        """
+        pin, model, data, frame = self.pin, self.model, self.data, self.frame
+        q, error, sizes = guess, np.empty(6), [np.inf, np.inf, np.inf]
+        diagonal = slice(None, None, 7)
+        for _ in range(ITERATIONS):
+            J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
+            place = pin.updateFramePlacement(model, data, frame)
+            error[:3] = translation - place.translation
+            error[3:] = pin.log3(rotation @ place.rotation.T)
+            size = float(np.sqrt(error @ error))
+            if size < REACHED:
+                return q, True
+            if size > STALLED * sizes[-3]:
+                return q, False
+            sizes.append(size)
+            normal = J @ J.T
+            normal.flat[diagonal] += DAMPING * min(size, 1.0) ** 2
+            _, weights, _ = self.solve(normal, error)
+            step = J.T @ weights
+            longest = float(np.abs(step).max())
+            if longest > LARGEST_STEP:
+                step *= LARGEST_STEP / longest
+            q = np.minimum(np.maximum(q + step, self.lower), self.upper)
+        return q, False
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointPath:
+    """Joint positions along the motions of N controllers.
+
+    Attributes:
+        q: Positions; where a pose is out of reach the arm waits at the last it reached.
+            (T, N, n) [rad]
+        reached: Whether the flange pose is reached inside the joint limits. (T, N)
+        speed: Largest joint speed as a share of its limit, NaN where no limit is known. (N,)
+    """
+
+    q: Array
+    reached: Flags
+    speed: Array
+
+
+def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> JointPath:
+    """Joint positions for flange deviations from a start pose.
+
+    Args:
+        solver: The arm's.
+        start: Joint positions of the target pose X_d. (n,) [rad]
+        x: Deviations in base axes, rotation vectors last. (T, N, 6) [m, rad]
+        period: Time between rows. [s]
+    """
+    rotation, translation = solver.pose(start)
+    samples, count = x.shape[:2]
+    q = np.empty((samples, count, solver.robot.joints))
+    reached = np.zeros((samples, count), dtype=bool)
+    for i in range(count):
+        goals = exp_matrix(x[:, i, 3:]) @ rotation
+        points = translation + x[:, i, :3]
+        same = np.zeros(samples, dtype=bool)
+        same[1:] = np.all(x[1:, i] == x[:-1, i], axis=1)
+        one_path(solver, start, (goals, points, same), q[:, i], reached[:, i])
+    return JointPath(q=q, reached=reached, speed=largest_speed(solver.robot, q, reached, period))
+
+
+def one_path(
+    solver: FlangeSolver,
+    start: Array,
+    goals: tuple[Array, Array, Flags],
+    q: Array,
+    reached: Flags,
+) -> None:
+    """Fill in one controller's joint positions (T, n), each guessed from the two before it."""
+    shown, last, before, good = start, start, start, True
+    for k, (rotation, point, same) in enumerate(zip(*goals, strict=True)):
+        if not same:
+            guess = 2.0 * last - before if good else last
+            found, good = try_pose(solver, rotation, point, guess, last)
+            last, before = found, last if good else found
+            shown = found if good else shown
+        else:
+            before = last
+        q[k], reached[k] = shown, good
+
+
+def try_pose(
+    solver: FlangeSolver, rotation: Array, point: Array, guess: Array, last: Array
+) -> tuple[Array, bool]:
+    """Reach a pose from a guess, and if that fails or leaps, from the joints before it."""
+    if not np.all(np.isfinite(point)):
+        return last, False
+    found, good = solver.reach(rotation, point, guess)
+    if good and np.abs(found - last).max() <= LARGEST_STEP:
+        return found, True
+    return solver.reach(rotation, point, last)
+
+
+def largest_speed(robot: Robot, q: Array, reached: Flags, period: float) -> Array:
+    """Largest joint speed between reached samples as a share of the limit. (N,)"""
+    share = np.abs(np.diff(q, axis=0)) / period / robot.limits.qd_max
+    both = (reached[1:] & reached[:-1])[:, :, None] & np.isfinite(share)
+    largest: Array = np.where(both, share, -1.0).max(axis=(0, 2), initial=-1.0)
+    return np.where(largest >= 0.0, largest, np.nan)

@@ -1,0 +1,155 @@
+"""What a motion is judged by: peak, time to peak, overshoot, return, idle time, work; axis by axis."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vftcli.admittance.law import Controller
+from vftcli.admittance.motion import Motion
+from vftcli.admittance.parameters import AXES
+from vftcli.admittance.thresholds import Phases
+from vftcli.arrays import Array
+
+PAUSE = 0.5
+"""Drags of one axis that follow each other within this time are one. [s]"""
+
+SHARES = {"return_10_s": 0.10, "return_2_s": 0.02}
+"""Return time → share of the deviation at release inside which the axis has to stay."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drag:
+    """One drag of one axis, from where its force passes the threshold to the next drag.
+
+    Attributes:
+        axis: Index of the axis.
+        number: Count of the drags of that axis, from 1.
+        begin: Row of the motion at which the drag phase begins.
+        release: Row from which on the axis recovers.
+        end: Row after the last that belongs to it.
+    """
+
+    axis: int
+    number: int
+    begin: int
+    release: int
+    end: int
+
+
+def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
+    """The drags of every axis along a record of T forces (rows 0 … T of the motion)."""
+    rows = len(phases.dragged) + 1
+    found: list[Drag] = []
+    for axis in range(6):
+        flags = np.concatenate([[False], phases.dragged[:, axis], [False]])
+        edges = np.flatnonzero(flags[1:] != flags[:-1]).reshape(-1, 2)
+        spans: list[list[int]] = []
+        for begin, release in edges.tolist():
+            if spans and (begin - spans[-1][1]) * period < PAUSE:
+                spans[-1][1] = release
+            else:
+                spans.append([begin, release])
+        ends = [*(begin for begin, _ in spans[1:]), rows - 1][: len(spans)]
+        found += [
+            Drag(axis=axis, number=k + 1, begin=begin, release=release, end=end + 1)
+            for k, ((begin, release), end) in enumerate(zip(spans, ends, strict=True))
+        ]
+    return tuple(found)
+
+
+def releases_of(x: Array, rows: int) -> tuple[Drag, ...]:
+    """The released axes of a release from deviation `x` (6,), as drags that are over at row 0."""
+    return tuple(
+        Drag(axis=int(axis), number=1, begin=0, release=0, end=rows) for axis in np.flatnonzero(x)
+    )
+
+
+def rows_of(
+    controllers: Sequence[Controller], motion: Motion, drags: Sequence[Drag], wrench: Array
+) -> list[dict[str, Any]]:
+    """The comparison as rows, one for each controller, axis and drag.
+
+    Times are in seconds: `start_s` and `release_s` on the motion's clock, `time_to_peak_s` and
+    `idle_s` from the start of the drag, the return times from the release. `overshoot` is the
+    largest deviation to the other side after the release, as a share of that at the release.
+    `work_J` is the work of the hand's force during the drag phase. What does not happen before the
+    record ends or the next drag begins is None.
+    """
+    rows = [
+        row
+        for n, controller in enumerate(controllers)
+        for drag in drags
+        for row in [row_of(controller, motion, n, drag, wrench)]
+    ]
+    first = {(r["axis"], r["drag"]): r for r in rows if r["controller"] == "traditional"}
+    for row in rows:
+        other = first.get((row["axis"], row["drag"]))
+        row["peak_advance_s"] = (
+            other["time_to_peak_s"] - row["time_to_peak_s"]
+            if other and row["controller"] != "traditional"
+            else None
+        )
+    return rows
+
+
+def row_of(
+    controller: Controller, motion: Motion, n: int, drag: Drag, wrench: Array
+) -> dict[str, Any]:
+    """One controller's figures for one drag of one axis."""
+    axis, t = drag.axis, motion.t
+    x, v = motion.x[:, n, axis], motion.v[:, n, axis]
+    window = slice(drag.begin, drag.end)
+    sizes = np.nan_to_num(np.abs(x[window]), nan=np.inf)
+    top = drag.begin + int(np.argmax(sizes))
+    returns = {name: return_time(motion.t, x, drag, share) for name, share in SHARES.items()}
+    back = returns["return_2_s"]
+    period = float(t[1] - t[0]) if len(t) > 1 else 0.0
+    span = slice(drag.begin, drag.release)
+    work = np.nansum(wrench[span, axis] * v[1:][span]) * period if len(wrench) else 0.0
+    return {
+        "controller": controller.kind,
+        "alpha": None if controller.kind == "traditional" else float(controller.alpha[axis]),
+        "xi": float(controller.xi[axis]),
+        "axis": AXES[axis],
+        "unit": "m" if axis < 3 else "rad",
+        "drag": drag.number,
+        "start_s": float(t[drag.begin]),
+        "release_s": float(t[drag.release]),
+        "peak": finite(x[top]),
+        "time_to_peak_s": float(t[top] - t[drag.begin]),
+        "at_release": finite(x[drag.release]),
+        "overshoot": overshoot(x, drag),
+        **returns,
+        "idle_s": None if back is None else float(t[drag.release] - t[drag.begin]) + back,
+        "work_J": finite(float(work)),
+    }
+
+
+def return_time(t: Array, x: Array, drag: Drag, share: float) -> float | None:
+    """Time from the release to the last sample beyond `share` of the deviation then. [s]
+
+    None if the axis is still outside when the record ends or the next drag begins.
+    """
+    after = np.abs(x[drag.release : drag.end])
+    if not np.all(np.isfinite(after)) or after[0] == 0.0:
+        return None
+    outside = np.flatnonzero(after > share * after[0])
+    last = int(outside[-1]) if outside.size else 0
+    if last == len(after) - 1:
+        return None
+    return float(t[drag.release + last] - t[drag.release])
+
+
+def overshoot(x: Array, drag: Drag) -> float | None:
+    """Largest deviation to the other side after the release, as a share of that at the release."""
+    after = x[drag.release : drag.end]
+    if not np.all(np.isfinite(after)) or after[0] == 0.0:
+        return None
+    return max(float(np.max(-after / after[0])), 0.0)
+
+
+def finite(value: float) -> float | None:
+    """A finite number, or None."""
+    return float(value) if np.isfinite(value) else None

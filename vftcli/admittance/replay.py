@@ -1,0 +1,341 @@
+"""Replay: one force record, or one release, through several controllers, and what came of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vftcli.admittance.force import ForceRecord, on_control_clock
+from vftcli.admittance.joints import FlangeSolver, JointPath, follow
+from vftcli.admittance.law import Controller, energy, printed_energy
+from vftcli.admittance.metrics import drags_of, releases_of, rows_of
+from vftcli.admittance.motion import Motion, run
+from vftcli.admittance.parameters import AXES, Admittance
+from vftcli.admittance.stability import Verdict, check_stable
+from vftcli.admittance.thresholds import Flags, Phases, phases
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.robots.robot import Robot
+
+RISE = 1e-12
+"""A step in which W rises by more than this share of its value at the start of the phase is told."""
+
+LONGEST = 600.0
+"""Longest release that is computed. [s]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lyapunov:
+    """Energies of the recovery phases along a run. All (T+1, N, 6), NaN in a drag phase.
+
+    Attributes:
+        corrected: W, which must not rise inside one recovery phase. [J]
+        printed: V of (52). [J]
+        rises: Steps in which W rises by more than `RISE` of its value at the phase's start, for
+            each controller; the three axes of a rotation that recover together count together. (N,)
+    """
+
+    corrected: Array
+    printed: Array
+    rises: np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Replay:
+    """What every controller would have made of one force record.
+
+    Attributes:
+        robot: The arm.
+        parameters: The admittance parameters.
+        controllers: The controllers.
+        verdicts: Their stability, in the same order.
+        source: Where the force comes from, in words.
+        start: Joint positions of the target pose X_d. (n,) [rad]
+        wrench: Force and moment on the robot at each control period, base axes. (T, 6) [N, N·m]
+        phases: Algorithm 1's phases, the same for all controllers.
+        motion: Deviations and velocities, row 0 before the first force.
+        path: Joint positions.
+        logged: Flange deviation of the log's own arm from X_d, None for a release. (T, 6) [m, rad]
+        lyapunov: Energies along the run.
+        rows: The comparison, one row a controller, axis and drag.
+        notes: What a reader should know, one sentence each.
+    """
+
+    robot: Robot
+    parameters: Admittance
+    controllers: tuple[Controller, ...]
+    verdicts: tuple[Verdict, ...]
+    source: str
+    start: Array
+    wrench: Array
+    phases: Phases
+    motion: Motion
+    path: JointPath
+    logged: Array | None
+    lyapunov: Lyapunov
+    rows: tuple[dict[str, Any], ...]
+    notes: tuple[str, ...]
+
+
+def replay(
+    record: ForceRecord,
+    robot: Robot,
+    parameters: Admittance,
+    controllers: Sequence[Controller],
+    *,
+    force_unstable: bool = False,
+) -> Replay:
+    """Run a force record through controllers that hold the arm at the log's first pose.
+
+    Args:
+        record: Force on the flange along a log.
+        robot: The arm.
+        parameters: Thresholds and control period, shared by the controllers.
+        controllers: The controllers.
+        force_unstable: Run unstable settings too.
+
+    Raises:
+        UnstableError: If a controller is unstable.
+        ParameterError: If the log starts outside the joint limits.
+    """
+    verdicts, complaints = check_stable(controllers, force_unstable=force_unstable)
+    solver = FlangeSolver(robot)
+    clock, (wrench, q) = on_control_clock(record.t, (record.wrench, record.q), parameters.period)
+    start = solver.check_start(q[0])
+    split = phases(wrench, parameters)
+    motion = shifted(run(controllers, split.force, split.dragged), float(clock[0]))
+    path = follow(solver, start, motion.x, parameters.period)
+    drags = drags_of(split, parameters.period)
+    logged = deviation_of(solver, start, q)
+    rows = rows_of(controllers, motion, drags, np.nan_to_num(wrench))
+    lyapunov = lyapunov_along(controllers, motion, split.dragged)
+    notes = (
+        *record.notes,
+        *complaints,
+        *quiet_note(wrench, parameters, bool(drags)),
+        *motion_notes(controllers, motion, path, lyapunov),
+        *travel_note(parameters, controllers, motion, path),
+        *moved_note(logged),
+    )
+    return Replay(
+        robot=robot,
+        parameters=parameters,
+        controllers=tuple(controllers),
+        verdicts=verdicts,
+        source=record.source,
+        start=start,
+        wrench=wrench,
+        phases=split,
+        motion=motion,
+        path=path,
+        logged=logged,
+        lyapunov=lyapunov,
+        rows=tuple(rows),
+        notes=notes,
+    )
+
+
+def replay_release(
+    x: Array,
+    robot: Robot,
+    parameters: Admittance,
+    controllers: Sequence[Controller],
+    *,
+    start: Array,
+    duration: float | None = None,
+    force_unstable: bool = False,
+) -> Replay:
+    """Let go of the arm at rest at deviation `x` (6,) [m, rad] from the pose `start` (n,) [rad].
+
+    Args:
+        x: Deviation.
+        robot: The arm.
+        parameters: Shared parameters.
+        controllers: The controllers.
+        start: Joint positions of the target pose.
+        duration: How long to watch; None for as long as it takes. [s]
+        force_unstable: Run unstable settings too.
+
+    Raises:
+        UnstableError: If a controller is unstable; the lack of a speed limit is let pass where the
+            release is inside the escape bound.
+        ParameterError: If the start pose is outside the joint limits, or `x` is nothing at all.
+    """
+    if not np.any(x):
+        raise ParameterError(
+            "a release needs a deviation, as --release x=0.3 [m] or --release rz=0.5 [rad]"
+        )
+    verdicts, complaints = check_release(x, controllers, force_unstable=force_unstable)
+    solver = FlangeSolver(robot)
+    q = solver.check_start(start)
+    length = duration or settling(controllers, x)
+    steps = int(np.ceil(length / parameters.period - 1e-9))
+    force, dragged = np.zeros((steps, 6)), np.zeros((steps, 6), dtype=bool)
+    motion = run(controllers, force, dragged, x)
+    path = follow(solver, q, motion.x, parameters.period)
+    lyapunov = lyapunov_along(controllers, motion, dragged)
+    rows = rows_of(controllers, motion, releases_of(x, steps + 1), force)
+    return Replay(
+        robot=robot,
+        parameters=parameters,
+        controllers=tuple(controllers),
+        verdicts=verdicts,
+        source="a release from rest, no force",
+        start=q,
+        wrench=force,
+        phases=Phases(dragged, force),
+        motion=motion,
+        path=path,
+        logged=None,
+        lyapunov=lyapunov,
+        rows=tuple(rows),
+        notes=(
+            *complaints,
+            *motion_notes(controllers, motion, path, lyapunov),
+            *travel_note(parameters, controllers, motion, path),
+        ),
+    )
+
+
+def check_release(
+    x: Array, controllers: Sequence[Controller], *, force_unstable: bool
+) -> tuple[tuple[Verdict, ...], tuple[str, ...]]:
+    """Judge controllers for one release: without a limit it may start inside the escape bound."""
+    verdicts, complaints = check_stable(controllers, force_unstable=True)
+    excused = set()
+    for verdict in verdicts:
+        inside = ~verdict.limited & (np.abs(x) <= verdict.escape)
+        calm = verdict._replace(limited=verdict.limited | inside)
+        excused |= set(verdict.complaints) - set(calm.complaints)
+    if force_unstable or set(complaints) <= excused:
+        return verdicts, complaints
+    return check_stable(controllers, force_unstable=False)
+
+
+def settling(controllers: Sequence[Controller], x: Array) -> float:
+    """A time after which every controller is back to less than 1 % of a release. [s]"""
+    slowest = np.inf
+    for controller in controllers:
+        p = controller.parameters
+        omega = controller.alpha * np.sqrt(p.stiffness / p.mass)
+        xi = np.maximum(controller.xi, 1e-3)
+        rate = omega * np.where(xi > 1.0, xi - np.sqrt(np.maximum(xi**2 - 1.0, 0.0)), xi)
+        slowest = min(slowest, float(np.min(rate[x != 0.0])))
+    return float(min(max(6.0 / slowest, 1.0), LONGEST))
+
+
+def shifted(motion: Motion, begin: float) -> Motion:
+    """The same motion on a clock that starts at `begin`. [s]"""
+    return Motion(t=motion.t + begin, x=motion.x, v=motion.v, clipped=motion.clipped)
+
+
+def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
+    """Where the log's own arm was, as a deviation from the start pose. (T, 6) [m, rad]"""
+    from vftcli.admittance.rotation import log_matrix
+    from vftcli.dynamics.kinematics import link_poses
+
+    poses = link_poses(solver.robot.chain, q)
+    rotation, translation = solver.pose(start)
+    turned = log_matrix(poses.rotation[:, -1] @ rotation.T)
+    return np.concatenate([poses.translation[:, -1] - translation, turned], axis=1)
+
+
+def lyapunov_along(
+    controllers: Sequence[Controller], motion: Motion, dragged: Flags
+) -> Lyapunov:
+    """Energies along a run, and where the corrected one rises inside a recovery phase."""
+    shape = motion.x.shape
+    corrected, printed = np.empty(shape), np.empty(shape)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for n, controller in enumerate(controllers):
+            corrected[:, n] = energy(controller, motion.x[:, n], motion.v[:, n])
+            printed[:, n] = printed_energy(controller, motion.x[:, n], motion.v[:, n])
+    recovering = np.concatenate([~dragged[:1], ~dragged]) if len(dragged) else np.ones((1, 6), bool)
+    recovering[1:] &= True
+    rises = np.array([count_rises(corrected[:, n], ~dragged) for n in range(shape[1])])
+    for values in (corrected, printed):
+        values[~np.broadcast_to(recovering[:, None, :], shape)] = np.nan
+    return Lyapunov(corrected=corrected, printed=printed, rises=rises)
+
+
+def count_rises(W: Array, recovering: Flags) -> int:
+    """Steps in which W (T+1, 6) rises while its axes recover through the whole step (T, 6)."""
+    together = np.all(recovering[:, 3:], axis=1, keepdims=True)
+    columns = np.column_stack([W[:, :3], W[:, 3:].sum(axis=1)])
+    inside = np.column_stack([recovering[:, :3], together])
+    rises = 0
+    for w, flags in zip(columns.T, inside.T, strict=True):
+        begins = flags & ~np.concatenate([[False], flags[:-1]])
+        origin = np.maximum.accumulate(np.where(begins, np.arange(len(flags)), 0))
+        rises += int(np.count_nonzero(flags & (np.diff(w) > RISE * w[:-1][origin])))
+    return rises
+
+
+def quiet_note(wrench: Array, parameters: Admittance, dragged: bool) -> tuple[str, ...]:
+    """Say so if nothing ever passed a threshold."""
+    if dragged or not len(wrench):
+        return ()
+    share = np.nanmax(np.abs(np.nan_to_num(wrench)), axis=0) / np.maximum(parameters.threshold, 1e-12)
+    k = int(np.argmax(share))
+    return (
+        f"no axis ever passes its threshold, so nothing moves; the nearest is {AXES[k]} with "
+        f"{100.0 * share[k]:.0f} % of its {parameters.threshold[k]:g}",
+    )
+
+
+def motion_notes(
+    controllers: Sequence[Controller], motion: Motion, path: JointPath, lyapunov: Lyapunov
+) -> tuple[str, ...]:
+    """What went wrong or was limited on the way, one sentence each."""
+    found = []
+    for n, controller in enumerate(controllers):
+        name = controller.name
+        if motion.escaped[n]:
+            k = int(np.argmin(np.all(np.isfinite(motion.x[:, n]), axis=1)))
+            found.append(f"{name}: escaped in finite time, {motion.t[k]:.3f} s")
+        if limits := int(np.count_nonzero(np.any(motion.clipped[:, n], axis=1))):
+            found.append(f"{name}: the speed limit acted in {limits} control periods")
+        if lost := int(np.count_nonzero(~path.reached[:, n])):
+            first = motion.t[int(np.argmin(path.reached[:, n]))]
+            found.append(
+                f"{name}: {lost} of {len(motion.t)} poses cannot be reached inside the workspace "
+                f"and the joint limits, the first at {first:.3f} s; the arm waits at the last it can"
+            )
+        if path.speed[n] > 1.0:
+            found.append(f"{name}: a joint would need {path.speed[n]:.2g} times its speed limit")
+        if lyapunov.rises[n]:
+            found.append(
+                f"{name}: W rises by more than 1e-12 of its start in {lyapunov.rises[n]} steps of "
+                "recovery phases"
+            )
+    return tuple(found)
+
+
+def travel_note(
+    parameters: Admittance, controllers: Sequence[Controller], motion: Motion, path: JointPath
+) -> tuple[str, ...]:
+    """Whether the travel is one that the arm could make."""
+    travel = np.nan_to_num(np.linalg.norm(motion.x[:, :, :3], axis=2), nan=np.inf).max(axis=0)
+    lost = [n for n in range(len(controllers)) if not np.all(path.reached[:, n])]
+    if not lost:
+        return ()
+    largest = max(travel[n] for n in lost)
+    soft = "" if parameters.threshold_mode == "soft" else (
+        " With the hard threshold the whole force enters as soon as it passes; --threshold-mode soft "
+        "lets in only what exceeds it."
+    )
+    return (
+        f"the travel of up to {largest:.2f} m is implausible: this arm cannot make it.{soft}",
+    )
+
+
+def moved_note(logged: Array) -> tuple[str, ...]:
+    """Say so if the log's arm moved while the replay holds it at its first pose."""
+    far = float(np.linalg.norm(logged[:, :3], axis=1).max())
+    if far < 0.01:
+        return ()
+    return (
+        f"in the log the flange moves by up to {far:.3f} m; the replay holds the log's first pose "
+        "as its target and uses the force as it was recorded",
+    )
