@@ -57,6 +57,8 @@ class OutputFolder:
 
     Until then they are in a temporary folder on the same file system; if the block fails, it goes,
     and with it every folder that was made for it. ``folder / "name"`` is where to write a file.
+    With `force`, those of `names` that an earlier run left and this one does not write are removed,
+    so that all files of the folder belong together.
 
     Raises:
         OutputError: If the folder is a file or cannot be written, or holds one of `names` and
@@ -119,10 +121,12 @@ class OutputFolder:
         files = sorted(p for p in self.temporary.rglob("*") if not p.is_dir())
         for file in files:
             refuse_existing(self.path / file.relative_to(self.temporary), self.force)
-        for file in files:
-            target = self.path / file.relative_to(self.temporary)
+        targets = [self.path / file.relative_to(self.temporary) for file in files]
+        for file, target in zip(files, targets, strict=True):
             target.parent.mkdir(parents=True, exist_ok=True)
             file.replace(target)
+        for stale in {self.path / name for name in self.names}.difference(targets):
+            stale.unlink(missing_ok=True)
         for folder in sorted((p for p in self.temporary.rglob("*")), reverse=True):
             folder.rmdir()
 

@@ -1,0 +1,61 @@
+"""A small analysis of a simulated arm: made in memory, with hostile names in it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.analysis import Analysis
+from vftcli.evaluation import evaluate
+from vftcli.outputs.run import run_record
+from vftcli.pipeline import Request, analyse
+from vftcli.recording import Recording, Source
+from vftcli.robots import load_robot
+from vftcli.torque import ExternalTorque
+
+HOSTILE = '<script>alert("x")</script>&_%.csv'
+
+
+@pytest.fixture(scope="session")
+def recording() -> Recording:
+    """600 samples of a UR5 at 125 Hz on smooth paths, with noise of seed 3 and one gap of 0.4 s."""
+    rng, samples = np.random.default_rng(3), 600
+    t = 0.008 * np.arange(samples)
+    t[400:] += 0.4
+    rate = np.array([0.7, 0.9, 1.1, 1.3, 0.8, 1.2])
+    q = 0.5 * np.sin(t[:, None] * rate) - np.array([0.0, 1.2, -1.0, 1.0, 1.5, 0.0])
+    return Recording(
+        t=t,
+        q=q,
+        dq=0.5 * rate * np.cos(t[:, None] * rate),
+        current=rng.normal(0.0, 1.0, (samples, 6)),
+        tau_ext=rng.normal(0.0, 2.0, (samples, 6)),
+        source=Source(
+            path=Path(HOSTILE),
+            format="table",
+            sha256="ab" * 32,
+            t0=100.25,
+            rows=600,
+            repairs=("turned <b>one</b> column",),
+            warnings=("looks & feels odd",),
+        ),
+    )
+
+
+@pytest.fixture(scope="session")
+def without_reference(recording: Recording) -> Analysis:
+    """All default observers on the log, with nothing to be judged by."""
+    return analyse(recording, load_robot("ur5"), Request(robot="ur5"))
+
+
+@pytest.fixture(scope="session")
+def analysis(without_reference: Analysis) -> Analysis:
+    """The same against a reference that has a floor and is unknown for its first 20 samples."""
+    made = without_reference
+    tau = np.array(made.recording.tau_ext)
+    tau[:20] = np.nan
+    reference = ExternalTorque(name="vendor", t=made.t, tau=tau, floor=np.full(6, 0.5))
+    errors = evaluate(made.recording.name, made.estimates, reference)
+    made = replace(made, reference=reference, errors=errors)
+    return replace(made, run=run_record(made, ["vftcli", "report", HOSTILE]))

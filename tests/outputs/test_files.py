@@ -1,0 +1,147 @@
+from pathlib import Path
+
+import pytest
+
+from vftcli.errors import OutputError
+from vftcli.outputs.files import OutputFolder, atomic, write_text
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*"))
+
+
+def test_a_file_appears_whole(tmp_path: Path) -> None:
+    with atomic(tmp_path / "a.txt") as temporary:
+        temporary.write_text("half")
+        assert not (tmp_path / "a.txt").exists()
+        temporary.write_text("whole")
+    assert names(tmp_path) == ["a.txt"]
+    assert (tmp_path / "a.txt").read_text() == "whole"
+
+
+def test_a_failing_block_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.txt", "old")
+
+    def fail() -> None:
+        with atomic(tmp_path / "a.txt", force=True) as temporary:
+            temporary.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fail()
+    assert names(tmp_path) == ["a.txt"]
+    assert (tmp_path / "a.txt").read_text() == "old"
+
+
+def test_an_existing_file_needs_force(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.txt", "old")
+    with pytest.raises(OutputError, match=r"a\.txt exists.*--force"):
+        write_text(tmp_path / "a.txt", "new")
+    write_text(tmp_path / "a.txt", "new", force=True)
+    assert (tmp_path / "a.txt").read_text() == "new"
+
+
+def test_a_link_is_written_through(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    (tmp_path / "link.txt").symlink_to(tmp_path / "there" / "a.txt")
+    write_text(tmp_path / "link.txt", "text", force=True)
+    assert (tmp_path / "link.txt").is_symlink()
+    assert (tmp_path / "there" / "a.txt").read_text() == "text"
+
+
+def test_a_device_is_written_straight() -> None:
+    with atomic(Path("/dev/null")) as path:
+        assert path == Path("/dev/null")
+        path.write_text("gone")
+    assert Path("/dev/null").is_char_device()
+
+
+def test_a_missing_folder_and_a_folder_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="no such folder"):
+        write_text(tmp_path / "no" / "a.txt", "text")
+    with pytest.raises(OutputError, match="is a folder"):
+        write_text(tmp_path, "text", force=True)
+
+
+def test_a_folder_gets_all_files_at_once(tmp_path: Path) -> None:
+    out = tmp_path / "new" / "out"
+    with OutputFolder(out, names=["a.txt"]) as folder:
+        (folder / "a.txt").write_text("a")
+        (folder / "sub/b.txt").write_text("b")
+        assert not (out / "a.txt").exists()
+    assert names(out) == ["a.txt", "sub", "sub/b.txt"]
+
+
+def test_a_failing_folder_is_gone_with_its_parents(tmp_path: Path) -> None:
+    def fail() -> None:
+        with OutputFolder(tmp_path / "new" / "out") as folder:
+            (folder / "a.txt").write_text("a")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert names(tmp_path) == []
+
+
+def test_a_failing_folder_leaves_what_was_there(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    (tmp_path / "a.txt").write_text("old")
+
+    def fail() -> None:
+        with OutputFolder(tmp_path, force=True, names=["a.txt"]) as folder:
+            (folder / "a.txt").write_text("new")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert names(tmp_path) == ["a.txt", "mine.txt"]
+    assert (tmp_path / "a.txt").read_text() == "old"
+
+
+def test_an_existing_output_is_refused_before_anything_is_made(tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text("old")
+    with (
+        pytest.raises(OutputError, match=r"run\.json exists.*--force"),
+        OutputFolder(tmp_path, names=["estimates.parquet", "run.json"]),
+    ):
+        pytest.fail("the block ran")
+    assert names(tmp_path) == ["run.json"]
+
+
+def test_an_undeclared_file_is_refused_at_the_end(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("old")
+    with pytest.raises(OutputError, match="exists"), OutputFolder(tmp_path) as folder:
+        (folder / "a.txt").write_text("new")
+    assert names(tmp_path) == ["a.txt"]
+    assert (tmp_path / "a.txt").read_text() == "old"
+
+
+def test_force_leaves_no_declared_file_of_an_earlier_run(tmp_path: Path) -> None:
+    for name in ("run.json", "errors.csv", "mine.txt"):
+        (tmp_path / name).write_text("old")
+    with OutputFolder(tmp_path, force=True, names=["run.json", "errors.csv"]) as folder:
+        (folder / "run.json").write_text("new")
+    assert names(tmp_path) == ["mine.txt", "run.json"]
+
+
+def test_a_file_is_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("")
+    with pytest.raises(OutputError, match="is a file"), OutputFolder(tmp_path / "out"):
+        pytest.fail("the block ran")
+
+
+def test_below_a_file_there_is_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot be written"), OutputFolder(tmp_path / "file/out"):
+        pytest.fail("the block ran")
+    assert names(tmp_path) == ["file"]
+
+
+def test_an_error_of_the_system_becomes_one_line(tmp_path: Path) -> None:
+    with (
+        pytest.raises(OutputError, match="no space left on device") as caught,
+        OutputFolder(tmp_path / "out"),
+    ):
+        raise OSError(28, "No space left on device")
+    assert "\n" not in str(caught.value)
+    assert names(tmp_path) == []
