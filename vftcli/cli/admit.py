@@ -202,8 +202,10 @@ def released(
     from vftcli.admittance.parameters import release_deviation
     from vftcli.admittance.replay import replay_release
     from vftcli.errors import ParameterError, RobotError
+    from vftcli.observers import observer_settings
     from vftcli.robots import PROFILES, load_robot
 
+    observer_settings(request.settings)  # nothing uses them, but a slip of the pen is told
     if request.robot is None:
         raise RobotError(f"a release needs an arm: --robot {'|'.join(PROFILES)}, or a file")
     arm = load_robot(request.robot)

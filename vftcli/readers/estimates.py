@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from vftcli.errors import LogError
-from vftcli.readers.opening import open_log
 
 PREFIX = "tau_ext/"
 
@@ -21,8 +20,11 @@ def estimates_columns(path: Path, observer: str) -> str | None:
     Raises:
         LogError: If it is, and holds no such observer; the message lists those it holds.
     """
-    if path.is_dir() or not path.is_file() or not open_log(path).head.startswith(b"PAR1"):
+    if not path.is_file():
         return None
+    with path.open("rb") as file:
+        if file.read(4) != b"PAR1":
+            return None
     import polars as pl
 
     names = pl.read_parquet_schema(path)
