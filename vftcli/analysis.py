@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
@@ -12,8 +12,10 @@ from vftcli.observers.observer import Observer, Tuning
 from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
 from vftcli.torque import ExternalTorque
-from vftcli.wrench.measurement import Measurement
-from vftcli.wrench.wrench import Wrench
+
+if TYPE_CHECKING:
+    from vftcli.wrench.measurement import Measurement
+    from vftcli.wrench.wrench import Wrench
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +44,7 @@ class Analysis:
     tunings: Mapping[str, Tuning]
     reference: ExternalTorque | None = None
     errors: pl.DataFrame | None = None
-    virtual_sensor: Measurement | None = None
+    virtual_sensor: "Measurement | None" = None
     notes: tuple[str, ...] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
 
@@ -54,7 +56,7 @@ class Analysis:
         return (*self.estimates, self.reference)
 
     @property
-    def wrenches(self) -> tuple[Wrench, ...]:
+    def wrenches(self) -> "tuple[Wrench, ...]":
         """One an observer, and the reference's last under the name "reference" if there is one."""
         if self.virtual_sensor is None:
             return ()

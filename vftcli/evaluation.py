@@ -1,6 +1,7 @@
 """Errors of estimates against a reference: one tidy table, the unit in each column's name."""
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
@@ -8,8 +9,10 @@ import polars as pl
 from vftcli.arrays import Array
 from vftcli.errors import ShapeError
 from vftcli.torque import ExternalTorque
-from vftcli.wrench.measurement import Measurement
 from vftcli.wrench.wrench import AXES, Wrench
+
+if TYPE_CHECKING:
+    from vftcli.wrench.measurement import Measurement
 
 SCHEMA: dict[str, type[pl.DataType]] = {
     "recording": pl.String,
@@ -130,7 +133,7 @@ def evaluate_wrenches(
     return pl.DataFrame(rows, schema=WRENCH_SCHEMA)
 
 
-def with_wrenches(errors: pl.DataFrame, recording: str, sensed: Measurement) -> pl.DataFrame:
+def with_wrenches(errors: pl.DataFrame, recording: str, sensed: "Measurement") -> pl.DataFrame:
     """The joints' errors, and below them the wrenches' where a reference wrench is known."""
     if sensed.reference is None:
         return errors

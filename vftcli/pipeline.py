@@ -9,13 +9,12 @@ from vftcli.errors import ParameterError, RobotError
 from vftcli.observers import DEFAULT, Observer, Setup, build_observers, observer_settings
 from vftcli.recording import Recording
 from vftcli.robots import PROFILES, Robot, load_robot
-from vftcli.wrench.frames import Mounting
-from vftcli.wrench.measurement import Measurement, Unloaded, WrenchRequest, measure, unloaded_from
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.torque import ExternalTorque
-    from vftcli.truth.reference import ReferenceRequest
+    from vftcli.wrench.frames import Mounting
+    from vftcli.wrench.measurement import Measurement, Unloaded, WrenchRequest
 
 FRICTION = ("profile", "none")
 
@@ -52,7 +51,7 @@ class Request:
     reference: str | None = None
     free: tuple[Path, ...] = ()
     reference_columns: str | None = None
-    wrench: WrenchRequest | None = None
+    wrench: "WrenchRequest | None" = None
 
 
 def open_log(path: Path, request: Request) -> Recording:
@@ -129,9 +128,10 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
     observers, notes = choose_observers(request, robot, recording)
     estimates = tuple(observer.estimate(terms) for observer in observers)
     tunings = {o.name: o.tuning(recording.step, robot.joints) for o in observers}
-    reference, errors, asked = None, None, None
+    measured, mounting, sensed = sense(recording, robot, estimates, request)
+    reference, errors = None, None
     if request.reference is not None:
-        from vftcli.evaluation import evaluate
+        from vftcli.evaluation import evaluate, with_wrenches
         from vftcli.truth.reference import ReferenceRequest, make_reference
 
         free = tuple(open_log(path, without_interval(request)) for path in request.free)
@@ -139,19 +139,17 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
             name=request.reference,
             free=free,
             columns=request.reference_columns,
-            mounting=request.wrench.mounting(robot) if request.wrench else Mounting(),
+            mounting=mounting,
         )
-        reference = make_reference(recording, robot, asked)
+        reference = make_reference(sensed, robot, asked)
         errors = evaluate(recording.name, estimates, reference)
-    virtual_sensor = None
-    if request.wrench is not None:
-        unloaded = unloaded_run(recording, robot, request)
-        virtual_sensor = measure(recording, robot, estimates, request.wrench, unloaded)
-        if reference is not None and asked is not None and errors is not None:
-            from vftcli.evaluation import with_wrenches
+        if measured is not None:
+            from vftcli.truth.wrench_reference import reference_wrench
+            from vftcli.wrench.measurement import referred
 
-            virtual_sensor = referred(virtual_sensor, recording, robot, reference, asked)
-            errors = with_wrenches(errors, recording.name, virtual_sensor)
+            theirs = reference_wrench(sensed, robot, reference, measured.sensor, asked)
+            measured = referred(measured, theirs)
+            errors = with_wrenches(errors, recording.name, measured)
     return Analysis(
         recording=recording,
         robot=robot,
@@ -161,26 +159,33 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
         tunings=tunings,
         reference=reference,
         errors=errors,
-        virtual_sensor=virtual_sensor,
+        virtual_sensor=measured,
         notes=(*notes, *printed_note(request)),
     )
 
 
-def referred(
-    virtual_sensor: Measurement,
+def sense(
     recording: Recording,
     robot: Robot,
-    reference: "ExternalTorque",
-    asked: "ReferenceRequest",
-) -> Measurement:
-    """The virtual sensor's measurement with the reference's wrench beside it."""
-    from vftcli.truth.wrench_reference import reference_wrench
+    estimates: tuple["ExternalTorque", ...],
+    request: Request,
+) -> "tuple[Measurement | None, Mounting | None, Recording]":
+    """What the virtual sensor measures, where things sit, and the log with its sensor relieved."""
+    if request.wrench is None:
+        return None, None, recording
+    from vftcli.wrench.measurement import measure
+    from vftcli.wrench.placing import placed, weighed
 
-    wrench = reference_wrench(recording, robot, reference, virtual_sensor.sensor, asked)
-    return replace(virtual_sensor, reference=wrench)
+    mounting, notes = placed(recording, robot, estimates, request.wrench)
+    unloaded = unloaded_run(recording, robot, request)
+    measured = measure(recording, robot, estimates, request.wrench, unloaded, mounting)
+    if request.wrench.sensor_weight:
+        recording, found = weighed(recording, robot.chain, mounting, measured.free)
+        notes += found
+    return replace(measured, notes=(*notes, *measured.notes)), mounting, recording
 
 
-def unloaded_run(recording: Recording, robot: Robot, request: Request) -> Unloaded | None:
+def unloaded_run(recording: Recording, robot: Robot, request: Request) -> "Unloaded | None":
     """What the observers read in the free run of ``--zero LOG``, None if none is given.
 
     Where it is the same trajectory, their torque at the same place of it is taken; else its mean.
@@ -189,6 +194,7 @@ def unloaded_run(recording: Recording, robot: Robot, request: Request) -> Unload
         return None
     from vftcli.errors import ReferenceTorqueError
     from vftcli.truth.alignment import align
+    from vftcli.wrench.measurement import unloaded_from
 
     free = open_log(request.wrench.zero_log, without_interval(request))
     terms = dynamics_terms(free, robot, literal=request.as_printed)

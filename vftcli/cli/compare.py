@@ -27,6 +27,7 @@ def compare(
     tool: opt.Tool = None,
     sensor_pose: opt.SensorPose = None,
     zero: opt.Zero = None,
+    sensor_weight: opt.SensorWeight = False,
     torque_sd: opt.TorqueSd = None,
     json: opt.Json = False,
     csv: Annotated[bool, typer.Option("--csv", help="One row per observer and joint.")] = False,
@@ -63,7 +64,9 @@ def compare(
         friction=friction,
         payload=payload,
         as_printed=as_printed,
-        wrench=wrench_request(wrench, frame, solver, tool, sensor_pose, zero, torque_sd),
+        wrench=wrench_request(
+            wrench, frame, solver, tool, sensor_pose, zero, sensor_weight, torque_sd
+        ),
         reference=reference,
         free=paths(free),
         reference_columns=reference_columns,

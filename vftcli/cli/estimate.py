@@ -28,6 +28,7 @@ def estimate(
     tool: opt.Tool = None,
     sensor_pose: opt.SensorPose = None,
     zero: opt.Zero = None,
+    sensor_weight: opt.SensorWeight = False,
     torque_sd: opt.TorqueSd = None,
     json: opt.Json = False,
     force: opt.Force = False,
@@ -54,7 +55,9 @@ def estimate(
         friction=friction,
         payload=payload,
         as_printed=as_printed,
-        wrench=wrench_request(wrench, frame, solver, tool, sensor_pose, zero, torque_sd),
+        wrench=wrench_request(
+            wrench, frame, solver, tool, sensor_pose, zero, sensor_weight, torque_sd
+        ),
     )
     recording = open_log(log, request)
     analysis = analyse(recording, choose_robot(request, recording), request)

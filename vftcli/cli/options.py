@@ -126,6 +126,13 @@ Zero = Annotated[
         "Repeat A:B to see the drift between spans. Implies --wrench.",
     ),
 ]
+SensorWeight = Annotated[
+    bool,
+    typer.Option(
+        "--sensor-weight",
+        help="Weigh the sensor's own tool in the unloaded spans and remove it from its reading.",
+    ),
+]
 TorqueSd = Annotated[
     str | None,
     typer.Option(

@@ -26,6 +26,7 @@ def report(
     tool: opt.Tool = None,
     sensor_pose: opt.SensorPose = None,
     zero: opt.Zero = None,
+    sensor_weight: opt.SensorWeight = False,
     torque_sd: opt.TorqueSd = None,
     json: opt.Json = False,
     force: opt.Force = False,
@@ -54,7 +55,9 @@ def report(
         friction=friction,
         payload=payload,
         as_printed=as_printed,
-        wrench=wrench_request(wrench, frame, solver, tool, sensor_pose, zero, torque_sd),
+        wrench=wrench_request(
+            wrench, frame, solver, tool, sensor_pose, zero, sensor_weight, torque_sd
+        ),
         reference=reference,
         free=paths(free),
         reference_columns=reference_columns,

@@ -18,6 +18,7 @@ def wrench_request(
     tool: str | None,
     sensor_pose: str | None,
     zero: Sequence[str] | None,
+    sensor_weight: bool,
     torque_sd: str | None,
 ) -> "WrenchRequest | None":
     """What is asked of the virtual sensor, None where no option asks for a wrench.
@@ -25,7 +26,7 @@ def wrench_request(
     Raises:
         ParameterError: If a frame or solver does not exist, or a zero is malformed.
     """
-    options = (frame, solver, tool, sensor_pose, zero or None, torque_sd)
+    options = (frame, solver, tool, sensor_pose, zero or None, torque_sd, sensor_weight or None)
     if not asked and all(option is None for option in options):
         return None
     from vftcli.errors import ParameterError
@@ -53,5 +54,6 @@ def wrench_request(
         zero=tuple(spans),
         zero_start=start,
         zero_log=logs[0] if logs else None,
+        sensor_weight=sensor_weight,
         torque_sd=torque_sd,
     )

@@ -25,8 +25,8 @@ def sensor_reference(
     wrench = logged_wrench(recording, robot.chain, mounting or Mounting())
     note = (
         "reference sensor: the log's wrench through the transposed flange Jacobian; contacts that "
-        "do not pass through the sensor are not in it, and its own error is not stated, so no floor "
-        "is known"
+        "do not pass through the sensor are not in it, and its own error is not stated, so no "
+        "floor is known"
     )
     return torque_of(wrench, recording, robot, "sensor", note)
 

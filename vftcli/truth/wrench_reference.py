@@ -13,7 +13,7 @@ from vftcli.robots.robot import Robot
 from vftcli.torque import ExternalTorque
 from vftcli.truth.reference import ReferenceRequest
 from vftcli.truth.sensor import torque_of
-from vftcli.wrench.frames import Mounting, from_base
+from vftcli.wrench.frames import NOTHING, Mounting, from_base
 from vftcli.wrench.log_wrench import logged_wrench
 from vftcli.wrench.virtual_sensor import VirtualSensor
 from vftcli.wrench.wrench import Wrench
@@ -100,7 +100,7 @@ def torque_of_file(
     Raises:
         ReferenceTorqueError: If its clock does not overlap the log's.
     """
-    wrench = wrench_of_file(recording, robot, path, asked.mounting, asked.columns)
+    wrench = wrench_of_file(recording, robot, path, asked.mounting or NOTHING, asked.columns)
     if wrench is None or not np.isfinite(wrench.values).any():
         raise ReferenceTorqueError(
             f"{path}: its clock does not overlap the log's; both must be the log's own clock"

@@ -8,7 +8,7 @@ import numpy as np
 
 from vftcli.arrays import Array, frozen
 from vftcli.errors import ParameterError
-from vftcli.wrench.wrench import Mask, Wrench
+from vftcli.wrench.wrench import Mask
 
 LEAVE = 0.6
 """A contact ends where the score falls below this share of the threshold: hysteresis."""
@@ -115,13 +115,6 @@ def hysteresis(score: Array, enter: float) -> list[tuple[int, int]]:
         for start, stop in edges
         if above[start:stop].any()
     ]
-
-
-def true_contacts(truth: Wrench) -> tuple[Contact, ...]:
-    """Contacts of a true wrench: wherever it is not zero."""
-    least = np.repeat([TRUE_FORCE, TRUE_MOMENT], 3)
-    score = np.nan_to_num(np.abs(truth.values) / least).max(axis=1)
-    return contacts(truth.t, score)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -70,6 +70,14 @@ def inverse(pose: Pose) -> Pose:
     return Pose(turned, -np.squeeze(turned @ pose.translation[..., None], axis=-1))
 
 
+def angles_of(rotation: Array) -> tuple[float, float, float]:
+    """Roll, pitch and yaw of a rotation, `rpy` turned round. [rad]"""
+    pitch = float(np.arcsin(np.clip(-rotation[2, 0], -1.0, 1.0)))
+    roll = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
+    yaw = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+    return roll, pitch, yaw
+
+
 def check_frame(name: str) -> str:
     """Return the frame's name.
 
@@ -94,8 +102,8 @@ def mounted(frame: str, mounting: Mounting) -> Pose:
         if mounting.tool is None:
             raise ParameterError(
                 "the robot has no tool, so there is no Jacobian for it: give its pose on the "
-                "flange with --tool x,y,z,roll,pitch,yaw, or a [tool.NAME] section in the robot file and "
-                "--tool NAME"
+                "flange with --tool x,y,z,roll,pitch,yaw, or a [tool.NAME] section in the robot "
+                "file and --tool NAME"
             )
         return mounting.tool
     if frame == "sensor":

@@ -1,7 +1,7 @@
 """What a log's virtual sensor measured: wrenches, zero drift, masks, contacts, and remarks."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,9 @@ from vftcli.robots.robot import Robot
 from vftcli.torque import ExternalTorque
 from vftcli.wrench.frames import Mounting, own_pose, read_pose
 from vftcli.wrench.null_space import Elsewhere, contact_elsewhere
+from vftcli.wrench.sensor import time_offset
 from vftcli.wrench.solvers import TORQUE_SD
+from vftcli.wrench.vendor import VendorCheck, check_vendor
 from vftcli.wrench.virtual_sensor import VirtualSensor
 from vftcli.wrench.wrench import Mask, Wrench
 from vftcli.wrench.zero import (
@@ -45,6 +47,7 @@ class WrenchRequest:
         zero: Unloaded spans: the first is the zero, further ones show its drift. [s]
         zero_start: Find the unloaded start and take it as the zero.
         zero_log: A log of the arm unloaded, or None.
+        sensor_weight: Weigh the sensor's own tool in the unloaded spans and remove it.
         torque_sd: Torque error the covariance starts from: "own", a number or one a joint as text,
             or None for the best that is known. [N·m]
     """
@@ -56,6 +59,7 @@ class WrenchRequest:
     zero: tuple[tuple[float, float], ...] = ()
     zero_start: bool = False
     zero_log: Path | None = None
+    sensor_weight: bool = False
     torque_sd: str | None = None
 
     def mounting(self, robot: Robot) -> Mounting:
@@ -99,6 +103,7 @@ class Measurement:
         wrenches: One an observer, drift removed where a zero was given.
         drifts: Zero drift, one an observer and unloaded span.
         free: Samples known to be unloaded: those of the zero spans, or of the unloaded start. (T,)
+        vendor: What convention the log's own wrench is in, None if it has none.
         elsewhere: The null-space channel's verdicts, for arms of more than six joints.
         reference: The wrench the others are judged by, in the same frame, or None.
         notes: What the reader of the numbers should know, one sentence each.
@@ -109,10 +114,11 @@ class Measurement:
     wrenches: tuple[Wrench, ...]
     drifts: tuple[Drift, ...] = ()
     free: Mask
+    vendor: VendorCheck | None = None
     elsewhere: tuple[Elsewhere, ...] = ()
     reference: Wrench | None = None
     notes: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = field(default=())
+    warnings: tuple[str, ...] = ()
 
     @property
     def masked_share(self) -> float:
@@ -162,16 +168,52 @@ def measure(
             replace(d, removed=True) if k < len(wrenches) else d for k, d in enumerate(drifts)
         )
         wrenches = tuple(without_drift(w, d) for w, d in zip(wrenches, drifts, strict=False))
+    vendor = vendor_check(recording, robot, torques)
+    if vendor is not None:
+        notes.extend(vendor.sentences())
     elsewhere = tuple(e for w in wrenches if (e := contact_elsewhere(w, free)) is not None)
     return Measurement(
         sensor=sensor,
         wrenches=wrenches,
         drifts=drifts,
         free=free,
+        vendor=vendor,
         elsewhere=elsewhere,
         notes=(*notes, *elsewhere_notes(elsewhere)),
         warnings=warnings,
     )
+
+
+def vendor_check(
+    recording: Recording, robot: Robot, torques: Sequence[ExternalTorque]
+) -> VendorCheck | None:
+    """The convention of the log's own wrench, told by the first observer's; None without one."""
+    if recording.wrench is None or not torques:
+        return None
+    ours = VirtualSensor(frame="base").wrench(torques[0], recording.q, robot.chain)
+    return check_vendor(recording, ours, robot.chain)
+
+
+def referred(measured: Measurement, reference: Wrench) -> Measurement:
+    """The measurement with a reference beside it: its zero removed, its time offset told."""
+    notes = list(measured.notes)
+    if reference.name == "sensor" and measured.drifts and measured.drifts[0].removed:
+        drift = replace(zero_drift(reference, measured.drifts[0].span), removed=True)
+        reference = replace(reference, values=reference.values - drift.mean)
+        notes.append(drift.sentence())
+    if reference.name == "sensor":
+        notes.append(offset_note(measured.wrenches, reference))
+    return replace(measured, reference=reference, notes=tuple(notes))
+
+
+def offset_note(wrenches: Sequence[Wrench], reference: Wrench) -> str:
+    """How far each virtual sensor runs behind the real one, in words."""
+    told = (time_offset(reference.t, wrench.known, reference.known) for wrench in wrenches)
+    each = ", ".join(
+        f"{wrench.name} {offset.lag * 1e3:+.0f} ms (correlation {offset.correlation:.3f})"
+        for wrench, offset in zip(wrenches, told, strict=True)
+    )
+    return f"time offset against the sensor, observer delay included and not removed: {each}"
 
 
 def relieved(

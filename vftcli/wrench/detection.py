@@ -1,0 +1,114 @@
+"""Contacts of every observer against the true ones."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.wrench.contact import (
+    TRUE_FORCE,
+    TRUE_MOMENT,
+    Contact,
+    Detection,
+    Operating,
+    contacts,
+    detection,
+    free_band,
+    operating_curve,
+)
+from vftcli.wrench.wrench import Mask
+from vftcli.wrench.zero import SETTLING
+
+TRUE_TORQUE = 0.5
+"""A true joint torque beyond this is a contact. [N·m]"""
+
+LEAST_TORQUE = 0.5
+"""Smallest half width of a free band of joint torques. [N·m]"""
+
+THRESHOLDS = tuple(float(x) for x in np.geomspace(0.1, 10.0, 41))
+"""Multiples of the free band of an operating curve."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signal:
+    """What contacts are told from: an observer's wrench or its joint torques.
+
+    Attributes:
+        name: The observer.
+        values: NaN where not known. (T, k)
+        least: Smallest half width of its free band, one a column. (k,)
+    """
+
+    name: str
+    values: Array
+    least: Array
+
+
+class Told(NamedTuple):
+    """How one observer tells contacts.
+
+    Attributes:
+        name: The observer.
+        detection: Counts and delays at the free band itself.
+        curve: Hits against false alarms over `THRESHOLDS`.
+        found: The contacts it found.
+    """
+
+    name: str
+    detection: Detection
+    curve: tuple[Operating, ...]
+    found: tuple[Contact, ...]
+
+
+def wrench_limits() -> Array:
+    """What a true wrench must exceed to be a contact, and a free band at least be. (6,)"""
+    return np.repeat([TRUE_FORCE, TRUE_MOMENT], 3)
+
+
+def true_intervals(t: Array, truth: Array, limits: Array | float) -> tuple[Contact, ...]:
+    """Contacts of a true wrench or torque (T, k)."""
+    return contacts(t, np.nan_to_num(np.abs(truth) / limits).max(axis=1))
+
+
+def learned_free(t: Array, true: Sequence[Contact]) -> Mask:
+    """Samples from `SETTLING` after the start to the first true contact. (T,)
+
+    Raises:
+        ParameterError: If a contact begins before the observers have settled.
+    """
+    first = true[0].start if true else float(t[-1])
+    free: Mask = (t >= t[0] + SETTLING) & (t < first)
+    if np.count_nonzero(free) < 10:
+        raise ParameterError(
+            f"contacts: the first true one begins at {first:g} s, so there is no free part to "
+            f"learn the band from; name one with --zero A:B"
+        )
+    return free
+
+
+def told(t: Array, signals: Iterable[Signal], free: Mask, true: Sequence[Contact]) -> list[Told]:
+    """Judge every observer's contacts by the true ones.
+
+    Args:
+        t: Time. (T,) [s]
+        signals: The observers.
+        free: The free part the band is learned from. (T,)
+        true: True contacts.
+    """
+    found = []
+    for signal in signals:
+        score = free_band(signal.values, free, signal.least).score(signal.values)
+        score = np.where(t < t[0] + SETTLING, 0.0, score)
+        here = contacts(t, score)
+        found.append(
+            Told(
+                name=signal.name,
+                detection=detection(here, true, float(t[-1] - t[0])),
+                curve=operating_curve(t, score, true, THRESHOLDS),
+                found=here,
+            )
+        )
+    return found
