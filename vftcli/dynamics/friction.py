@@ -1,4 +1,4 @@
-"""Friction models: torque lost in a joint as a function of its velocity."""
+"""Friction models: torque lost in a joint as a function of its velocity and of its load."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -19,10 +19,14 @@ def coulomb_viscous(
     quadratic: Array | float = 0.0,
     offset: Array | float = 0.0,
     smoothing: Array | float = SMOOTHING,
+    load_coulomb: Array | float = 0.0,
+    stribeck: Array | float = 0.0,
+    stribeck_velocity: Array | float = 1.0,
+    load: Array | None = None,
 ) -> Array:
     """Coulomb, viscous and signed quadratic friction with an offset. Like `dq` [N·m]
 
-    f = offset + f_c tanh(q̇/smoothing) + f_v q̇ + f_2 q̇|q̇|
+    f = offset + (f_c + f_l |load| + f_s exp(−(q̇/v_s)²)) tanh(q̇/smoothing) + f_v q̇ + f_2 q̇|q̇|
 
     Args:
         dq: Joint velocities. (T,) or (T, n) [rad/s]
@@ -31,10 +35,19 @@ def coulomb_viscous(
         quadratic: Signed quadratic coefficient f_2. [N·m·s²/rad²]
         offset: Torque at rest. [N·m]
         smoothing: Velocity over which the sign is smoothed. [rad/s]
+        load_coulomb: Growth f_l of the Coulomb torque with the torque the gear carries. [1]
+        stribeck: Extra dry torque f_s at breakaway, above the Coulomb torque. [N·m]
+        stribeck_velocity: Velocity v_s over which it fades. [rad/s]
+        load: Torque the gear carries: the joint's gravity torque; None for none. Like `dq` [N·m]
     """
     torque: Array = dq / smoothing
     np.tanh(torque, out=torque)
-    torque *= coulomb
+    dry = coulomb
+    if load is not None and np.any(load_coulomb):
+        dry = dry + load_coulomb * np.abs(load)
+    if np.any(stribeck):
+        dry = dry + stribeck * np.exp(-((dq / stribeck_velocity) ** 2))
+    torque *= dry
     torque += viscous * dq
     if np.any(quadratic):
         torque += quadratic * dq * np.abs(dq)
@@ -71,12 +84,19 @@ MODELS: dict[str, Callable[..., Array]] = {
     "coulomb-viscous": coulomb_viscous,
     "coulomb-viscous-offset": coulomb_viscous,
     "coulomb-viscous-quadratic": coulomb_viscous,
+    "coulomb-viscous-load": coulomb_viscous,
+    "coulomb-viscous-stribeck": coulomb_viscous,
     "sigmoid": sigmoid,
 }
 """Name in a robot file → function of velocity and the file's parameters."""
 
+LOADED = frozenset({"coulomb-viscous-load", "coulomb-viscous-stribeck"})
+"""Models that also take the load of the joint."""
 
-def friction_torque(friction: Sequence[JointFriction], dq: Array) -> Array:
+
+def friction_torque(
+    friction: Sequence[JointFriction], dq: Array, load: Array | None = None
+) -> Array:
     """Friction torque of every joint at every sample, opposing motion when subtracted. (T, n) [N·m]
 
     Joints that share a model are evaluated together.
@@ -84,6 +104,8 @@ def friction_torque(friction: Sequence[JointFriction], dq: Array) -> Array:
     Args:
         friction: One model a joint; empty for a frictionless arm.
         dq: Joint velocities. (T, n) [rad/s]
+        load: Gravity torques of the loaded arm, for models whose Coulomb torque grows with the
+            load; None for unloaded joints. (T, n) [N·m]
 
     Raises:
         ParameterError: If a model's name is unknown.
@@ -97,7 +119,10 @@ def friction_torque(friction: Sequence[JointFriction], dq: Array) -> Array:
         if model not in MODELS:
             raise ParameterError(f"no friction model {model!r}; there is {', '.join(MODELS)}")
         values = stacked([friction[j].parameters for j in joints])
-        if len(joints) == dq.shape[1]:
+        every = len(joints) == dq.shape[1]
+        if load is not None and model in LOADED:
+            values["load"] = load if every else load[:, joints]
+        if every:
             return MODELS[model](dq, **values)
         torque[:, joints] = MODELS[model](dq[:, joints], **values)
     return torque

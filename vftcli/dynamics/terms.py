@@ -74,18 +74,18 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
     effort, scale = effort_of(recording, robot)
     p, mu = empty_series(*q.shape), empty_series(*q.shape)
     chunks = literal_chunks if literal else kernel_chunks
-    for span, velocity, momentum, free_torque in chunks(robot, q, dq):
+    for span, velocity, momentum, free_torque, gravity in chunks(robot, q, dq):
         p[span] = momentum
         mu[span] = effort[span]
         mu[span] *= scale
         mu[span] += free_torque
         if robot.friction:
-            mu[span] -= friction_torque(robot.friction, velocity)
+            mu[span] -= friction_torque(robot.friction, velocity, gravity)
     return DynamicsTerms(t=recording.t, p=handed_over(p), mu=handed_over(mu))
 
 
-Chunk = tuple[slice, Array, Array, Array]
-"""Which samples, and their velocity, momentum p and Cᵀq̇ − g, each (N, n) with its columns whole."""
+Chunk = tuple[slice, Array, Array, Array, Array]
+"""Which samples; their velocity, p, Cᵀq̇ − g and g, each (N, n) with its columns whole."""
 
 
 def kernel_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
@@ -99,7 +99,7 @@ def kernel_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
         columns = np.ascontiguousarray(q[span].T), np.ascontiguousarray(dq[span].T)
         momentum_chunk(maps, space, *columns, momentum, coriolis, gravity)
         coriolis -= gravity
-        yield span, columns[1].T, momentum.T, coriolis.T
+        yield span, columns[1].T, momentum.T, coriolis.T, gravity.T
 
 
 def literal_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
@@ -107,7 +107,7 @@ def literal_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
     from vftcli.dynamics.literal import literal_momentum_terms
 
     p, coriolis, gravity = literal_momentum_terms(robot.model, q, dq)
-    yield slice(0, len(q)), dq, p, coriolis - gravity
+    yield slice(0, len(q)), dq, p, coriolis - gravity, gravity
 
 
 def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]:

@@ -22,6 +22,14 @@ FRICTION_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "coulomb-viscous": (("coulomb", "viscous"), ("smoothing",)),
     "coulomb-viscous-offset": (("coulomb", "viscous"), ("offset", "smoothing")),
     "coulomb-viscous-quadratic": (("coulomb", "viscous"), ("quadratic", "offset", "smoothing")),
+    "coulomb-viscous-load": (
+        ("coulomb", "viscous", "load_coulomb"),
+        ("quadratic", "offset", "smoothing"),
+    ),
+    "coulomb-viscous-stribeck": (
+        ("coulomb", "viscous", "stribeck", "stribeck_velocity"),
+        ("load_coulomb", "quadratic", "offset", "smoothing"),
+    ),
     "sigmoid": (("amplitude", "slope", "shift"), ()),
 }
 """Friction model → its required and its optional keys in ``[joints.friction]``."""
@@ -43,22 +51,27 @@ class RobotFile:
             raise RobotError(f"{path}: not valid TOML: {error}") from None
 
     def line(self, table: str, index: int | None, key: str) -> int | None:
-        """Line of `key` in the `index`-th occurrence of `table`, from 1, or of its header."""
-        lines = self.text.splitlines()
-        seen, inside, header = -1, table == "", 1
-        for number, line in enumerate(lines, start=1):
+        """Line of `key` in `table`, from 1, or of the table's header.
+
+        Args:
+            table: Dotted name, "" for the keys before any table.
+            index: Which ``[[joints]]`` the table belongs to, from 0, or None outside of them.
+            key: The key to look for.
+        """
+        header = 1 if table == "" else None
+        joint, name = -1, ""
+        for number, line in enumerate(self.text.splitlines(), start=1):
             stripped = line.strip()
             if stripped.startswith("["):
                 name = stripped.split("#")[0].strip().strip("[]").strip()
-                if name == table:
-                    seen += 1
-                    inside = index is None or seen == index
-                    header = number if inside else header
-                elif not (inside and name.startswith(f"{table}.")) or table == "":
-                    inside = False
-            elif inside and re.match(rf"[\"']?{re.escape(key)}[\"']?\s*=", stripped):
+                joint += stripped.startswith("[[joints]]")
+                if name == table and index in {None, joint}:
+                    header = number
+            elif name == table and index in {None, joint} and starts_with_key(stripped, key):
                 return number
-        return header if seen >= 0 or table == "" else None
+        if header is None and "." in table:
+            return self.line(table.rpartition(".")[0], index, "")
+        return header
 
     def refuse(
         self, message: str, table: str = "", index: int | None = None, key: str = ""
@@ -72,6 +85,11 @@ class RobotFile:
             label = names[index].get("name", "") if index < len(names) else ""
             joint = f"joint {index + 1}{f' ({label})' if label else ''}: "
         raise RobotError(f"{where}: {joint}{message}")
+
+
+def starts_with_key(line: str, key: str) -> bool:
+    """Whether a line of TOML assigns `key`."""
+    return bool(key) and re.match(rf"[\"']?{re.escape(key)}[\"']?\s*=", line) is not None
 
 
 def load_profile(path: Path) -> Robot:
@@ -245,8 +263,9 @@ def checked_friction(
         values |= {
             k: number(file, section, k, "joints.friction", j) for k in optional if k in section
         }
-        if values.get("smoothing", 1.0) <= 0:
-            file.refuse("smoothing must be positive [rad/s]", "joints.friction", j, "smoothing")
+        for key in ("smoothing", "stribeck_velocity"):
+            if values.get(key, 1.0) <= 0:
+                file.refuse(f"{key} must be positive [rad/s]", "joints.friction", j, key)
         models.append(
             JointFriction(
                 model=name, parameters=values, confidence=str(section.get("confidence", ""))

@@ -1,0 +1,187 @@
+"""Robot files as text: schema 1, written so that `load_robot` reads the same robot back."""
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import RobotError
+from vftcli.robots.chain import Chain, Payload
+from vftcli.robots.conventions import CONVENTIONS, Pose
+from vftcli.robots.profile import SCHEMA
+from vftcli.robots.robot import Limits, Robot, SensorNoise
+
+Table = dict[str, Any]
+
+AGREES = 1e-12
+"""Relative difference below which a number of the file is taken to be unchanged."""
+
+
+def robot_toml(robot: Robot, heading: Sequence[str] = ()) -> str:
+    """The robot as the text of a robot file.
+
+    Sections and keys of the file the robot came from that are not physical numbers of the arm
+    (gains, sources, words) are kept as they are.
+
+    Args:
+        robot: The robot; its `document` holds what is kept.
+        heading: Comment lines for the top of the file.
+    """
+    comments = "".join(f"# {line}\n" for line in heading)
+    return comments + "".join(lines_of(robot_document(robot)))
+
+
+def robot_document(robot: Robot) -> Table:
+    """The tables of a robot's file, its numbers brought up to date with the robot. Schema 1."""
+    old = dict(robot.document)
+    if old.get("convention") not in CONVENTIONS:
+        old = xyz_rpy_document(robot)
+    tables = [dict(table) for table in old["joints"]]
+    update_inertials(tables, old, robot.chain)
+    for j, table in enumerate(tables):
+        table["rotor_inertia"] = float(robot.chain.rotor_inertia[j])
+        if robot.torque_constant is not None:
+            table["torque_constant"] = float(robot.torque_constant[j])
+        table.pop("friction", None)
+        if robot.friction and robot.friction[j].model != "none":
+            friction = robot.friction[j]
+            table["friction"] = {"model": friction.model, **friction.parameters}
+            if friction.confidence:
+                table["friction"]["confidence"] = friction.confidence
+    document = {**old, "schema": SCHEMA, "name": robot.name, "title": robot.title or robot.name}
+    document |= {"torque_source": robot.torque_source, "gravity": robot.chain.gravity.tolist()}
+    document |= {"dof": robot.joints, "joints": tables, "payload": payload_tables(robot)}
+    if robot.notes:
+        document["notes"] = robot.notes[0] if len(robot.notes) == 1 else list(robot.notes)
+    return {key: value for key, value in document.items() if value != {}}
+
+
+def update_inertials(tables: list[Table], document: Mapping[str, Any], chain: Chain) -> None:
+    """Put the chain's inertials into the joint tables, in the frames of the file's convention."""
+    kinematics = CONVENTIONS[document["convention"]].kinematics(tables, document)
+    for j, (table, frame) in enumerate(zip(tables, kinematics.inertial_frames, strict=True)):
+        R = frame.rotation
+        tensor = R.T @ chain.inertia[j] @ R
+        values = {
+            "mass": np.array(chain.mass[j]),
+            "com": R.T @ (chain.com[j] - frame.translation),
+            "inertia": tensor[np.triu_indices(3)],
+        }
+        for key, value in values.items():
+            scale = float(np.max(np.abs(value), initial=1e-12))
+            before = table.get(key)
+            if before is None or not np.allclose(before, value, rtol=0, atol=AGREES * scale):
+                table[key] = value.tolist()
+
+
+def payload_tables(robot: Robot) -> Table:
+    """The ``[payload]`` section: what is mounted, and the loads that can be named."""
+    tables = {} if robot.payload is None else payload_table(robot.payload)
+    for name, load in robot.payloads.items():
+        tables[name] = payload_table(load)
+    return tables
+
+
+def payload_table(payload: Payload) -> Table:
+    """One load, in flange axes."""
+    tensor = payload.inertia[np.triu_indices(3)].tolist()
+    return {"mass": payload.mass, "com": payload.com.tolist(), "inertia": tensor}
+
+
+def xyz_rpy_document(robot: Robot) -> Table:
+    """A document for a robot that came from a URDF: its chain, stated as xyz and rpy."""
+    chain = robot.chain
+    joints: list[Table] = []
+    for j, name in enumerate(chain.names):
+        place = Pose(chain.rotation[j], chain.translation[j])
+        table = {"name": name, "xyz": place.translation.tolist(), "rpy": angles(place.rotation)}
+        for group in (robot.limits, robot.noise):
+            table |= known_numbers(group, j)
+        joints.append(table)
+    return {
+        **{key: value for key, value in robot.document.items() if key != "joints"},
+        "convention": "xyz-rpy",
+        "ee_xyz": chain.flange_translation.tolist(),
+        "ee_rpy": angles(chain.flange_rotation),
+        "joints": joints,
+    }
+
+
+def known_numbers(group: Limits | SensorNoise, j: int) -> Table:
+    """The limits or noise figures of one joint that are known, under their keys in the file."""
+    prefix = "noise_" if isinstance(group, SensorNoise) else ""
+    values = {f"{prefix}{key}": float(getattr(group, key)[j]) for key in vars(group)}
+    return {key: value for key, value in values.items() if math.isfinite(value)}
+
+
+def angles(R: Array) -> list[float]:
+    """Roll, pitch and yaw of a rotation Rz(yaw) Ry(pitch) Rx(roll). [rad]"""
+    pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
+    if math.hypot(R[0, 0], R[1, 0]) < 1e-9:  # yaw and roll turn about one axis
+        return [math.atan2(-R[1, 2], R[1, 1]), pitch, 0.0]
+    return [math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])]
+
+
+def lines_of(document: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[str]:
+    """The lines of a table: its values first, then its tables, then its arrays of tables."""
+    for key, value in document.items():
+        if not is_table(value) and not is_tables(value):
+            yield f"{bare(key)} = {value_text(value, '.'.join((*path, key)))}\n"
+    for key, value in document.items():
+        here = (*path, key)
+        name = ".".join(map(bare, here))
+        if is_table(value):
+            if any(not is_table(v) and not is_tables(v) for v in value.values()):
+                yield f"\n[{name}]\n" if path != ("joints",) else f"[{name}]\n"
+            yield from lines_of(value, here)
+        elif is_tables(value):
+            for table in value:
+                yield f"\n[[{name}]]\n"
+                yield from lines_of(table, here)
+
+
+def is_table(value: object) -> bool:
+    """Whether a value is a table."""
+    return isinstance(value, Mapping)
+
+
+def is_tables(value: object) -> bool:
+    """Whether a value is a list of tables, which may not be empty."""
+    return isinstance(value, list | tuple) and bool(value) and all(map(is_table, value))
+
+
+def bare(key: str) -> str:
+    """A key, quoted if TOML needs it."""
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else quoted(key)
+
+
+def quoted(text: str) -> str:
+    """A basic string with its escapes."""
+    escapes = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
+    out = "".join(escapes.get(c, c) for c in text)
+    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in out) + '"'
+
+
+def value_text(value: Any, key: str) -> str:  # noqa: ANN401 - whatever TOML can hold
+    """A value as TOML; floats with as many digits as tell them apart.
+
+    Raises:
+        RobotError: If the value is none that TOML has.
+    """
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return quoted(value)
+        case int():
+            return str(value)
+        case float():
+            return repr(value) if math.isfinite(value) else str(value)
+        case list() | tuple():
+            return f"[{', '.join(value_text(item, key) for item in value)}]"
+        case np.ndarray() | np.generic():
+            return value_text(value.tolist(), key)
+    raise RobotError(f"{key}: a robot file cannot hold a {type(value).__name__}")
