@@ -5,6 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,11 @@ SEPARATORS = (",", ";", "\t", " ")
 TAIL_BYTES = 128 * 1024
 COMPARED_ROWS = 20
 """Rows before the last that tell whether its last number is whole."""
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line before the table is a comment, as np.savetxt writes its header."""
+    return line.removeprefix("\ufeff").lstrip().startswith("#")
 
 
 def as_number(text: str, *, decimal_comma: bool = False) -> float | None:
@@ -66,8 +72,8 @@ class TextTable:
         if len(self.file.lines) <= 200 and not self.file.is_whole:
             lines = lines[:-1] if len(lines) > 1 else lines  # the head may end inside a line
         lines[0] = lines[0].removeprefix("\ufeff")
-        comments = [line for line in lines if line.lstrip().startswith("#")]
-        rows = [line for line in lines if not line.lstrip().startswith("#")]
+        comments = list(takewhile(is_comment, lines))
+        rows = lines[len(comments) :]
         if comments and rows and self._names_in(comments[-1], rows[0]):
             return [comments[-1].lstrip("# "), *rows]
         return rows or lines
@@ -191,8 +197,13 @@ class TextTable:
         blank = re.search(rb"(\n|^)[ \t\r]*\n", head) is not None
         lone = b"\r" in head and (b"\r\r" in head or head.count(b"\r") != head.count(b"\r\n"))
         blanks = self.separator == " " and re.search(rb"  |\n | \r?\n", head) is not None
-        comments = re.search(rb"\n[ \t]*#", head) is not None
-        return blank or lone or blanks or comments or head.startswith(b"\xef\xbb\xbf")
+        return (
+            blank
+            or lone
+            or blanks
+            or is_comment(decoded(head[:64]))
+            or head.startswith(b"\xef\xbb\xbf")
+        )
 
     def _mended(self) -> bytes:
         """The rows with plain line ends, without blank lines, comments and doubled blanks."""
@@ -201,7 +212,9 @@ class TextTable:
         text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         if self.separator == " ":
             text = re.sub(rb"[ \t]+", b" ", text).replace(b"\n ", b"\n").replace(b" \n", b"\n")
-        text = re.sub(rb"^[ \t]*#[^\n]*\n", b"", text.lstrip(b"\n "), flags=re.MULTILINE)
+        text = text.lstrip(b"\n ")
+        while is_comment(decoded(text[:64])):
+            text = text.partition(b"\n")[2].lstrip(b"\n ")
         text = re.sub(rb"\n\s*\n", b"\n", text)
         if self.names is not None and not self._header_is_comment:
             text = text.partition(b"\n")[2]

@@ -23,6 +23,18 @@ class Refused(pickle.UnpicklingError):
     """The pickle asks for something that is no array of numbers."""
 
 
+class Marker:
+    """Stands for the class ndarray, which a pickle names but may not call."""
+
+    def __new__(cls, *_: object, **__: object) -> "Marker":
+        """Refuse to be called.
+
+        Raises:
+            Refused: Always.
+        """
+        raise Refused("an array of its own making")
+
+
 def _dtype(code: Any, *_: Any) -> Any:  # noqa: ANN401
     """A dtype of plain numbers, letters or booleans; object dtypes are refused."""
     dtype = np.dtype(code)
@@ -55,7 +67,7 @@ def _from_buffer(buffer: Any, dtype: Any, shape: Any, order: Any = "C") -> Any: 
 
 
 ALLOWED: dict[tuple[str, str], Callable[..., Any] | type] = {
-    ("numpy", "ndarray"): np.ndarray,
+    ("numpy", "ndarray"): Marker,
     ("numpy", "dtype"): _dtype,
     ("collections", "OrderedDict"): OrderedDict,
     ("_codecs", "encode"): _encode,

@@ -156,9 +156,10 @@ def check_npy_header(file: LogFile, size: int) -> None:
     except (ValueError, KeyError, SyntaxError, TypeError, OverflowError, RecursionError) as error:
         reason = str(error).split("\n")[0][:120]
         raise LogError(f"{file.path}: not a readable .npy file ({reason})") from None
-    if claimed > size or any(s < 0 for s in shape):
+    if claimed != size - stream.tell() or any(s < 0 for s in shape):
         raise LogError(
-            f"{file.path}: the header claims {claimed} bytes, the file holds {size}; it is cut."
+            f"{file.path}: the header claims {claimed} bytes of numbers, the file holds "
+            f"{size - stream.tell()}; it is cut, damaged, or holds more than one array."
         )
 
 

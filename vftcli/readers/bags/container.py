@@ -169,9 +169,7 @@ def equal_rows(buffer: Bytes, start: int, stride: int, ranges: Sequence[tuple[in
     count, step = 1, 16
     while count < total:
         rows = min(step, total - count)
-        view = np.lib.stride_tricks.as_strided(
-            buffer[start + count * stride :], shape=(rows, stride), strides=(stride, 1)
-        )
+        view = np.ndarray((rows, stride), np.uint8, buffer, start + count * stride, (stride, 1))
         same = np.ones(rows, dtype=bool)
         for a, b in ranges:
             same &= (view[:, a:b] == buffer[start + a : start + b]).all(axis=1)
@@ -186,10 +184,9 @@ def strided(buffer: Bytes, offsets: Integers, a: int, b: int) -> Bytes:
     """Bytes a to b of each message. (k, b − a)"""
     if len(offsets) > 1:
         stride = int(offsets[1] - offsets[0])
-        if stride > 0 and np.all(np.diff(offsets) == stride):
-            start = int(offsets[0]) + a
-            return np.lib.stride_tricks.as_strided(
-                buffer[start:], shape=(len(offsets), b - a), strides=(stride, 1)
+        if stride > 0 and (offsets[1:] - offsets[:-1] == stride).all():
+            return np.ndarray(
+                (len(offsets), b - a), np.uint8, buffer, int(offsets[0]) + a, (stride, 1)
             )
     picked: Bytes = buffer[offsets[:, None] + np.arange(a, b)]
     return picked

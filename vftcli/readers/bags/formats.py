@@ -1,5 +1,6 @@
 """The bag formats: ROS 1 bags, ROS 2 bags as folder or bare file, and other MCAP files."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -10,6 +11,8 @@ from vftcli.readers.bags.decode import Decoder
 from vftcli.readers.bags.documents import Documents, read_documents
 from vftcli.readers.bags.topics import aligned
 from vftcli.readers.reader import LogFile, RawLog, Reader, Request, open_log
+
+METADATA_BYTES = 1024 * 1024
 
 STORAGE = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
 
@@ -27,6 +30,7 @@ def read_bag(file: LogFile, request: Request) -> RawLog:
         messages += len(batch.offsets)
         if not documents.take(batch):
             decoder.take(batch)
+    _check_count(file, messages, ingest)
     if messages == 0:
         cut = f" ({ingest.repairs[0]})" if ingest.repairs else ""
         raise LogError(f"{file.path}: no messages in any whole chunk{cut}.")
@@ -69,8 +73,20 @@ def storage_files(file: LogFile) -> list[str]:
 
     Names in metadata.yaml are not followed: only files that lie in the folder itself are read.
     """
-    names = [n for n in file.entries if n.endswith(STORAGE) and (file.path / n).is_file()]
-    return sorted(names, key=_numbers_in)
+    names = {n for n in file.entries if n.endswith(STORAGE) and (file.path / n).is_file()}
+    plain = {n for n in names if n.removesuffix(".zstd").removesuffix(".zst") not in names - {n}}
+    return sorted(plain, key=_numbers_in)
+
+
+def _check_count(file: LogFile, messages: int, ingest: Ingest) -> None:
+    """Say so if metadata.yaml counts another number of messages than were found."""
+    if "metadata.yaml" not in file.entries:
+        return
+    with (file.path / "metadata.yaml").open("rb") as metadata:
+        text = metadata.read(METADATA_BYTES)
+    match = re.search(rb"^  message_count: (\d{1,15})\s*$", text, flags=re.MULTILINE)
+    if match is not None and int(match[1]) != messages:
+        ingest.note(f"metadata.yaml counts {int(match[1])} messages, {messages} were found")
 
 
 def _numbers_in(name: str) -> tuple[list[int], str]:

@@ -63,6 +63,7 @@ class Layout:
         texts: Dotted path → strings, one or several.
         fixed: Ranges of bytes that have to be equal for a message to have this layout.
         length: Length of the message. [B]
+        uses: Number of batches it was used for.
         expected: The bytes of those ranges, one after another.
     """
 
@@ -70,6 +71,7 @@ class Layout:
     texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
     fixed: list[tuple[int, int]] = field(default_factory=list)
     length: int = 0
+    uses: int = 0
     expected: list[Bytes] = field(default_factory=list)
 
     def settle(self, message: Bytes) -> None:

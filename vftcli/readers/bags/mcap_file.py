@@ -25,7 +25,7 @@ from vftcli.readers.bags.container import (
 )
 
 MAGIC = b"\x89MCAP0\r\n"
-SCHEMA, CHANNEL, MESSAGE, CHUNK, FOOTER, DATA_END = 3, 4, 5, 6, 2, 15
+SCHEMA, CHANNEL, MESSAGE, CHUNK, STATISTICS, FOOTER, DATA_END = 3, 4, 5, 6, 11, 2, 15
 HEADER = 9
 """Bytes before a record's content: opcode and length."""
 MESSAGE_HEAD = 22
@@ -53,6 +53,10 @@ class Catalogue:
         self.ingest = ingest
         self.schemas: dict[int, tuple[str, str, bytes]] = {}
         self.channels: dict[int, Channel] = {}
+        self.messages = 0
+        self.counted: int | None = None
+        self.loose: dict[int, list[Run]] = {}
+        self.ended = self.closed = False
 
     def schema(self, content: memoryview) -> None:
         """Take up a schema record."""
@@ -92,33 +96,54 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
         LogError: If a chunk or a record is damaged.
     """
     catalogue = Catalogue(ingest)
-    start, position, ended = len(MAGIC), len(MAGIC), False
-    loose: dict[int, list[Run]] = {}
+    position = len(MAGIC)
     try:
-        while position + HEADER <= len(content):
+        while position + HEADER <= len(content) and not catalogue.closed:
             opcode, end = content[position], position + HEADER + u64(content, position + 1)
-            if end > len(content) or content[position : position + 8] == MAGIC:
+            if end > len(content):
                 break
             if opcode == CHUNK:
                 yield from _chunk(content[position + HEADER : end], catalogue)
-            elif opcode == MESSAGE:
-                _message(content, position, end, loose)
-            elif opcode in {SCHEMA, CHANNEL} and not ended:
-                _take(catalogue, opcode, content[position + HEADER : end])
-            elif opcode in {DATA_END, FOOTER}:
-                ended = True
-                if opcode == FOOTER:
-                    break
+            else:
+                _record(catalogue, opcode, content, position, end)
             position = end
     except struct.error:
         raise LogError(f"{ingest.path}: a record is damaged at byte {position}.") from None
-    buffer = np.frombuffer(content, dtype=np.uint8)
-    yield from _yielded(loose, buffer, catalogue)
-    if not ended:
-        left = len(content) - position
+    yield from _yielded(catalogue.loose, np.frombuffer(content, dtype=np.uint8), catalogue)
+    _check_end(catalogue, len(content) - position)
+
+
+def _record(
+    catalogue: Catalogue, opcode: int, content: memoryview, position: int, end: int
+) -> None:
+    """Take up a record outside chunks; kinds that say nothing of messages are passed over."""
+    if opcode == MESSAGE:
+        _message(content, position, end, catalogue.loose)
+    elif opcode in {SCHEMA, CHANNEL}:
+        _take(catalogue, opcode, content[position + HEADER : end])
+    elif opcode == STATISTICS:
+        catalogue.counted = u64(content, position + HEADER)
+    elif opcode in {DATA_END, FOOTER}:
+        catalogue.ended = True
+        catalogue.closed = opcode == FOOTER
+
+
+def _check_end(catalogue: Catalogue, left: int) -> None:
+    """Say so if the file is cut.
+
+    Raises:
+        LogError: If its statistics count another number of messages.
+    """
+    ingest = catalogue.ingest
+    if catalogue.counted is not None and catalogue.counted != catalogue.messages:
+        raise LogError(
+            f"{ingest.path}: its statistics count {catalogue.counted} messages, the chunks hold "
+            f"{catalogue.messages}; the file is damaged."
+        )
+    if not catalogue.ended:
         ingest.note(
             f"the file is cut: read up to the last whole chunk, {left} bytes left behind"
-            if left > 0 and start != position
+            if left > 0
             else "the file was not closed by its recorder"
         )
 
@@ -163,11 +188,12 @@ def _walk(chunk: memoryview, buffer: Bytes, catalogue: Catalogue) -> dict[int, l
         stride = HEADER + length
         if position + stride > len(chunk):
             raise LogError(f"{catalogue.ingest.path}: a record ends outside its chunk; damaged.")
-        if opcode != MESSAGE:
-            if opcode in {SCHEMA, CHANNEL}:
-                _take(catalogue, opcode, chunk[position + HEADER : position + stride])
+        if opcode in {SCHEMA, CHANNEL}:
+            _take(catalogue, opcode, chunk[position + HEADER : position + stride])
             position += stride
             continue
+        if opcode != MESSAGE:
+            raise LogError(f"{catalogue.ingest.path}: an unknown record in a chunk; damaged.")
         if length < MESSAGE_HEAD:
             raise struct.error
         channel = int(struct.unpack_from("<H", chunk, position + HEADER)[0])
@@ -184,7 +210,8 @@ def _walk(chunk: memoryview, buffer: Bytes, catalogue: Catalogue) -> dict[int, l
 def _yielded(found: dict[int, list[Run]], buffer: Bytes, catalogue: Catalogue) -> Iterator[Batch]:
     for number, runs in found.items():
         if (channel := catalogue.channels.get(number)) is None:
-            continue
+            raise LogError(f"{catalogue.ingest.path}: messages of an unknown channel; damaged.")
+        catalogue.messages += sum(run.messages for run in runs)
         offsets = np.concatenate([r.start + r.stride * np.arange(r.messages) for r in runs])
         lengths = np.repeat([r.length for r in runs], [r.messages for r in runs])
         stamps = buffer[(offsets - MESSAGE_HEAD + 6)[:, None] + np.arange(8)]

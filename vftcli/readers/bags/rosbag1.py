@@ -104,6 +104,7 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
         LogError: If a chunk is damaged or the bag is encrypted.
     """
     connections: dict[int, Channel] = {}
+    counts: dict[int, int] = {}
     position, indexed = len(MAGIC), False
     while position < len(content):
         try:
@@ -121,10 +122,26 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
         elif record.op == OP_CONNECTION:
             _connect(connections, content, record)
         elif record.op == OP_CHUNK:
-            yield from _chunk(content, record, connections, ingest)
+            counts = {}
+            yield from _chunk(content, record, connections, counts, ingest)
+        elif record.op == OP_INDEX:
+            _compare(record, counts, ingest)
+        elif record.op != OP_CHUNK_INFO:
+            raise LogError(f"{ingest.path}: an unknown record at byte {position}; damaged.")
         position = record.end
     if not indexed:
         ingest.note("the bag was not closed by its recorder: read without its index")
+
+
+def _compare(record: Record, counts: dict[int, int], ingest: Ingest) -> None:
+    """Compare the messages found in the last chunk with its index.
+
+    Raises:
+        LogError: If the index counts another number of messages.
+    """
+    number, count = record.header.get(b"conn", b""), record.header.get(b"count", b"")
+    if len(number) != 4 or len(count) != 4 or counts.get(u32(number, 0), 0) != u32(count, 0):
+        raise LogError(f"{ingest.path}: a chunk and its index count differently; it is damaged.")
 
 
 def _connect(connections: dict[int, Channel], content: memoryview, record: Record) -> None:
@@ -145,7 +162,11 @@ def _connect(connections: dict[int, Channel], content: memoryview, record: Recor
 
 
 def _chunk(
-    content: memoryview, record: Record, connections: dict[int, Channel], ingest: Ingest
+    content: memoryview,
+    record: Record,
+    connections: dict[int, Channel],
+    counts: dict[int, int],
+    ingest: Ingest,
 ) -> Iterator[Batch]:
     size = record.header.get(b"size", b"")
     if len(size) != 4:
@@ -156,8 +177,10 @@ def _chunk(
     found = _walk(chunk, connections, ingest)
     buffer = np.frombuffer(chunk, dtype=np.uint8)
     for connection, runs in found.items():
-        if connection in connections:
-            yield _batch(connections[connection], buffer, runs)
+        counts[connection] = sum(run.messages for run in runs)
+        if connection not in connections:
+            raise LogError(f"{ingest.path}: messages of an unknown connection; damaged.")
+        yield _batch(connections[connection], buffer, runs)
 
 
 class Run(NamedTuple):
@@ -203,10 +226,11 @@ def _walk(
                 ) from None
             if record.op == OP_CONNECTION:
                 _connect(connections, chunk, record)
-            template = _template(chunk, position, record) if record.op == OP_MESSAGE else None
-            if template is None:
                 position = record.end
                 continue
+            template = _template(chunk, position, record) if record.op == OP_MESSAGE else None
+            if template is None:
+                raise LogError(f"{ingest.path}: an unknown record in a chunk; damaged.")
             templates.insert(0, template)
         data = position + 8 + template.length
         length = u32(chunk, data - 4)
