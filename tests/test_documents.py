@@ -1,4 +1,4 @@
-"""The documents are run: every command and snippet in them works on the repository's own fixtures."""
+"""The documents are run: every command and snippet in them works on the repository's fixtures."""
 
 import os
 import re
@@ -16,7 +16,9 @@ DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 
 
 def blocks(path: Path, language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```$", path.read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    return re.findall(
+        rf"^```{language}\n(.*?)^```$", path.read_text("utf-8"), re.MULTILINE | re.DOTALL
+    )
 
 
 def commands(path: Path) -> list[str]:
@@ -49,7 +51,7 @@ def test_every_command_and_snippet_of_a_document_runs(path: Path) -> None:
         result = CliRunner().invoke(app, words)
         assert result.exit_code == 0, f"{command}\n{result.output}\n{result.exception!r}"
     for snippet in blocks(path, "python"):
-        exec(compile(snippet, path.name, "exec"), {})  # noqa: S102 - the document's own code
+        exec(compile(snippet, path.name, "exec"), {})
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda p: p.name)

@@ -103,7 +103,7 @@ def chain_from_model(model: Any, owner: str) -> Chain:  # noqa: ANN401 - Pinocch
                 f"{owner}: joint {name!r} branches off {model.names[model.parents[k]]!r}; only "
                 "serial arms are supported. Remove the gripper or lock its joints (type fixed)."
             )
-        turn = align_z(joint_axis(model.joints[k], name, owner))
+        turn = align_z(joint_axis(model, k, owner))
         place = model.jointPlacements[k]
         rotations.append(turn_before.T @ place.rotation @ turn)
         translations.append(turn_before.T @ place.translation)
@@ -131,17 +131,24 @@ def chain_from_model(model: Any, owner: str) -> Chain:  # noqa: ANN401 - Pinocch
     )
 
 
-def joint_axis(joint: Any, name: str, owner: str) -> Array:  # noqa: ANN401
+def joint_axis(model: Any, index: int, owner: str) -> Array:  # noqa: ANN401
     """The unit axis of a revolute joint in its own frame. (3,)"""
+    import pinocchio as pin
+
+    joint = model.joints[index]
     kind = joint.shortname()
     if kind in AXES:
         return np.array(AXES[kind])
-    if kind.startswith("JointModelRevolute"):
-        return np.array(joint.extract().axis)
-    raise RobotError(
-        f"{owner}: joint {name!r} is a {kind.removeprefix('JointModel')}, not revolute; only arms "
-        "of revolute joints are supported. Lock it (type fixed) if it belongs to a gripper."
-    )
+    if not kind.startswith("JointModelRevolute"):
+        raise RobotError(
+            f"{owner}: joint {model.names[index]!r} is a {kind.removeprefix('JointModel')}, not "
+            "revolute; only arms of revolute joints are supported. Lock it (type fixed) if it "
+            "belongs to a gripper."
+        )
+    data = model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    local = pin.getJointJacobian(model, data, index, pin.ReferenceFrame.LOCAL)
+    return np.array(local[3:, joint.idx_v])
 
 
 def align_z(axis: Array) -> Array:
