@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
+from vftcli.outputs.wrench_tables import latex_axes, markdown_axes, terminal_axes
+
 AT_FLOOR = 1.2
 """An RMSE within this factor of the reference's floor cannot be told from the reference's own."""
 
@@ -118,7 +120,7 @@ def terminal(errors: pl.DataFrame) -> str:
     found = blocks(errors)
     if not found:
         return "no errors to show: the estimates and the reference have no sample in common\n"
-    return "\n".join(terminal_block(table) for table in found) + explanation(found)
+    return "\n".join(terminal_block(table) for table in found) + explanation(found) + terminal_axes(errors)
 
 
 def terminal_block(table: Block) -> str:
@@ -178,7 +180,7 @@ def to_csv(errors: pl.DataFrame) -> str:
 
 def to_markdown(errors: pl.DataFrame) -> str:
     """The RMSE tables as GitHub Markdown, best value of each joint bold."""
-    return "\n".join(markdown_block(table) for table in blocks(errors))
+    return "\n".join(markdown_block(table) for table in blocks(errors)) + markdown_axes(errors)
 
 
 def markdown_block(table: Block) -> str:
@@ -204,7 +206,7 @@ def escape_markdown(text: str) -> str:
 
 def to_latex(errors: pl.DataFrame) -> str:
     """The RMSE tables as LaTeX tabulars (needs ``booktabs``), best value of each joint bold."""
-    return "\n".join(latex_block(table) for table in blocks(errors))
+    return "\n".join(latex_block(table) for table in blocks(errors)) + latex_axes(errors)
 
 
 def latex_block(table: Block) -> str:

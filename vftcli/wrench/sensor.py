@@ -8,7 +8,8 @@ import numpy as np
 from vftcli.arrays import Array, frozen, is_uniform, median
 from vftcli.errors import ParameterError
 from vftcli.robots.conventions import Pose
-from vftcli.wrench.frames import skew
+from vftcli.wrench.frames import angles_of, skew
+from vftcli.wrench.solvers import SCALE
 from vftcli.wrench.wrench import Mask
 
 LEAST_DIRECTIONS = 0.02
@@ -168,8 +169,8 @@ class Offset(NamedTuple):
 def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offset:
     """The lag of `late` behind `early` at which they correlate best, all columns together.
 
-    Columns are weighed by their own spread, so that moments count beside forces. The peak is
-    refined by a parabola through its neighbours.
+    Of six columns the last three are moments and count by a lever of 0.3 m. The peak is refined
+    by a parabola through its neighbours.
 
     Args:
         t: Common clock. (T,) [s]
@@ -179,7 +180,7 @@ def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offs
     """
     step = median(np.diff(t))
     even = t if is_uniform(t) else np.arange(t[0], t[-1], step)
-    x, y = (standardised(resampled(t, series, even)) for series in (late, early))
+    x, y = (comparable(resampled(t, series, even)) for series in (late, early))
     count = len(even)
     reach = min(int(limit / step), count - 2)
     size = 1 << int(np.ceil(np.log2(2 * count)))
@@ -207,18 +208,14 @@ def resampled(t: Array, series: Array, even: Array) -> Array:
     return np.column_stack(columns)
 
 
-def standardised(series: Array) -> Array:
-    """Columns without mean, divided by their spread; a column that stands still is zero. (N, k)"""
-    centred = series - series.mean(axis=0)
-    spread = centred.std(axis=0)
-    scaled: Array = centred / np.where(spread > 0, spread, np.inf)
-    return scaled
+def comparable(series: Array) -> Array:
+    """Columns without mean; moments of a wrench as the forces of a lever of 0.3 m. (N, k)"""
+    centred: Array = series - series.mean(axis=0)
+    return centred / SCALE if series.shape[1] == len(SCALE) else centred
 
 
 def described(fit: PoseFit) -> str:
     """A fitted pose in words."""
-    from vftcli.wrench.frames import angles_of
-
     x, y, z = fit.pose.translation * 1e3
     roll, pitch, yaw = np.degrees(angles_of(fit.pose.rotation))
     sx, sy, sz = fit.position_sd * 1e3

@@ -107,6 +107,7 @@ class VendorCheck:
         axes: Order, sign and gain of its axes in that frame.
         offset: Its lag behind ours, negative where it is earlier.
         zeros: Share of the samples in which it is exactly zero on all axes.
+        at_zeros: What our force reads there, rms of its norm. [N]
     """
 
     said: str
@@ -114,13 +115,17 @@ class VendorCheck:
     axes: AxesFit | None
     offset: Offset
     zeros: float
+    at_zeros: float
 
     def sentences(self) -> tuple[str, ...]:
         """The findings in words."""
         found = []
         if self.zeros > 0:
             what = "every sample" if self.zeros == 1.0 else f"{self.zeros:.1%} of the samples"
-            found.append(f"the log's wrench is all zeros in {what}: no measurement, not no force")
+            found.append(
+                f"the log's wrench is exactly zero in {what}, where ours reads "
+                f"{self.at_zeros:.2g} N rms: a zero there need not mean no force"
+            )
         if self.axes is None or not self.axes.correlation > RESEMBLES:
             if self.zeros < 1.0:
                 found.append(
@@ -160,10 +165,13 @@ def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorChec
     said = recording.wrench_frame or "frame not stated"
     empty = ~np.any(theirs, axis=1)
     zeros = float(np.mean(empty))
+    norm = np.linalg.norm(ours.force[empty & ~ours.hidden], axis=1)
+    at_zeros = float(np.sqrt(np.mean(norm**2))) if len(norm) else float("nan")
+    shares = {"zeros": zeros, "at_zeros": at_zeros}
     usable = ~empty & ~ours.hidden
     if np.count_nonzero(usable) < 10:
         nothing = Offset(float("nan"), float("nan"))
-        return VendorCheck(said=said, frame="base", axes=None, offset=nothing, zeros=zeros)
+        return VendorCheck(said=said, frame="base", axes=None, offset=nothing, **shares)
     flange = link_poses(chain, recording.q).rotation[:, -1]
     forces = {"base": ours.force, "flange": np.einsum("tji,tj->ti", flange, ours.force)}
     given = np.where(usable[:, None], theirs[:, :3], np.nan)
@@ -173,4 +181,4 @@ def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorChec
     offset = time_offset(recording.t, given, turned)
     moved = resampled(recording.t, turned, recording.t - offset.lag)
     axes = fit_axes(np.where(usable[:, None], moved, np.nan) @ fits[frame].matrix, given)
-    return VendorCheck(said=said, frame=frame, axes=axes, offset=offset, zeros=zeros)
+    return VendorCheck(said=said, frame=frame, axes=axes, offset=offset, **shares)
