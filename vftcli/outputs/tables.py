@@ -120,7 +120,8 @@ def terminal(errors: pl.DataFrame) -> str:
     found = blocks(errors)
     if not found:
         return "no errors to show: the estimates and the reference have no sample in common\n"
-    return "\n".join(terminal_block(table) for table in found) + explanation(found) + terminal_axes(errors)
+    joints = "\n".join(terminal_block(table) for table in found)
+    return joints + explanation(found) + terminal_axes(errors)
 
 
 def terminal_block(table: Block) -> str:
