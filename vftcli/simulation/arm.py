@@ -17,6 +17,10 @@ from vftcli.simulation.touch import Touching
 
 WARMING_STEPS = 250
 """Inner steps between two updates of the friction's temperature."""
+CHECK_STEPS = 10
+"""Inner steps between two looks at whether the arm still moves like an arm."""
+RUNAWAY = 200.0
+"""Joint velocity no arm reaches. [rad/s]"""
 
 
 @dataclass(kw_only=True)
@@ -105,7 +109,7 @@ class Arm:
         h = scenario.step
         q, v = start.q[0], start.dq[0]
         self.plant = Plant(self.true.chain.to_pinocchio(), self.true.friction, q, v, h)
-        self.servo = Servo(scenario.servo, self.true.nominal, q)
+        self.servo = Servo(scenario.servo, self.true.nominal, q, h)
         self.steps = int(np.ceil(duration / h - 1e-9))
         self.touching = Touching(
             scenario.contacts, self.robot.chain, self.steps, h, self.seeds["contacts"]
@@ -131,11 +135,14 @@ class Arm:
     def command(self, q_d: Array, dq_d: Array | None = None, ddq_d: Array | None = None) -> None:
         """Make one inner step towards a commanded position, with the servo's own feed-forward.
 
+        A position outside the joint limits is brought to them.
+
         Args:
             q_d: Commanded positions. (n,) [rad]
             dq_d: Commanded velocities, zero if not given. (n,) [rad/s]
             ddq_d: Commanded accelerations, zero if not given. (n,) [rad/s²]
         """
+        q_d = self.servo.within(np.asarray(q_d, dtype=float))
         nothing = np.zeros_like(q_d)
         rows = [q_d, nothing if dq_d is None else dq_d, nothing if ddq_d is None else ddq_d]
         reference = Reference(*(np.asarray(row, dtype=float)[None] for row in rows))
@@ -160,6 +167,17 @@ class Arm:
             plant.advance(tau)
         history.a[k], history.friction[k] = plant.a, plant.friction
         history.rows = k + 1
+        if k % CHECK_STEPS == 0:
+            self.check_motion()
+
+    def check_motion(self) -> None:
+        """Raise a ParameterError if the loop has become unstable."""
+        fastest = float(np.max(np.abs(self.plant.v)))
+        if not fastest < RUNAWAY:
+            raise ParameterError(
+                f"the arm runs away at {self.t:.3f} s: servo or contacts are too stiff for a step "
+                f"of {self.scenario.step:g} s; lower servo.stiffness, a contact's stiffness or step"
+            )
 
     def warm(self, t: float) -> None:
         """Let the viscous friction follow the joints' temperature."""
@@ -170,6 +188,7 @@ class Arm:
 
     def finished(self) -> History:
         """The history so far, with the state after the last step as its closing row."""
+        self.check_motion()
         history, k = self.history, self.history.rows
         history.q[k], history.v[k] = self.plant.q, self.plant.v
         for name in ("target_q", "target_dq", "target_ddq", "tau", "friction", "a"):

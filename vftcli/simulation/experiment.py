@@ -18,8 +18,8 @@ from vftcli.simulation.trajectories import plan
 from vftcli.simulation.truth import Truth, tell_truth
 from vftcli.simulation.vendor import Vendor, vendor_view
 
-LONGEST = 3600.0
-"""Longest run. [s]"""
+MOST_STEPS = 2_000_000
+"""Most inner steps of a run: half an hour at 1 ms, a gigabyte of history."""
 REPORT_STEPS = 500
 """Inner steps between two reports of progress."""
 
@@ -99,10 +99,15 @@ def prepare(scenario: Scenario, seed: int) -> tuple[Arm, Reference]:
     check_sensing(scenario.sensing)
     robot = load_robot(scenario.robot)
     duration = scenario.duration or scenario.trajectory.motion(robot).duration
-    if not 0.0 < duration <= LONGEST:
-        raise ParameterError(f"duration is {duration:g} s; it must lie in 0 to {LONGEST:g} s")
-    if scenario.step <= 0:
-        raise ParameterError(f"step is {scenario.step:g} s; it must be positive")
+    if duration <= 0 or scenario.step <= 0:
+        raise ParameterError(
+            f"duration {duration:g} s and step {scenario.step:g} s: both must be positive"
+        )
+    if duration / scenario.step > MOST_STEPS:
+        raise ParameterError(
+            f"duration {duration:g} s at a step of {scenario.step:g} s is more than {MOST_STEPS} "
+            "steps; shorten it"
+        )
     steps = int(np.ceil(duration / scenario.step - 1e-9))
     reference = plan(scenario.trajectory, robot, np.arange(steps + 1, dtype=float) * scenario.step)
     arm = Arm(scenario, seed, Reference(*(rows[:1] for rows in reference)), duration)

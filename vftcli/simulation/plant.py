@@ -55,18 +55,29 @@ class Plant:
         self.true_friction = friction
         self.step = step
         self.q, self.v = np.array(q, dtype=float), np.array(v, dtype=float)
-        self.v_before = self.v.copy()
         self.q_mid, self.v_mid = self.q.copy(), self.v.copy()
         self.a = np.zeros_like(self.q)
+        self.moved = False
         self.friction = np.zeros_like(self.q)
         self.external = np.zeros_like(self.q)
         self.signs = np.where(friction.coulomb > 0.0, np.sign(self.v), 1.0)
 
     def advance(self, tau: Array, external: External | None = None) -> None:
         """Move one step on under drive torques `tau` (n,) [N·m] and the contacts' torque."""
+        if not self.moved:
+            signs = self.signs
+            self.a = (self.impulses(tau, external) - self.v) / self.step
+            self.signs, self.moved = signs, True
+        after = self.impulses(tau, external)
+        self.a = (after - self.v) / self.step
+        self.q = self.q + 0.5 * self.step * (self.v + after)
+        self.v = after
+
+    def impulses(self, tau: Array, external: External | None) -> Array:
+        """Velocities after the step, v_m extrapolated with the acceleration known so far. (n,)"""
         h, pin, model, data = self.step, self.pin, self.model, self.data
         q_mid = self.q + 0.5 * h * self.v
-        v_mid = 1.5 * self.v - 0.5 * self.v_before
+        v_mid = self.v + 0.5 * h * self.a
         v_mid[self.signs == 0.0] = 0.0
         bias = pin.nonLinearEffects(model, data, q_mid, v_mid)
         M = pin.crba(model, data, q_mid)
@@ -79,9 +90,6 @@ class Plant:
         M.flat[:: len(slope) + 1] += 0.5 * h * slope
         limit = h * self.true_friction.dry(self.v)
         after, impulse, self.signs = slide_or_stick(M, h * torque, self.v, limit, self.signs)
-        change = after - self.v
-        self.a = change / h
-        self.friction = smooth + 0.5 * slope * change + impulse / h
+        self.friction = smooth + 0.5 * slope * (after - self.v) + impulse / h
         self.q_mid, self.v_mid = q_mid, v_mid
-        self.q = self.q + 0.5 * h * (self.v + after)
-        self.v_before, self.v = self.v, after
+        return after

@@ -14,6 +14,8 @@ from vftcli.simulation.schema import unknown
 
 STIFFNESS = {"stiff": 90.0, "soft": 28.0}
 """Natural frequency of the position loop by name. [rad/s]"""
+FASTEST_LOOP = 0.4
+"""Largest natural frequency times step: beyond it the sampled loop is badly damped or unstable."""
 
 
 class Servo:
@@ -28,7 +30,7 @@ class Servo:
         limit: Torque limits; infinite where unknown. (n,) [N·m]
     """
 
-    def __init__(self, spec: ServoSpec, robot: Robot, start: Array) -> None:
+    def __init__(self, spec: ServoSpec, robot: Robot, start: Array, step: float) -> None:
         import pinocchio as pin
 
         if isinstance(spec.stiffness, str) and spec.stiffness not in STIFFNESS:
@@ -38,12 +40,23 @@ class Servo:
         omega = STIFFNESS[spec.stiffness] if isinstance(spec.stiffness, str) else spec.stiffness
         if omega <= 0 or spec.damping < 0:
             raise ParameterError("servo.stiffness must be positive and damping not negative")
+        if omega * step > FASTEST_LOOP:
+            raise ParameterError(
+                f"servo.stiffness {omega:g} rad/s chatters at a step of {step:g} s; it can be at "
+                f"most {FASTEST_LOOP / step:g}, or choose a smaller step"
+            )
         self.spec, self.robot = spec, robot
         self.model, self.data = robot.model, robot.model.createData()
         inertia = np.diag(pin.crba(self.model, self.data, start)).copy()
         self.kp, self.kd = omega**2 * inertia, 2.0 * spec.damping * omega * inertia
         known = np.isfinite(robot.limits.tau_max) & spec.torque_limits
         self.limit = np.where(known, robot.limits.tau_max, np.inf)
+        self.q_min = np.where(np.isfinite(robot.limits.q_min), robot.limits.q_min, -np.inf)
+        self.q_max = np.where(np.isfinite(robot.limits.q_max), robot.limits.q_max, np.inf)
+
+    def within(self, q_d: Array) -> Array:
+        """A commanded position brought inside the joint limits. (n,) [rad]"""
+        return np.clip(q_d, self.q_min, self.q_max)
 
     def feed_forward(self, reference: Reference) -> Array:
         """Nominal torque along a reference; gravity only if so asked. (T, n) [N·m]"""

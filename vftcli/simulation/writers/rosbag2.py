@@ -33,7 +33,8 @@ class Topic(NamedTuple):
 def write_rosbag2(path: Path, simulation: Simulation) -> None:
     """Write the log as a bag folder.
 
-    Effort is the motor current for a UR arm, in ampere, as its driver has it. A flange sensor is a second topic, WrenchStamped in the sensor's frame.
+    Effort is the motor current for a UR arm, in ampere, as its driver has it. A flange sensor is a
+    second topic, WrenchStamped in the sensor's frame.
     """
     from rosbags.rosbag2 import StoragePlugin, Writer
 

@@ -1,0 +1,107 @@
+"""Contacts one by one."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from vftcli.errors import ParameterError
+from vftcli.simulation.contact import Place
+from vftcli.simulation.contacts import RandomWalkSpec
+from vftcli.simulation.hand import HandSpec
+from vftcli.simulation.pushes import STYLES, LoadSpec, ProfileSpec, PushesSpec
+from vftcli.simulation.stop import StopSpec
+from vftcli.simulation.touch import draw_walk
+
+HERE = Place(np.eye(3), np.array([0.4, 0.1, 0.3]), np.zeros(3), np.zeros(3))
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(1)
+
+
+def test_profile_rises_holds_and_falls() -> None:
+    contact = ProfileSpec(name="p", spans=((1.0, 3.0),), force=(0, 0, 10.0)).start(rng(), 5.0)
+    sizes = [contact.wrench(t, HERE)[2] for t in (0.5, 1.1, 2.0, 2.9, 3.5)]
+    np.testing.assert_allclose(sizes, [0.0, 5.0, 10.0, 5.0, 0.0], atol=1e-12)
+
+
+def test_profile_in_link_axes_turns_with_the_link() -> None:
+    spec = ProfileSpec(name="p", spans=((0.0, 2.0),), force=(4.0, 0, 0), axes="link")
+    turned = HERE._replace(rotation=np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]))
+    np.testing.assert_allclose(spec.start(rng(), 2.0).wrench(1.0, turned)[:3], [0, 4, 0])
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_pushes_stay_inside_what_they_are_drawn_from(style: str) -> None:
+    limits = STYLES[style]
+    pushes = PushesSpec(name="h", style=style, begin=1.0).start(rng(), 200.0).pushes
+    assert len(pushes) > 50
+    assert pushes[0].start >= 1.0
+    assert pushes[-1].stop <= 200.0
+    for before, after in pairwise(pushes):
+        assert after.start - before.stop >= limits.pause[0]
+    for push in pushes:
+        assert limits.length[0] <= push.stop - push.start <= limits.length[1] + 1e-9
+        assert limits.force[0] <= np.linalg.norm(push.wrench[:3]) <= limits.force[1]
+
+
+def test_hand_pulls_to_where_it_goes_and_lets_go() -> None:
+    spec = HandSpec(
+        name="h", spans=((1.0, 2.0),), moves=((0.1, 0, 0),), stiffness=200.0, reach=0.2, release=0.0
+    )
+    hand = spec.start(rng(), 3.0)
+    assert not hand.active(0.5)
+    np.testing.assert_allclose(hand.wrench(1.0, HERE), 0.0, atol=1e-12)
+    np.testing.assert_allclose(hand.wrench(1.5, HERE)[:3], [20.0, 0, 0])
+    moved = HERE._replace(
+        position=HERE.position + np.array([0.1, 0, 0]), velocity=np.array([0.2, 0, 0])
+    )
+    np.testing.assert_allclose(hand.wrench(1.6, moved)[:3], [-15.0 * 0.2, 0, 0], atol=1e-12)
+    assert not hand.active(2.0)
+
+
+def test_hand_twists_about_its_turn() -> None:
+    spec = HandSpec(
+        name="h", spans=((0.0, 1.0),), turns=((0, 0, 0.5),), twist_stiffness=10.0, reach=0.1
+    )
+    hand = spec.start(rng(), 1.0)
+    hand.wrench(0.0, HERE)
+    np.testing.assert_allclose(hand.wrench(0.5, HERE)[3:], [0, 0, 5.0], atol=1e-12)
+
+
+def test_load_pulls_straight_down() -> None:
+    load = LoadSpec(name="l", weight=9.2, spans=((0.0, 4.0),)).start(rng(), 4.0)
+    np.testing.assert_allclose(load.wrench(2.0, HERE), [0, 0, -9.2, 0, 0, 0])
+
+
+def test_stop_pushes_and_never_pulls() -> None:
+    stop = StopSpec(name="s", through=(0, 0, 0.31), stiffness=1000.0, damping=100.0)
+    wall = stop.start(rng(), 1.0)
+    np.testing.assert_allclose(wall.wrench(0.0, HERE)[:3], [0, 0, 10.0])
+    leaving = HERE._replace(velocity=np.array([0.0, 0, 1.0]))
+    np.testing.assert_array_equal(wall.wrench(0.0, leaving), 0.0)
+    away = HERE._replace(position=np.array([0.4, 0.1, 0.32]))
+    np.testing.assert_array_equal(wall.wrench(0.0, away), 0.0)
+
+
+def test_random_walk_gains_its_intensity() -> None:
+    walk = draw_walk(RandomWalkSpec(name="w", intensity=(4.0,)), 500, 1000, 1e-3, rng())
+    # variance of 500 walks after 1 s: 4 (N·m)², good to 2·4/√1000 = 0.25 (one sigma)
+    assert np.var(walk.torque[-1]) == pytest.approx(4.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        (PushesSpec(name="h", style="tapps"), "Did you mean taps"),
+        (PushesSpec(name="h", length=(0.0, 1.0)), "must be positive"),
+        (LoadSpec(name="l", weight=-1.0, spans=()), "negative"),
+        (StopSpec(name="s", through=(0, 0, 0), normal=(0, 0, 0)), "no length"),
+        (HandSpec(name="h", spans=((0, 1),), moves=((0, 0, 0), (0, 0, 0))), "one for each"),
+        (ProfileSpec(name="p", spans=(), axes="tool"), "There is base, link"),
+    ],
+)
+def test_impossible_contacts_are_refused(spec: object, words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        spec.start(rng(), 1.0)  # type: ignore[attr-defined]

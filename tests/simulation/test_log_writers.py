@@ -1,0 +1,152 @@
+"""What `simulate` writes, the readers read back, to the format's own precision."""
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from vftcli.errors import OutputError, ParameterError
+from vftcli.readers import read
+from vftcli.readers.references import read_reference
+from vftcli.simulation import Simulation, load_scenario, simulate
+from vftcli.simulation.saving import companions, save
+from vftcli.simulation.writers import WRITERS
+from vftcli.simulation.writers.flange import force_estimate
+
+LOSSY = ["duration=2.0", "sensing.repeated=0.02", "sensing.dropped=0.02"]
+
+
+@pytest.fixture(scope="module")
+def ur5() -> Simulation:
+    return simulate(load_scenario("ur5-circle", [*LOSSY, "contacts.hand.begin=0.0"]), 1)
+
+
+@pytest.fixture(scope="module")
+def panda() -> Simulation:
+    return simulate(load_scenario("panda-bearing", LOSSY), 1)
+
+
+@pytest.fixture(scope="module")
+def sensed() -> Simulation:
+    return simulate(load_scenario("ur5-sensor", ["duration=1.0"]), 1)
+
+
+# absolute tolerance: what the format keeps (nine and six decimals; six significant digits of a
+# torque below 100 N·m and an angle below 10 rad; all of a double)
+CASES = [
+    ("ur5", "rtde", "log.csv", 5e-10),
+    ("ur5", "ur-rtde", "log.csv", 5.1e-7),
+    ("ur5", "parquet", "log.parquet", 0.0),
+    ("ur5", "rosbag2", "bag", 0.0),
+    ("panda", "libfranka", "log.csv", 5.1e-5),
+    ("panda", "parquet", "log.parquet", 0.0),
+    ("panda", "rosbag2", "bag", 0.0),
+]
+
+
+@pytest.mark.parametrize(("who", "form", "name", "kept"), CASES)
+def test_readers_read_back_what_is_written(
+    who: str,
+    form: str,
+    name: str,
+    kept: float,
+    tmp_path: Path,
+    request: pytest.FixtureRequest,
+) -> None:
+    run: Simulation = request.getfixturevalue(who)
+    save(run, tmp_path / name, form)
+    back, mine = read(tmp_path / name), run.recording
+    assert back.samples == mine.samples
+    assert back.source.duplicates == mine.source.duplicates > 0
+    # stamps of 100 s in doubles: 1e-14; a bag counts nanoseconds
+    np.testing.assert_allclose(back.t, mine.t, atol=2e-9)
+    compared = 0
+    for signal in ("q", "dq", "current", "torque", "target_q", "target_current", "tau_ext"):
+        there, here = getattr(back, signal), getattr(mine, signal)
+        if there is not None and here is not None:
+            np.testing.assert_allclose(there, here, rtol=0, atol=kept + 1e-15, err_msg=signal)
+            compared += 1
+    assert compared >= 3
+
+
+def test_full_recipe_has_the_columns_of_the_client(ur5: Simulation, tmp_path: Path) -> None:
+    save(ur5, tmp_path / "log.csv")
+    text = (tmp_path / "log.csv").read_bytes()
+    header = text.split(b"\r\n")[0].split(b" ")
+    assert len(header) == 119  # the client's default recipe
+    assert header[0] == b"timestamp"
+    assert header[-1] == b"joint_position_deviation_ratio"
+    assert all(len(line.split(b" ")) == 119 for line in text.split(b"\r\n")[:-1])
+
+
+def test_libfranka_log_has_its_columns_and_sign(panda: Simulation, tmp_path: Path) -> None:
+    save(panda, tmp_path / "log.csv")
+    lines = (tmp_path / "log.csv").read_text().splitlines()
+    names = lines[0].split(",")
+    assert len(names) == 87
+    assert names[:3] == ["time", "success_rate", "state.q[0]"]
+    row = [float(v) for v in lines[1].split(",")]
+    column = names.index("state.tau_ext_hat_filtered[1]")
+    assert row[column] == pytest.approx(-panda.vendor.tau_ext[0, 1], rel=1e-5)
+    assert row[0] == 100_000.0
+
+
+def test_sensor_is_logged_in_every_format(sensed: Simulation, tmp_path: Path) -> None:
+    save(sensed, tmp_path / "log.csv")
+    header = (tmp_path / "log.csv").read_text().splitlines()[0]
+    assert header.endswith("ft_raw_wrench_5")
+    for form, name in (("parquet", "log.parquet"), ("rosbag2", "bag")):
+        save(sensed, tmp_path / name, form)
+        back = read(tmp_path / name)
+        np.testing.assert_array_equal(back.require("wrench"), sensed.force_sensor)
+
+
+def test_truth_is_on_the_clock_of_the_log(ur5: Simulation, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    save(ur5, path)
+    truth, log = read_reference(companions(path)[0], None), read(path)
+    assert truth.t[0] == pytest.approx(log.source.t0, abs=1e-12)
+    assert truth.tau is not None
+    np.testing.assert_array_equal(truth.tau, ur5.truth.tau_ext)
+    table = pl.read_parquet(companions(path)[0])
+    axes = [f"wrench/{a}" for a in ("fx", "fy", "fz", "mx", "my", "mz")]
+    assert table.columns == ["t", *(f"tau_ext/{j}" for j in range(1, 7)), *axes]
+
+
+def test_existing_files_are_kept_unless_forced(ur5: Simulation, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    companions(path)[0].write_text("mine")
+    with pytest.raises(OutputError, match="--force"):
+        save(ur5, path)
+    assert not path.exists()
+    save(ur5, path, force=True)
+    save(ur5, tmp_path / "bag", "rosbag2")
+    save(ur5, tmp_path / "bag", "rosbag2", force=True)
+    assert path.exists()
+    assert sorted(p.name for p in tmp_path.iterdir() if p.name.startswith(".")) == []
+
+
+def test_a_robot_logs_only_in_its_own_formats(
+    ur5: Simulation, panda: Simulation, tmp_path: Path
+) -> None:
+    for run, form in ((ur5, "libfranka"), (panda, "rtde"), (panda, "ur-rtde")):
+        with pytest.raises(ParameterError, match="--as"):
+            save(run, tmp_path / "log", form)
+    with pytest.raises(ParameterError, match="Did you mean rosbag2"):
+        save(ur5, tmp_path / "log", "rosbag")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_every_writer_is_tried() -> None:
+    assert {form for _, form, _, _ in CASES} == set(WRITERS)
+
+
+def test_force_estimate_inverts_the_jacobian_where_it_can() -> None:
+    rng = np.random.default_rng(2)
+    J, wrench = rng.standard_normal((20, 6, 7)), rng.standard_normal((20, 6))
+    tau = np.einsum("kij,ki->kj", J, wrench)
+    found, regular = force_estimate(J, tau)
+    # random matrices: condition below 1e3
+    np.testing.assert_allclose(found[regular], wrench[regular], atol=1e-10)
+    assert np.count_nonzero(regular) > 10

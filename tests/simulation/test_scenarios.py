@@ -1,0 +1,147 @@
+"""Scenario files: every built-in one runs, what is wrong is named."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.errors import ParameterError, VftError
+from vftcli.simulation import load_scenario, scenario_names, simulate
+from vftcli.simulation.load import to_toml
+from vftcli.simulation.scenario import Scenario
+from vftcli.simulation.schema import build
+
+NAMES = (
+    "free-excitation",
+    "jointwise",
+    "panda-bearing",
+    "payload-pair",
+    "static-poses",
+    "ur5-circle",
+    "ur5-drag",
+    "ur5-sensor",
+    "ur5-table1",
+    "ur5-twist",
+)
+
+
+def test_the_paper_is_there() -> None:
+    assert scenario_names() == NAMES
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scenario_runs_and_its_file_makes_it_again(name: str, tmp_path: Path) -> None:
+    scenario = load_scenario(name, ["duration=0.2"])
+    run = simulate(scenario)
+    assert scenario.title
+    assert np.all(np.isfinite(run.recording.q))
+    path = tmp_path / "copy.toml"
+    path.write_text(to_toml(scenario, scenario.seed), encoding="utf-8")
+    assert load_scenario(path) == scenario
+
+
+def test_free_excitation_moves_a_panda() -> None:
+    run = simulate(load_scenario("free-excitation", ["robot=panda", "duration=0.5"]))
+    assert run.recording.joints == 7
+
+
+@pytest.mark.parametrize(("start", "stop", "axis"), [(7.0, 8.4, "force"), (18.5, 20.0, "force")])
+def test_drags_exceed_the_threshold(start: float, stop: float, axis: str) -> None:
+    run = simulate(load_scenario("ur5-drag", ["duration=20.5"]))
+    inside = (run.truth.t > start) & (run.truth.t < stop)
+    assert axis == "force"
+    # Table III: 20 N
+    assert np.max(np.abs(run.truth.wrench[inside, :3])) > 20.0
+
+
+def test_twists_exceed_the_threshold() -> None:
+    run = simulate(load_scenario("ur5-twist", ["duration=28"]))
+    for start, stop in ((13.9, 16.0), (25.7, 27.6)):
+        inside = (run.truth.t > start) & (run.truth.t < stop)
+        # Table III: 6 N·m
+        assert np.max(np.abs(run.truth.wrench[inside, 3:])) > 6.0
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (["servo.stifness=soft"], "Did you mean stiffness"),
+        (["servo.stiffness=hard"], "There is stiff, soft"),
+        (["sensor.rate=3"], "no scenario key 'sensor'"),
+        (["contacts.hnd.style=taps"], "Did you mean hand"),
+        (["contacts.hand.kind=push"], "Did you mean pushes"),
+        (["trajectory.kind=cirlce"], "Did you mean circle"),
+        (["step=two"], "must be a number"),
+        (["duration=inf"], "finite"),
+        (["pair=1"], "true or false"),
+        (["duration"], "takes key=value"),
+        (["servo=3"], "must be a section"),
+        (["title.x=3"], "is a value, not a section"),
+    ],
+)
+def test_wrong_keys_are_named(overrides: list[str], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        simulate(load_scenario("ur5-circle", [*overrides]))
+
+
+RUNAWAY = ["duration=1", "servo.damping=200", "servo.torque_limits=false", "friction.enabled=false"]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (["payload.mass=-1"], "mass is -1 kg"),
+        (["mismatch.mass=-0.1"], "must not be negative"),
+        (["duration=-3"], "must be positive"),
+        (["duration=1e9"], "shorten it"),
+        (["step=0.01", "duration=1"], "at most 0.001"),
+        (["robot=ur55"], "no robot 'ur55'"),
+        (["servo.stiffness=4000", "duration=1"], "at most 400"),
+        (["contacts.hand.kind=hand"], "no scenario key"),
+        (RUNAWAY, "runs away"),
+        (["contacts.hand.link=9"], "0 .flange. to 6"),
+    ],
+)
+def test_impossible_experiments_are_refused(overrides: list[str], words: str) -> None:
+    with pytest.raises(VftError, match=words):
+        simulate(load_scenario("ur5-circle", overrides))
+
+
+def test_unknown_scenario_lists_them() -> None:
+    with pytest.raises(ParameterError, match=r"Did you mean ur5-circle\?.*panda-bearing"):
+        load_scenario("ur5-cirle")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("name = 'x'\n[servo]\nstiffness = ", "not valid TOML"),
+        ("[trajectory]\nradius = 0.2\n", "trajectory.kind ''"),
+        ("[[contacts]]\nkind = 'load'\nname = 'l'\n", "lacks contacts.0..weight"),
+    ],
+)
+def test_broken_files_are_refused(text: str, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(ParameterError, match=words):
+        load_scenario(path)
+
+
+def test_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="cannot be read"):
+        load_scenario(tmp_path / "none.toml")
+
+
+def test_two_contacts_of_one_name_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "two.toml"
+    one = "[[contacts]]\nname='a'\nkind='load'\nweight=1.0\nspans=[[0.0,1.0]]\n"
+    path.write_text("duration = 0.1\n" + one + one)
+    with pytest.raises(ParameterError, match="two contacts are named 'a'"):
+        simulate(load_scenario(path))
+
+
+def test_words_with_quotes_survive_the_file() -> None:
+    scenario = build(Scenario, {"name": 'a"b\\c', "title": "two\nlines"}, "")
+    again = build(Scenario, tomllib.loads(to_toml(scenario, scenario.seed)), "")
+    assert again == scenario
