@@ -36,6 +36,11 @@ class Request:
         reference: Name of the reference, or None.
         free: Logs of free runs for the two-cycle difference.
         reference_columns: Column description of a reference file.
+        period: The commanded period of a repeated motion, None to find it. [s]
+        free_cycles: Its free cycles, as ``1`` or ``1,2``, None to find them.
+        alignment: Rung of the alignment ladder of the two-cycle difference, or "auto".
+        low_pass: Its zero-phase cutoff in Hz, "none", or "auto".
+        match: ``delay=S`` or ``bandwidth=HZ`` for all observers alike, or None.
         wrench: What is asked of the virtual force/torque sensor, None for joint torques alone.
     """
 
@@ -51,6 +56,11 @@ class Request:
     reference: str | None = None
     free: tuple[Path, ...] = ()
     reference_columns: str | None = None
+    period: float | None = None
+    free_cycles: str | None = None
+    alignment: str = "auto"
+    low_pass: str = "auto"
+    match: str | None = None
     wrench: "WrenchRequest | None" = None
 
 
@@ -117,7 +127,13 @@ def choose_observers(
         step=recording.step,
         as_printed=request.as_printed,
     )
-    return build_observers(request.observers, setup)
+    observers, notes = build_observers(request.observers, setup)
+    if request.match is None:
+        return observers, notes
+    from vftcli.observers.matching import matched
+
+    observers, remarks = matched(observers, request.match, setup)
+    return observers, (*notes, *remarks)
 
 
 def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
@@ -139,6 +155,10 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
             name=request.reference,
             free=free,
             columns=request.reference_columns,
+            period=request.period,
+            free_cycles=request.free_cycles,
+            alignment=request.alignment,
+            low_pass=request.low_pass,
             mounting=mounting,
         )
         reference = make_reference(sensed, robot, asked)

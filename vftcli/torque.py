@@ -18,6 +18,8 @@ class ExternalTorque:
         tau: External torque; NaN where it is not known. (T, n) [N·m]
         sd: One standard deviation of `tau` by the estimator's own account. (T, n) [N·m]
         floor: Root-mean-square error that the estimate itself is known to have. (n,) [N·m]
+        trusted: 1 where a sample may be relied on, 0 where it is shown but may not, as the
+            two-cycle difference of a joint at rest; None where nothing speaks against any. (T, n)
         notes: What a reader of the numbers should know, one sentence each.
     """
 
@@ -26,10 +28,11 @@ class ExternalTorque:
     tau: Array
     sd: Array | None = None
     floor: Array | None = None
+    trusted: Array | None = None
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("t", "tau", "sd", "floor"):
+        for name in ("t", "tau", "sd", "floor", "trusted"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(getattr(self, name)))
         if self.tau.ndim != 2:
@@ -38,6 +41,8 @@ class ExternalTorque:
         check_shape(self.tau, (len(self.t), self.tau.shape[1]), "tau", self.name)
         if self.sd is not None:
             check_shape(self.sd, self.tau.shape, "sd", self.name)
+        if self.trusted is not None:
+            check_shape(self.trusted, self.tau.shape, "trusted", self.name)
         if self.floor is not None:
             check_shape(self.floor, self.tau.shape[1:], "floor", self.name)
 

@@ -62,7 +62,7 @@ Reference = Annotated[
     str | None,
     typer.Option(
         metavar="REF",
-        help="two-cycle (with --free), sensor, vendor, zero, or file:PATH.",
+        help="two-cycle, sensor, vendor, zero, or file:PATH.",
     ),
 ]
 RequiredReference = Annotated[
@@ -70,7 +70,7 @@ RequiredReference = Annotated[
     typer.Option(
         "--reference",
         metavar="REF",
-        help="two-cycle (with --free), sensor, vendor, zero, or file:PATH.",
+        help="two-cycle, sensor, vendor, zero, or file:PATH.",
     ),
 ]
 Free = Annotated[
@@ -138,6 +138,37 @@ TorqueSd = Annotated[
     typer.Option(
         metavar="own|NUMBER(S)",
         help="Joint torque error behind the wrench's band [N·m]; own: the observer's covariance.",
+    ),
+]
+Period = Annotated[
+    float | None,
+    typer.Option(metavar="S", help="Commanded period of a repeated motion; found if not given."),
+]
+FreeCycles = Annotated[
+    str | None,
+    typer.Option(
+        "--free-cycles", metavar="1|1,2|1-3", help="Cycles free of contact; found if not given."
+    ),
+]
+Alignment = Annotated[
+    str,
+    typer.Option(
+        metavar="auto|commanded|period|phase|model",
+        help="How the two-cycle difference lays free and loaded motion over one another; auto "
+        "takes what has the smallest error on this log.",
+    ),
+]
+LowPass = Annotated[
+    str,
+    typer.Option(
+        "--low-pass", metavar="auto|none|HZ", help="Zero-phase low-pass of that difference."
+    ),
+]
+Match = Annotated[
+    str | None,
+    typer.Option(
+        metavar="delay=S|bandwidth=HZ",
+        help="Gains that give every observer the same delay or −3 dB bandwidth on every joint.",
     ),
 ]
 Folder = Annotated[

@@ -20,6 +20,11 @@ def report(
     as_printed: opt.AsPrinted = False,
     free: opt.Free = None,
     reference_columns: opt.ReferenceColumns = None,
+    period: opt.Period = None,
+    free_cycles: opt.FreeCycles = None,
+    alignment: opt.Alignment = "auto",
+    low_pass: opt.LowPass = "auto",
+    match: opt.Match = None,
     wrench: opt.WrenchFlag = False,
     frame: opt.Frame = None,
     solver: opt.Solver = None,
@@ -61,6 +66,11 @@ def report(
         reference=reference,
         free=paths(free),
         reference_columns=reference_columns,
+        period=period,
+        free_cycles=free_cycles,
+        alignment=alignment,
+        low_pass=low_pass,
+        match=match,
     )
     analyses = []
     for log in logs:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,7 +11,9 @@ from vftcli.errors import ReferenceTorqueError
 from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
 from vftcli.torque import ExternalTorque
-from vftcli.wrench.frames import NOTHING, Mounting
+
+if TYPE_CHECKING:
+    from vftcli.wrench.frames import Mounting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,12 +25,20 @@ class ReferenceRequest:
         free: Free runs of the same trajectory, already read, for ``two-cycle``.
         columns: The column description of a reference file, or None to recognise its columns.
         mounting: Where tool and sensor sit on the flange, for ``sensor``.
+        period: The commanded period of a repeated motion, or None to find it. [s]
+        free_cycles: Its free cycles, as ``1`` or ``1,2`` or ``1-3``, or None to find them.
+        alignment: Rung of the alignment ladder, or "auto".
+        low_pass: Cutoff of the two-cycle difference in Hz, "none", or "auto".
     """
 
     name: str
     free: tuple[Recording, ...] = ()
     columns: str | None = None
-    mounting: Mounting = NOTHING
+    mounting: "Mounting | None" = None
+    period: float | None = None
+    free_cycles: str | None = None
+    alignment: str = "auto"
+    low_pass: str = "auto"
 
 
 def zero(recording: Recording, _robot: Robot, _request: ReferenceRequest) -> ExternalTorque:
@@ -49,21 +60,23 @@ def vendor(recording: Recording, _robot: Robot, _request: ReferenceRequest) -> E
         t=recording.t,
         tau=recording.require("tau_ext"),
         notes=(
-            "reference vendor: the log's own external torque, itself an estimate unless the log was "
-            "simulated, so its floor is not known; the RMSE measures agreement, not accuracy",
+            "reference vendor: the log's own external torque, itself an estimate unless the log "
+            "was simulated, so its floor is not known; the RMSE measures agreement, not accuracy",
         ),
     )
 
 
 def two_cycle(recording: Recording, robot: Robot, request: ReferenceRequest) -> ExternalTorque:
-    """The two-cycle difference against a free run in another log."""
-    from vftcli.truth.two_cycle import two_cycle_reference
+    """The two-cycle difference, against cycles of the same log or free runs in others."""
+    from vftcli.truth.two_cycle import TwoCycleOptions, two_cycle_difference
 
-    if not request.free:
-        raise ReferenceTorqueError(
-            "two-cycle needs a free run of the same trajectory: give its log with --free"
-        )
-    return two_cycle_reference(recording, request.free, robot)
+    options = TwoCycleOptions(
+        period=request.period,
+        free_cycles=request.free_cycles,
+        alignment=request.alignment,
+        low_pass=request.low_pass,
+    )
+    return two_cycle_difference(recording, request.free, robot, options)
 
 
 def sensor(recording: Recording, robot: Robot, request: ReferenceRequest) -> ExternalTorque:

@@ -1,0 +1,175 @@
+"""Equal footing: gains that give every observer the same delay or the same bandwidth."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.observers import Setup
+from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
+from vftcli.observers.kalman import KalmanObserver
+from vftcli.observers.momentum import MomentumObserver
+from vftcli.observers.observer import Observer
+
+HALVINGS = 70
+"""Bisections of a gain's logarithm: its last digits are those of float64."""
+
+
+class Goal(NamedTuple):
+    """What every observer is to have on every joint.
+
+    Attributes:
+        quantity: "delay" or "bandwidth".
+        value: [s] or [Hz]
+    """
+
+    quantity: str
+    value: float
+
+
+def parse_goal(text: str) -> Goal:
+    """Read ``delay=S`` or ``bandwidth=HZ``.
+
+    Raises:
+        ParameterError: If it is neither, or not positive.
+    """
+    quantity, _, number = text.partition("=")
+    try:
+        value = float(number)
+    except ValueError:
+        value = float("nan")
+    if quantity.strip() not in MEASURES or not (np.isfinite(value) and value > 0):
+        raise ParameterError(
+            f"--match {text!r} is not delay=S (seconds) or bandwidth=HZ, a positive number"
+        )
+    return Goal(quantity.strip(), value)
+
+
+def matched(
+    observers: Sequence[Observer], text: str, setup: Setup
+) -> tuple[tuple[Observer, ...], tuple[str, ...]]:
+    """Re-tune observers to one delay or −3 dB bandwidth per joint, with notes on their gains.
+
+    A first-order observer has one gain to move. A Kalman filter keeps R and Q_p and moves Q_τ,
+    which sets its natural frequency. Delay is that behind a slow ramp, 1/K or L₁/L₂ − Ts/2;
+    bandwidth is where the exact response to a sinusoid has fallen to 1/√2 of that to a constant.
+
+    Args:
+        observers: As built from profile and settings.
+        text: ``delay=S`` or ``bandwidth=HZ``.
+        setup: Joints, sample time, and whether the printed formulas run.
+
+    Raises:
+        ParameterError: If the goal is out of reach at the sample time, or an observer has neither.
+    """
+    goal = parse_goal(text)
+    if setup.as_printed:
+        raise ParameterError(
+            "--match tunes the corrected observers; the printed ones have another response. Leave "
+            "--match or --as-printed away"
+        )
+    tuned = tuple(tune(observer, goal, setup) for observer in observers)
+    return tuned, (note(goal, tuned),)
+
+
+def tune(observer: Observer, goal: Goal, setup: Setup) -> Observer:
+    """One observer with the gain that reaches the goal on every joint."""
+    if type(observer) not in KNOBS:
+        raise ParameterError(
+            f"--match cannot tune {observer.name}: it has no {goal.quantity} of its own to set; "
+            "choose fdo, gmo, kfo-fe or kfo-zoh with --observer"
+        )
+    turn, low, high = KNOBS[type(observer)]
+    measure = MEASURES[goal.quantity]
+    rising = goal.quantity == "bandwidth"
+    a, b = (np.full(setup.joints, np.log(limit)) for limit in (low, high))
+    ends = [measure(turn(observer, np.exp(x)), goal.value, setup) for x in (a, b)]
+    if not np.all((np.minimum(*ends) <= 0.0) & (np.maximum(*ends) >= 0.0)):
+        raise ParameterError(out_of_reach(observer, goal, setup))
+    for _ in range(HALVINGS):
+        middle = 0.5 * (a + b)
+        above = measure(turn(observer, np.exp(middle)), goal.value, setup) > 0.0
+        a, b = np.where(above == rising, a, middle), np.where(above == rising, middle, b)
+    return turn(observer, np.exp(0.5 * (a + b)))
+
+
+def out_of_reach(observer: Observer, goal: Goal, setup: Setup) -> str:
+    """One line on a goal that no gain reaches."""
+    limit = (
+        f"a delay of more than half a sample ({0.5 * setup.step:g} s)"
+        if goal.quantity == "delay"
+        else f"a bandwidth well below half the sample rate ({0.5 / setup.step:.4g} Hz)"
+    )
+    unit = {"delay": "s", "bandwidth": "Hz"}[goal.quantity]
+    return (
+        f"--match {goal.quantity}={goal.value:g}: no gain gives {observer.name} a "
+        f"{goal.quantity} of {goal.value:g} {unit} at {1.0 / setup.step:.4g} Hz; choose {limit}"
+    )
+
+
+def excess_delay(observer: Observer, goal: float, setup: Setup) -> Array:
+    """Delay less the wanted one. (n,) [s]"""
+    return observer.tuning(setup.step, setup.joints).delay - goal
+
+
+def excess_response(observer: Observer, goal: float, setup: Setup) -> Array:
+    """Gain at the wanted bandwidth, relative to that of a constant, less 1/√2. (n,)"""
+    frequency = np.array([goal])
+    response = np.abs(observer.frequency_response(frequency, setup.step, setup.joints)[0])
+    constant = observer.tuning(setup.step, setup.joints).dc_gain
+    excess: Array = response / constant - np.sqrt(0.5)
+    return excess
+
+
+MEASURES: dict[str, Callable[[Observer, float, Setup], Array]] = {
+    "delay": excess_delay,
+    "bandwidth": excess_response,
+}
+"""Quantity of ``--match`` → how far an observer is above the goal."""
+
+
+class Knob(NamedTuple):
+    """What is turned on an observer.
+
+    Attributes:
+        turn: Makes the observer anew with another value on each joint.
+        low: Least value.
+        high: Largest value.
+    """
+
+    turn: Callable[[Observer, Array], Observer]
+    low: float
+    high: float
+
+
+def turn_kalman(observer: Observer, value: Array) -> Observer:
+    """The Kalman observer with another Q_τ."""
+    return replace(cast("KalmanObserver", observer), q_tau_diag=value)
+
+
+KNOBS: dict[type, Knob] = {
+    FilteredDynamicsObserver: Knob(
+        lambda _, value: FilteredDynamicsObserver(omega=float(value[0])), 1e-3, 1e6
+    ),
+    MomentumObserver: Knob(lambda _, value: MomentumObserver(gain=value), 1e-3, 1e6),
+    KalmanObserver: Knob(turn_kalman, 1e-9, 1e18),
+}
+"""Observer → its knob: cutoff ω [rad/s], gain K [1/s], or Q_τ. A cutoff is one for all joints."""
+
+
+def note(goal: Goal, observers: Sequence[Observer]) -> str:
+    """What was matched, and why filtered dynamics and momentum observer then agree."""
+    unit = {"delay": "s", "bandwidth": "Hz"}[goal.quantity]
+    text = (
+        f"matched: every observer has a {goal.quantity} of {goal.value:g} {unit} on every joint; "
+        "the gains of the profile and of --set give way, R and Q_p stay"
+    )
+    if {"fdo", "gmo"} <= {observer.name for observer in observers}:
+        text += (
+            "; fdo and gmo are then one and the same filter (bilinear FDO(ω) ≡ bilinear "
+            "GMO(K = ωI)) and agree to rounding"
+        )
+    return text
