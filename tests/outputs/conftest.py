@@ -13,6 +13,7 @@ from vftcli.pipeline import Request, analyse
 from vftcli.recording import Recording, Source
 from vftcli.robots import load_robot
 from vftcli.torque import ExternalTorque
+from vftcli.wrench.measurement import WrenchRequest
 
 HOSTILE = '<script>alert("x")</script>&_%.csv'
 
@@ -59,3 +60,10 @@ def analysis(without_reference: Analysis) -> Analysis:
     errors = evaluate(made.recording.name, made.estimates, reference)
     made = replace(made, reference=reference, errors=errors)
     return replace(made, run=run_record(made, ["vftcli", "report", HOSTILE]))
+
+
+@pytest.fixture(scope="session")
+def with_wrench(recording: Recording) -> Analysis:
+    """The log's estimates with their wrenches in base axes."""
+    request = Request(robot="ur5", wrench=WrenchRequest(frame="base"))
+    return analyse(recording, load_robot("ur5"), request)

@@ -149,6 +149,19 @@ def test_without_a_reference_the_page_says_so(without_reference: Analysis) -> No
     assert [c["key"] for c in embedded(html)["charts"]] == ["tau", "drive", "q", "dq"]
 
 
+def test_wrenches_have_a_chart_an_axis(with_wrench: Analysis, html: str) -> None:
+    shown = render(with_wrench)
+    charts = embedded(shown)["wrenches"]
+    assert [chart["key"] for chart in charts] == ["fx", "fy", "fz", "mx", "my", "mz"]
+    assert [chart["unit"] for chart in charts] == ["N"] * 3 + ["N·m"] * 3
+    drawn = floats(charts[2]["series"][0]["lines"][0]["y"])
+    expected = with_wrench.wrenches[0].known[:, 2]
+    kept, known = drawn[np.isfinite(drawn)], expected[np.isfinite(expected)]
+    np.testing.assert_allclose(kept, known, rtol=1e-6)  # float32 holds seven digits
+    assert 'id="wrenches"' in shown
+    assert 'id="wrenches"' not in html
+
+
 def test_joints_that_agree_share_a_line() -> None:
     assert joint_values(np.array([10.0, 10.0])) == "10.0"
     text = joint_values(np.array([5.0, 10.0, 10.0, 7.0]))

@@ -16,6 +16,7 @@ from vftcli.outputs.rerun_recording import (
     write_rrd,
 )
 from vftcli.outputs.rerun_text import drawable
+from vftcli.wrench.wrench import AXES
 
 
 @pytest.fixture(scope="module")
@@ -112,6 +113,12 @@ def test_without_a_reference_there_are_no_residuals(
     entities = {chunk.entity_path for chunk in reader.stream()}
     assert "/tau_ext/J1" in entities
     assert not [entity for entity in entities if entity.startswith("/residual")]
+
+
+def test_wrenches_have_their_own_tab(with_wrench: Analysis) -> None:
+    lines = line_groups(with_wrench)["Wrench"]
+    assert [entry.path for entry in lines] == [f"/wrench/{a}" for a in AXES]
+    np.testing.assert_array_equal(lines[4].values[:, 1], with_wrench.wrenches[1].known[:, 4])
 
 
 def test_a_plot_shows_all_of_its_lines(analysis: Analysis) -> None:

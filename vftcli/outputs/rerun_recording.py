@@ -23,6 +23,7 @@ from vftcli.outputs.rerun_text import drawable
 from vftcli.outputs.run import CONVENTIONS, all_notes
 from vftcli.outputs.tables import escape_markdown, to_markdown
 from vftcli.torque import ExternalTorque
+from vftcli.wrench.wrench import AXES
 
 ARM_RATE = 50.0
 """Poses a second of the arm. [Hz]"""
@@ -89,6 +90,8 @@ def line_groups(analysis: Analysis) -> dict[str, list[Lines]]:
         groups["Residual"] = [
             joint_lines("residual", analysis, j, None, reference.tau[:, j]) for j in joints
         ]
+    if analysis.wrenches:
+        groups["Wrench"] = [wrench_lines(analysis, k) for k in range(len(AXES))]
     return {**groups, "Motion": motion_lines(analysis)}
 
 
@@ -130,6 +133,21 @@ def joint_lines(
         shades, widths = [REFERENCE, *shades], [2.5, *widths]
     path, title = f"/{group}/J{j + 1}", f"J{j + 1} {TITLES[group]}"
     return Lines(path, title, names, shades, widths, np.column_stack(columns))
+
+
+def wrench_lines(analysis: Analysis, k: int) -> Lines:
+    """One axis of every wrench, the reference first."""
+    colours = colours_of(analysis.estimates)
+    found = sorted(analysis.wrenches, key=lambda wrench: wrench.name != "reference")
+    title = f"{AXES[k]} in {found[0].frame} axes [{'N' if k < 3 else 'N·m'}]"
+    return Lines(
+        f"/wrench/{AXES[k]}",
+        title,
+        [wrench.name for wrench in found],
+        [colours.get(wrench.name, REFERENCE) for wrench in found],
+        [1.5 if wrench.name in colours else 2.5 for wrench in found],
+        np.column_stack([wrench.known[:, k] for wrench in found]),
+    )
 
 
 def motion_lines(analysis: Analysis) -> list[Lines]:

@@ -8,7 +8,7 @@
     const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
     return new Float32Array(bytes.buffer);
   };
-  for (const chart of [...data.charts, ...data.responses])
+  for (const chart of [...data.charts, ...(data.wrenches || []), ...data.responses])
     for (const series of chart.series)
       series.lines = series.lines.map((line) => ({ x: floats(line.x), y: floats(line.y) }));
 
@@ -74,7 +74,7 @@
       this.listen();
       new ResizeObserver(() => this.draw()).observe(this.area);
     }
-    get at() { return this.small ? this.joint : state.joint; }
+    get at() { return this.spec.at !== undefined ? this.spec.at : this.small ? this.joint : state.joint; }
     lines() {
       return this.spec.series.filter((s) => !state.hidden.has(s.name)).map((s) => ({ ...s, line: s.lines[this.at] }));
     }
@@ -128,7 +128,7 @@
       this.hover();
     }
     heading() {
-      this.title.textContent = this.small ? label(this.joint) : `${this.spec.title}, ${label(this.at)}`;
+      this.title.textContent = this.small ? label(this.joint) : this.spec.at !== undefined ? this.spec.title : `${this.spec.title}, ${label(this.at)}`;
       const band = this.spec.band && this.spec.band[this.at];
       this.note.textContent = this.small ? "" : band ? `grey: ${this.spec.bandLabel}, ${significant(band)} ${unit(this.spec, this.at)}` : "";
       this.figure.classList.toggle("chosen", this.small && this.joint === state.joint);
@@ -342,6 +342,7 @@
   }
   for (let j = 0; j < data.joints; j++) charts.push(new Chart(data.charts[0], document.getElementById("overview"), j));
   for (const spec of data.charts) charts.push(new Chart(spec, document.getElementById("detail")));
+  for (const spec of data.wrenches || []) charts.push(new Chart(spec, document.getElementById("wrenches")));
   for (const spec of data.responses) charts.push(new Chart(spec, document.getElementById("responses")));
   document.getElementById("all").addEventListener("click", () => { look("time", whole.time); look("frequency", whole.frequency); });
 

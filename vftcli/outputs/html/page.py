@@ -29,6 +29,7 @@ def render(analysis: Analysis) -> str:
             sections.remarks(remarks),
             sections.errors(analysis),
             sections.series(analysis),
+            sections.wrenches(analysis),
             sections.observers(analysis),
             sections.conventions(record),
             sections.provenance(record),

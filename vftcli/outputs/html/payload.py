@@ -12,6 +12,7 @@ from vftcli.arrays import Array
 from vftcli.dynamics.drive import drive_torque
 from vftcli.outputs.decimation import Line, decimated
 from vftcli.outputs.palette import DASHED, colours_of
+from vftcli.wrench.wrench import AXES
 
 STRETCHES = 2000
 """Stretches a long log is cut into: two samples a stretch are about what a wide screen can show."""
@@ -65,6 +66,7 @@ def payload(analysis: Analysis) -> str:
         "joints": analysis.recording.joints,
         "span": [float(t[0]), float(t[-1])],
         "charts": [packed(chart, t) for chart in time_charts(analysis)],
+        "wrenches": [{**packed(chart, t), "at": 0} for chart in wrench_charts(analysis)],
         "responses": responses(analysis),
     }
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
@@ -102,7 +104,7 @@ def reference_series(analysis: Analysis) -> tuple[Series, ...]:
     """The reference in the page's ink, if there is one."""
     if analysis.reference is None:
         return ()
-    return (Series(f"reference ({analysis.reference.name})", analysis.reference.tau),)
+    return (Series(legend_name(analysis, "reference"), analysis.reference.tau),)
 
 
 def motion_charts(analysis: Analysis) -> Iterator[Chart]:
@@ -113,6 +115,30 @@ def motion_charts(analysis: Analysis) -> Iterator[Chart]:
     yield Chart("q", "Position", "rad", (Series("measured", recording.q),))
     if recording.dq is not None:
         yield Chart("dq", "Velocity", "rad/s", (Series("measured", recording.dq),))
+
+
+def wrench_charts(analysis: Analysis) -> Iterator[Chart]:
+    """One chart an axis of the wrench, where wrenches were asked for."""
+    colours = colours_of(analysis.estimates)
+    found = sorted(analysis.wrenches, key=lambda wrench: wrench.name != "reference")
+    for k, axis in enumerate(AXES if found else ()):
+        series = tuple(
+            Series(
+                legend_name(analysis, w.name),
+                w.known[:, k : k + 1],
+                colours.get(w.name, "ink"),
+                w.name in DASHED,
+            )
+            for w in found
+        )
+        yield Chart(axis, f"{axis} in {found[0].frame} axes", "N" if k < 3 else "N·m", series)
+
+
+def legend_name(analysis: Analysis, name: str) -> str:
+    """A series' name in the legend: the reference's says which it is."""
+    if name == "reference" and analysis.reference is not None:
+        return f"reference ({analysis.reference.name})"
+    return name
 
 
 def packed(chart: Chart, t: Array) -> dict[str, Any]:
@@ -174,6 +200,7 @@ def responses(analysis: Analysis) -> list[dict[str, Any]]:
     return [
         {
             "key": "gain",
+            "lowest": -80,
             "title": "Gain from torque to estimate",
             "unit": "dB",
             **shape,

@@ -15,6 +15,7 @@ from vftcli.observers import OBSERVERS
 from vftcli.outputs.html.payload import STRETCHES, is_decimated
 from vftcli.outputs.run import observer_record
 from vftcli.outputs.tables import AT_FLOOR, Block, blocks, mean_of, significant, title
+from vftcli.outputs.wrench_tables import HEADER, AxisBlock, axis_blocks
 
 
 def facts(analysis: Analysis) -> str:
@@ -60,7 +61,8 @@ def errors(analysis: Analysis) -> str:
             "<code>--reference two-cycle|sensor|vendor|zero|file:PATH</code> gives one.</p>"
         )
     shown = "".join(rmse_table(block) for block in found)
-    return f"<h2>Errors against the reference</h2>{shown}{meaning(found)}{further(table)}"
+    axes = "".join(axis_table(block) for block in axis_blocks(table))
+    return f"<h2>Errors against the reference</h2>{shown}{meaning(found)}{axes}{further(table)}"
 
 
 def rmse_table(block: Block) -> str:
@@ -77,6 +79,14 @@ def rmse_table(block: Block) -> str:
         rows.append(f'<tr class="floor"><th scope="row">floor</th>{floors}{mean}</tr>')
     header = ["Observer", *(f"J{j}" for j in block.joints), "mean"]
     return html_table(f"RMSE in N·m: {title(block)}", header, rows)
+
+
+def axis_table(block: AxisBlock) -> str:
+    """RMSE of the wrenches: observers down, axes across."""
+    rows = []
+    for name, *numbers in block.rows:
+        rows.append(f"<tr>{observer_head(name)}{''.join(map(number_cell, numbers))}</tr>")
+    return html_table(f"RMSE: {block.title}", HEADER, rows)
 
 
 def rmse_cell(value: float, best: bool, at_floor: bool) -> str:
@@ -168,6 +178,18 @@ def series(analysis: Analysis) -> str:
         '<div class="buttons"><button type="button" id="all">Whole span</button></div></div>'
         '<div id="overview"></div><div id="detail"></div>'
         "<noscript><p>The charts need JavaScript; the tables do not.</p></noscript>"
+    )
+
+
+def wrenches(analysis: Analysis) -> str:
+    """The charts of the virtual sensor's wrenches, where they were asked for."""
+    if not analysis.wrenches:
+        return ""
+    return (
+        "<h2>Wrench over time</h2>"
+        '<p class="soft">Force and moment on the robot, as the virtual sensor tells them; the line '
+        "breaks where the pose cannot.</p>"
+        '<div class="responses" id="wrenches"></div>'
     )
 
 
