@@ -1,0 +1,229 @@
+"""Bad input: one line on stderr, exit 1 or 2, no traceback, and no partial output left."""
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.cli import main
+
+FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+    """Run the command line as installed; return its exit code, stdout and stderr."""
+
+    def call(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr("sys.argv", ["vftcli", *map(str, words)])
+        try:
+            main()
+        except SystemExit as stop:
+            code = stop.code if isinstance(stop.code, int) else 1
+        else:
+            code = 0
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return call
+
+
+def table(rows: int = 400, joints: int = 6) -> list[list[str]]:
+    """A headerless log t, q, dq, current as rows of cells."""
+    t = np.arange(rows) * 0.008
+    angle = t[:, None] + np.arange(joints)
+    values = np.column_stack([t, np.sin(angle), np.cos(angle), 0.5 * np.ones((rows, joints))])
+    return [[f"{v:.6f}" for v in row] for row in values]
+
+
+def saved(path: Path, rows: list[list[str]], end: str = "\n") -> Path:
+    path.write_text("\n".join(",".join(row) for row in rows) + end, encoding="utf-8")
+    return path
+
+
+def changed(rows: list[list[str]], row: int, column: int, text: str) -> list[list[str]]:
+    rows[row][column] = text
+    return rows
+
+
+def emptied(rows: list[list[str]], column: int) -> list[list[str]]:
+    for row in rows:
+        row[column] = "nan"
+    return rows
+
+
+COLUMNS = "t,q:6,dq:6,current:6"
+
+CASES: dict[str, tuple[Callable[[Path], Path], str, str]] = {
+    "empty file": (lambda d: saved(d / "log.csv", [], end=""), COLUMNS, "empty"),
+    "folder": (lambda d: d, COLUMNS, ""),
+    "no such file": (lambda d: d / "nothing.csv", COLUMNS, "nothing.csv"),
+    "too few columns described": (
+        lambda d: saved(d / "log.csv", table()), "t,q:6,dq:6", "describes 13 columns"
+    ),
+    "unknown signal described": (
+        lambda d: saved(d / "log.csv", table()), "t,q:6,speed:6,current:6", "--columns"
+    ),
+    "wrong joint count": (
+        lambda d: saved(d / "log.csv", table(joints=7)), "t,q:7,dq:7,current:7", "7 joints"
+    ),
+    "missing current": (
+        lambda d: saved(d / "log.csv", table()), "t,q:6,dq:6,_:6", "no motor currents"
+    ),
+    "missing velocity": (
+        lambda d: saved(d / "log.csv", table()), "t,q:6,_:6,current:6", "no joint velocities"
+    ),
+    "all-NaN column": (
+        lambda d: saved(d / "log.csv", emptied(table(), 14)), COLUMNS, "current of joint 2"
+    ),
+    "NaN in the middle": (
+        lambda d: saved(d / "log.csv", changed(table(), 200, 3, "nan")), COLUMNS, "q of joint 3"
+    ),
+    "time backwards": (
+        lambda d: saved(d / "log.csv", changed(table(), 200, 0, "0.5")), COLUMNS, "backwards"
+    ),
+    "one sample": (lambda d: saved(d / "log.csv", table(rows=1)), COLUMNS, "one sample"),
+    "letters in a number": (
+        lambda d: saved(d / "log.csv", changed(table(), 200, 3, "abc")), COLUMNS, ""
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("command", ["estimate", "report", "compare"])
+def test_a_bad_log_is_one_line(tmp_path: Path, run: Run, case: str, command: str) -> None:
+    make, columns, words = CASES[case]
+    inside = tmp_path / "in"
+    inside.mkdir()
+    log, out = make(inside), tmp_path / "out"
+    more = ["--reference", "zero"] if command == "compare" else ["-o", out]
+    code, stdout, stderr = run(command, log, "--robot", "ur5", "--columns", columns, *more)
+    assert code in {1, 2}
+    assert stdout == ""
+    assert "Traceback" not in stderr
+    errors = [line for line in stderr.splitlines() if line.startswith("error: ")]
+    assert len(errors) == 1, stderr
+    assert words in errors[0]
+    assert not out.exists()
+
+
+def test_binary_noise_is_one_line(tmp_path: Path, run: Run) -> None:
+    log = tmp_path / "noise.csv"
+    log.write_bytes(np.random.default_rng(0).bytes(5000))
+    code, _, stderr = run("estimate", log, "--robot", "ur5", "-o", tmp_path / "out")
+    assert code == 1
+    assert stderr.startswith("error: ")
+    assert stderr.count("\n") == 1
+
+
+def test_a_cut_last_row_is_dropped_and_said(tmp_path: Path, run: Run) -> None:
+    log = saved(tmp_path / "log.csv", [*table(), ["3.2", "0.1"]], end="")
+    out = tmp_path / "out"
+    code, _, stderr = run("estimate", log, "--robot", "ur5", "--columns", COLUMNS, "-o", out)
+    assert code == 0
+    assert "last" in stderr
+    assert "400 samples" in stderr
+
+
+def test_existing_output_is_kept_unless_forced(tmp_path: Path, run: Run) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "run.json").write_text("precious")
+    words = ("estimate", FIXTURE, "--robot", "ur5", "-o", out)
+    code, _, stderr = run(*words)
+    assert code == 1
+    assert "--force" in stderr
+    assert (out / "run.json").read_text() == "precious"
+    assert sorted(p.name for p in out.iterdir()) == ["run.json"]
+    assert run(*words, "--force")[0] == 0
+    assert (out / "run.json").read_text() != "precious"
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_an_unwritable_folder_is_one_line(tmp_path: Path, run: Run) -> None:
+    locked = tmp_path / "locked"
+    locked.mkdir(mode=0o500)
+    code, _, stderr = run("estimate", FIXTURE, "--robot", "ur5", "-o", locked / "out")
+    assert code == 1
+    assert stderr.startswith("error: ")
+
+
+def test_an_output_that_is_a_file_is_one_line(tmp_path: Path, run: Run) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("a file")
+    code, _, stderr = run("estimate", FIXTURE, "--robot", "ur5", "-o", taken)
+    assert code == 1
+    assert "is a file" in stderr
+    code, _, stderr = run("estimate", FIXTURE, "--robot", "ur5", "-o", taken / "below")
+    assert code == 1
+    assert taken.read_text() == "a file"
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--robot", "ur9"), "Did you mean"),
+        ((), "choose one with --robot: ur5, ur5e, ur10e"),
+        (("--robot", "ur5", "--observer", "kalman"), "there is fdo, gmo"),
+        (("--robot", "ur5", "--set", "gmo.gain=-3"), "must be positive"),
+        (("--robot", "ur5", "--set", "gmo.gain=1,2"), "one for each of 6"),
+        (("--robot", "ur5", "--set", "kfo.noise_convention=white"), "there is density"),
+        (("--robot", "ur5", "--friction", "some"), "there is profile, none"),
+        (("--robot", "ur5", "--payload", "bucket"), "no payload 'bucket'"),
+        (("--robot", "ur5", "--interval", "8:4"), "A:B with A < B"),
+        (("--robot", "ur5", "--interval", "100:200"), "the log runs from 0 to"),
+        (("--robot", "ur5", "--format", "excel"), "known formats"),
+    ],
+)
+def test_a_wrong_option_is_one_line(
+    tmp_path: Path, run: Run, words: tuple[str, ...], expected: str
+) -> None:
+    code, _, stderr = run("estimate", FIXTURE, *words, "-o", tmp_path / "out")
+    assert code == 1
+    errors = [line for line in stderr.splitlines() if line.startswith("error: ")]
+    assert len(errors) == 1
+    assert expected in errors[0]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("words", [("estimate",), ("estimate", FIXTURE), ("frobnicate",)])
+def test_wrong_usage_exits_two(run: Run, words: tuple[str, ...]) -> None:
+    code, _, stderr = run(*words)
+    assert code == 2
+    assert "Traceback" not in stderr
+
+
+@pytest.mark.parametrize(
+    ("reference", "words", "expected"),
+    [
+        ("vendor", (), "no vendor estimates"),
+        ("magic", (), "no reference 'magic'; there is zero"),
+        ("file:nowhere.csv", (), "nowhere.csv"),
+        ("zero", ("--free", FIXTURE), "--free goes with"),
+    ],
+)
+def test_a_reference_that_cannot_be_made_is_one_line(
+    run: Run, reference: str, words: tuple[object, ...], expected: str
+) -> None:
+    code, stdout, stderr = run(
+        "compare", FIXTURE, "--robot", "ur5", "--reference", reference, *words
+    )
+    assert code == 1
+    assert stdout == ""
+    errors = [line for line in stderr.splitlines() if line.startswith("error: ")]
+    assert len(errors) == 1
+    assert expected in errors[0]
+
+
+def test_a_name_with_markup_stays_text(tmp_path: Path, run: Run) -> None:
+    log = tmp_path / "<script>alert(1)<.csv"
+    shutil.copy(FIXTURE, log)
+    code, _, _ = run("report", log, "--robot", "ur5", "-o", tmp_path / "out")
+    assert code == 0
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert "<script>alert" not in page
