@@ -244,3 +244,21 @@ def run_rounds(
             timings.measure(name, partial(observer.estimate, terms))
         timings.measure("analytic script", lambda: analytic_script(model, short, kalman), scale)
         timings.measure("literal script", lambda: literal_script(model, short, kalman), scale)
+
+
+def memory_per_sample(robot_name: str = "panda", samples: int = 1_000_000) -> float:
+    """Peak memory of dynamics and all four observers beyond the recording's own. [B/sample]"""
+    import tracemalloc
+
+    robot = load_robot(robot_name)
+    recording = circle(robot, samples, rate=1000.0)
+    setup = Setup(
+        gains=robot.gains, settings={}, joints=robot.joints, step=recording.step, as_printed=False
+    )
+    observers = [OBSERVERS[name].build(setup)[0] for name in DEFAULT]
+    tracemalloc.start()
+    terms = dynamics_terms(recording, robot)
+    estimates = [observer.estimate(terms) for observer in observers]
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return peak / len(estimates[0].t)

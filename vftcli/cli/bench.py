@@ -11,6 +11,9 @@ def bench(
     robot: Annotated[str, typer.Option(metavar="NAME|FILE", help="Whose dynamics.")] = "ur5",
     samples: Annotated[int, typer.Option(min=100, help="Length of the log.")] = 30_060,
     rounds: Annotated[int, typer.Option(min=1, help="Interleaved repetitions.")] = 7,
+    memory: Annotated[
+        bool, typer.Option("--memory", help="Measure memory too, on a million samples of a Panda.")
+    ] = False,
     json: opt.Json = False,
 ) -> None:
     """Time the observers and print the ratios to a bare RNEA loop and to per-sample scripts.
@@ -19,9 +22,11 @@ def bench(
     """
     import json as json_module
 
-    from vftcli.benchmark import benchmark
+    from vftcli.benchmark import benchmark, memory_per_sample
 
     result = benchmark(robot, samples, rounds)
+    if memory:
+        result["memory_bytes_per_sample"] = memory_per_sample()
     if json:
         typer.echo(json_module.dumps(result, indent=2))
         return
@@ -41,3 +46,8 @@ def bench(
     )
     typer.echo(f"per-sample Pinocchio script / this: {ratios['analytic_script_over_core']:.0f}")
     typer.echo(f"the paper's literal method / this: {ratios['literal_script_over_core']:.0f}")
+    if memory:
+        typer.echo(
+            f"memory beyond the log's own, 1 000 000 samples of a Panda: "
+            f"{result['memory_bytes_per_sample']:.0f} B per sample"
+        )

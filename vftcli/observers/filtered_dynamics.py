@@ -9,14 +9,12 @@ from vftcli.arrays import Array, handed_over
 from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.errors import ParameterError
 from vftcli.observers.first_order import (
+    Piece,
     first_order_response,
     first_order_tuning,
-    half_steps,
-    restarts,
+    run_first_order,
 )
 from vftcli.observers.observer import Complex, Tuning
-from vftcli.observers.recursion import recursion, steps_of
-from vftcli.observers.steady_filter import steady_filter
 from vftcli.torque import ExternalTorque
 
 
@@ -56,26 +54,26 @@ class FilteredDynamicsObserver:
 
         Past a gap with a > 1 the filter starts afresh, and the estimate's notes say so.
         """
-        n, steps = terms.joints, steps_of(terms.t)
-        rate = np.full(n, self.omega)
-        a = half_steps(rate, steps)
+        rate = np.full(terms.joints, self.omega)
+        tau, notes = run_first_order(terms, rate, self._coefficients, self._start)
+        tau += self.omega * terms.p
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), notes=notes)
+
+    def _coefficients(self, piece: Piece) -> tuple[Array, Array]:
+        """(29): Y₁ and Y₂ obey the same recursion, so it is their sum that is run."""
+        a, p, mu = piece.a, piece.p, piece.mu
         k1, k2 = (1.0 - a) / (1.0 + a), a / (1.0 + a)
         k3 = -self.omega * a / (1.0 + (2.0 if self.as_printed else 1.0) * a)
-        # Y₁ and Y₂ obey the same recursion, so their sum is run, as (29) writes it.
-        p, mu = terms.p, terms.mu
-        x = np.empty_like(p)
-        x[0] = 0.0 if self.as_printed else -self.omega * p[0]
-        np.add(p[1:], p[:-1], out=x[1:])
-        x[1:] *= tail(k3)
+        x = p[1:] + p[:-1]
+        x *= k3
         both = mu[1:] + mu[:-1]
-        both *= tail(k2)
-        x[1:] -= both
-        fresh, notes = restarts(a, rate, steps)
-        if notes:
-            k1, x = np.where(fresh, 0.0, k1), np.where(fresh, -self.omega * p, x)
-        tau = scalar_recursion(k1, x)
-        tau += self.omega * p
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), notes=notes)
+        both *= k2
+        x -= both
+        return k1, x
+
+    def _start(self, p: Array) -> Array:
+        """Y₁ + Y₂ = −ωp, so that τ̂ = 0; zero as printed."""
+        return np.zeros_like(p) if self.as_printed else -self.omega * p
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """What ω means at a sample time. [s]"""
@@ -84,17 +82,3 @@ class FilteredDynamicsObserver:
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Complex gain at `frequency` [Hz]: that of a momentum observer with K = ω. (F, n)"""
         return first_order_response(np.full(joints, self.omega), frequency, step)
-
-
-def tail(coefficient: Array) -> Array:
-    """The coefficients of samples 1…: all but the first row, or the one row there is."""
-    return coefficient if len(coefficient) == 1 else coefficient[1:]
-
-
-def scalar_recursion(decay: Array, x: Array) -> Array:
-    """Run y_t = decay_t y_{t−1} + x_t from zero, for each joint. (T, n)"""
-    n = x.shape[1]
-    start = np.zeros((1, n))
-    if len(decay) == 1:
-        return steady_filter(decay.reshape(1, 1, n), np.ones((1, n)), x, start, wanted=0)
-    return recursion(decay.reshape(-1, 1, 1, n), x[:, None, :], start)[:, 0]

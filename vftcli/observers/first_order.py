@@ -1,38 +1,91 @@
 """What the two first-order observers share: sample times, restarts, and what a gain means."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
-from vftcli.arrays import Array
+from vftcli.arrays import Array, empty_series
+from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.observers.observer import Complex, Tuning
-from vftcli.observers.recursion import Steps
+from vftcli.observers.recursion import PIECE, Steps, recursion, steps_of
+from vftcli.observers.steady_filter import steady_filter
 
 
-def half_steps(rate: Array, steps: Steps) -> Array:
-    """Return a = rate·Ts/2: constant (1, n) on a uniform clock, else one a sample. (T, n)"""
-    dt = np.array([steps.median]) if steps.uniform else steps.dt
-    half: Array = 0.5 * dt[:, None] * rate[None, :]
-    return half
+@dataclass(frozen=True)
+class Piece:
+    """A stretch of a log with the sample before it, as a first-order observer works on it.
 
-
-def restarts(a: Array, rate: Array, steps: Steps) -> tuple[Array, tuple[str, ...]]:
-    """Where a gap is so long (a > 1) that the filter would turn its state's sign. (T, n), notes.
-
-    There the filter starts afresh from zero. Gains that give a > 1 at the nominal sample time are
-    the user's own choice and restart nothing.
+    Attributes:
+        p: Momentum, the sample before first. (N+1, n) [kg·m²/s]
+        mu: μ, the sample before first. (N+1, n) [N·m]
+        a: rate·Ts/2, constant (1, n) on a uniform clock, else one a sample. (N, n)
     """
-    nominal = 0.5 * steps.median * rate
-    if steps.uniform:
-        return np.zeros((0, 0)), ()
-    where = (a > 1.0) & (nominal <= 1.0)[None, :]
-    count = int(np.count_nonzero(where.any(axis=1)))
-    if count == 0:
-        return np.zeros((0, 0)), ()
+
+    p: Array
+    mu: Array
+    a: Array
+
+
+Coefficients = Callable[[Piece], tuple[Array, Array]]
+"""A piece → how much of the state stays (1 or N, n), and what is added to it (N, n)."""
+
+
+def run_first_order(
+    terms: DynamicsTerms, rate: Array, coefficients: Coefficients, start: Callable[[Array], Array]
+) -> tuple[Array, tuple[str, ...]]:
+    """Run y_t = decay_t y_{t−1} + x_t over a log, a piece at a time. (T, n), notes
+
+    Past a gap so long that a > 1 the state would change its sign: there the filter starts afresh,
+    and a note says so. Gains that give a > 1 at the nominal sample time are the user's own choice
+    and restart nothing.
+
+    Args:
+        terms: p and μ.
+        rate: ω or K. (n,) [1/s]
+        coefficients: The observer's formula.
+        start: Momentum where the filter starts (…, n) → the state it starts from.
+    """
+    steps = steps_of(terms.t)
+    y = empty_series(terms.samples, terms.joints)
+    y[0] = start(terms.p[0])
+    gaps = 0
+    for first in range(1, terms.samples, PIECE):
+        span, with_before = slice(first, first + PIECE), slice(first - 1, first + PIECE)
+        dt = np.array([steps.median]) if steps.uniform else steps.dt[span]
+        piece = Piece(terms.p[with_before], terms.mu[with_before], 0.5 * dt[:, None] * rate)
+        decay, x = coefficients(piece)
+        afresh = restarts(piece.a, rate, steps)
+        if afresh is not None:
+            gaps += int(np.count_nonzero(afresh.any(axis=1)))
+            decay = np.where(afresh, 0.0, decay)
+            x = np.where(afresh, start(piece.p[1:]), x)
+        y[span] = scalar_recursion(decay, x, y[first - 1])
+    if gaps == 0:
+        return y, ()
     longest = float(np.max(steps.dt))
-    note = (
-        f"restarted from zero after {count} gap{'s' if count > 1 else ''} "
-        f"(longest {longest:.3g} s), too long for its gain"
+    return y, (
+        f"restarted from zero after {gaps} gap{'s' if gaps > 1 else ''} "
+        f"(longest {longest:.3g} s), too long for its gain",
     )
-    return where.astype(np.float64), (note,)
+
+
+def restarts(a: Array, rate: Array, steps: Steps) -> NDArray[np.bool_] | None:
+    """Where a gap makes the filter start afresh (N, n), or None where nothing does."""
+    if steps.uniform:
+        return None
+    where: NDArray[np.bool_] = (a > 1.0) & (0.5 * steps.median * rate <= 1.0)
+    return where if where.any() else None
+
+
+def scalar_recursion(decay: Array, x: Array, before: Array) -> Array:
+    """Run y_t = decay_t y_{t−1} + x_t from `before`, for each joint. (N, n)"""
+    n = x.shape[1]
+    start = before[None]
+    if len(decay) == 1:
+        return steady_filter(decay.reshape(1, 1, n), np.ones((1, n)), x, start, wanted=0)
+    return recursion(decay.reshape(-1, 1, 1, n), x[:, None, :], start)[:, 0]
 
 
 def first_order_tuning(rate: Array, step: float, numbers: int) -> Tuning:

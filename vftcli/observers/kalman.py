@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array, frozen, handed_over
+from vftcli.arrays import Array, empty_series, frozen, handed_over
 from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.errors import ParameterError
-from vftcli.observers.kalman_gains import Covariance, Gains, Steady, gain_sequence, steady
+from vftcli.observers.kalman_gains import Covariance, Gains, Steady, gain_pieces, steady
 from vftcli.observers.kalman_model import (
     DISCRETISATIONS,
     NOISE_CONVENTIONS,
@@ -100,27 +100,44 @@ class KalmanObserver:
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """Run over a whole log; `sd` is √P₂₂, the filter's own account of its error."""
         n, steps = terms.joints, steps_of(terms.t)
-        gains, a12, a22 = self.gains(steps, terms.samples, n)
-        change = momentum_change(terms, steps, trapezoid=not self.as_printed)
-        tau = filtered(change, gains, a12, a22)
-        sd = np.broadcast_to(np.sqrt(gains.posterior.p22), tau.shape)
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=sd)
-
-    def gains(self, steps: Steps, samples: int, joints: int) -> tuple[Gains, Array, Array]:
-        """Gains, A₁₂ and A₂₂: one row (n,) if nothing changes along the log, else one a sample."""
-        settled = self.steady(steps.median, joints)
+        settled = self.steady(steps.median, n)
         if steps.uniform and self.initial_covariance is None:
-            model = self.model(steps.median, joints)
-            return settled.gains, model.a12, model.a22
-        prior = settled.prior
-        if self.initial_covariance is not None:
-            given = np.broadcast_to(
-                np.asarray(self.initial_covariance, dtype=np.float64).reshape(3, -1), (3, joints)
-            )
-            prior = Covariance(*given)
+            model = self.model(steps.median, n)
+            change = momentum_change(terms, steps, trapezoid=not self.as_printed)
+            F, g = error_filter(settled.gains, model.a12, model.a22)
+            tau = steady_filter(F, g, change, np.zeros((2, n)), wanted=1)
+            row = handed_over(np.sqrt(settled.gains.posterior.p22))
+            sd = np.broadcast_to(row, tau.shape)
+        else:
+            tau, sd = self._step_by_step(terms, steps, settled)
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=handed_over(sd))
+
+    def _step_by_step(
+        self, terms: DynamicsTerms, steps: Steps, settled: Steady
+    ) -> tuple[Array, Array]:
+        """τ̂ and √P₂₂ with gains that follow each step's own sample time. (T, n) each"""
+        samples, n = terms.p.shape
         dt = np.full(samples, steps.median) if steps.uniform else steps.dt
-        model = self.model(dt[:, None], joints)
-        return gain_sequence(model, prior, settled.gains.posterior), model.a12, model.a22
+        tau, sd, state = empty_series(samples, n), empty_series(samples, n), np.zeros((2, n))
+        for span, model, gains in gain_pieces(
+            lambda span: self.model(dt[span, None], n),
+            samples,
+            self._first_prior(settled),
+            settled.gains.posterior,
+        ):
+            F, g = error_filter(gains, model.a12, model.a22)
+            d = momentum_change(terms, steps, trapezoid=not self.as_printed, span=span)
+            states = recursion(F, g * d[:, None, :], state)
+            state = states[-1]
+            tau[span], sd[span] = states[:, 1], np.sqrt(gains.posterior.p22)
+        return tau, sd
+
+    def _first_prior(self, settled: Steady) -> Covariance:
+        """Covariance before the first update: the user's, or the stationary one. (n,)"""
+        if self.initial_covariance is None:
+            return settled.prior
+        given = np.asarray(self.initial_covariance, dtype=np.float64).reshape(3, -1)
+        return Covariance(*np.broadcast_to(given, (3, len(settled.prior.p11))))
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """ω_n = (Q_τ/R)^¼, ζ = ½√(2 + Q_p/√(Q_τR)) of the effective densities, and the exact delay.
@@ -170,24 +187,36 @@ def transition(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array, Arra
     return rest, rest * a12, -gains.l2, a22 - gains.l2 * a12
 
 
-def momentum_change(terms: DynamicsTerms, steps: Steps, *, trapezoid: bool = True) -> Array:
-    """Return d = pᵗ − pᵗ⁻¹ − Ts·u, the change of momentum that the model leaves unexplained. (T, n)
+def momentum_change(
+    terms: DynamicsTerms, steps: Steps, *, trapezoid: bool = True, span: slice = slice(None)
+) -> Array:
+    """Return d = pᵗ − pᵗ⁻¹ − Ts·u, the change of momentum that the model leaves unexplained. (N, n)
 
-    u is ½(μᵗ + μᵗ⁻¹), or μᵗ alone without `trapezoid` (40); the first sample has none.
+    u is ½(μᵗ + μᵗ⁻¹), or μᵗ alone without `trapezoid` (40); the first sample of a log has none.
+
+    Args:
+        terms: p and μ of the whole log.
+        steps: Its sample times.
+        trapezoid: Whether u is the mean of two samples.
+        span: The samples wanted.
     """
+    first, stop, _ = span.indices(terms.samples)
+    begin = max(first, 1)
+    now, before = slice(begin, stop), slice(begin - 1, stop - 1)
     p, mu = terms.p, terms.mu
-    d = np.empty_like(p)
-    d[0] = 0.0
-    step = steps.median if steps.uniform else steps.dt[1:, None]
-    explained = mu[1:] + mu[:-1] if trapezoid else mu[1:].copy()
+    d = empty_series(stop - first, terms.joints)
+    d[: begin - first] = 0.0
+    rest = d[begin - first :]
+    step = steps.median if steps.uniform else steps.dt[now, None]
+    explained = mu[now] + mu[before] if trapezoid else mu[now].copy()
     explained *= 0.5 * step if trapezoid else step
-    np.subtract(p[1:], p[:-1], out=d[1:])
-    d[1:] -= explained
+    np.subtract(p[now], p[before], out=rest)
+    rest -= explained
     return d
 
 
-def filtered(d: Array, gains: Gains, a12: Array, a22: Array) -> Array:
-    """τ̂ᵗ of the Kalman filter, run on its error e = p − p̂ instead of on p̂ itself. (T, n)
+def error_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
+    """Transition (…, 2, 2, n) and input (…, 2, n) of the filter on its error e = p − p̂.
 
     Subtracting p from x̂ᵗ = (I−LC)(A x̂ᵗ⁻¹ + B u) + L pᵗ leaves one input, d:
 
@@ -198,9 +227,4 @@ def filtered(d: Array, gains: Gains, a12: Array, a22: Array) -> Array:
     """
     rest, l2 = 1.0 - gains.l1, gains.l2
     F = np.stack([rest, -rest * a12, l2, a22 - l2 * a12], axis=-2)
-    F = F.reshape(*F.shape[:-2], 2, 2, F.shape[-1])
-    g = np.stack([rest, l2], axis=-2)
-    start = np.zeros((2, d.shape[1]))
-    if F.ndim == 3:
-        return steady_filter(F, g, d, start, wanted=1)
-    return np.ascontiguousarray(recursion(F, g * d[:, None, :], start)[:, 1])
+    return F.reshape(*F.shape[:-2], 2, 2, F.shape[-1]), np.stack([rest, l2], axis=-2)

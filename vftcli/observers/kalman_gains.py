@@ -1,12 +1,15 @@
 """Gains and covariances of n independent two-state Kalman filters: steady, or step by step."""
 
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.arrays import Array
 from vftcli.observers.kalman_model import Discrete
-from vftcli.observers.recursion import PIECE
+
+PIECE = 1 << 14
+"""Samples handled at a time: the covariances of a piece are a dozen arrays of its size."""
 
 SETTLED = 4e-16
 """Relative change of a block's first covariance below which another pass would change nothing."""
@@ -96,36 +99,48 @@ def update(prior: Covariance, r: Array) -> Gains:
     return Gains(l1, l2, posterior)
 
 
-def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
-    """Run the covariance recursion over a log's own sample times.
+def gain_pieces(
+    model_of: Callable[[slice], Discrete], samples: int, prior: Covariance, guess: Covariance
+) -> Iterator[tuple[slice, Discrete, Gains]]:
+    """Run the covariance recursion over a log's own sample times, a piece of the log at a time.
 
-    The recursion is nonlinear but forgets where it started, so blocks of the log are run side by
+    The recursion is nonlinear but forgets where it started, so blocks of a piece are run side by
     side from a guess, and again from where the block before ended, until no block's start changes:
     the result is then that of the plain loop. A filter that forgets slowly only takes more passes.
 
     Args:
-        model: One model a sample, entries (T, n); the first is not used for predicting.
+        model_of: The models of a span of samples, entries (N, n); that of sample 0 only has its
+            measurement noise used.
+        samples: Number of samples T.
         prior: Covariance before the first sample's update. (n,)
         guess: Where the blocks start before they know better, the stationary posterior. (n,)
 
-    Returns:
-        Gains and posterior covariances for each sample. (T, n) each
+    Yields:
+        A span of samples, its models, and its gains and posterior covariances. (N, n) each
     """
-    samples, n = model.a12.shape
-    out = Gains(
-        np.empty((samples, n)),
-        np.empty((samples, n)),
-        Covariance(*(np.empty((samples, n)) for _ in range(3))),
-    )
-    first = update(prior, model.r[0])
-    write(out, slice(0, 1), Gains(first.l1, first.l2, first.posterior))
-    entering = first.posterior
+    first = slice(0, 1)
+    model = model_of(first)
+    gains = update(Covariance(*(p[None] for p in prior)), model.r)
+    yield first, model, gains
     for begin in range(1, samples, PIECE):
         span = slice(begin, min(begin + PIECE, samples))
-        piece = Discrete(*(entry[span] for entry in model))
-        write(out, span, settle(piece, entering, guess))
-        entering = Covariance(*(p[span.stop - 1] for p in out.posterior))
-    return out
+        model = model_of(span)
+        entering = Covariance(*(p[-1] for p in gains.posterior))
+        gains = settle(model, entering, guess)
+        yield span, model, gains
+
+
+def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
+    """The gains of `gain_pieces` for a whole log at once. (T, n) each"""
+    pieces = [
+        gains
+        for _, _, gains in gain_pieces(
+            lambda span: Discrete(*(entry[span] for entry in model)), len(model.r), prior, guess
+        )
+    ]
+    l1, l2 = (np.concatenate(parts) for parts in zip(*((g.l1, g.l2) for g in pieces), strict=True))
+    posterior = zip(*(g.posterior for g in pieces), strict=True)
+    return Gains(l1, l2, Covariance(*(np.concatenate(parts) for parts in posterior)))
 
 
 def write(out: Gains, span: slice, part: Gains) -> None:

@@ -8,12 +8,11 @@ import numpy as np
 from vftcli.arrays import Array, frozen, handed_over
 from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.errors import ParameterError
-from vftcli.observers.filtered_dynamics import scalar_recursion, tail
 from vftcli.observers.first_order import (
+    Piece,
     first_order_response,
     first_order_tuning,
-    half_steps,
-    restarts,
+    run_first_order,
 )
 from vftcli.observers.observer import Complex, Tuning, per_joint
 from vftcli.observers.recursion import recursion, steps_of
@@ -54,30 +53,29 @@ class MomentumObserver:
 
         Past a gap with a > 1 the filter starts afresh, and the estimate's notes say so.
         """
-        gain, steps = per_joint(self.gain, terms.joints), steps_of(terms.t)
-        a = half_steps(gain, steps)
-        p, mu = terms.p, terms.mu
+        gain = per_joint(self.gain, terms.joints)
         if self.as_printed:
-            return self._as_printed(terms, gain, a)
-        x = np.empty_like(p)
-        x[0] = 0.0
-        np.subtract(p[1:], p[:-1], out=x[1:])
-        x[1:] *= gain / (1.0 + tail(a))
-        both = mu[1:] + mu[:-1]
-        both *= tail(a) / (1.0 + tail(a))
-        x[1:] -= both
-        decay = (1.0 - a) / (1.0 + a)
-        fresh, notes = restarts(a, gain, steps)
-        if notes:
-            decay, x = np.where(fresh, 0.0, decay), np.where(fresh, 0.0, x)
-        tau = scalar_recursion(decay, x)
+            return self._as_printed(terms, gain)
+
+        def coefficients(piece: Piece) -> tuple[Array, Array]:
+            a, p, mu = piece.a, piece.p, piece.mu
+            x = p[1:] - p[:-1]
+            x *= gain / (1.0 + a)
+            both = mu[1:] + mu[:-1]
+            both *= a / (1.0 + a)
+            x -= both
+            return (1.0 - a) / (1.0 + a), x
+
+        tau, notes = run_first_order(terms, gain, coefficients, np.zeros_like)
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), notes=notes)
 
-    def _as_printed(self, terms: DynamicsTerms, gain: Array, a: Array) -> ExternalTorque:
+    def _as_printed(self, terms: DynamicsTerms, gain: Array) -> ExternalTorque:
         """rᵗ = rᵗ⁻¹ + K(pᵗ−pᵗ⁻¹) − a(μᵗ+μᵗ⁻¹+rᵗ⁻¹+rᵗ⁻²), r⁻¹ = r⁰ = 0: two states a joint."""
-        n, p, mu = terms.joints, terms.p, terms.mu
+        n, p, mu, steps = terms.joints, terms.p, terms.mu, steps_of(terms.t)
+        dt = np.array([steps.median]) if steps.uniform else steps.dt
+        a = 0.5 * dt[:, None] * gain
         x = np.zeros((terms.samples, 2, n))
-        x[1:, 0] = gain * (p[1:] - p[:-1]) - tail(a) * (mu[1:] + mu[:-1])
+        x[1:, 0] = gain * (p[1:] - p[:-1]) - a[-terms.samples + 1 :] * (mu[1:] + mu[:-1])
         F = np.zeros((len(a), 2, 2, n))
         F[:, 0, 0], F[:, 0, 1], F[:, 1, 0] = 1.0 - a, -a, 1.0
         with np.errstate(over="ignore", invalid="ignore"):
