@@ -14,6 +14,7 @@ from vftcli.robots.robot import Robot
 from vftcli.torque import ExternalTorque
 
 if TYPE_CHECKING:
+    from vftcli.wrench.detection import Told
     from vftcli.wrench.measurement import Measurement
     from vftcli.wrench.wrench import Wrench
 
@@ -32,6 +33,7 @@ class Analysis:
         reference: What the estimates are judged by, or None.
         errors: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
         virtual_sensor: The wrenches and what is known of them, or None where none was asked for.
+        contacts: How each observer tells contacts, or empty where it was not asked.
         notes: What the reader of the numbers should know, one sentence each.
         run: The command, versions and conventions, as `run.json` holds them.
     """
@@ -45,6 +47,7 @@ class Analysis:
     reference: ExternalTorque | None = None
     errors: pl.DataFrame | None = None
     virtual_sensor: "Measurement | None" = None
+    contacts: "tuple[Told, ...]" = ()
     notes: tuple[str, ...] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
 

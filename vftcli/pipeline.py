@@ -13,6 +13,7 @@ from vftcli.robots import PROFILES, Robot, load_robot
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.torque import ExternalTorque
+    from vftcli.wrench.detection import Told
     from vftcli.wrench.frames import Mounting
     from vftcli.wrench.measurement import Measurement, Unloaded, WrenchRequest
 
@@ -41,6 +42,7 @@ class Request:
         alignment: Rung of the alignment ladder of the two-cycle difference, or "auto".
         low_pass: Its zero-phase cutoff in Hz, "none", or "auto".
         match: ``delay=S`` or ``bandwidth=HZ`` for all observers alike, or None.
+        contacts: Whether to judge each observer's contacts by the reference's.
         wrench: What is asked of the virtual force/torque sensor, None for joint torques alone.
     """
 
@@ -61,6 +63,7 @@ class Request:
     alignment: str = "auto"
     low_pass: str = "auto"
     match: str | None = None
+    contacts: bool = False
     wrench: "WrenchRequest | None" = None
 
 
@@ -146,6 +149,7 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
     tunings = {o.name: o.tuning(recording.step, robot.joints) for o in observers}
     measured, mounting, sensed = sense(recording, robot, estimates, request)
     reference, errors = None, None
+    contacts: tuple[Told, ...] = ()
     if request.reference is not None:
         from vftcli.evaluation import evaluate, with_wrenches
         from vftcli.truth.reference import ReferenceRequest, make_reference
@@ -170,6 +174,12 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
             theirs = reference_wrench(sensed, robot, reference, measured.sensor, asked)
             measured = referred(measured, theirs)
             errors = with_wrenches(errors, recording.name, measured)
+        if request.contacts:
+            from vftcli.evaluation import with_contacts
+            from vftcli.wrench.detection import judge_contacts
+
+            contacts = judge_contacts(estimates, measured, reference)
+            errors = with_contacts(errors, recording.name, reference.name, contacts)
     return Analysis(
         recording=recording,
         robot=robot,
@@ -180,6 +190,7 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
         reference=reference,
         errors=errors,
         virtual_sensor=measured,
+        contacts=contacts,
         notes=(*notes, *printed_note(request)),
     )
 

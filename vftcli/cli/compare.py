@@ -34,6 +34,7 @@ def compare(
     zero: opt.Zero = None,
     sensor_weight: opt.SensorWeight = False,
     torque_sd: opt.TorqueSd = None,
+    contacts: opt.Contacts = False,
     json: opt.Json = False,
     csv: Annotated[bool, typer.Option("--csv", help="One row per observer and joint.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="A Markdown table.")] = False,
@@ -69,6 +70,7 @@ def compare(
         friction=friction,
         payload=payload,
         as_printed=as_printed,
+        contacts=contacts,
         wrench=wrench_request(
             wrench, frame, solver, tool, sensor_pose, zero, sensor_weight, torque_sd
         ),

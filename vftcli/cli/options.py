@@ -133,6 +133,14 @@ SensorWeight = Annotated[
         help="Weigh the sensor's own tool in the unloaded spans and remove it from its reading.",
     ),
 ]
+Contacts = Annotated[
+    bool,
+    typer.Option(
+        "--contacts",
+        help="Also detection delay, false alarms per hour and missed contacts against the "
+        "reference.",
+    ),
+]
 TorqueSd = Annotated[
     str | None,
     typer.Option(

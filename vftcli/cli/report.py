@@ -33,6 +33,7 @@ def report(
     zero: opt.Zero = None,
     sensor_weight: opt.SensorWeight = False,
     torque_sd: opt.TorqueSd = None,
+    contacts: opt.Contacts = False,
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
@@ -60,6 +61,7 @@ def report(
         friction=friction,
         payload=payload,
         as_printed=as_printed,
+        contacts=contacts,
         wrench=wrench_request(
             wrench, frame, solver, tool, sensor_pose, zero, sensor_weight, torque_sd
         ),

@@ -63,6 +63,7 @@ def run_record(
             for observer in analysis.observers
         ],
         "reference": reference_record(analysis.reference),
+        "wrench": wrench_record(analysis),
         "conventions": CONVENTIONS,
         "repairs": list(analysis.recording.source.repairs),
         "warnings": list(analysis.recording.source.warnings),
@@ -192,6 +193,26 @@ def reference_record(reference: ExternalTorque | None) -> dict[str, Any] | None:
     return {"name": reference.name, "floor_Nm": floor, "notes": list(reference.notes)}
 
 
+def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
+    """How the wrenches were made and what is known of them, None where none was asked for."""
+    sensed = analysis.virtual_sensor
+    if sensed is None:
+        return None
+    from vftcli.wrench.frames import FRAMES
+
+    return {
+        "frame": sensed.sensor.frame,
+        "meaning": f"force and moment ON the robot; {FRAMES[sensed.sensor.frame]}",
+        "solver": sensed.sensor.solver,
+        "least_sigma_m": sensed.sensor.least_sigma,
+        "masked_share": sensed.masked_share,
+        "tool": plain(sensed.sensor.mounting.tool),
+        "sensor": plain(sensed.sensor.mounting.sensor),
+        "zero_drift": [plain(drift) for drift in sensed.drifts],
+        "warnings": list(sensed.warnings),
+    }
+
+
 def all_notes(analysis: Analysis) -> list[str]:
     """Notes of the run, of every estimate and of the reference, each once."""
     notes = [*analysis.notes]
@@ -201,4 +222,6 @@ def all_notes(analysis: Analysis) -> list[str]:
             for note in torque.notes
             if note not in analysis.notes
         ]
+    if analysis.virtual_sensor is not None:
+        notes += [*analysis.virtual_sensor.warnings, *analysis.virtual_sensor.notes]
     return list(dict.fromkeys(notes))

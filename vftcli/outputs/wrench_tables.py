@@ -74,7 +74,51 @@ def terminal_axes(errors: pl.DataFrame) -> str:
             for row in (HEADER, *block.rows)
         ]
         parts.append("\n".join([f"{block.title}, RMSE", *lines, ""]))
+    if contacts := contact_lines(errors):
+        parts.append(contacts)
     return "\n" + "\n".join(parts) if parts else ""
+
+
+CONTACTS = {
+    "recording": "recording",
+    "observer": "observer",
+    "signal": "told from",
+    "contacts": "contacts",
+    "missed_contacts": "missed",
+    "false_alarms_per_h": "false alarms/h",
+    "detection_delay_s": "mean delay [s]",
+    "longest_delay_s": "longest [s]",
+}
+"""Columns of the contact table, and how they are headed."""
+
+
+def contact_rows(errors: pl.DataFrame) -> list[tuple[str, ...]]:
+    """What is told of contacts as text, one row a recording and observer; empty where not asked."""
+    if "contacts" not in errors.columns:
+        return []
+    rows = errors.filter(pl.col("contacts").is_not_null())
+    return [
+        tuple(
+            text_of(row[key])
+            if isinstance(row[key], float)
+            else str(row[key] or 0)
+            if isinstance(row[key], int)
+            else str(row[key] or DASH)
+            for key in CONTACTS
+        )
+        for row in rows.iter_rows(named=True)
+    ]
+
+
+def contact_lines(errors: pl.DataFrame) -> str:
+    """The contact table for a terminal, "" where contacts were not judged."""
+    rows = contact_rows(errors)
+    if not rows:
+        return ""
+    table = [tuple(CONTACTS.values()), *rows]
+    widths = [max(len(row[c]) for row in table) for c in range(len(CONTACTS))]
+    lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in table]
+    return "\n".join(["contacts against the reference", *(line.rstrip() for line in lines), ""])
 
 
 def markdown_axes(errors: pl.DataFrame) -> str:

@@ -141,6 +141,12 @@ class Detection:
         found = [d for d in self.delay if np.isfinite(d)]
         return float(np.mean(found)) if found else float("nan")
 
+    @property
+    def longest_delay(self) -> float:
+        """Longest delay of the contacts that were found, NaN if none was. [s]"""
+        found = [d for d in self.delay if np.isfinite(d)]
+        return max(found) if found else float("nan")
+
 
 def detection(
     found: Sequence[Contact], true: Sequence[Contact], duration: float, late: float = 1.0

@@ -8,6 +8,7 @@ import numpy as np
 
 from vftcli.arrays import Array
 from vftcli.errors import ParameterError
+from vftcli.torque import ExternalTorque
 from vftcli.wrench.contact import (
     TRUE_FORCE,
     TRUE_MOMENT,
@@ -19,6 +20,7 @@ from vftcli.wrench.contact import (
     free_band,
     operating_curve,
 )
+from vftcli.wrench.measurement import Measurement
 from vftcli.wrench.wrench import Mask
 from vftcli.wrench.zero import SETTLING
 
@@ -38,11 +40,13 @@ class Signal:
 
     Attributes:
         name: The observer.
+        kind: "torque" or "wrench".
         values: NaN where not known. (T, k)
         least: Smallest half width of its free band, one a column. (k,)
     """
 
     name: str
+    kind: str
     values: Array
     least: Array
 
@@ -52,12 +56,14 @@ class Told(NamedTuple):
 
     Attributes:
         name: The observer.
+        signal: What it tells them from, "torque" or "wrench".
         detection: Counts and delays at the free band itself.
         curve: Hits against false alarms over `THRESHOLDS`.
         found: The contacts it found.
     """
 
     name: str
+    signal: str
     detection: Detection
     curve: tuple[Operating, ...]
     found: tuple[Contact, ...]
@@ -89,7 +95,44 @@ def learned_free(t: Array, true: Sequence[Contact]) -> Mask:
     return free
 
 
-def told(t: Array, signals: Iterable[Signal], free: Mask, true: Sequence[Contact]) -> list[Told]:
+def judge_contacts(
+    estimates: Sequence[ExternalTorque], measured: Measurement | None, reference: ExternalTorque
+) -> tuple[Told, ...]:
+    """Every observer's contacts against those of a reference torque.
+
+    Told from the wrenches where they were asked for, else from the joint torques. The free band is
+    learned in the zero spans if they were given, else before the first true contact.
+
+    Args:
+        estimates: The observers' torques.
+        measured: Their wrenches, or None.
+        reference: The true torque; beyond `TRUE_TORQUE`, or five times its floor, it is a contact.
+
+    Raises:
+        ParameterError: If there is no free part to learn the band from.
+    """
+    floor = np.zeros(reference.joints) if reference.floor is None else reference.floor
+    limits = np.maximum(TRUE_TORQUE, 5.0 * np.nan_to_num(floor))
+    true = true_intervals(reference.t, reference.tau, limits)
+    if measured is not None:
+        least = wrench_limits()
+        signals = [
+            Signal(name=w.name, kind="wrench", values=w.known, least=least)
+            for w in measured.wrenches
+        ]
+    else:
+        signals = [
+            Signal(name=e.name, kind="torque", values=e.tau, least=np.full(e.joints, LEAST_TORQUE))
+            for e in estimates
+        ]
+    given = measured is not None and bool(measured.drifts)
+    free = measured.free if given and measured is not None else learned_free(reference.t, true)
+    return told(reference.t, signals, free, true)
+
+
+def told(
+    t: Array, signals: Iterable[Signal], free: Mask, true: Sequence[Contact]
+) -> tuple[Told, ...]:
     """Judge every observer's contacts by the true ones.
 
     Args:
@@ -106,9 +149,10 @@ def told(t: Array, signals: Iterable[Signal], free: Mask, true: Sequence[Contact
         found.append(
             Told(
                 name=signal.name,
+                signal=signal.kind,
                 detection=detection(here, true, float(t[-1] - t[0])),
                 curve=operating_curve(t, score, true, THRESHOLDS),
                 found=here,
             )
         )
-    return found
+    return tuple(found)
