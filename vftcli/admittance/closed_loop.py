@@ -1,0 +1,318 @@
+"""The whole loop in simulation: hand, arm and servo, sensing, observer, Algorithm 1, joints, servo.
+
+The arm is the simulator's, with its contacts, friction and mismatch; the controller sees what a log
+would hold: positions and velocities with noise, and the drive torque averaged over the sampling
+interval (or its last instant). Between two control periods the servo holds the last command.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vftcli.admittance.joints import FlangeSolver
+from vftcli.admittance.law import Controller
+from vftcli.admittance.motion import Recursion
+from vftcli.admittance.online import OnlineKalman
+from vftcli.admittance.replay import deviation_of
+from vftcli.admittance.rotation import exp_matrix
+from vftcli.admittance.stability import check_stable
+from vftcli.admittance.thresholds import Flags
+from vftcli.arrays import Array
+from vftcli.errors import ParameterError
+from vftcli.observers.kalman import KalmanObserver
+from vftcli.simulation.arm import Arm
+from vftcli.simulation.experiment import Progress, Simulation, observe
+from vftcli.simulation.motion import Reference
+from vftcli.simulation.scenario import Scenario
+from vftcli.simulation.sensing import known, log_rate
+
+FARTHEST = 3.0
+"""A flange this far from its start has run away. [m]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosedLoop:
+    """A finished run.
+
+    Attributes:
+        controller: The controller in the loop.
+        t: Control instants. (T,) [s]
+        estimate: Wrench that the controller saw, zero removed, base axes. (T, 6) [N, N·m]
+        truth: Wrench of the contacts on the flange, about its origin, base axes. (T, 6) [N, N·m]
+        dragged: Phases. (T, 6)
+        commanded: Deviation X̃ that was commanded. (T, 6) [m, rad]
+        moved: Deviation of the flange itself from where it started. (T, 6) [m, rad]
+        reached: Whether the inverse kinematics found the commanded pose. (T,)
+        zero: Zero of the wrench that was removed. (6,) [N, N·m]
+        simulation: The log and truth of the run, None if it ran away.
+    """
+
+    controller: Controller
+    t: Array
+    estimate: Array
+    truth: Array
+    dragged: Flags
+    commanded: Array
+    moved: Array
+    reached: Flags
+    zero: Array
+    simulation: Simulation | None
+
+    @property
+    def stable(self) -> bool:
+        """Whether the arm stayed within `FARTHEST` of its start to the end."""
+        return self.simulation is not None
+
+
+@dataclass(kw_only=True)
+class Log:
+    """What the loop writes down, one row a control period."""
+
+    t: list[float]
+    estimate: list[Array]
+    dragged: list[Flags]
+    commanded: list[Array]
+    q: list[Array]
+    reached: list[bool]
+
+
+class Sensors:
+    """What the arm's controller measures, noise and all.
+
+    Attributes:
+        interval: Sampling interval. [s]
+    """
+
+    def __init__(self, arm: Arm, torque: str) -> None:
+        robot, spec = arm.robot, arm.scenario.sensing
+        self.arm, self.torque = arm, torque
+        self.interval = 1.0 / log_rate(spec, robot)
+        self.rng = np.random.default_rng(arm.seeds["sensing"])
+        self.q_noise = spec.noise * known(robot.noise.q)
+        self.dq_noise = spec.noise * known(robot.noise.qd)
+        if robot.torque_source == "current" and robot.torque_constant is not None:
+            current = spec.noise * known(robot.noise.current)
+            if spec.current_noise is not None:
+                current = np.full(robot.joints, spec.current_noise)
+            self.torque_noise = current * robot.torque_constant
+        else:
+            self.torque_noise = spec.noise * known(robot.noise.tau)
+        self.grain = spec.position_step
+
+    def read(self) -> tuple[Array, Array, Array]:
+        """Positions, velocities and drive torques now. (n,) each [rad, rad/s, N·m]"""
+        arm, n = self.arm, self.arm.robot.joints
+        q = arm.q + self.q_noise * self.rng.standard_normal(n)
+        if self.grain > 0:
+            q = np.round(q / self.grain) * self.grain
+        dq = arm.v + self.dq_noise * self.rng.standard_normal(n)
+        span = self.interval if self.torque == "average" else arm.scenario.step
+        return q, dq, arm.mean_torque(span) + self.torque_noise * self.rng.standard_normal(n)
+
+
+class Loop:
+    """The controller's side of the loop: observer, phases, law, inverse kinematics."""
+
+    def __init__(
+        self, arm: Arm, controller: Controller, observer: KalmanObserver, sensors: Sensors
+    ) -> None:
+        self.arm, self.controller, self.sensors = arm, controller, sensors
+        averaged = sensors.torque == "average"
+        self.sensor = OnlineKalman(
+            observer, arm.true.nominal, sensors.interval, averaged=averaged
+        )
+        self.solver = FlangeSolver(arm.true.nominal)
+        self.start = self.solver.check_start(arm.q.copy())
+        self.rotation, self.translation = self.solver.pose(self.start)
+        self.law = Recursion([controller])
+        self.dragged = np.zeros(6, dtype=bool)
+        self.q_measured = self.start
+        self.q_command, self.q_before = self.start, self.start
+        speed = arm.robot.limits.qd_max
+        self.reach_step = np.where(np.isfinite(speed), speed, np.inf) * controller.parameters.period
+        self.reached = True
+        self.zeros: list[Array] = []
+        self.zero = np.zeros(6)
+
+    def sample(self) -> None:
+        """Read the sensors and run the observer."""
+        self.q_measured, dq, torque = self.sensors.read()
+        self.sensor.sample(self.q_measured, dq, torque)
+
+    def rest(self, counts: bool) -> Array:
+        """Before the zero is known: hold still, and average the wrench if this instant counts."""
+        wrench = self.sensor.wrench(self.q_measured)
+        if counts:
+            self.zeros.append(wrench)
+            self.zero = np.mean(self.zeros, axis=0)
+        return wrench - self.zero
+
+    def control(self) -> Array:
+        """One control period of Algorithm 1; returns the wrench it acted on. (6,) [N, N·m]"""
+        p = self.controller.parameters
+        wrench = self.sensor.wrench(self.q_measured) - self.zero
+        size = np.abs(wrench)
+        release = p.threshold * (1.0 - np.asarray(p.hysteresis))
+        self.dragged = (size > p.threshold) | (self.dragged & (size > release))
+        force = wrench
+        if p.threshold_mode == "soft":
+            force = np.sign(wrench) * np.maximum(size - p.threshold, 0.0)
+        x, v, turn = self.law.x.copy(), self.law.v.copy(), self.law.turn.copy()
+        self.law.step(np.where(self.dragged, force, 0.0), self.dragged)
+        q, self.reached = self.solve(self.law.x[0])
+        if self.reached:
+            self.q_before, self.q_command = self.q_command, q
+        else:  # out of reach or too fast for a joint: wait at rest, as at a wall
+            self.law.x, self.law.v, self.law.turn = x, 0.0 * v, turn
+            self.q_before = self.q_command
+        return wrench
+
+    def solve(self, x: Array) -> tuple[Array, bool]:
+        """Joint positions for a deviation (6,) [m, rad], inside the joints' limits and speeds."""
+        if not np.all(np.isfinite(x)):
+            return self.q_command, False
+        goal = exp_matrix(x[3:]) @ self.rotation
+        guess = 2.0 * self.q_command - self.q_before
+        q, good = self.solver.reach(goal, self.translation + x[:3], guess)
+        fastest = np.max(np.abs(q - self.q_command) / self.reach_step)
+        return q, bool(good and fastest <= 1.0)
+
+    @property
+    def reference(self) -> Reference:
+        """The command that the servo holds until the next one, one row."""
+        speed = (self.q_command - self.q_before) / self.controller.parameters.period
+        return Reference(self.q_command[None], speed[None], np.zeros_like(speed)[None])
+
+
+def run_closed_loop(
+    scenario: Scenario,
+    controller: Controller,
+    observer: KalmanObserver,
+    *,
+    seed: int | None = None,
+    torque: str = "average",
+    zero: tuple[float, float] | None = None,
+    force_unstable: bool = False,
+    progress: Progress | None = None,
+) -> ClosedLoop:
+    """Run a scenario's contacts against an arm under admittance control.
+
+    The scenario's own trajectory is not followed: the arm starts where it starts, and where it goes
+    is the controller's doing.
+
+    Args:
+        scenario: The experiment: arm, contacts, friction, mismatch, sensing.
+        controller: The controller; its period is the control period.
+        observer: The Kalman filter of the virtual sensor.
+        seed: Seed of everything drawn; the scenario's own if not given.
+        torque: "average" over the sampling interval, or the last "instant".
+        zero: Unloaded span whose mean wrench is removed; the controller holds still until it ends.
+            None removes nothing. [s]
+        force_unstable: Run unstable settings too.
+        progress: Told how far the run is.
+
+    Raises:
+        UnstableError: If the controller is unstable.
+        ParameterError: If the period is no multiple of the inner step.
+    """
+    if torque not in {"average", "instant"}:
+        raise ParameterError(f"torque is {torque!r}; it is average or instant")
+    check_stable([controller], force_unstable=force_unstable)
+    arm = still_arm(scenario, controller.parameters.period, seed)
+    sensors = Sensors(arm, torque)
+    loop = Loop(arm, controller, observer, sensors)
+    log = Log(t=[], estimate=[], dragged=[], commanded=[], q=[], reached=[])
+    every_sample = whole(sensors.interval, arm.scenario.step, "sampling interval")
+    every_control = whole(controller.parameters.period, arm.scenario.step, "control period")
+    forward = arm.servo.feed_forward(loop.reference)[0]
+    for k in range(arm.steps):
+        if k % every_sample == 0:
+            loop.sample()
+        if k % every_control == 0:
+            note(log, loop, zero)
+            forward = arm.servo.feed_forward(loop.reference)[0]
+            if runaway(loop):
+                break
+            if progress is not None:
+                progress(k, arm.steps)
+        reference = loop.reference
+        arm.step(reference.q[0], reference.dq[0], reference.ddq[0], forward)
+    return finished(loop, log, zero)
+
+
+def still_arm(scenario: Scenario, period: float, seed: int | None) -> Arm:
+    """The scenario's arm at rest at its start, with an inner step that divides the period."""
+    from vftcli.robots import load_robot
+    from vftcli.simulation.trajectories import plan
+
+    robot = load_robot(scenario.robot)
+    divided = abs(period / scenario.step - round(period / scenario.step)) < 1e-9
+    inner = scenario.step if divided else period / np.ceil(period / scenario.step + 2)
+    scenario = replace(scenario, step=float(inner))
+    duration = scenario.duration or scenario.trajectory.motion(robot).duration
+    start = plan(scenario.trajectory, robot, np.array([0.0]))
+    still = Reference(start.q[:1], 0.0 * start.dq[:1], 0.0 * start.ddq[:1])
+    return Arm(scenario, scenario.seed if seed is None else seed, still, duration)
+
+
+def whole(interval: float, step: float, what: str) -> int:
+    """How many inner steps an interval is.
+
+    Raises:
+        ParameterError: If it is no whole number of them.
+    """
+    count = round(interval / step)
+    if count < 1 or abs(interval / step - count) > 1e-6:
+        raise ParameterError(
+            f"the {what} of {1e3 * interval:g} ms is no multiple of the inner step of "
+            f"{1e3 * step:g} ms; set step to one that divides it"
+        )
+    return count
+
+
+def note(log: Log, loop: Loop, zero: tuple[float, float] | None) -> None:
+    """Act once and write down what happened."""
+    t = loop.arm.t
+    if zero is not None and t <= zero[1]:
+        wrench = loop.rest(counts=t >= zero[0])
+    else:
+        wrench = loop.control()
+    log.t.append(t)
+    log.estimate.append(wrench)
+    log.dragged.append(loop.dragged.copy())
+    log.commanded.append(loop.law.x[0].copy())
+    log.q.append(loop.arm.q.copy())
+    log.reached.append(loop.reached)
+
+
+def runaway(loop: Loop) -> bool:
+    """Whether the arm has left everything behind."""
+    x = loop.law.x[0]
+    fast = np.max(np.abs(loop.arm.v)) > 50.0
+    return bool(not np.all(np.isfinite(x)) or np.linalg.norm(x[:3]) > FARTHEST or fast)
+
+
+def finished(loop: Loop, log: Log, zero: tuple[float, float] | None) -> ClosedLoop:
+    """Put the run together; the truth is the simulator's."""
+    arm, t = loop.arm, np.array(log.t)
+    complete = arm.history.rows == arm.steps
+    simulation = observe(arm) if complete else None
+    truth = np.full((len(t), 6), np.nan)
+    if simulation is not None:
+        seen = simulation.truth
+        truth = np.column_stack([np.interp(t, seen.t, column) for column in seen.wrench.T])
+    estimate = np.array(log.estimate)
+    if zero is not None:
+        estimate[t < zero[0]] = np.nan
+    return ClosedLoop(
+        controller=loop.controller,
+        t=t,
+        estimate=estimate,
+        truth=truth,
+        dragged=np.array(log.dragged),
+        commanded=np.array(log.commanded),
+        moved=deviation_of(loop.solver, loop.start, np.array(log.q)),
+        reached=np.array(log.reached),
+        zero=loop.zero,
+        simulation=simulation,
+    )

@@ -1,0 +1,86 @@
+"""Latencies of a closed loop as the paper reports them: force, detection, motion, withdrawal."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vftcli.admittance.closed_loop import ClosedLoop
+from vftcli.arrays import Array
+
+STARTED = 5e-3
+"""Displacement of the flange at which it is said to have moved. [m]"""
+
+TURNED = 0.02
+"""Rotation of the flange at which it is said to have turned. [rad]"""
+
+STILL = 0.005
+"""Speed below which the flange counts as at rest when a force comes. [m/s, rad/s]"""
+
+REST = 1.0
+"""A contact begins where the force had been below the threshold for this long. [s]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Latency:
+    """One application of a force, all in seconds; None where it did not happen.
+
+    Attributes:
+        axis: Index of the axis whose true force is the first to pass its threshold.
+        force: When it passes.
+        detection: Time from then until the estimate passes it.
+        motion: Time from `force` until the flange has moved by `STARTED` (or `TURNED`).
+        withdrawal: Time from the true force's fall below the threshold to the estimate's.
+        rested: Whether the flange was at rest when the force came; the time to a displacement says
+            nothing of one that was moving already.
+    """
+
+    axis: int
+    force: float
+    detection: float | None
+    motion: float | None
+    withdrawal: float | None
+    rested: bool
+
+
+def latencies(run: ClosedLoop) -> tuple[Latency, ...]:
+    """One entry for each application of a force above a threshold."""
+    threshold = run.controller.parameters.threshold
+    above = np.any(np.abs(run.truth) > threshold, axis=1)
+    period = run.controller.parameters.period
+    quiet = max(round(REST / period), 1)
+    found, last = [], -quiet
+    for k in np.flatnonzero(above).tolist():
+        if k - last >= quiet:
+            found.append(one(run, k, threshold))
+        last = k
+    return tuple(found)
+
+
+def one(run: ClosedLoop, k: int, threshold: Array) -> Latency:
+    """The latencies of the contact whose force first passes a threshold in row `k`."""
+    axis = int(np.argmax(np.abs(run.truth[k]) / threshold))
+    limit, t = threshold[axis], run.t
+    felt, there = np.abs(run.estimate[:, axis]) > limit, np.abs(run.truth[:, axis]) > limit
+    part = slice(0, 3) if axis < 3 else slice(3, 6)
+    way = np.linalg.norm(run.moved[:, part] - run.moved[k, part], axis=1)
+    far = way > (STARTED if axis < 3 else TURNED)
+    before = run.moved[max(k - 3, 0) : k + 1, part]
+    speed = np.linalg.norm(before[-1] - before[0]) / max(t[k] - t[max(k - 3, 0)], 1e-9)
+    begin = first(felt, k)
+    ends = first(~there, k)
+    gone = None if ends is None else first(~felt, ends)
+    moving = first(far, k)
+    return Latency(
+        axis=axis,
+        force=float(t[k]),
+        detection=None if begin is None else float(t[begin] - t[k]),
+        motion=None if moving is None else float(t[moving] - t[k]),
+        withdrawal=None if gone is None or ends is None else float(t[gone] - t[ends]),
+        rested=bool(speed < STILL),
+    )
+
+
+def first(flags: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], start: int) -> int | None:
+    """First row from `start` on that is set, or None."""
+    found = np.flatnonzero(flags[start:])
+    return start + int(found[0]) if found.size else None

@@ -1,0 +1,85 @@
+"""The virtual sensor one sample at a time: what a controller has, with no future and no log."""
+
+from typing import Any
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.dynamics.friction import friction_torque
+from vftcli.observers.kalman import KalmanObserver
+from vftcli.robots.robot import Robot
+from vftcli.wrench.solvers import LEAST_SIGMA, SCALE
+
+class OnlineKalman:
+    """A disturbance Kalman filter run sample by sample at a constant rate, from x̂⁰ = [p⁰; 0].
+
+    A drive torque that is the mean over the sampling interval is what the momentum has gained by it,
+    exactly; the trapezoid over two such means is half a sample late, and in a loop that half sample
+    turns every jerk of the arm into a false force. So a mean enters as it is, and only the rest of
+    μ by the trapezoid. An instantaneous torque enters by the trapezoid: then the numbers are those
+    of `KalmanObserver.estimate` over the log.
+
+    Attributes:
+        tau: The estimate now. (n,) [N·m]
+    """
+
+    def __init__(
+        self, observer: KalmanObserver, robot: Robot, step: float, *, averaged: bool
+    ) -> None:
+        """Prepare for samples every `step` [s] whose torque is `averaged` over it, or not."""
+        import pinocchio as pin
+
+        n = robot.joints
+        self.pin, self.model, self.robot, self.step = pin, robot.model, robot, step
+        self.averaged = averaged
+        self.data: Any = self.model.createData()
+        model = observer.model(step, n)
+        self.a12, self.a22 = model.a12, model.a22
+        self.gains = observer.steady(step, n).gains
+        self.p: Array | None = None
+        self.mu = np.zeros(n)
+        self.tau = np.zeros(n)
+
+    def terms(self, q: Array, dq: Array) -> tuple[Array, Array]:
+        """p = M q̇ and Cᵀq̇ − g − F_f, μ without the drives. (n,) each [kg·m²/s, N·m]"""
+        pin, model, data = self.pin, self.model, self.data
+        C = pin.computeCoriolisMatrix(model, data, q, dq)
+        p = pin.crba(model, data, q) @ dq
+        rest = C.T @ dq - pin.computeGeneralizedGravity(model, data, q)
+        if self.robot.friction:
+            rest = rest - friction_torque(self.robot.friction, dq[None])[0]
+        return p, rest
+
+    def sample(self, q: Array, dq: Array, torque: Array) -> Array:
+        """Take one sample and return the external torque. (n,) [N·m]
+
+        Args:
+            q: Measured positions. (n,) [rad]
+            dq: Measured velocities. (n,) [rad/s]
+            torque: Measured drive torque. (n,) [N·m]
+        """
+        p, rest = self.terms(q, dq)
+        mu = rest if self.averaged else rest + torque
+        if self.p is None:
+            self.p, self.mu = p, mu
+            return self.tau
+        gained = 0.5 * (mu + self.mu) + (torque if self.averaged else 0.0)
+        ahead = self.p + self.a12 * self.tau + self.step * gained
+        innovation = p - ahead
+        self.p = ahead + self.gains.l1 * innovation
+        self.tau = self.a22 * self.tau + self.gains.l2 * innovation
+        self.mu = mu
+        return self.tau
+
+    def wrench(self, q: Array) -> Array:
+        """F = pinv(J_Fᵀ) τ̂ (46) at the flange, base axes; zero where the pose cannot tell it. (6,)
+
+        A controller that knows no force must not move by it.
+        """
+        pin, model, data = self.pin, self.model, self.data
+        frame = model.getFrameId("flange")
+        J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
+        if np.linalg.svd(J * SCALE[:, None], compute_uv=False)[-1] < LEAST_SIGMA:
+            return np.zeros(6)
+        found: Array = np.linalg.pinv(J.T) @ self.tau
+        return found
