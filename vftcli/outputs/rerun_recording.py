@@ -28,8 +28,8 @@ from vftcli.wrench.wrench import AXES
 ARM_RATE = 50.0
 """Poses a second of the arm. [Hz]"""
 
-NEWTON_PER_METRE = 100.0
-"""Length of the force arrow: 100 N are 1 m."""
+NEWTON_PER_METRE = 200.0
+"""Length of the force arrow: 200 N are 1 m."""
 
 LINK, JOINT, FORCE = (176, 184, 192), (78, 92, 106), (221, 100, 21)
 """Colours of links, joints and the force arrow."""
@@ -108,7 +108,7 @@ def scene_of(poses: Motion) -> Scene:
     corners = poses.translation.reshape(-1, 3)
     low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
     centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
-    eye = centre + 1.9 * radius * np.array([0.62, -0.66, 0.42])
+    eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
     return Scene(tuple(eye.tolist()), tuple(centre.tolist()))
 
 

@@ -54,9 +54,11 @@ class Block(NamedTuple):
 
     @property
     def best(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-        """The smallest RMSE of each joint. (observers, joints)"""
+        """The smallest RMSE of each joint, and what prints the same. (observers, joints)"""
         least = np.where(np.isfinite(self.rmse), self.rmse, np.inf).min(axis=0)
-        return np.asarray(self.rmse == least)
+        shown = [[significant(value) for value in row] for row in self.rmse]
+        best = np.array([significant(value) for value in least])
+        return np.asarray(np.array(shown) == best) & np.isfinite(self.rmse)
 
 
 def blocks(errors: pl.DataFrame) -> tuple[Block, ...]:
