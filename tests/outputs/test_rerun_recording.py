@@ -8,8 +8,10 @@ import pytest
 import rerun.chunk
 
 from vftcli.analysis import Analysis
+from vftcli.errors import OutputError
 from vftcli.outputs.rerun_recording import (
     NEWTON_PER_METRE,
+    finish,
     flange_force,
     line_groups,
     plot_of,
@@ -151,3 +153,15 @@ def test_odd_names_do_no_harm(analysis: Analysis, tmp_path: Path) -> None:
     write_rrd(tmp_path / "odd.rrd", odd)
     for chunk in rerun.chunk.RrdReader(str(tmp_path / "odd.rrd")).stream():
         assert "ᵀ" not in str(chunk.to_record_batch().to_pydict())
+
+
+def test_a_recording_without_its_footer_is_no_recording(tmp_path: Path) -> None:
+    """What a full disk leaves: Rerun's writer may end without an error."""
+
+    class Stream:
+        def flush(self) -> None: ...
+        def disconnect(self) -> None: ...
+
+    (tmp_path / "cut.rrd").write_bytes(b"RRF2" + bytes(1000))
+    with pytest.raises(OutputError, match=r"cut\.rrd cannot be written whole"):
+        finish(Stream(), tmp_path / "cut.rrd")

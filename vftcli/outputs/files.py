@@ -170,3 +170,8 @@ def unwritable(path: Path, error: OSError) -> OutputError:
     """The one-line error for what the operating system refused."""
     why = error.strerror or str(error)
     return OutputError(f"{path} cannot be written: {why[0].lower()}{why[1:]}; give another -o")
+
+
+def one_line(error: Exception) -> str:
+    """What an error of a library says, on one line."""
+    return " ".join(str(error).split())

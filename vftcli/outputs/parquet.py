@@ -8,6 +8,8 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.arrays import Array
+from vftcli.errors import OutputError
+from vftcli.outputs.files import one_line
 from vftcli.wrench.wrench import AXES
 
 if TYPE_CHECKING:
@@ -75,9 +77,18 @@ def per_axis(name: str, values: Array) -> Iterator[tuple[str, Array]]:
 
 
 def write_estimates(path: Path, analysis: Analysis) -> None:
-    """Write the table as Parquet (zstd)."""
+    """Write the table as Parquet (zstd).
+
+    Raises:
+        OutputError: If the disk is full.
+    """
+    from polars.exceptions import ComputeError
+
     table = estimates_table(analysis)
-    table.write_parquet(path, compression="zstd", compression_level=1, statistics=False)
+    try:
+        table.write_parquet(path, compression="zstd", compression_level=1, statistics=False)
+    except ComputeError as error:  # how polars reports a full disk
+        raise OutputError(f"{path.name} cannot be written: {one_line(error)}") from None
 
 
 def write_csv(path: Path, analysis: Analysis) -> None:

@@ -5,8 +5,8 @@ reference), `/residual/J1` … (every estimate minus the reference), `/drive_tor
 (one line a joint). All of it stands on the timeline `t`, in seconds from the log's first sample.
 """
 
-import gc
 import itertools
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +16,9 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.arrays import Array
 from vftcli.dynamics.drive import drive_torque
+from vftcli.errors import OutputError
 from vftcli.outputs.arm import Motion, capsules, flange_force, motion
+from vftcli.outputs.files import one_line
 from vftcli.outputs.palette import REFERENCE, SPARE, colours_of, rgb
 from vftcli.outputs.rerun_blueprint import Plot, Scene, Tab, arrangement
 from vftcli.outputs.rerun_text import drawable
@@ -33,6 +35,9 @@ NEWTON_PER_METRE = 200.0
 
 LINK, JOINT, FORCE = (176, 184, 192), (78, 92, 106), (221, 100, 21)
 """Colours of links, joints and the force arrow."""
+
+FOOTER, TRAILER = b"RRF2FOOT", 64
+"""A whole recording has this mark in its last bytes."""
 
 Stream = Any
 
@@ -76,10 +81,24 @@ def write_rrd(path: Path, analysis: Analysis) -> None:
         send_lines(stream, analysis.t, lines)
     send_words(stream, analysis)
     send_arm(stream, analysis, poses)
-    stream.flush()
-    stream.disconnect()
-    del stream
-    gc.collect()  # the footer is written when the last reference goes
+    finish(stream, path)
+
+
+def finish(stream: Stream, path: Path) -> None:
+    """Write what is still in memory, and the footer.
+
+    Raises:
+        OutputError: If the file is not whole: Rerun writes in a thread of its own.
+    """
+    try:
+        stream.flush()
+        stream.disconnect()
+    except RuntimeError as error:
+        raise OutputError(f"{path.name} cannot be written: {one_line(error)}") from None
+    with path.open("rb") as file:
+        file.seek(-min(TRAILER, path.stat().st_size), os.SEEK_END)
+        if FOOTER not in file.read():
+            raise OutputError(f"{path.name} cannot be written whole: is the disk full?")
 
 
 def line_groups(analysis: Analysis) -> dict[str, list[Lines]]:
