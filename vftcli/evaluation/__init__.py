@@ -1,0 +1,24 @@
+"""Evaluation: errors of estimates against a reference, with intervals, lags and significance."""
+
+from vftcli.evaluation.errors import SCHEMA, correlation, evaluate, rmse
+from vftcli.evaluation.pooling import evaluate_pooled
+from vftcli.evaluation.significance import paired_significance
+from vftcli.evaluation.wrenches import (
+    WRENCH_SCHEMA,
+    evaluate_wrenches,
+    with_contacts,
+    with_wrenches,
+)
+
+__all__ = [
+    "SCHEMA",
+    "WRENCH_SCHEMA",
+    "correlation",
+    "evaluate",
+    "evaluate_pooled",
+    "evaluate_wrenches",
+    "paired_significance",
+    "rmse",
+    "with_contacts",
+    "with_wrenches",
+]

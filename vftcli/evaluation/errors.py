@@ -1,0 +1,202 @@
+"""Errors of estimates against a reference: one tidy table, the unit in each column's name."""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from vftcli.arrays import Array
+from vftcli.errors import ShapeError
+from vftcli.evaluation.intervals import Resampled, interval, resample
+from vftcli.evaluation.lag import lags
+from vftcli.evaluation.significance import p_value
+from vftcli.torque import ExternalTorque
+
+SCHEMA: dict[str, type[pl.DataType]] = {
+    "recording": pl.String,
+    "observer": pl.String,
+    "joint": pl.Int64,
+    "rmse_Nm": pl.Float64,
+    "rmse_low_Nm": pl.Float64,
+    "rmse_high_Nm": pl.Float64,
+    "bias_Nm": pl.Float64,
+    "max_Nm": pl.Float64,
+    "correlation": pl.Float64,
+    "lag_s": pl.Float64,
+    "p_vs_best": pl.Float64,
+    "reference": pl.String,
+    "reference_floor_Nm": pl.Float64,
+    "reference_trusted": pl.Boolean,
+    "at_rest": pl.Float64,
+    "rmse_moving_Nm": pl.Float64,
+    "samples": pl.Int64,
+}
+"""Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the samples."""
+
+TRUSTED_SHARE = 0.5
+"""A joint's reference is trusted if at least this share of its samples is."""
+
+
+def rmse(estimate: Array, reference: Array) -> Array:
+    """Root-mean-square error per joint over the samples where both are finite. (n,)
+
+    Raises:
+        ShapeError: If the two have different shapes.
+    """
+    if estimate.shape != reference.shape:
+        raise ShapeError(f"estimate {estimate.shape} against reference {reference.shape}")
+    error = estimate - reference
+    known = np.isfinite(error)
+    count = np.count_nonzero(known, axis=0)
+    total = np.sum(np.where(known, error, 0.0) ** 2, axis=0)
+    result: Array = np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+    return result
+
+
+def correlation(x: Array, y: Array) -> float:
+    """Pearson's correlation of two series, NaN where one of them does not vary."""
+    x, y = x - x.mean(), y - y.mean()
+    power = float(np.sqrt(np.sum(x**2) * np.sum(y**2)))
+    return float(np.sum(x * y)) / power if power > 0 else float("nan")
+
+
+class Scored(NamedTuple):
+    """Estimates of one joint against one reference, over the samples where all are known.
+
+    Attributes:
+        names: The observers' names.
+        joint: Joint number, from 1.
+        estimates: One column an observer. (T, m) [N·m]
+        reference: (T,) [N·m]
+        trusted: Whether a sample of the reference may be relied on. (T,)
+        floor: The reference's own error, NaN where it is not known. [N·m]
+        resampled: Bootstrap draws of the mean squared errors, one column an observer.
+        lag: Best-fitting delay of each observer, NaN where nothing fits. (m,) [s]
+    """
+
+    names: tuple[str, ...]
+    joint: int
+    estimates: Array
+    reference: Array
+    trusted: NDArray[np.bool_]
+    floor: float
+    resampled: Resampled
+    lag: Array
+
+    @property
+    def error(self) -> Array:
+        """Estimate less reference. (T, m) [N·m]"""
+        return self.estimates - self.reference[:, None]
+
+
+def evaluate(
+    recording: str, estimates: Iterable[ExternalTorque], reference: ExternalTorque
+) -> pl.DataFrame:
+    """One row per observer and joint, over the samples where all observers are known.
+
+    Args:
+        recording: The log's name, for the first column.
+        estimates: The observers' estimates, on the reference's clock.
+        reference: What they are judged by; its `floor` stands beside every error.
+
+    Raises:
+        ShapeError: If an estimate and the reference have different shapes.
+    """
+    joints = scored(tuple(estimates), reference)
+    return table(recording, reference.name, joints)
+
+
+def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> list[Scored]:
+    """Estimates and reference joint by joint, resampled, with their lags."""
+    for estimate in estimates:
+        if estimate.tau.shape != reference.tau.shape:
+            raise ShapeError(
+                f"estimate {estimate.tau.shape} against reference {reference.tau.shape}"
+            )
+    names = tuple(estimate.name for estimate in estimates)
+    step = float(np.median(np.diff(reference.t))) if len(reference.t) > 1 else 1.0
+    lag = np.array([lags(e.tau, reference.tau, step) for e in estimates])
+    trusted = reference.trusted if reference.trusted is not None else reference.finite
+    found = []
+    for j in range(reference.joints if estimates else 0):
+        x, y = np.column_stack([e.tau[:, j] for e in estimates]), reference.tau[:, j]
+        known = comparable(x, y)
+        squares = np.nan_to_num((x[known] - y[known, None]) ** 2)
+        draws = resample(squares) if len(squares) else Resampled(np.ones((1, len(names))), 0)
+        floor = float(reference.floor[j]) if reference.floor is not None else float("nan")
+        sure = trusted[known, j] > 0
+        found.append(Scored(names, j + 1, x[known], y[known], sure, floor, draws, lag[:, j]))
+    return found
+
+
+def comparable(estimates: Array, reference: Array) -> NDArray[np.bool_]:
+    """Samples at which the reference and every observer that mostly works are known. (T,)
+
+    An observer that is known for less than half as many samples as the others (an unstable one)
+    does not spoil their comparison; it has no row of errors.
+    """
+    finite = np.isfinite(estimates) & np.isfinite(reference)[:, None]
+    count = finite.sum(axis=0)
+    return np.asarray(finite[:, count >= 0.5 * count.max()].all(axis=1))
+
+
+def table(recording: str, reference: str, joints: Sequence[Scored]) -> pl.DataFrame:
+    """The tidy table of scored joints, observer by observer."""
+    rows = [[row(recording, reference, s, k) for s in joints] for k in range(width(joints))]
+    return pl.DataFrame([line for observer in rows for line in observer], schema=SCHEMA)
+
+
+def width(joints: Sequence[Scored]) -> int:
+    """How many observers were scored."""
+    return len(joints[0].names) if joints else 0
+
+
+def row(recording: str, reference: str, joint: Scored, k: int) -> dict[str, object]:
+    """One row: observer k on one joint."""
+    here = {
+        "recording": recording,
+        "observer": joint.names[k],
+        "joint": joint.joint,
+        "reference": reference,
+        "reference_floor_Nm": number(joint.floor),
+        "samples": len(joint.reference),
+    }
+    if not len(joint.reference) or not np.isfinite(joint.error[:, k]).all():
+        return here | {"samples": 0}
+    return here | sizes(joint, k) | trust(joint, k)
+
+
+def sizes(joint: Scored, k: int) -> dict[str, object]:
+    """How large the error is, how sure that is, and what shape it has."""
+    error, draws = joint.error[:, k], joint.resampled
+    square = float(np.mean(error**2))
+    low, high = interval(square, draws.draws[:, k], draws.blocks)
+    best = int(np.nanargmin(np.mean(joint.error**2, axis=0)))
+    return {
+        "rmse_Nm": number(np.sqrt(square)),
+        "rmse_low_Nm": number(low),
+        "rmse_high_Nm": number(high),
+        "bias_Nm": number(error.mean()),
+        "max_Nm": number(np.max(np.abs(error))),
+        "correlation": number(correlation(joint.estimates[:, k], joint.reference)),
+        "lag_s": number(joint.lag[k]),
+        "p_vs_best": 1.0 if k == best else p_value(draws.draws[:, k], draws.draws[:, best]),
+    }
+
+
+def trust(joint: Scored, k: int) -> dict[str, object]:
+    """How far the reference of this joint can be trusted, and the error where it can."""
+    share = float(np.mean(joint.trusted))
+    moving = joint.error[joint.trusted, k]
+    return {
+        "reference_trusted": share >= TRUSTED_SHARE,
+        "at_rest": 1.0 - share,
+        "rmse_moving_Nm": number(np.sqrt(np.mean(moving**2))) if len(moving) else None,
+    }
+
+
+def number(value: float) -> float | None:
+    """A finite number, or None, which tables and JSON can hold."""
+    return float(value) if np.isfinite(value) else None

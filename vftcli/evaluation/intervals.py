@@ -1,0 +1,116 @@
+"""Confidence intervals of an RMSE whose errors follow one another: moving-block bootstrap."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.arrays import Array
+
+REPETITIONS = 1000
+"""Bootstrap repetitions; the ends of a 95 % interval rest on 25 of them."""
+
+SEED = 20250811
+"""Seed of every bootstrap: the same log gives the same interval."""
+
+MOST_BLOCKS = 300
+"""Blocks a repetition is put together from, at most: more change nothing but the time it takes."""
+
+LEAST_BLOCKS = 10
+"""Blocks a repetition is put together from, at least, however long errors remember."""
+
+MEMORY = 5.0
+"""Length of a block in correlation times of the squared error."""
+
+LEVEL = 0.95
+"""Coverage of the intervals."""
+
+
+class Resampled(NamedTuple):
+    """Mean squares of resampled errors.
+
+    Attributes:
+        draws: One mean square a repetition and column. (B, m)
+        blocks: How many blocks each repetition has: the effective number of independent pieces.
+    """
+
+    draws: Array
+    blocks: int
+
+
+def resample(squares: Array, seed: int = SEED) -> Resampled:
+    """Mean squares of moving-block bootstrap repetitions; all columns share the same blocks.
+
+    Blocks of `MEMORY` correlation times are drawn with replacement from the series closed to a
+    ring, so that every sample counts alike (Politis and Romano's circular variant of Künsch's
+    moving blocks). Sums over blocks come from one cumulative sum.
+
+    Args:
+        squares: Squared errors, one column an observer. (T, m) [(N·m)²]
+        seed: Of the block starts.
+    """
+    samples = len(squares)
+    length = block_length(squares)
+    blocks = max(1, round(samples / length))
+    ring = np.concatenate([np.zeros((1, squares.shape[1])), squares, squares[: length - 1]])
+    total = np.cumsum(ring, axis=0)
+    starts = np.random.default_rng(seed).integers(0, samples, (REPETITIONS, blocks))
+    picked = np.zeros((REPETITIONS, squares.shape[1]))
+    for column in range(squares.shape[1]):
+        sums = total[length:, column] - total[:-length, column]
+        picked[:, column] = sums[starts].sum(axis=1) / (blocks * length)
+    return Resampled(picked, blocks)
+
+
+def block_length(squares: Array) -> int:
+    """Length of the blocks: `MEMORY` times the longest correlation time. [samples]"""
+    samples = len(squares)
+    longest = max(1, samples // LEAST_BLOCKS)
+    shortest = min(longest, max(1, -(-samples // MOST_BLOCKS)))
+    wanted = int(np.ceil(MEMORY * np.max(correlation_time(squares))))
+    return int(np.clip(wanted, shortest, longest))
+
+
+def correlation_time(x: Array) -> Array:
+    """Integral of each column's autocorrelation up to its first value below 0.05. (m,) [samples]
+
+    1 for white noise.
+    """
+    samples = len(x)
+    x = x - x.mean(axis=0)
+    size = 1 << int(np.ceil(np.log2(2 * samples)))
+    spectrum = np.abs(np.fft.rfft(x, size, axis=0)) ** 2
+    product = np.fft.irfft(spectrum, size, axis=0)[: max(samples // 2, 1)]
+    rho = product / np.where(product[0] > 0, product[0], 1.0)
+    fallen = rho < 0.05
+    end = np.where(fallen.any(axis=0), fallen.argmax(axis=0), len(rho))
+    inside = np.arange(len(rho))[:, None] < end
+    time: Array = 2.0 * np.sum(np.where(inside, rho, 0.0), axis=0) - 1.0
+    return np.maximum(time, 1.0)
+
+
+def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, float]:
+    """95 % interval of an RMSE from bootstrap draws of its mean square. [N·m]
+
+    Taken on the logarithm, where the mean of squares is nearest to normal, as its value plus and
+    minus Student's quantile for the number of blocks times the draws' standard deviation.
+
+    Args:
+        mean_square: The observed mean square. [(N·m)²]
+        draws: Resampled mean squares. (B,) [(N·m)²]
+        blocks: Blocks in each repetition.
+    """
+    from scipy.special import stdtrit
+
+    if not mean_square > 0 or blocks < 2:
+        return float("nan"), float("nan")
+    spread = float(np.std(np.log(np.maximum(draws, 1e-300))))
+    quantile = float(stdtrit(blocks - 1, 0.5 + 0.5 * LEVEL)) * np.sqrt(blocks / (blocks - 1.0))
+    half = 0.5 * quantile * spread
+    root = float(np.sqrt(mean_square))
+    return root * float(np.exp(-half)), root * float(np.exp(half))
+
+
+def known_rows(errors: Array) -> NDArray[np.bool_]:
+    """Samples in which every column is known. (T,)"""
+    return np.asarray(np.isfinite(errors).all(axis=1))

@@ -1,0 +1,99 @@
+"""Errors of wrenches against a reference wrench: rows below the joints' in the same table."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import polars as pl
+
+from vftcli.evaluation.errors import SCHEMA, correlation, number, rmse
+from vftcli.wrench.detection import Told
+from vftcli.wrench.measurement import Measurement
+from vftcli.wrench.wrench import AXES, Wrench
+
+WRENCH_SCHEMA: dict[str, type[pl.DataType]] = {
+    **SCHEMA,
+    "axis": pl.String,
+    "rmse_N": pl.Float64,
+    "bias_N": pl.Float64,
+    "max_N": pl.Float64,
+}
+"""Columns where wrenches are compared: `axis` fx…mz, `joint` null; forces fill rmse_N."""
+
+
+def evaluate_wrenches(
+    recording: str, wrenches: Iterable[Wrench], reference: Wrench
+) -> pl.DataFrame:
+    """One row per observer and axis, over the samples where the pose can tell both.
+
+    Args:
+        recording: The log's name, for the first column.
+        wrenches: The observers' wrenches, on the reference's clock and in its frame.
+        reference: What they are judged by.
+    """
+    rows: list[dict[str, object]] = []
+    for wrench in wrenches:
+        overall = rmse(wrench.known, reference.known)
+        for k, axis in enumerate(AXES):
+            x, y = wrench.known[:, k], reference.known[:, k]
+            known = np.isfinite(x) & np.isfinite(y)
+            error, unit = (x - y)[known], "N" if k < 3 else "Nm"
+            some = len(error) > 0
+            rows.append(
+                {
+                    "recording": recording,
+                    "observer": wrench.name,
+                    "axis": axis,
+                    f"rmse_{unit}": number(overall[k]),
+                    f"bias_{unit}": number(error.mean()) if some else None,
+                    f"max_{unit}": number(np.max(np.abs(error))) if some else None,
+                    "correlation": number(correlation(x[known], y[known])) if some else None,
+                    "reference": reference.name,
+                    "samples": len(error),
+                }
+            )
+    return pl.DataFrame(rows, schema=WRENCH_SCHEMA)
+
+
+def with_wrenches(errors: pl.DataFrame, recording: str, sensed: Measurement) -> pl.DataFrame:
+    """The joints' errors, and below them the wrenches' where a reference wrench is known."""
+    if sensed.reference is None:
+        return errors
+    rows = evaluate_wrenches(recording, sensed.wrenches, sensed.reference)
+    return pl.concat([errors, rows], how="diagonal")
+
+
+CONTACT_SCHEMA: dict[str, type[pl.DataType]] = {
+    "recording": pl.String,
+    "observer": pl.String,
+    "reference": pl.String,
+    "signal": pl.String,
+    "contacts": pl.Int64,
+    "missed_contacts": pl.Int64,
+    "false_alarms": pl.Int64,
+    "false_alarms_per_h": pl.Float64,
+    "detection_delay_s": pl.Float64,
+    "longest_delay_s": pl.Float64,
+}
+"""Columns where contacts are judged: one row an observer; `signal` is "torque" or "wrench"."""
+
+
+def with_contacts(
+    errors: pl.DataFrame, recording: str, reference: str, contacts: Iterable[Told]
+) -> pl.DataFrame:
+    """The errors, and below them one row an observer on the contacts it tells."""
+    rows = [
+        {
+            "recording": recording,
+            "observer": told.name,
+            "reference": reference,
+            "signal": told.signal,
+            "contacts": told.detection.contacts,
+            "missed_contacts": told.detection.missed,
+            "false_alarms": told.detection.false_alarms,
+            "false_alarms_per_h": number(told.detection.false_alarms_per_h),
+            "detection_delay_s": number(told.detection.mean_delay),
+            "longest_delay_s": number(told.detection.longest_delay),
+        }
+        for told in contacts
+    ]
+    return pl.concat([errors, pl.DataFrame(rows, schema=CONTACT_SCHEMA)], how="diagonal")
