@@ -1,7 +1,7 @@
 """Disturbance observers: one table, and the parameters each starts from."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from vftcli.observers.kalman import KalmanObserver
 from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer, Tuning, per_joint
 from vftcli.observers.settings import PARAMETERS, Settings, joint_values, merged, parse_settings
+from vftcli.observers.smoother import KalmanSmoother
 
 FALLBACK_RATE = 10.0
 """First-order gain where a robot gives no gains at all. [1/s]"""
@@ -111,6 +112,12 @@ def build_kfo(scheme: str) -> Callable[[Setup], tuple[Observer, tuple[str, ...]]
     return build
 
 
+def build_rts(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
+    """The smoother on the zero-order-hold filter, whose process noise leaves no bias on a ramp."""
+    kalman, notes = build_kfo("zoh")(setup)
+    return KalmanSmoother(filter=cast("KalmanObserver", kalman)), notes
+
+
 OBSERVERS: dict[str, Entry] = {
     "fdo": Entry(
         "filtered dynamics observer",
@@ -139,6 +146,13 @@ OBSERVERS: dict[str, Entry] = {
         "(36)–(40), (43), (44)",
         "the same with the exact process noise",
         build_kfo("zoh"),
+    ),
+    "kfo-rts": Entry(
+        "Rauch–Tung–Striebel smoother on kfo-zoh",
+        "kfo",
+        "not in the paper",
+        "the same with the whole log in view: no delay, but it leads before a tap",
+        build_rts,
     ),
 }
 """Name at the command line → the observer."""

@@ -84,7 +84,8 @@ def scalar_recursion(decay: Array, x: Array, before: Array) -> Array:
     n = x.shape[1]
     start = before[None]
     if len(decay) == 1:
-        return steady_filter(decay.reshape(1, 1, n), np.ones((1, n)), x, start, wanted=0)
+        one = np.ones((1, n))
+        return steady_filter(decay.reshape(1, 1, n), one, x, start, wanted=one)
     return recursion(decay.reshape(-1, 1, 1, n), x[:, None, :], start)[:, 0]
 
 

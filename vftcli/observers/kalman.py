@@ -105,7 +105,7 @@ class KalmanObserver:
             model = self.model(steps.median, n)
             change = momentum_change(terms, steps, trapezoid=not self.as_printed)
             F, g = error_filter(settled.gains, model.a12, model.a22)
-            tau = steady_filter(F, g, change, np.zeros((2, n)), wanted=1)
+            tau = steady_filter(F, g, change, np.zeros((2, n)), wanted=second_entry(n))
             row = handed_over(np.sqrt(settled.gains.posterior.p22))
             sd = np.broadcast_to(row, tau.shape)
         else:
@@ -122,7 +122,7 @@ class KalmanObserver:
         for span, model, gains in gain_pieces(
             lambda span: self.model(dt[span, None], n),
             samples,
-            self._first_prior(settled),
+            self.first_prior(settled),
             settled.gains.posterior,
         ):
             F, g = error_filter(gains, model.a12, model.a22)
@@ -132,7 +132,7 @@ class KalmanObserver:
             tau[span], sd[span] = states[:, 1], np.sqrt(gains.posterior.p22)
         return tau, sd
 
-    def _first_prior(self, settled: Steady) -> Covariance:
+    def first_prior(self, settled: Steady) -> Covariance:
         """Covariance before the first update: the user's, or the stationary one. (n,)"""
         if self.initial_covariance is None:
             return settled.prior
@@ -213,6 +213,11 @@ def momentum_change(
     np.subtract(p[now], p[before], out=rest)
     rest -= explained
     return d
+
+
+def second_entry(joints: int) -> Array:
+    """Weights that pick the external torque out of a two-state filter. (2, n)"""
+    return np.repeat([[0.0], [1.0]], joints, axis=1)
 
 
 def error_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:

@@ -1,7 +1,7 @@
 """Filters whose coefficients do not change along the log, as products with short Toeplitz matrices.
 
-s_t = F s_{t−1} + g d_t, with a scalar input d and a small state for each joint of which one entry
-is wanted. Within a block of samples the wanted entry is a triangular Toeplitz matrix of the impulse
+s_t = F s_{t−1} + g d_t, with a scalar input d and a small state for each joint of which one
+combination is wanted. Within a block of samples that is a triangular Toeplitz matrix of its impulse
 response times the block's inputs, plus what the state at the block's start still contributes; BLAS
 does that for all blocks at once. The states at the blocks' ends obey the same kind of recursion,
 once a block. It is the plain loop's sum in another order, to rounding.
@@ -19,19 +19,19 @@ PIECE = 1 << 16
 """Samples handled at a time, so that memory does not grow with the log."""
 
 
-def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: int) -> Array:
-    """Run s_t = F s_{t−1} + g d_t and return one entry of the state. (T, n)
+def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> Array:
+    """Run s_t = F s_{t−1} + g d_t and return one combination of the state, wanted·s_t. (T, n)
 
     Args:
         F: Transition. (m, m, n)
         g: What the input adds to the state. (m, n)
         d: Input. (T, n)
         start: State before the first sample. (m, n)
-        wanted: Which entry of the state to return.
+        wanted: Weights of the state's entries. (m, n)
     """
     samples, n = d.shape
     out = empty_series(samples, n)
-    kernels = [Kernel(F[:, :, j], g[:, j], wanted) for j in range(n)]
+    kernels = [Kernel(F[:, :, j], g[:, j], wanted[:, j]) for j in range(n)]
     state = start
     for first in range(0, samples, PIECE):
         span = slice(first, min(first + PIECE, samples))
@@ -43,12 +43,12 @@ class Kernel:
     """One joint's block: impulse response, its effect on the block's end, and the state's decay.
 
     Attributes:
-        inputs: Block's inputs → wanted entries, then the state at its end. (BLOCK, BLOCK + m)
-        carry: State at the block's start → wanted entries. (m, BLOCK)
+        inputs: Block's inputs → what is wanted, then the state at its end. (BLOCK, BLOCK + m)
+        carry: State at the block's start → what is wanted. (m, BLOCK)
         reach: State at the block's start → at its end. (m, m)
     """
 
-    def __init__(self, F: Array, g: Array, wanted: int) -> None:
+    def __init__(self, F: Array, g: Array, wanted: Array) -> None:
         m = len(g)
         powers = np.empty((BLOCK + 1, m, m))
         powers[0] = np.eye(m)
@@ -56,9 +56,9 @@ class Kernel:
             powers[i + 1] = F @ powers[i]
         response = powers[:BLOCK] @ g
         lag = np.arange(BLOCK)[None, :] - np.arange(BLOCK)[:, None]
-        toeplitz = np.where(lag >= 0, response[np.maximum(lag, 0), wanted], 0.0)
+        toeplitz = np.where(lag >= 0, (response @ wanted)[np.maximum(lag, 0)], 0.0)
         self.inputs = np.ascontiguousarray(np.hstack([toeplitz, response[::-1]]))
-        self.carry = np.ascontiguousarray(powers[1:, wanted, :].T)
+        self.carry = np.ascontiguousarray((wanted @ powers[1:]).T)
         self.reach = powers[BLOCK]
 
 

@@ -1,0 +1,216 @@
+"""Rauch–Tung–Striebel smoother on the disturbance Kalman filter: `kfo-rts`, for complete logs.
+
+A log is complete, so an estimate at t may use what came after t. The smoother is the Kalman
+filter's fixed-interval answer, run backwards in the form of Bryson and Frazier, which needs the
+innovations ν only and inverts nothing but a number:
+
+    λ̃ᵗ = Aᵀ[(I − LC)ᵀ λ̃ᵗ⁺¹ − Cᵀ νᵗ⁺¹/Sᵗ⁺¹],  λ̃ = 0 at the last sample,  x̂ₛᵗ = x̂ᵗ − Pᵗ λ̃ᵗ
+
+with P the filter's posterior and S its innovation variance. In the long run it is the two-sided
+filter |H|² = Q_τ/(Q_τ + Q_p ω² + R ω⁴): no delay, but it leads before a tap, because it knows that
+one is coming.
+
+References:
+    H. E. Rauch, F. Tung, C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems",
+    AIAA Journal 3(8), 1965; G. J. Bierman, "Fixed interval smoothing with discrete measurements",
+    Int. J. Control 18(1), 1973, for the form used here.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vftcli.arrays import Array, empty_series, handed_over
+from vftcli.dynamics.terms import DynamicsTerms
+from vftcli.observers.kalman import KalmanObserver, error_filter, momentum_change
+from vftcli.observers.kalman_gains import Covariance, Gains, gain_pieces
+from vftcli.observers.kalman_model import Discrete
+from vftcli.observers.observer import Complex, Tuning
+from vftcli.observers.recursion import Steps, recursion, steps_of
+from vftcli.observers.steady_filter import steady_filter
+from vftcli.torque import ExternalTorque
+
+SETTLED = 1e-15
+"""Relative change of the smoother's information a sample back, below which it has settled."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class KalmanSmoother:
+    """Fixed-interval smoother on a disturbance Kalman filter, with the filter's own parameters.
+
+    Exact at uneven clocks; memory grows with the log, time too.
+
+    Attributes:
+        filter: The Kalman observer that it smooths.
+        name: Name at the command line.
+    """
+
+    filter: KalmanObserver
+    name: str = "kfo-rts"
+
+    def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
+        """Smooth a whole log; `sd` is the smoother's own √P₂₂."""
+        steps = steps_of(terms.t)
+        if steps.uniform and self.filter.initial_covariance is None:
+            tau, sd = self._steady(terms, steps)
+        else:
+            tau, sd = self._step_by_step(terms, steps)
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=handed_over(sd))
+
+    def _steady(self, terms: DynamicsTerms, steps: Steps) -> tuple[Array, Array]:
+        """Smooth with constant gains. (T, n) each"""
+        n = terms.joints
+        settled, model = self.filter.steady(steps.median, n), self.filter.model(steps.median, n)
+        gains = settled.gains
+        change = momentum_change(terms, steps, trapezoid=not self.filter.as_printed)
+        F, g = error_filter(gains, model.a12, model.a22)
+        start, both = np.zeros((2, n)), np.stack([np.zeros(n), np.ones(n)])
+        tau = steady_filter(F, g, change, start, wanted=both)
+        innovation = innovations(tau, gains.l2, model.a22)
+        S = settled.prior.p11 + model.r
+        backward, b = adjoint(gains, model.a12, model.a22)
+        # λ̃ᵗ is driven by νᵗ⁺¹: turned round, by the sample before.
+        driven = np.zeros_like(innovation)
+        driven[1:] = innovation[:0:-1] / S
+        weights = np.stack([gains.posterior.p12, gains.posterior.p22])
+        tau -= steady_filter(backward, b, driven, start, wanted=weights)[::-1]
+        return tau, self._steady_deviation(gains, model, S, terms.samples)
+
+    def _steady_deviation(self, gains: Gains, model: Discrete, S: Array, samples: int) -> Array:
+        """√P₂₂ of the smoother: it settles within a few time constants of the log's end. (T, n)"""
+        L = np.zeros((3, len(S)))
+        steps, variances = [], []
+        step = information_step(gains, model.a12, model.a22)
+        for _ in range(samples):
+            variances.append(smoothed_variance(gains.posterior, L))
+            new = np.einsum("abj,bj->aj", step, L)
+            new += information_gain(model.a12, S)
+            moved = np.max(np.abs(new - L) / np.maximum(np.abs(new), np.finfo(float).tiny))
+            L = new
+            steps.append(moved)
+            if moved <= SETTLED:
+                break
+        sd = empty_series(samples, len(S))
+        count = len(variances)
+        sd[:] = np.sqrt(variances[-1])
+        sd[samples - count :] = np.sqrt(np.array(variances[::-1]))
+        return sd
+
+    def _step_by_step(self, terms: DynamicsTerms, steps: Steps) -> tuple[Array, Array]:
+        """Smooth with gains that follow each step's own sample time. (T, n) each"""
+        gains, model, S = self._forward(terms, steps)
+        n = terms.joints
+        F, g = error_filter(gains, model.a12, model.a22)
+        change = momentum_change(terms, steps, trapezoid=not self.filter.as_printed)
+        states = recursion(F, g * change[:, None, :], np.zeros((2, n)))
+        tau = states[:, 1].copy()
+        innovation = innovations(tau, gains.l2, model.a22)
+        backward, b = adjoint(gains, model.a12, model.a22)
+        forced = -b * (innovation / S)[:, None, :]
+        lam = shifted_back(recursion(backward[::-1], -forced[::-1], np.zeros((2, n)))[::-1])
+        P = gains.posterior
+        tau -= P.p12 * lam[:, 0] + P.p22 * lam[:, 1]
+        step = information_step(gains, model.a12, model.a22)
+        gain = information_gain(model.a12, S)
+        information = shifted_back(recursion(step[::-1], gain[::-1], np.zeros((3, n)))[::-1])
+        variance = smoothed_variance(P, information.transpose(1, 0, 2))
+        return tau, np.sqrt(variance)
+
+    def _forward(self, terms: DynamicsTerms, steps: Steps) -> tuple[Gains, Discrete, Array]:
+        """The filter's gains, models and innovation variances along the log. (T, n) each"""
+        samples, n = terms.p.shape
+        dt = np.full(samples, steps.median) if steps.uniform else steps.dt
+        settled = self.filter.steady(steps.median, n)
+        pieces = list(
+            gain_pieces(
+                lambda span: self.filter.model(dt[span, None], n),
+                samples,
+                self.filter.first_prior(settled),
+                settled.gains.posterior,
+            )
+        )
+        model = Discrete(*(np.concatenate(e) for e in zip(*(m for _, m, _ in pieces), strict=True)))
+        l1 = np.concatenate([g.l1 for _, _, g in pieces])
+        l2 = np.concatenate([g.l2 for _, _, g in pieces])
+        posterior = Covariance(
+            *(np.concatenate(e) for e in zip(*(g.posterior for _, _, g in pieces), strict=True))
+        )
+        # L₁ = P⁻₁₁/S and R = S − P⁻₁₁, so S = R/(1 − L₁).
+        return Gains(l1, l2, posterior), model, model.r / (1.0 - l1)
+
+    def tuning(self, step: float, joints: int) -> Tuning:
+        """What the parameters mean: no delay, −3 dB where |H_KFO|² has fallen to 1/√2.
+
+        Q_τ/(Q_τ + Q_pω² + Rω⁴) = 1/√2 at the effective densities, ω_n and ζ those of the filter.
+        """
+        causal = self.filter.tuning(step, joints)
+        # In units of ω_n: x⁴ + c x² + 1 = √2 with c = Q_p/√(Q_τR) = 4ζ² − 2.
+        c = 4.0 * causal.zeta**2 - 2.0
+        x = np.sqrt(0.5 * (-c + np.sqrt(c**2 + 4.0 * (np.sqrt(2.0) - 1.0))))
+        return Tuning(
+            omega_n=causal.omega_n,
+            zeta=causal.zeta,
+            delay=np.zeros(joints),
+            bandwidth=causal.omega_n * x / (2.0 * np.pi),
+            dc_gain=causal.dc_gain,
+            numbers=causal.numbers,
+        )
+
+    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
+        """Gain of the two-sided filter in the middle of a log: real, without delay. (F, n)"""
+        causal = self.filter.tuning(step, joints)
+        x = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[:, None] / causal.omega_n
+        c = 4.0 * causal.zeta**2 - 2.0
+        response: Complex = (1.0 / (1.0 + c * x**2 + x**4)).astype(np.complex128)
+        return response
+
+
+def innovations(tau: Array, l2: Array, a22: Array) -> Array:
+    """ν of the filter, read off its estimate: τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ; none at the first sample."""
+    nu = empty_series(*tau.shape)
+    nu[0] = 0.0
+    rows = l2.ndim == 2
+    before = tau[:-1] * (a22[1:] if rows else a22)
+    np.subtract(tau[1:], before, out=nu[1:])
+    nu[1:] /= l2[1:] if rows else l2
+    return nu
+
+
+def adjoint(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
+    """Transition ((I − LC)A)ᵀ and input −AᵀCᵀ of the backward recursion. (…, 2, 2, n), (…, 2, n)"""
+    rest, l2 = 1.0 - gains.l1, gains.l2
+    F = np.stack([rest, -l2, rest * a12, a22 - l2 * a12], axis=-2)
+    b = np.stack([-np.ones_like(rest), -a12 * np.ones_like(rest)], axis=-2)
+    return F.reshape(*F.shape[:-2], 2, 2, F.shape[-1]), b
+
+
+def information_step(gains: Gains, a12: Array, a22: Array) -> Array:
+    """Λ̃ ← FᵀΛ̃F with F = (I − LC)A, as a matrix on (Λ₁₁, Λ₁₂, Λ₂₂). (…, 3, 3, n)"""
+    rest, l2 = 1.0 - gains.l1, gains.l2
+    f11, f12, f21, f22 = rest, rest * a12, -l2, a22 - l2 * a12
+    rows = [
+        [f11 * f11, 2.0 * f11 * f21, f21 * f21],
+        [f11 * f12, f11 * f22 + f12 * f21, f21 * f22],
+        [f12 * f12, 2.0 * f12 * f22, f22 * f22],
+    ]
+    return np.stack([np.stack(row, axis=-2) for row in rows], axis=-3)
+
+
+def information_gain(a12: Array, S: Array) -> Array:
+    """AᵀCᵀCA/S, what one sample tells of the one before, as (Λ₁₁, Λ₁₂, Λ₂₂). (…, 3, n)"""
+    return np.stack([1.0 / S, a12 / S, a12**2 / S], axis=-2)
+
+
+def smoothed_variance(P: Covariance, information: Array) -> Array:
+    """P₂₂ − [P₁₂ P₂₂] Λ̃ [P₁₂ P₂₂]ᵀ. Like P₂₂"""
+    l11, l12, l22 = information
+    gained = P.p12**2 * l11 + 2.0 * P.p12 * P.p22 * l12 + P.p22**2 * l22
+    variance: Array = P.p22 - gained
+    return variance
+
+
+def shifted_back(series: Array) -> Array:
+    """The series one sample later, zero at the end: what a sample learns from those after it."""
+    out = np.zeros_like(series)
+    out[:-1] = series[1:]
+    return out
