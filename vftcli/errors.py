@@ -43,3 +43,7 @@ class ReferenceTorqueError(VftError):
 
 class OutputError(VftError):
     """A file cannot be written, or exists and --force was not given."""
+
+
+class IdentificationError(VftError):
+    """A log does not determine what shall be identified from it, or contradicts the robot."""

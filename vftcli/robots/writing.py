@@ -79,10 +79,18 @@ def update_inertials(tables: list[Table], document: Mapping[str, Any], chain: Ch
 
 def payload_tables(robot: Robot) -> Table:
     """The ``[payload]`` section: what is mounted, and the loads that can be named."""
-    tables = {} if robot.payload is None else payload_table(robot.payload)
+    old = robot.document.get("payload", {})
+    tables = {} if robot.payload is None else kept_or_new(old, robot.payload)
     for name, load in robot.payloads.items():
-        tables[name] = payload_table(load)
+        tables[name] = kept_or_new(old.get(name, {}), load)
     return tables
+
+
+def kept_or_new(old: Table, payload: Payload) -> Table:
+    """The file's own section if it says the same mass, else a new one in flange axes."""
+    if old.get("mass") == payload.mass:
+        return {key: value for key, value in old.items() if not is_table(value)}
+    return payload_table(payload)
 
 
 def payload_table(payload: Payload) -> Table:

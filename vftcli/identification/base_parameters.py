@@ -1,0 +1,141 @@
+"""Base parameters: the combinations of inertial parameters that any motion can tell at all."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.identification.regressor import torque_regressor
+from vftcli.identification.stacking import TRUNCATION, Layout, Triangles
+from vftcli.robots.chain import Chain
+
+PROBES = 400
+"""Random states at which the structure is found."""
+
+RANK_TOLERANCE = 1e-8
+"""Diagonal entries of R below this share of the largest are zero: rounding is at 1e-15."""
+
+DOUBTFUL = 0.3
+"""A parameter whose standard deviation is more than this share of its size is not determined."""
+
+
+class Grouping(NamedTuple):
+    """Which unknowns stand for themselves, and what each carries along.
+
+    Attributes:
+        independent: Places of the independent unknowns. (b,)
+        dependent: Places of the others. (d,)
+        carried: β: how much of each dependent unknown an independent one carries. (b, d)
+    """
+
+    independent: tuple[int, ...]
+    dependent: tuple[int, ...]
+    carried: Array
+
+    def values(self, x: Array) -> Array:
+        """Base parameters of a full parameter vector: x₁ + β x₂. (b,)"""
+        base: Array = x[list(self.independent)] + self.carried @ x[list(self.dependent)]
+        return base
+
+    def named(self, names: tuple[str, ...]) -> list[str]:
+        """Each base parameter written out as a sum, as "Izz1 + 0.25 m2 + Iyy2"."""
+        out = []
+        for k, row in zip(self.independent, self.carried, strict=True):
+            text = names[k]
+            for place, factor in zip(self.dependent, row, strict=True):
+                if abs(factor) > 1e-9:
+                    size = "" if abs(abs(factor) - 1.0) < 1e-9 else f"{abs(factor):.5g} "
+                    text += f" {'-' if factor < 0 else '+'} {size}{names[place]}"
+            out.append(text)
+        return out
+
+
+def structure(chain: Chain, rotor: bool) -> Grouping:
+    """Group an arm's inertial parameters and rotor inertias by rank-revealing QR.
+
+    The regressor of random states, seeded, is decomposed with column pivoting; R = [R₁ R₂] gives
+    β = R₁⁻¹ R₂ (M. Gautier, "Numerical calculation of the base inertial parameters of robots",
+    J. Robotic Systems 8(4), 1991).
+
+    Args:
+        chain: The arm's geometry.
+        rotor: Whether rotor inertias are unknowns.
+    """
+    from scipy.linalg import qr
+
+    n, rng = chain.joints, np.random.default_rng(0)
+    q, dq, ddq = rng.uniform(-3.0, 3.0, (3, PROBES, n))
+    A = torque_regressor(chain, q, dq, ddq)
+    if rotor:
+        A = np.concatenate([A, ddq[:, :, None] * np.eye(n)], axis=2)
+    flat = A.reshape(-1, A.shape[2])
+    R, order = qr(flat, mode="r", pivoting=True)
+    diagonal = np.abs(np.diag(R))
+    rank = int(np.count_nonzero(diagonal > RANK_TOLERANCE * diagonal[0]))
+    beta = np.linalg.solve(R[:rank, :rank], R[:rank, rank:])
+    beta[np.abs(beta) < 1e-9] = 0.0
+    first = np.argsort(order[:rank])
+    return Grouping(
+        tuple(order[:rank][first].tolist()), tuple(order[rank:].tolist()), beta[first]
+    )
+
+
+def extended(grouping: Grouping, layout: Layout) -> Grouping:
+    """The grouping of all unknowns: friction coefficients stand for themselves."""
+    own = tuple(range(layout.inertial + layout.rotors, layout.size))
+    carried = np.vstack([grouping.carried, np.zeros((len(own), grouping.carried.shape[1]))])
+    return Grouping((*grouping.independent, *own), grouping.dependent, carried)
+
+
+class BaseParameters(NamedTuple):
+    """Estimated base parameters.
+
+    Attributes:
+        names: What each is the sum of.
+        values: Estimates. (b,)
+        sd: Standard deviations; infinite where the data says nothing. (b,)
+        determined: Whether the data determines it, by `DOUBTFUL`. (b,)
+        full: A full parameter vector with exactly these base parameters, the start's dependent
+            ones kept; it need not be physical. (size,)
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    sd: Array
+    determined: tuple[bool, ...]
+    full: Array
+
+
+def base_parameters(triangles: Triangles, start: Array) -> BaseParameters:
+    """Weighted least squares of the base parameters; directions without data keep the start.
+
+    Args:
+        triangles: The stacked equations.
+        start: The profile's parameters. (size,)
+    """
+    layout = triangles.layout
+    grouping = extended(structure(layout.chain, layout.rotor), layout)
+    places = list(grouping.independent)
+    R, z = triangles.joined()
+    R = R[:, places]
+    before = grouping.values(start)
+    scale = np.linalg.norm(R, axis=0)
+    silent = scale == 0.0
+    scale[silent] = 1.0
+    U, S, Vt = np.linalg.svd(R / scale, full_matrices=False)
+    keep = TRUNCATION * S[0] < S
+    step = Vt[keep].T @ ((U[:, keep].T @ (z - R @ before)) / S[keep]) / scale
+    values = before + step
+    spread = np.sqrt(np.sum((Vt[keep].T / S[keep]) ** 2, axis=1) * triangles.correlation) / scale
+    lost = np.sum(Vt[~keep] ** 2, axis=0) > DOUBTFUL
+    sd = np.where(silent | lost, np.inf, spread)
+    size = np.maximum(np.abs(values), np.abs(before))
+    full = start.copy()
+    full[places] = values - grouping.carried @ start[list(grouping.dependent)]
+    return BaseParameters(
+        names=tuple(grouping.named(layout.names)),
+        values=values,
+        sd=sd,
+        determined=tuple((sd <= DOUBTFUL * size).tolist()),
+        full=full,
+    )

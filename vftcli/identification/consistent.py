@@ -1,0 +1,226 @@
+r"""A physically consistent model: least squares with a barrier at the edge of what a body can be.
+
+A link's ten parameters belong to some mass distribution exactly if its pseudo-inertia
+
+.. math:: P = \begin{bmatrix} \tfrac12 \mathrm{tr}(I)\,1 - I & h \\ h^T & m \end{bmatrix}
+
+is positive definite (P. Wensing, S. Kim, J.-J. Slotine, IEEE RA-L 3(1), 2018). The distance to the
+profile is the log-determinant divergence tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4 (T. Lee, P. Wensing,
+F. Park, IEEE T-RO 36(1), 2020): it has no units, does not depend on the frame, is convex in the
+parameters, and grows without bound towards the edge, so that Newton's method never leaves the
+physical models and finds the one optimum.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import IdentificationError
+from vftcli.identification.regressor import LINK, TENSOR
+from vftcli.identification.stacking import Layout, Triangles
+
+WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3)
+"""Weights of the distance to the profile that cross-validation chooses from, in effective samples."""
+
+STEPS = 100
+"""Newton steps at most; a dozen or two are usual."""
+
+SETTLED = 1e-3
+"""Decrement at which Newton's method stops: the cost is a log-likelihood, where 1 is one standard
+deviation of one parameter, so that the rest to go is nothing."""
+
+SMALLEST_RADIUS = 1e-3
+"""A profile's link is made at least this thick, so that a distance to it exists. [m]"""
+
+
+def basis() -> Array:
+    """∂P/∂φ_k of the ten parameters. (10, 4, 4)"""
+    out = np.zeros((LINK, 4, 4))
+    out[0, 3, 3] = 1.0
+    for k in range(3):
+        out[1 + k, k, 3] = out[1 + k, 3, k] = 1.0
+    for k, (r, c) in enumerate(TENSOR, start=4):
+        if r == c:
+            out[k, :3, :3] = 0.5 * np.eye(3)
+        out[k, r, c] -= 1.0
+        if r != c:
+            out[k, c, r] -= 1.0
+    return out
+
+
+BASIS = basis()
+
+
+def pseudo_inertias(phi: Array) -> Array:
+    """Pseudo-inertia of each link. (n, 4, 4)"""
+    P: Array = np.einsum("jk,krc->jrc", phi.reshape(-1, LINK), BASIS)
+    return P
+
+
+def is_physical(phi: Array) -> bool:
+    """Whether every link's pseudo-inertia is positive definite."""
+    try:
+        np.linalg.cholesky(pseudo_inertias(phi))
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def thickened(phi: Array) -> Array:
+    """The nearest parameters whose every link has some mass and some thickness. (10n,)
+
+    Profiles from rounded tables, or with point masses, touch the edge of what is physical.
+    """
+    out = phi.reshape(-1, LINK).copy()
+    for row in out:
+        row[0] = max(row[0], 1e-3)
+        com = row[1:4] / row[0]
+        P = pseudo_inertias(row)[0]
+        about = P[:3, :3] - row[0] * np.outer(com, com)
+        values, vectors = np.linalg.eigh(about)
+        values = np.maximum(values, row[0] * SMALLEST_RADIUS**2)
+        second = (vectors * values) @ vectors.T + row[0] * np.outer(com, com)
+        tensor = np.trace(second) * np.eye(3) - second
+        row[4:] = [tensor[r, c] for r, c in TENSOR]
+    return out.ravel()
+
+
+class Problem(NamedTuple):
+    """½‖R x − z‖² + weight · distance(x, start), over physical x.
+
+    Attributes:
+        R: Triangle of the stacked equations. (size, size)
+        z: Its right-hand side. (size,)
+        start: The profile, physical. (size,)
+        layout: The unknowns.
+        weight: Weight of the distance.
+    """
+
+    R: Array
+    z: Array
+    start: Array
+    layout: Layout
+    weight: float
+
+    def value(self, x: Array) -> float:
+        """The cost; infinite outside the physical models."""
+        n, rotors = self.layout.inertial, self.layout.rotors
+        J, J0 = x[n : n + rotors], self.start[n : n + rotors]
+        if not is_physical(x[:n]) or np.any(J <= 0):
+            return float("inf")
+        P, P0 = pseudo_inertias(x[:n]), pseudo_inertias(self.start[:n])
+        ratio = np.linalg.solve(P0, P)
+        distance = float(np.sum(np.trace(ratio, axis1=1, axis2=2)) - 4 * len(P))
+        distance -= float(np.sum(np.linalg.slogdet(ratio)[1]))
+        distance += float(np.sum(J / J0 - np.log(J / J0) - 1.0))
+        misfit = self.R @ x - self.z
+        return 0.5 * float(misfit @ misfit) + self.weight * distance
+
+    def step(self, x: Array) -> tuple[Array, float]:
+        """Newton's step and the square of its decrement."""
+        n, rotors = self.layout.inertial, self.layout.rotors
+        gradient = self.R.T @ (self.R @ x - self.z)
+        hessian = self.R.T @ self.R
+        inverse = np.linalg.inv(pseudo_inertias(x[:n]))
+        before = np.linalg.inv(pseudo_inertias(self.start[:n]))
+        for j, (now, then) in enumerate(zip(inverse, before, strict=True)):
+            place = slice(LINK * j, LINK * (j + 1))
+            gradient[place] += self.weight * np.einsum("rc,kcr->k", then - now, BASIS)
+            turned = now @ BASIS
+            hessian[place, place] += self.weight * np.einsum("krc,lcr->kl", turned, turned)
+        J, J0 = x[n : n + rotors], self.start[n : n + rotors]
+        spots = np.arange(n, n + rotors)
+        gradient[spots] += self.weight * (1.0 / J0 - 1.0 / J)
+        hessian[spots, spots] += self.weight / J**2
+        scale = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
+        scaled = hessian / np.outer(scale, scale) + 1e-12 * np.eye(len(x))
+        step = -np.linalg.solve(scaled, gradient / scale) / scale
+        return step, float(-gradient @ step)
+
+
+def solve(problem: Problem, x: Array) -> Array:
+    """Damped Newton from a physical x; every iterate is physical. (size,)
+
+    Raises:
+        IdentificationError: If it does not settle.
+    """
+    cost = problem.value(x)
+    for _ in range(STEPS):
+        step, decrement = problem.step(x)
+        if decrement < SETTLED:
+            return x
+        length, low = 1.0, 1e-12
+        while (new := problem.value(x + length * step)) > cost - 1e-4 * length * decrement:
+            length *= 0.5
+            if length < low:
+                return x
+        x, cost = x + length * step, new
+    if decrement < 1.0:
+        return x
+    raise IdentificationError(
+        "the physically consistent fit did not settle; the log contradicts the profile too much. "
+        "Use --method friction, or a profile closer to the arm"
+    )
+
+
+class ConsistentFit(NamedTuple):
+    """A physical model.
+
+    Attributes:
+        x: All unknowns. (size,)
+        weight: Weight of the distance to the profile.
+        errors: Weight → cross-validated misfit, in standard deviations of the residual.
+    """
+
+    x: Array
+    weight: float
+    errors: dict[float, float]
+
+
+def starting_point(layout: Layout, x: Array) -> Array:
+    """Physical parameters near x to measure the distance from. (size,)"""
+    start = x.copy()
+    start[: layout.inertial] = thickened(x[: layout.inertial])
+    spots = slice(layout.inertial, layout.inertial + layout.rotors)
+    start[spots] = np.maximum(x[spots], 1e-3)
+    return start
+
+
+def fit_at(
+    triangles: Triangles, start: Array, weight: float, x: Array, leave_out: int | None = None
+) -> Array:
+    """The physical model at one weight; the equations count as correlated as they are. (size,)"""
+    R, z = triangles.joined(leave_out)
+    shrink = 1.0 / np.sqrt(triangles.correlation)
+    return solve(Problem(R * shrink, z * shrink, start, triangles.layout, weight), x)
+
+
+def fit_consistent(triangles: Triangles, profile: Array) -> ConsistentFit:
+    """Fit a physical model, its pull to the profile chosen by cross-validation.
+
+    Args:
+        triangles: The stacked equations.
+        profile: The profile's parameters with fitted friction. (size,)
+    """
+    start = starting_point(triangles.layout, profile)
+    totals = dict.fromkeys(WEIGHTS[::-1], 0.0)
+    for part in range(len(triangles.parts)):
+        x = start
+        for weight in totals:
+            x = fit_at(triangles, start, weight, x, leave_out=part)
+            totals[weight] += triangles.misfit(part, x)
+    rows = triangles.samples * triangles.correlation
+    errors = {weight: float(np.sqrt(total / rows)) for weight, total in totals.items()}
+    best = min(errors.values())
+    weight = max(w for w, error in errors.items() if error <= 1.002 * best)
+    return ConsistentFit(fit_at(triangles, start, weight, start), weight, errors)
+
+
+def nearest_physical(triangles: Triangles, profile: Array, weight: float = WEIGHTS[0]) -> Array:
+    """The physical model that predicts what least squares predicts, as nearly as one can. (size,)"""
+    start = starting_point(triangles.layout, profile)
+    x = start
+    for pull in (w for w in WEIGHTS[::-1] if w >= weight):
+        x = fit_at(triangles, start, pull, x)
+    return x

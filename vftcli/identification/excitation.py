@@ -1,0 +1,152 @@
+"""What a log can tell at all: which joints move, both ways, and whether something touches."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import IdentificationError
+from vftcli.identification.least_squares import robust_sd
+from vftcli.identification.processing import Motion, Samples, runs
+
+SLOW = 0.02
+"""A joint must move faster than this to identify anything. [rad/s]"""
+
+ENOUGH = 1.0
+"""Time it must do so, and for both ways to count the time each way. [s]"""
+
+TOUCH = 7.0
+"""Residual that counts as contact, in robust standard deviations of its joint."""
+
+TOUCH_TIME = 0.15
+"""Time it must last. [s]"""
+
+TOUCH_MARGIN = 0.3
+"""Time left out before and after. [s]"""
+
+WRONG = 0.5
+"""Share of the torque's variation that a model must explain in the joints that carry weight."""
+
+
+class Excitation(NamedTuple):
+    """Which joints the training logs excite.
+
+    Attributes:
+        moves: Whether a joint moves at all. (n,)
+        reverses: Whether it moves both ways. (n,)
+    """
+
+    moves: Samples
+    reverses: Samples
+
+
+def excitation(motions: Sequence[Motion]) -> Excitation:
+    """Find which joints move, and which both ways.
+
+    Raises:
+        IdentificationError: If no joint moves: a log at rest identifies nothing.
+    """
+    times = np.zeros((2, motions[0].joints))
+    for motion in motions:
+        if motion.samples < 2:
+            continue
+        step = float(np.median(np.diff(motion.t)))
+        times[0] += step * np.count_nonzero(motion.dq > SLOW, axis=0)
+        times[1] += step * np.count_nonzero(motion.dq < -SLOW, axis=0)
+    moves = times.sum(axis=0) >= ENOUGH
+    if not np.any(moves):
+        names = ", ".join(m.recording.name for m in motions)
+        raise IdentificationError(
+            f"{names}: no joint moves faster than {SLOW:g} rad/s for {ENOUGH:g} s; a log at rest "
+            "identifies no friction and no inertia. Record free motion, or use --find-payload "
+            "on static poses"
+        )
+    return Excitation(moves, np.min(times, axis=0) >= 0.1 * ENOUGH)
+
+
+class Contact(NamedTuple):
+    """A stretch in which something seems to touch the arm.
+
+    Attributes:
+        start: First instant. [s]
+        stop: Last instant. [s]
+        joint: Joint with the largest residual, from 1.
+        size: Its residual there. [N·m]
+    """
+
+    start: float
+    stop: float
+    joint: int
+    size: float
+
+
+def contacts(motion: Motion, residual: Array) -> list[Contact]:
+    """Find stretches whose residual is far outside what the rest of the log shows.
+
+    Args:
+        motion: The prepared log.
+        residual: Torque that the fitted model does not explain. (M, n) [N·m]
+    """
+    usable = motion.usable
+    sd = np.array([robust_sd(r[u]) for r, u in zip(residual.T, usable.T, strict=True)])
+    z = np.abs(residual) * usable / np.maximum(sd, 1e-9)
+    worst = z.max(axis=1)
+    found = []
+    for start, stop in runs(worst > TOUCH):
+        if motion.t[stop - 1] - motion.t[start] >= TOUCH_TIME:
+            k, j = np.unravel_index(int(np.argmax(z[start:stop])), (stop - start, z.shape[1]))
+            found.append(
+                Contact(
+                    float(motion.t[start]),
+                    float(motion.t[stop - 1]),
+                    int(j) + 1,
+                    float(residual[start + k, j]),
+                )
+            )
+    return merged(found)
+
+
+def merged(found: Sequence[Contact]) -> list[Contact]:
+    """Join contacts that lie closer together than twice the margin."""
+    out: list[Contact] = []
+    for contact in found:
+        if out and contact.start - out[-1].stop < 2 * TOUCH_MARGIN:
+            larger = max(out[-1], contact, key=lambda c: abs(c.size))
+            out[-1] = larger._replace(start=out[-1].start, stop=contact.stop)
+        else:
+            out.append(contact)
+    return out
+
+
+def without(motion: Motion, found: Sequence[Contact]) -> Samples:
+    """Samples outside all contacts and their margins. (M,)"""
+    free = np.ones(motion.samples, dtype=bool)
+    for contact in found:
+        inside = motion.t > contact.start - TOUCH_MARGIN
+        free &= ~(inside & (motion.t < contact.stop + TOUCH_MARGIN))
+    return free
+
+
+def check_robot(name: str, robot: str, torque: Array, residual: Array, heavy: Samples) -> None:
+    """Raise if the model misses most of the torque of the joints that carry the arm's weight.
+
+    Args:
+        name: The log's name.
+        robot: The robot's name.
+        torque: Drive torque. (M, n) [N·m]
+        residual: What is left after the fit. (M, n) [N·m]
+        heavy: Joints whose gravity torque varies. (n,)
+
+    Raises:
+        IdentificationError: With the joint and the share that is explained.
+    """
+    for j in np.flatnonzero(heavy):
+        explained = 1.0 - float(np.var(residual[:, j]) / max(np.var(torque[:, j]), 1e-12))
+        if explained < WRONG:
+            raise IdentificationError(
+                f"{name}: with robot {robot!r} the model explains {100 * max(explained, 0):.0f} % "
+                f"of the torque's variation in joint {j + 1}; this is another robot, its effort "
+                "has another sign or unit, or it carries an unknown load. "
+                "Choose another --robot, or check --columns"
+            )

@@ -1,0 +1,138 @@
+"""Friction, rotor inertia and optionally the drive constant of each joint, the links held."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.identification.friction_shapes import (
+    SMOOTHINGS,
+    STRIBECK_VELOCITIES,
+    FrictionColumns,
+    Shape,
+)
+from vftcli.identification.least_squares import Fit, cross_validated, fit_column
+
+PLAIN = ("coulomb", "viscous", "offset")
+RICHEST = (*PLAIN, "quadratic", "load_coulomb")
+CANDIDATES: tuple[tuple[str, ...], ...] = (
+    PLAIN,
+    (*PLAIN, "quadratic"),
+    (*PLAIN, "load_coulomb"),
+    (*PLAIN, "quadratic", "load_coulomb"),
+    (*PLAIN, "stribeck"),
+    (*PLAIN, "stribeck", "quadratic"),
+    (*PLAIN, "stribeck", "quadratic", "load_coulomb"),
+)
+"""Sets of friction terms that compete, simplest first."""
+
+NEVER_NEGATIVE = ("coulomb", "load_coulomb", "stribeck")
+"""Terms whose negative value would push the joint along."""
+
+MARGIN = 1.01
+"""A simpler model within this factor of the best cross-validated error is preferred."""
+
+LIGHT = 1.0
+"""Spread of the gravity torque below which growth with load cannot be told. [N·m]"""
+
+
+class Contest(NamedTuple):
+    """One candidate's cross-validated error.
+
+    Attributes:
+        joint: Joint, from 1.
+        shape: The candidate.
+        error: RMS on the stretches left out. [N·m]
+        chosen: Whether it was taken.
+    """
+
+    joint: int
+    shape: Shape
+    error: float
+    chosen: bool = False
+
+
+class Given(NamedTuple):
+    """What one joint's fit is made from, over all training logs.
+
+    Attributes:
+        y: Torque that friction and rotor shall explain. (M,) [N·m]
+        fixed: Columns beside friction: q̈ where the rotor inertia is sought, the rigid-body torque
+            where the drive constant is. (M, f)
+        weights: 0 where nothing is told, 1 elsewhere. (M,)
+        sources: Friction columns of each log.
+        loads: Spread of the gravity torque. [N·m]
+        reverses: Whether the joint moves both ways.
+    """
+
+    y: Array
+    fixed: Array
+    weights: Array
+    sources: Sequence[FrictionColumns]
+    loads: float
+    reverses: bool
+
+    def columns(self, j: int, shape: Shape) -> Array:
+        """Friction columns, then the fixed ones. (M, k + f)"""
+        friction = np.concatenate([source.joint(j, shape) for source in self.sources])
+        return np.hstack([friction, self.fixed])
+
+
+def choose_shape(j: int, given: Given) -> tuple[Shape, list[Contest]]:
+    """Choose a joint's friction model by cross-validation, simplest of the nearly best.
+
+    First the smoothing is chosen with the richest plain model, then the terms.
+
+    Args:
+        j: Joint, from 0.
+        given: Its data.
+    """
+    rich = allowed(RICHEST, given)
+    start = fit_column(given.columns(j, Shape(rich)), given.y, given.weights)
+
+    def error(smoothing: float) -> float:
+        return cross_validated(given.columns(j, Shape(rich, smoothing)), given.y, start.weights)
+
+    smoothing = min(SMOOTHINGS, key=error)
+    contests = []
+    for shape in candidates(smoothing, given):
+        A = given.columns(j, shape)
+        fit = fit_column(A, given.y, given.weights)
+        if physical(shape, fit):
+            contests.append(Contest(j + 1, shape, cross_validated(A, given.y, start.weights)))
+    if not contests:
+        return Shape(allowed(PLAIN, given), smoothing), []
+    limit = MARGIN * min(contest.error for contest in contests)
+    near = [c for c in contests if c.error <= limit]
+    chosen = min(near, key=lambda c: (len(c.shape.terms), c.error))
+    return chosen.shape, [c._replace(chosen=c is chosen) for c in contests]
+
+
+def candidates(smoothing: float, given: Given) -> Iterator[Shape]:
+    """The shapes that compete, each once."""
+    shapes: dict[Shape, None] = {}
+    for terms in CANDIDATES:
+        kept = allowed(terms, given)
+        if "stribeck" not in kept:
+            shapes[Shape(kept, smoothing)] = None
+            continue
+        for velocity in STRIBECK_VELOCITIES:
+            if velocity > 2 * smoothing:  # else the sign's own rounding hides it
+                shapes[Shape(kept, smoothing, velocity)] = None
+    yield from shapes
+
+
+def allowed(terms: tuple[str, ...], given: Given) -> tuple[str, ...]:
+    """Drop what the motion cannot tell: growth with a load there is none of, offset one-way."""
+    out = tuple(t for t in terms if t != "load_coulomb" or given.loads >= LIGHT)
+    return out if given.reverses else tuple(t for t in out if t != "offset")
+
+
+def physical(shape: Shape, fit: Fit) -> bool:
+    """Whether no dry-friction term came out negative."""
+    return all(
+        value >= 0.0
+        for term, value in zip(shape.terms, fit.values, strict=False)
+        if term in NEVER_NEGATIVE
+    )

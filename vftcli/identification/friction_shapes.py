@@ -1,0 +1,119 @@
+"""Friction as a sum of known shapes times coefficients: what is linear in it, and what is not.
+
+The shapes are evaluated on the log as it was recorded and then filtered like the torque, so that a
+reversal is rounded alike on both sides of the equation.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.identification.processing import Motion
+from vftcli.robots.robot import JointFriction
+
+SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)
+"""Velocities over which the sign may be smoothed. [rad/s]"""
+
+STRIBECK_VELOCITIES = (0.02, 0.05, 0.1, 0.2)
+"""Velocities over which a Stribeck term may fade. [rad/s]"""
+
+
+class Shape(NamedTuple):
+    """The structure of one joint's friction: which terms, and its two nonlinear numbers.
+
+    Attributes:
+        terms: Keys of the robot file whose values are coefficients, in order.
+        smoothing: Velocity over which the sign is smoothed. [rad/s]
+        stribeck_velocity: Velocity over which the Stribeck term fades. [rad/s]
+    """
+
+    terms: tuple[str, ...]
+    smoothing: float = 0.01
+    stribeck_velocity: float = 0.05
+
+    @property
+    def model(self) -> str:
+        """The robot file's name for it."""
+        if "stribeck" in self.terms:
+            return "coulomb-viscous-stribeck"
+        if "load_coulomb" in self.terms:
+            return "coulomb-viscous-load"
+        if "quadratic" in self.terms:
+            return "coulomb-viscous-quadratic"
+        return "coulomb-viscous-offset" if "offset" in self.terms else "coulomb-viscous"
+
+    @property
+    def words(self) -> str:
+        """The terms and the nonlinear numbers, for tables."""
+        text = f"{' + '.join(self.terms)}, smoothing {self.smoothing:g} rad/s"
+        if "stribeck" in self.terms:
+            text += f", Stribeck velocity {self.stribeck_velocity:g} rad/s"
+        return text
+
+    def friction(self, values: Array, confidence: str = "") -> JointFriction:
+        """The joint's friction with these coefficients, one a term."""
+        parameters = {k: rounded(float(v)) for k, v in zip(self.terms, values, strict=True)}
+        parameters["smoothing"] = self.smoothing
+        if "stribeck" in self.terms:
+            parameters["stribeck_velocity"] = self.stribeck_velocity
+        return JointFriction(model=self.model, parameters=parameters, confidence=confidence)
+
+
+def rounded(value: float, digits: int = 7) -> float:
+    """A number with as many digits as an identification can possibly mean."""
+    return float(f"{value:.{digits}g}")
+
+
+def shape_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
+    """One term of a friction shape at every sample. Like `dq`
+
+    Args:
+        term: Its key.
+        shape: The structure.
+        dq: Velocities as recorded. [rad/s]
+        load: Absolute gravity torque. [N·m]
+    """
+    if term == "offset":
+        return np.ones_like(dq)
+    if term == "viscous":
+        return dq
+    if term == "quadratic":
+        values: Array = dq * np.abs(dq)
+        return values
+    sign: Array = np.tanh(dq / shape.smoothing)
+    if term == "load_coulomb":
+        return sign * load
+    if term == "stribeck":
+        return sign * np.exp(-((dq / shape.stribeck_velocity) ** 2))
+    return sign
+
+
+class FrictionColumns:
+    """Filtered friction columns of one prepared log, each made once.
+
+    Args:
+        motion: The prepared log.
+        load: Absolute gravity torques along the whole log. (T, n) [N·m]
+    """
+
+    def __init__(self, motion: Motion, load: Array) -> None:
+        self.motion = motion
+        self.load = load
+        self.made: dict[tuple[str, int, float, float], Array] = {}
+
+    def column(self, term: str, j: int, shape: Shape) -> Array:
+        """One term of joint j. (M,)"""
+        steep = shape.smoothing if term in {"coulomb", "load_coulomb", "stribeck"} else 0.0
+        fades = shape.stribeck_velocity if term == "stribeck" else 0.0
+        key = (term, j, steep, fades)
+        if key not in self.made:
+            dq = self.motion.recording.require("dq")[:, j]
+            values = shape_values(term, shape, dq, self.load[:, j])
+            self.made[key] = self.motion.filtered(values[:, None])[:, 0]
+        return self.made[key]
+
+    def joint(self, j: int, shape: Shape) -> Array:
+        """All terms of joint j. (M, k)"""
+        columns = [self.column(term, j, shape) for term in shape.terms]
+        return np.stack(columns, axis=1) if columns else np.zeros((self.motion.samples, 0))

@@ -1,0 +1,172 @@
+"""From a log to the signals an identification is made from: filtered alike, without delay."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.dynamics.drive import drive_torque
+from vftcli.dynamics.kernels import CHUNK, momentum_terms
+from vftcli.errors import ParameterError
+from vftcli.identification.filtering import ORDER, derivative, zero_phase
+from vftcli.recording import Recording
+from vftcli.robots.robot import Robot
+
+Samples = np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Processing:
+    """How signals are prepared. Everything a joint's torque is made of goes through one filter.
+
+    Attributes:
+        cutoff: Cutoff of the zero-phase low-pass, −3 dB a pass; the band that is used ends
+            there. [Hz]
+        oversampling: Samples kept per period of the cutoff when the filtered log is decimated.
+        still: Speed below which a joint counts as at rest. [rad/s]
+        rest: Length of a stop from which on it identifies nothing, because of stiction. [s]
+        gap: Steps longer than this many median steps are left out.
+    """
+
+    cutoff: float = 8.0
+    oversampling: float = 6.0
+    still: float = 1e-3
+    rest: float = 0.3
+    gap: float = 10.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.cutoff < 1e4:
+            raise ParameterError(f"cutoff is {self.cutoff:g} Hz; it must be positive")
+
+    def described(self, step: float) -> dict[str, str | float]:
+        """The settings in words, for the robot file and `run.json`.
+
+        Args:
+            step: Median step of the log. [s]
+        """
+        return {
+            "filter": f"Butterworth order {ORDER}, forwards and backwards (zero phase)",
+            "cutoff_hz": self.cutoff,
+            "band_hz": f"0 to {self.cutoff:g}",
+            "differentiation": "central differences of the filtered velocity on the log's clock; "
+            "positions are never differentiated",
+            "decimation": float(self.stride(step)),
+            "kept_rate_hz": round(1.0 / (step * self.stride(step)), 6),
+            "scored_span": f"first to last sample with |dq| > {self.still:g} rad/s",
+        }
+
+    def stride(self, step: float) -> int:
+        """Every how many samples of the filtered log are kept."""
+        return max(1, int(1.0 / (step * self.oversampling * self.cutoff) + 1e-9))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """A log prepared for identification: M samples from the first to the last that moves.
+
+    Attributes:
+        recording: The log.
+        processing: How it was prepared.
+        kept: Which samples of the log these are. (M,)
+        t: Time. (M,) [s]
+        q: Positions. (M, n) [rad]
+        dq: Velocities. (M, n) [rad/s]
+        ddq: Accelerations. (M, n) [rad/s²]
+        tau: Drive torque, friction included. (M, n) [N·m]
+        usable: Whether a sample of a joint tells anything: the joint is not in a long stop and
+            the sample lies in no gap of the clock. (M, n)
+    """
+
+    recording: Recording
+    processing: Processing
+    kept: Samples
+    t: Array
+    q: Array
+    dq: Array
+    ddq: Array
+    tau: Array
+    usable: Samples
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return int(self.q.shape[1])
+
+    @property
+    def samples(self) -> int:
+        """Number of samples M."""
+        return len(self.t)
+
+    def filtered(self, signals: Array) -> Array:
+        """Filter signals on the log's whole clock (T, m) and keep what is kept. (M, m)"""
+        recording = self.recording
+        columns = [
+            zero_phase(recording.t, column[:, None], self.processing.cutoff)[self.kept]
+            for column in signals.T
+        ]
+        return np.concatenate(columns, axis=1)
+
+    def chunks(self, size: int = 1024) -> Iterator[slice]:
+        """Spans of samples to work on at a time."""
+        for start in range(0, self.samples, size):
+            yield slice(start, min(start + size, self.samples))
+
+
+def prepare(recording: Recording, robot: Robot, processing: Processing) -> Motion:
+    """Filter, differentiate and decimate a log, one column at a time.
+
+    Raises:
+        MissingSignalError: If velocities, or both currents and torques, are missing.
+        RobotError: If the number of joints differs.
+        ClockError: If the log is too short for the filter.
+    """
+    torque, dq = drive_torque(recording, robot), recording.require("dq")
+    t, stride = recording.t, processing.stride(recording.step)
+    moving = np.flatnonzero(np.any(np.abs(dq) > processing.still, axis=1))
+    kept = np.arange(moving[0], moving[-1] + 1, stride) if moving.size else np.arange(0)
+    columns: dict[str, list[Array]] = {"q": [], "dq": [], "ddq": [], "tau": []}
+    for j in range(recording.joints):
+        velocity = zero_phase(t, dq[:, j : j + 1], processing.cutoff)
+        columns["dq"].append(velocity[kept])
+        columns["ddq"].append(derivative(t, velocity)[kept])
+        for name, signal in (("q", recording.q), ("tau", torque)):
+            columns[name].append(zero_phase(t, signal[:, j : j + 1], processing.cutoff)[kept])
+    usable = told(t, dq, processing)[kept]
+    return Motion(
+        recording=recording,
+        processing=processing,
+        kept=kept,
+        t=t[kept],
+        usable=usable,
+        **{name: np.concatenate(parts, axis=1) for name, parts in columns.items()},
+    )
+
+
+def told(t: Array, dq: Array, processing: Processing) -> Samples:
+    """Whether each sample of each joint tells anything: no long stop, no gap beside it. (T, n)"""
+    usable = np.ones(dq.shape, dtype=bool)
+    for j, column in enumerate(np.abs(dq).T):
+        for start, stop in runs(column <= processing.still):
+            if t[stop - 1] - t[start] >= processing.rest:
+                usable[start:stop, j] = False
+    steps = np.diff(t)
+    margin = 0.5 / processing.cutoff
+    for k in np.flatnonzero(steps > processing.gap * np.median(steps)):
+        usable[(t > t[k] - margin) & (t < t[k + 1] + margin)] = False
+    return usable
+
+
+def runs(flags: Samples) -> list[tuple[int, int]]:
+    """First and one-past-last index of every stretch of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def gravity_torque(robot: Robot, q: Array) -> Array:
+    """Gravity torques of the loaded arm, chunk by chunk. (T, n) [N·m]"""
+    out = np.empty(q.shape)
+    for start in range(0, len(q), CHUNK):
+        span = slice(start, start + CHUNK)
+        out[span] = momentum_terms(robot.loaded_chain, q[span], np.zeros_like(q[span])).gravity
+    return out

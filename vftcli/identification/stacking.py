@@ -1,0 +1,209 @@
+"""The whole arm's regressor, reduced to a triangle chunk by chunk.
+
+All unknowns stand in one vector: inertial parameters (10 a link), rotor inertias, friction
+coefficients joint by joint. Of the stacked equations only the R factor of their QR decomposition
+is kept, so that memory does not grow with the log.
+"""
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.identification.friction_shapes import FrictionColumns, Shape
+from vftcli.identification.least_squares import (
+    FOLDS,
+    PASSES,
+    correlation_time,
+    folds,
+    huber,
+    robust_sd,
+)
+from vftcli.identification.processing import Motion, Samples
+from vftcli.identification.regressor import INERTIAL_NAMES, LINK, torque_regressor
+from vftcli.robots.chain import Chain
+
+
+class Layout(NamedTuple):
+    """Which unknown stands where.
+
+    Attributes:
+        chain: The arm's geometry.
+        rotor: Whether rotor inertias are unknowns: where torque is measured before the gear.
+        shapes: Friction structure of each joint.
+    """
+
+    chain: Chain
+    rotor: bool
+    shapes: tuple[Shape, ...]
+
+    @property
+    def inertial(self) -> int:
+        """Number of inertial unknowns."""
+        return LINK * self.chain.joints
+
+    @property
+    def rotors(self) -> int:
+        """Number of rotor inertias."""
+        return self.chain.joints if self.rotor else 0
+
+    @property
+    def frictions(self) -> tuple[slice, ...]:
+        """Place of each joint's friction coefficients."""
+        edges = np.cumsum([self.inertial + self.rotors, *(len(s.terms) for s in self.shapes)])
+        return tuple(slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True))
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.frictions[-1].stop
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """A name for each unknown: m2, mx3, Ixx1, J4, coulomb5 …"""
+        n = self.chain.joints
+        inertial = [f"{name}{j}" for j in range(1, n + 1) for name in INERTIAL_NAMES]
+        rotors = [f"J{j}" for j in range(1, self.rotors + 1)]
+        terms = [f"{t}{j}" for j, s in enumerate(self.shapes, start=1) for t in s.terms]
+        return (*inertial, *rotors, *terms)
+
+    def rows(self, motion: Motion, columns: FrictionColumns, span: slice) -> Array:
+        """The regressor of some samples. (N, n, size)"""
+        n = self.chain.joints
+        q, dq, ddq = motion.q[span], motion.dq[span], motion.ddq[span]
+        A = np.zeros((len(q), n, self.size))
+        A[:, :, : self.inertial] = torque_regressor(self.chain, q, dq, ddq)
+        for j, (shape, place) in enumerate(zip(self.shapes, self.frictions, strict=True)):
+            if self.rotor:
+                A[:, j, self.inertial + j] = ddq[:, j]
+            A[:, j, place] = columns.joint(j, shape)[span]
+        return A
+
+
+class Data(NamedTuple):
+    """One training log, ready to be stacked.
+
+    Attributes:
+        motion: The prepared log.
+        columns: Its friction columns.
+        weights: Weight of every sample and joint, 0 … 1. (M, n)
+    """
+
+    motion: Motion
+    columns: FrictionColumns
+    weights: Array
+
+
+class Triangles(NamedTuple):
+    """The stacked, weighted equations A x ≈ y of the whole logs, as R factors of [A y].
+
+    Attributes:
+        layout: The unknowns.
+        parts: R factor of each cross-validation stretch. (size+1, size+1) each
+        sigma: Standard deviation of each joint's residual, by which its rows are divided. [N·m]
+        correlation: Samples that count as one, by the residual's correlation along time.
+        samples: Effective number of weighted equations.
+    """
+
+    layout: Layout
+    parts: tuple[Array, ...]
+    sigma: Array
+    correlation: float
+    samples: float
+
+    def joined(self, leave_out: int | None = None) -> tuple[Array, Array]:
+        """R (size, size) and the right-hand side (size,) of all stretches but one."""
+        kept = [part for k, part in enumerate(self.parts) if k != leave_out]
+        whole = np.linalg.qr(np.vstack(kept), mode="r")
+        return whole[:-1, :-1], whole[:-1, -1]
+
+    def misfit(self, part: int, x: Array) -> float:
+        """Weighted sum of squares that x leaves in one stretch."""
+        R = self.parts[part]
+        return float(np.sum((R[:, -1] - R[:, :-1] @ x) ** 2))
+
+
+def residuals(layout: Layout, data: Data, x: Array) -> Array:
+    """Torque that x does not explain. (M, n) [N·m]"""
+    motion = data.motion
+    out = np.empty(motion.q.shape)
+    for span in motion.chunks():
+        out[span] = motion.tau[span] - layout.rows(motion, data.columns, span) @ x
+    return out
+
+
+def stack(layout: Layout, logs: Sequence[Data], start: Array) -> Triangles:
+    """Weigh and stack all logs, down-weighting outliers by what the last solution leaves.
+
+    Args:
+        layout: The unknowns.
+        logs: The training logs.
+        start: A solution to start from: the profile with its fitted friction. (size,)
+    """
+    x = start
+    for _ in range(PASSES):
+        left = [residuals(layout, data, x) for data in logs]
+        sigma = joint_sigma(logs, left)
+        triangles = reduced(layout, logs, left, sigma)
+        x = nearest(triangles, start)
+    return triangles
+
+
+def joint_sigma(logs: Sequence[Data], left: Sequence[Array]) -> Array:
+    """Robust standard deviation of each joint's residual where it tells anything. (n,) [N·m]"""
+    n = left[0].shape[1]
+    sigma = np.empty(n)
+    for j in range(n):
+        parts = [r[d.weights[:, j] > 0, j] for d, r in zip(logs, left, strict=True)]
+        sigma[j] = max(robust_sd(np.concatenate(parts)), 1e-9)
+    return sigma
+
+
+def reduced(
+    layout: Layout, logs: Sequence[Data], left: Sequence[Array], sigma: Array
+) -> Triangles:
+    """QR updates over all chunks of all logs, one triangle a cross-validation stretch."""
+    parts = [np.zeros((0, layout.size + 1)) for _ in range(FOLDS)]
+    total, correlation = 0.0, []
+    for data, residual in zip(logs, left, strict=True):
+        weights = data.weights * huber(residual / sigma)
+        total += float(np.sum(weights))
+        for r, w in zip(residual.T, data.weights.T, strict=True):
+            if np.count_nonzero(w) > 10:
+                correlation.append(correlation_time(r[w > 0]))
+        for k, fold in enumerate(folds(data.motion.samples)):
+            for rows in weighted_rows(layout, data, np.sqrt(weights) / sigma, fold):
+                parts[k] = np.linalg.qr(np.vstack([parts[k], rows]), mode="r")
+    inflation = float(np.mean(correlation)) if correlation else 1.0
+    return Triangles(layout, tuple(parts), sigma, inflation, total / inflation)
+
+
+def weighted_rows(
+    layout: Layout, data: Data, scale: Array, fold: slice, size: int = 512
+) -> Iterator[Array]:
+    """Rows [A y] times their weights, a chunk at a time; rows of no weight are dropped."""
+    for start in range(fold.start, fold.stop, size):
+        span = slice(start, min(start + size, fold.stop))
+        A = layout.rows(data.motion, data.columns, span)
+        rows = np.concatenate([A, data.motion.tau[span, :, None]], axis=2) * scale[span, :, None]
+        flat = rows.reshape(-1, rows.shape[2])
+        told: Samples = scale[span].ravel() > 0
+        yield flat[told]
+
+
+TRUNCATION = 1e-3
+"""Singular values below this share of the largest are left at the start (columns scaled)."""
+
+
+def nearest(triangles: Triangles, start: Array, truncation: float = TRUNCATION) -> Array:
+    """Least squares that leaves the start only where the data says so (truncated SVD). (size,)"""
+    R, z = triangles.joined()
+    scale = np.linalg.norm(R, axis=0)
+    scale[scale == 0.0] = 1.0
+    U, S, Vt = np.linalg.svd(R / scale)
+    keep = truncation * S[0] < S
+    step = Vt[keep].T @ ((U[:, keep].T @ (z - R @ start)) / S[keep])
+    x: Array = start + step / scale
+    return x
