@@ -1,7 +1,10 @@
 """Readers: a log in any known format becomes a Recording. The content decides, never the name."""
 
 from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from vftcli.errors import LogError, UnknownFormatError
 from vftcli.readers import arrays_file, lerobot, libfranka, parquet, pickles, rtde, tables
@@ -60,7 +63,9 @@ def read(
     file = open_log(path)
     reader = _reader(file, format, columns)
     request = Request(columns=columns, signals=frozenset(signals) if signals is not None else None)
-    raw = reader.read(file, request)
+    with np.errstate(all="ignore"):  # whatever a damaged file holds is judged when it is cleaned
+        raw = reader.read(file, request)
+        raw = replace(raw, repairs=(*file.repairs, *raw.repairs)) if file.repairs else raw
     return cleaned(raw, path, reader.name, Digest(path).hexdigest)
 
 

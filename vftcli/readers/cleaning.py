@@ -20,6 +20,9 @@ GARBAGE_VALUE = 1e6
 
 DENORMAL = 1e-300
 
+ABSURD = 1e9
+"""Values as large as this are no measurement in any unit; anywhere in a log they are refused."""
+
 GAP_STEPS = 4.0
 """A step this many times the median is reported as a gap."""
 
@@ -51,6 +54,13 @@ def cleaned(
         LogError: If a signal holds NaN or infinity, or its unit cannot be radians.
         ClockError: If the clock is not finite, runs backwards, or holds no samples.
     """
+    with np.errstate(all="ignore"):  # whatever a damaged file holds is judged, not computed with
+        return _cleaned(raw, path, format_name, sha256)
+
+
+def _cleaned(
+    raw: RawLog, path: Path, format_name: str, sha256: str | Callable[[], str]
+) -> Recording:
     findings = Findings(list(raw.repairs), list(raw.warnings))
     rows = len(raw.stamps)
     if rows == 0:
@@ -118,8 +128,7 @@ def without_leading_garbage(raw: RawLog, findings: Findings) -> RawLog:
     absurd = np.zeros(head.stop, dtype=bool)
     for value in raw.signals.values():
         size = np.abs(value[head])
-        with np.errstate(invalid="ignore"):
-            bad = ~(size < GARBAGE_VALUE) | ((size > 0) & (size < DENORMAL))
+        bad = ~(size < GARBAGE_VALUE) | ((size > 0) & (size < DENORMAL))
         absurd |= bad.any(axis=1)
     absurd |= ~np.isfinite(raw.stamps[head].astype(np.float64))
     if not absurd.any() or absurd.all():
@@ -137,34 +146,32 @@ def without_leading_garbage(raw: RawLog, findings: Findings) -> RawLog:
 
 def _last_jump(raw: RawLog, rows: int) -> int:
     """Index of the row after the last backward or enormous step among the first rows, or 0."""
-    t = raw.stamps[:rows].astype(np.float64) * raw.tick
-    steps = np.diff(t)
+    steps = np.diff(raw.stamps[:rows].astype(np.float64) * raw.tick)
     usual = np.median(np.diff(raw.stamps.astype(np.float64))) * raw.tick
-    with np.errstate(invalid="ignore"):
-        jumps = ~((steps >= 0) & (steps <= max(60.0, 1000 * usual)))
+    jumps = ~((steps >= 0) & (steps <= max(60.0, 1000 * usual)))
     return int(np.flatnonzero(jumps)[-1]) + 1 if jumps.any() else 0
 
 
 def refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
-    """Raise a LogError that names the row and column of the first NaN or infinity."""
+    """Raise a LogError that names the row and column of the first NaN, infinity or absurd value."""
     if not np.isfinite(raw.stamps).all():
         row = raw.first_row + int(np.argmin(np.isfinite(raw.stamps)))
         raise LogError(f"{path}: the clock is not a number in sample {row}. Cut the row out.")
     for name, value in raw.signals.items():
-        # a sum is finite if every term is; the slow look is only for the message
-        if np.isfinite(np.sum(value)) or np.isfinite(value).all():
+        # the largest tells whether all are finite; the slow look is only for the message
+        if max(float(np.max(value)), -float(np.min(value))) < ABSURD:
             continue
-        unknown = ~np.isfinite(value)
+        unknown = ~(np.abs(value) < ABSURD)
         row, column = (int(k) for k in np.argwhere(unknown)[0])
         lost = int(unknown[:, column].sum())
-        if lost == len(value):
+        if lost == len(value) and np.isnan(value[:, column]).all():
             raise LogError(
                 f"{path}: {name} of joint {column + 1} holds no numbers at all, only empty cells "
                 "or NaN. Leave the signal out (with _ in --columns), or record it."
             )
         raise LogError(
             f"{path}: {name} {'axis' if name == 'wrench' else 'of joint'} {column + 1} is "
-            f"{value[row, column]} in sample {raw.first_row + row} (t = "
+            f"{value[row, column]:.6g} in sample {raw.first_row + row} (t = "
             f"{seconds(raw)[row]:.6g} s), {lost} such in all. Nothing is filled in: cut the rows "
             "out, or leave the signal out with _ in --columns."
         )

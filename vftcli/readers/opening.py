@@ -26,6 +26,8 @@ Recorded numbers shrink by 3 to 15; a log that shrinks a hundredfold is not a re
 """
 
 CHUNK = 1024 * 1024
+ZSTD_BYTES = 1024
+"""zstd is fed in pieces so small that even a bomb yields only some tens of megabytes at a time."""
 
 
 def head_of(path: Path) -> tuple[bytes, Wrapping | None]:
@@ -53,7 +55,7 @@ def head_of(path: Path) -> tuple[bytes, Wrapping | None]:
 
 def _unwrapped_head(path: Path, wrapping: Wrapping) -> bytes:
     found = b""
-    for piece in _pieces(path, wrapping):
+    for piece in Unpacker(path, wrapping).pieces():
         found += piece
         if len(found) >= HEAD_BYTES:
             break
@@ -62,63 +64,84 @@ def _unwrapped_head(path: Path, wrapping: Wrapping) -> bytes:
     return found[:HEAD_BYTES]
 
 
-def unwrapped(path: Path, wrapping: Wrapping | None) -> memoryview:
-    """Return a file's whole content: mapped if plain, unpacked into memory if wrapped.
+def unwrapped(path: Path, wrapping: Wrapping | None) -> tuple[memoryview, bool]:
+    """Return a file's whole content, mapped if plain, unpacked into memory if wrapped.
+
+    Returns:
+        The content, and whether a wrapped file ends before its packed data does.
 
     Raises:
         LogError: If it is damaged, or unpacks beyond the limit.
     """
     if wrapping is not None:
-        return memoryview(b"".join(_pieces(path, wrapping)))
+        unpacker = Unpacker(path, wrapping)
+        return memoryview(b"".join(unpacker.pieces())), not unpacker.ended
     if path.stat().st_size < CHUNK:
-        return memoryview(path.read_bytes())
+        return memoryview(path.read_bytes()), False
     with path.open("rb") as file:
-        return memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+        return memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)), False
 
 
-def _pieces(path: Path, wrapping: Wrapping) -> Iterator[bytes]:
-    """Unpack a file piece by piece; a cut end yields what there is, a bomb is refused."""
-    limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * path.stat().st_size)
-    total = 0
-    for piece in (_gunzipped if wrapping == "gzip" else _unzstd)(path):
-        total += len(piece)
-        if total > limit:
-            raise LogError(
-                f"{path}: unpacks to more than {limit >> 20} MiB, more than a log this small can "
-                f"hold. If it is genuine, unpack it ({wrapping} -d) and give the unpacked file."
-            )
-        yield piece
+class Unpacker:
+    """Unpacks a file piece by piece: a cut end yields what there is, a bomb is refused.
 
+    Attributes:
+        ended: After the last piece: whether the packed data was whole.
+    """
 
-def _gunzipped(path: Path) -> Iterator[bytes]:
-    with path.open("rb") as file:
-        unpacker = zlib.decompressobj(wbits=31)
-        while packed := file.read(CHUNK // 16):
-            try:
-                while packed:
-                    yield unpacker.decompress(packed, CHUNK)
-                    packed = unpacker.unconsumed_tail
-                    if unpacker.eof and (packed := unpacker.unused_data):
-                        unpacker = zlib.decompressobj(wbits=31)  # the next member
-            except zlib.error as error:
-                raise LogError(f"{path}: the gzip file is damaged ({error})") from None
+    def __init__(self, path: Path, wrapping: Wrapping) -> None:
+        self.path = path
+        self.wrapping = wrapping
+        self.limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * path.stat().st_size)
+        self.ended = False
 
+    def pieces(self) -> Iterator[bytes]:
+        """The content, piece by piece.
 
-def _unzstd(path: Path) -> Iterator[bytes]:
-    import zstandard
-
-    with path.open("rb") as file:
-        reader = zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(
-            file, read_across_frames=True
-        )
-        while True:
-            try:
-                piece = reader.read(CHUNK)
-            except zstandard.ZstdError as error:
-                raise LogError(f"{path}: the zstd file is damaged ({error})") from None
-            if not piece:
-                return
+        Raises:
+            LogError: If the packed data is damaged, or unpacks beyond the limit.
+        """
+        total = 0
+        for piece in self._gunzipped() if self.wrapping == "gzip" else self._unzstd():
+            total += len(piece)
+            if total > self.limit:
+                raise LogError(
+                    f"{self.path}: unpacks to more than {self.limit >> 20} MiB, more than a log "
+                    f"this small can hold. If it is genuine, unpack it ({self.wrapping} -d) and "
+                    "give the unpacked file."
+                )
             yield piece
+
+    def _gunzipped(self) -> Iterator[bytes]:
+        with self.path.open("rb") as file:
+            unpacker = zlib.decompressobj(wbits=31)
+            while packed := file.read(CHUNK // 16):
+                try:
+                    while packed:
+                        yield unpacker.decompress(packed, CHUNK)
+                        packed = unpacker.unconsumed_tail
+                        if unpacker.eof and (packed := unpacker.unused_data.lstrip(b"\0")):
+                            unpacker = zlib.decompressobj(wbits=31)  # the next member
+                except zlib.error as error:
+                    raise LogError(f"{self.path}: the gzip file is damaged ({error})") from None
+            self.ended = unpacker.eof
+
+    def _unzstd(self) -> Iterator[bytes]:
+        import zstandard
+
+        context = zstandard.ZstdDecompressor(max_window_size=1 << 27)
+        with self.path.open("rb") as file:
+            unpacker = context.decompressobj()
+            while packed := file.read(ZSTD_BYTES):
+                try:
+                    while packed:
+                        yield unpacker.decompress(packed)
+                        packed = b""
+                        if unpacker.eof and (packed := unpacker.unused_data):
+                            unpacker = context.decompressobj()  # the next frame
+                except zstandard.ZstdError as error:
+                    raise LogError(f"{self.path}: the zstd file is damaged ({error})") from None
+            self.ended = unpacker.eof
 
 
 class Digest:

@@ -35,13 +35,24 @@ class LogFile:
         """Whether `head` is the whole content."""
         return len(self.content) == len(self.head)
 
-    @cached_property
+    @property
     def content(self) -> memoryview:
         """The whole content, unwrapped; the pages of a plain file are read when they are touched.
 
         Raises:
             LogError: If a compressed file is damaged or unpacks to an unreasonable size.
         """
+        return self._unwrapped[0]
+
+    @property
+    def repairs(self) -> tuple[str, ...]:
+        """What had to be left behind to open the file."""
+        if self.wrapping is None or not self._unwrapped[1]:
+            return ()
+        return (f"the {self.wrapping} file is cut: read what could be unpacked",)
+
+    @cached_property
+    def _unwrapped(self) -> tuple[memoryview, bool]:
         return unwrapped(self.path, self.wrapping)
 
     @cached_property

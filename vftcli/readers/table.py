@@ -327,7 +327,8 @@ def missing_column(table: Table, signal: str, name: str) -> LogError:
 
 def listed(names: Sequence[str], most: int = 24) -> str:
     """Names for a message; a long list is cut."""
-    shown = ", ".join(name if len(name) <= 40 else name[:37] + "…" for name in names[:most])
+    clean = ["".join(c if c.isprintable() else "?" for c in name[:41]) for name in names[:most]]
+    shown = ", ".join(name if len(name) <= 40 else name[:37] + "…" for name in clean)
     return shown + (f" and {len(names) - most} more" if len(names) > most else "")
 
 

@@ -1,5 +1,6 @@
 """Generic tables: headed by aliases or described by --columns; text, npy, npz and Parquet."""
 
+import tokenize
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -15,6 +16,12 @@ from vftcli.readers.delimited import TextTable, as_number
 from vftcli.readers.joints import robot_of
 from vftcli.readers.reader import LogFile, RawLog, Reader, Request
 from vftcli.readers.table import Column, Table, picked, picks_of
+
+NOT_AN_ARRAY = (
+    ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError, KeyError, OverflowError,
+    RecursionError, tokenize.TokenError,
+)  # fmt: skip
+"""What NumPy raises for a header or content that is no array."""
 
 
 def from_table(table: Table, request: Request, **more: Any) -> RawLog:  # noqa: ANN401
@@ -115,7 +122,7 @@ def numpy_array(path: Path, content: Any) -> Column:  # noqa: ANN401 - any reada
     """
     try:
         array = np.lib.format.read_array(BytesIO(content), allow_pickle=False)
-    except (ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError, KeyError) as error:
+    except NOT_AN_ARRAY as error:
         reason = str(error).split("\n")[0][:120]
         raise LogError(f"{path}: not a readable array ({reason}). Save it with np.save.") from None
     return np.asarray(array)
@@ -153,7 +160,7 @@ def check_npy_header(file: LogFile, size: int) -> None:
         }[version]
         shape, _, dtype = header(stream)
         claimed = int(np.prod([int(s) for s in shape], dtype=object)) * dtype.itemsize
-    except (ValueError, KeyError, SyntaxError, TypeError, OverflowError, RecursionError) as error:
+    except NOT_AN_ARRAY as error:
         reason = str(error).split("\n")[0][:120]
         raise LogError(f"{file.path}: not a readable .npy file ({reason})") from None
     if claimed != size - stream.tell() or any(s < 0 for s in shape):

@@ -90,9 +90,14 @@ class Ingest:
             self.repairs.append(repair)
 
 
+def printable(name: str) -> str:
+    """A name of a bag for messages: one line, no control characters, not too long."""
+    return "".join(c if c.isprintable() else "?" for c in name[:120])
+
+
 def type_name(name: str) -> str:
     """A ROS message type without its middle part: sensor_msgs/msg/JointState → …/JointState."""
-    parts = name.replace("::", "/").split("/")
+    parts = printable(name).replace("::", "/").split("/")
     return f"{parts[0]}/{parts[-1]}" if len(parts) > 1 else name
 
 

@@ -7,7 +7,7 @@ from contextlib import closing
 import numpy as np
 
 from vftcli.errors import LogError
-from vftcli.readers.bags.container import Batch, Channel, Ingest, type_name
+from vftcli.readers.bags.container import Batch, Channel, Ingest, printable, type_name
 from vftcli.readers.reader import LogFile
 
 MAGIC = b"SQLite format 3\0"
@@ -25,7 +25,9 @@ def batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
     try:
         with closing(_opened(file)) as db:
             db.text_factory = lambda raw: raw.decode("utf-8", "replace")
-            for number, channel in _channels(db, ingest).items():
+            channels = _channels(db, ingest)
+            _check_topics(db, channels, ingest)
+            for number, channel in channels.items():
                 yield from _messages(db, number, channel, ingest)
     except (sqlite3.Error, OverflowError) as error:
         raise LogError(f"{ingest.path}: not a readable ROS 2 bag ({error!s:.80})") from None
@@ -60,13 +62,22 @@ def _channels(db: sqlite3.Connection, ingest: Ingest) -> dict[int, Channel]:
     ):
         text, idl = texts.get(str(kind), ("", False))
         channels[int(number)] = Channel(
-            topic=str(topic),
+            topic=printable(str(topic)),
             type=type_name(str(kind)),
             encoding="cdr" if encoding == "cdr" else "other",
             definition=text,
             idl=idl,
         )
     return channels
+
+
+def _check_topics(db: sqlite3.Connection, channels: dict[int, Channel], ingest: Ingest) -> None:
+    """Raise a LogError if messages belong to no topic: they would be lost without a word."""
+    strays = {row[0] for row in db.execute("SELECT DISTINCT topic_id FROM messages")} - set(
+        channels
+    )
+    if strays:
+        raise LogError(f"{ingest.path}: messages of an unknown topic; the database is damaged.")
 
 
 def _messages(

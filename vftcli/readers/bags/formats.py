@@ -54,7 +54,10 @@ def _batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
         yield from _file_batches(file, ingest)
         return
     for name in storage_files(file):
-        yield from _file_batches(open_log(file.path / name), ingest)
+        inner = open_log(file.path / name)
+        yield from _file_batches(inner, ingest)
+        for repair in inner.repairs:
+            ingest.note(f"{name}: {repair}")
 
 
 def _file_batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:

@@ -216,7 +216,8 @@ def types_of(definition: str, name: str, *, idl: bool) -> dict[str, tuple[Field,
     try:
         parsed = get_types_from_idl(definition) if idl else get_types_from_msg(definition, name)
     except (TypesysError, ValueError, KeyError, TypeError, RecursionError, AssertionError) as error:
-        raise LayoutError(f"no message definition ({error!s:.60})") from None
+        reason = str(error).split("\n", maxsplit=1)[0][:60]
+        raise LayoutError(f"no message definition: {reason}") from None
     return {short(kind): fields_of(fields) for kind, (_, fields) in parsed.items()}
 
 

@@ -18,6 +18,7 @@ from vftcli.readers.bags.container import (
     Encoding,
     Ingest,
     equal_rows,
+    printable,
     type_name,
     u32,
     u64,
@@ -74,8 +75,8 @@ class Catalogue:
         name, kind, data = self.schemas.get(schema, ("", "", b""))
         text = data.decode("utf-8", "replace") if kind in {"ros1msg", "ros2msg", "ros2idl"} else ""
         self.channels[number] = Channel(
-            topic=topic,
-            type=type_name(name) if text else name,
+            topic=printable(topic),
+            type=type_name(name) if text else printable(name),
             encoding=ENCODINGS.get(encoding, "other"),
             definition=text,
             idl=kind == "ros2idl",
@@ -139,6 +140,10 @@ def _check_end(catalogue: Catalogue, left: int) -> None:
         raise LogError(
             f"{ingest.path}: its statistics count {catalogue.counted} messages, the chunks hold "
             f"{catalogue.messages}; the file is damaged."
+        )
+    if catalogue.closed and left != len(MAGIC):
+        raise LogError(
+            f"{ingest.path}: {left} bytes follow its end where {len(MAGIC)} should; it is damaged."
         )
     if not catalogue.ended:
         ingest.note(

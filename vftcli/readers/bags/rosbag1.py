@@ -17,6 +17,7 @@ from vftcli.readers.bags.container import (
     Channel,
     Ingest,
     equal_rows,
+    printable,
     type_name,
     u32,
     unpack_chunk,
@@ -154,7 +155,7 @@ def _connect(connections: dict[int, Channel], content: memoryview, record: Recor
         return
     topic = record.header.get(b"topic", fields.get(b"topic", b""))
     connections[u32(number, 0)] = Channel(
-        topic=topic.decode("utf-8", "replace"),
+        topic=printable(topic.decode("utf-8", "replace")),
         type=type_name(fields.get(b"type", b"").decode("utf-8", "replace")),
         encoding="ros1",
         definition=fields.get(b"message_definition", b"").decode("utf-8", "replace"),

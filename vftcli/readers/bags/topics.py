@@ -71,7 +71,9 @@ def aligned(
     left = sorted(topics - {lead.channel.topic} - _taken(notes))
     if left:
         notes.repairs.append(f"left out {', '.join(left[:6])}: other joints, targets, or repeated")
-    hint = robot_of(names) or next((h for s in streams if (h := robot_of(s.names))), None)
+    hint = robot_of(names)
+    if not names:
+        names, hint = _names_elsewhere(streams, lead)
     wanted = {name: value for name, value in signals.items() if request.wants(name)}
     return RawLog(
         stamps=stamps,
@@ -101,6 +103,17 @@ def _own_topic(signals: dict[str, Array], stream: Stream, lead: Stream, times: I
             if np.array_equal(signals[other], value):
                 del signals[other]  # the effort of /joint_states said the same without its kind
     signals[field_name] = value
+
+
+def _names_elsewhere(streams: Sequence[Stream], lead: Stream) -> tuple[tuple[str, ...], str | None]:
+    """Joint names, and the robot they settle, that only another topic about the arm has."""
+    width = lead.signals["q"].shape[1]
+    for stream in streams:
+        if (hint := robot_of(stream.names)) is not None:
+            names = tuple(stream.names[k] for k in kinematic_order(stream.names))
+            if len(names) == width:
+                return names, hint
+    return (), None
 
 
 def _taken(notes: Notes) -> set[str]:

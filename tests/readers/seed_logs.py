@@ -1,0 +1,329 @@
+"""Small logs of every format, made in code: the seeds of the reader tests and of the fuzzer."""
+
+import gzip
+import json
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+ROWS = 120
+JOINTS = 6
+
+FRANKA_STATE = """std_msgs/Header header
+float64[7] q
+float64[7] q_d
+float64[7] dq
+float64[7] dq_d
+float64[7] tau_J
+float64[6] O_F_ext_hat_K
+float64[7] tau_ext_hat_filtered
+float64 m_load
+float64 time
+"""
+
+
+def motion(joints: int = JOINTS, rows: int = ROWS, step: float = 0.008) -> dict[str, np.ndarray]:
+    """A smooth motion with currents and torques, all numbers exact in nine decimals."""
+    t = step * np.arange(rows)
+    phase = 2 * np.pi * t[:, None] / t[-1] + np.arange(joints)
+    signals = {
+        "q": np.sin(phase),
+        "dq": np.cos(phase) * 2 * np.pi / t[-1],
+        "current": 3 * np.cos(phase + 0.3),
+        "tau": 30 * np.cos(phase + 0.2),
+        "tau_ext": 2 * np.sin(2 * phase),
+    }
+    return {"t": t} | {name: np.round(value, 9) for name, value in signals.items()}
+
+
+def ur_csv(path: Path, *, separator: str = " ", end: str = "\r\n", rows: int = ROWS) -> Path:
+    """A log as the official RTDE client writes it (or ur_rtde, with commas)."""
+    log = motion(rows=rows)
+    names = ["timestamp"]
+    columns = [1000 + log["t"]]
+    for name, key in (("actual_q", "q"), ("actual_qd", "dq"), ("actual_current", "current")):
+        names += [f"{name}_{j}" for j in range(6)]
+        columns += list(log[key].T)
+    names.append("robot_mode")
+    columns.append(np.full(rows, 7))
+    lines = [separator.join(names)]
+    lines += [separator.join(repr(float(v)) for v in row) for row in np.column_stack(columns)]
+    path.write_bytes((end.join(lines) + end).encode())
+    return path
+
+
+def ur_binary(path: Path) -> Path:
+    """A log as the official client's --binary writes it."""
+    log = motion()
+    names = ["timestamp", *(f"actual_q_{j}" for j in range(6)), "robot_mode"]
+    kinds = [">f8"] * 7 + [">i4"]
+    records = np.zeros(ROWS, dtype=list(zip(names, kinds, strict=True)))
+    records["timestamp"] = 1000 + log["t"]
+    for j in range(6):
+        records[f"actual_q_{j}"] = log["q"][:, j]
+    header = " ".join(names) + "\n" + " ".join(["DOUBLE"] * 7 + ["INT32"]) + "\n"
+    path.write_bytes(header.encode() + records.tobytes())
+    return path
+
+
+def libfranka_csv(path: Path, *, old: bool = False) -> Path:
+    """A log as franka::logToCSV writes it, before or after 0.9.1."""
+    log = motion(7)
+    groups = ["q", "q_d", "dq", "dq_d", "tau_J", "tau_ext_hat_filtered"]
+    keys = ["q", "q", "dq", "dq", "tau", "tau_ext"]
+    state = np.hstack([log[key] for key in keys])
+    times = 5000 + np.arange(ROWS)
+    if old:
+        names = ["duration", " success rate"]
+        for group in groups:
+            first = " q[0]" if group == "q" else f"{group}[0]"
+            names += [first, *(f" {group}[{j}]" for j in range(1, 7))]
+        names += ["sent commands", "q_d[0]", *(f" q_d[{j}]" for j in range(1, 7))]
+        tail = [""] + ["0"] * 7
+    else:
+        names = ["time", "success_rate"]
+        names += [f"state.{group}[{j}]" for group in groups for j in range(7)]
+        names += [f"cmd.q_d[{j}]" for j in range(7)]
+        tail = ["0"] * 7
+    lines = [",".join(names)]
+    for time, row in zip(times, state, strict=True):
+        lines.append(",".join([str(time), "1", *(f"{v:.6g}" for v in row), *tail]))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def libfranka_json(path: Path) -> Path:
+    """Robot states as std::cout prints them."""
+    log = motion(7)
+    lines = []
+    for k in range(ROWS):
+        state = {"O_T_EE": [0] * 16, "tau_J": log["tau"][k].tolist(), "q": log["q"][k].tolist()}
+        state |= {"dq": log["dq"][k].tolist(), "O_F_ext_hat_K": [0.0] * 6, "time": 5000 + k}
+        lines.append(json.dumps(state))
+    path.write_text("\n".join([*lines, "Done."]) + "\n")
+    return path
+
+
+def table_csv(path: Path) -> Path:
+    """A headed table by aliases."""
+    log = motion()
+    names = ["t"] + [f"{name}_{j}" for name in ("q", "dq", "tau") for j in range(6)]
+    matrix = np.column_stack([log["t"], log["q"], log["dq"], log["tau"]])
+    lines = [",".join(names), *(",".join(repr(float(v)) for v in row) for row in matrix)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def table_gz(path: Path) -> Path:
+    """The headed table, gzipped."""
+    plain = table_csv(path.with_suffix(".plain"))
+    path.write_bytes(gzip.compress(plain.read_bytes(), mtime=0))
+    plain.unlink()
+    return path
+
+
+def headerless_csv(path: Path) -> Path:
+    """A table of numbers; HEADERLESS_COLUMNS describes it."""
+    log = motion()
+    matrix = np.column_stack([log["t"], log["q"], log["dq"], log["current"]])
+    path.write_text("\n".join(",".join(f"{v:.6f}" for v in row) for row in matrix) + "\n")
+    return path
+
+
+def matrix_npy(path: Path) -> Path:
+    """The same numbers as an array."""
+    log = motion()
+    with path.open("wb") as file:
+        np.save(file, np.column_stack([log["t"], log["q"], log["dq"], log["current"]]))
+    return path
+
+
+def panda_py_log() -> dict[str, np.ndarray]:
+    """What panda-py's get_log() gives, as arrays."""
+    log = motion(7)
+    return {
+        "time": (5000.0 + np.arange(ROWS))[:, None],
+        "q": log["q"],
+        "dq": log["dq"],
+        "tau_J": log["tau"],
+        "tau_ext_hat_filtered": log["tau_ext"],
+    }
+
+
+def panda_py_npz(path: Path) -> Path:
+    """panda-py's log by np.savez."""
+    with path.open("wb") as file:
+        np.savez(file, **panda_py_log())
+    return path
+
+
+def panda_py_pickle(path: Path) -> Path:
+    """panda-py's log by pickle: lists of arrays."""
+    path.write_bytes(pickle.dumps({name: list(value) for name, value in panda_py_log().items()}))
+    return path
+
+
+def parquet(path: Path) -> Path:
+    """A table with a column of lists, as LeRobot writes it."""
+    import polars as pl
+
+    log = motion(7)
+    pl.DataFrame(
+        {"timestamp": log["t"], "observation.state": log["q"].tolist(), "dq": log["dq"].tolist()}
+    ).write_parquet(path)
+    return path
+
+
+def mcap_json(path: Path) -> Path:
+    """JSON documents in an MCAP of several chunks."""
+    from mcap.writer import Writer
+
+    log = motion()
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=4096)
+        writer.start(profile="", library="test")
+        channel = writer.register_channel("/joints", "json", 0)
+        for k in range(ROWS):
+            stamp = 10**9 + round(log["t"][k] * 1e9)
+            document = {"timestamp": {"sec": stamp // 10**9, "nsec": stamp % 10**9}}
+            document |= {"q": log["q"][k].tolist(), "tau": log["tau"][k].tolist()}
+            writer.add_message(channel, stamp, json.dumps(document).encode(), stamp, k)
+        writer.finish()
+    return path
+
+
+def bag_messages(ros1: bool) -> tuple[object, list[tuple[str, str, int, object]]]:
+    """A typestore, and messages of a Franka arm: topic, type, time [ns], message."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    name = "franka_msgs/msg/FrankaState"
+    store.register(get_types_from_msg(FRANKA_STATE, name))
+    types = store.types
+    log = motion(7, step=0.001)
+    messages = []
+    for k in range(ROWS):
+        stamp = 1_700_000_000 * 10**9 + k * 10**6
+        head = {"seq": k} if ros1 else {}
+        time = types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9)
+        header = types["std_msgs/msg/Header"](**head, stamp=time, frame_id="base")
+        state = types[name](
+            header=header,
+            q=log["q"][k], q_d=log["q"][k], dq=log["dq"][k], dq_d=log["dq"][k],
+            tau_J=log["tau"][k], O_F_ext_hat_K=np.zeros(6),
+            tau_ext_hat_filtered=log["tau_ext"][k], m_load=0.5, time=100 + k / 1000,
+        )  # fmt: skip
+        messages.append(("/franka_states", name, stamp + 300_000, state))
+        order = [3, 0, 6, 1, 2, 4, 5]
+        joint_state = types["sensor_msgs/msg/JointState"](
+            header=header,
+            name=[f"panda_joint{j + 1}" for j in order],
+            position=log["q"][k][order],
+            velocity=log["dq"][k][order],
+            effort=log["tau"][k][order],
+        )
+        kind = "sensor_msgs/msg/JointState"
+        messages.append(("/joint_states", kind, stamp + 310_000, joint_state))
+    return store, messages
+
+
+def rosbag1(path: Path, *, compression: str = "") -> Path:
+    """A ROS 1 bag of several chunks."""
+    from rosbags.rosbag1 import Writer
+
+    store, messages = bag_messages(ros1=True)
+    writer = Writer(path)
+    if compression:
+        writer.set_compression(Writer.CompressionFormat[compression])
+    writer.chunk_threshold = 16 * 1024
+    with writer:
+        connections = {}
+        for topic, kind, time, message in messages:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connections[topic], time, store.serialize_ros1(message, kind))
+    return path
+
+
+def rosbag2(folder: Path, *, storage: str = "mcap", mode: str = "", method: str = "") -> Path:
+    """A ROS 2 bag folder."""
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+    store, messages = bag_messages(ros1=False)
+    plugin = StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3
+    writer = Writer(folder, version=9, storage_plugin=plugin)
+    if mode:
+        writer.set_compression(CompressionMode[mode], CompressionFormat[method or "ZSTD"])
+    with writer:
+        connections = {}
+        for topic, kind, time, message in messages:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connections[topic], time, store.serialize_cdr(message, kind))
+    return folder
+
+
+def bare_mcap(path: Path) -> Path:
+    """The MCAP inside a ROS 2 bag folder, chunked anew so that it has several chunks."""
+    from mcap.reader import make_reader
+    from mcap.writer import Writer
+
+    folder = rosbag2(path.with_suffix(".folder"))
+    inner = next(folder.glob("*.mcap"))
+    with inner.open("rb") as source, path.open("wb") as file:
+        writer = Writer(file, chunk_size=16 * 1024)
+        writer.start(profile="ros2", library="test")
+        channels: dict[str, int] = {}
+        for schema, channel, message in make_reader(source).iter_messages():
+            if channel.topic not in channels:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
+            writer.add_message(
+                channels[channel.topic],
+                message.log_time,
+                message.data,
+                message.publish_time,
+                message.sequence,
+            )
+        writer.finish()
+    for inner in folder.iterdir():
+        inner.unlink()
+    folder.rmdir()
+    return path
+
+
+def bare_db3(path: Path) -> Path:
+    """The database inside a ROS 2 bag folder."""
+    folder = rosbag2(path.with_suffix(".folder"), storage="sqlite3")
+    next(folder.glob("*.db3")).replace(path)
+    for inner in folder.iterdir():
+        inner.unlink()
+    folder.rmdir()
+    return path
+
+
+HEADERLESS_COLUMNS = "t,q:6,dq:6,current:6"
+
+SEEDS: dict[str, tuple[Callable[[Path], Path], str | None]] = {
+    "ur-csv": (ur_csv, None),
+    "ur-binary": (ur_binary, None),
+    "ur-rtde": (lambda path: ur_csv(path, separator=",", end="\n"), None),
+    "libfranka-csv": (libfranka_csv, None),
+    "libfranka-csv-old": (lambda path: libfranka_csv(path, old=True), None),
+    "libfranka-json": (libfranka_json, None),
+    "table": (table_csv, None),
+    "table-gz": (table_gz, None),
+    "headerless": (headerless_csv, HEADERLESS_COLUMNS),
+    "npy": (matrix_npy, HEADERLESS_COLUMNS),
+    "npz": (panda_py_npz, None),
+    "pickle": (panda_py_pickle, None),
+    "parquet": (parquet, None),
+    "rosbag1": (rosbag1, None),
+    "rosbag1-lz4": (lambda path: rosbag1(path, compression="LZ4"), None),
+    "db3": (bare_db3, None),
+    "mcap": (bare_mcap, None),
+    "mcap-json": (mcap_json, None),
+}
+"""Name → how a log of that format is made, and its --columns."""
