@@ -14,6 +14,7 @@ from vftcli.simulation import Arm, Simulation, load_scenario, observe, prepare, 
 from vftcli.simulation.mismatch import build_arm
 from vftcli.simulation.pairs import simulate_pair
 from vftcli.simulation.saving import save
+from vftcli.simulation.writers.flange import flange_signals, force_estimate
 
 EXACT = [
     *(f"mismatch.{k}=0" for k in ("mass", "com", "rotor_inertia", "friction", "torque_constant")),
@@ -215,3 +216,20 @@ def test_warming_joints_rub_less() -> None:
     ratio = rms(warm.truth.friction[late]) / rms(cold.truth.friction[late])
     assert np.all(ratio[:3] < 0.95)
     assert cold.measured.temperature[-1, 0] == pytest.approx(47.0, abs=0.5)
+
+
+def test_bearing_weighs_what_it_should_and_the_arm_does_not_chatter() -> None:
+    """Exact profile: GMO(30) through Jᵀ reads the 9.2 N, and nothing while unloaded."""
+    kinds = ("mass", "com", "friction", "torque_constant", "torque_offset")
+    settings = [*(f"mismatch.{k}=0" for k in kinds), "friction.stribeck=0", "friction.sticking=0"]
+    run = simulate(load_scenario("panda-bearing", settings), 1)
+    slip = np.max(np.abs(run.truth.dq - run.samples.target_dq), axis=0)
+    assert np.all(slip < 0.1), slip  # knocks shake the wrist by 0.05 rad/s
+    log = run.recording
+    tau = MomentumObserver(gain=30.0).estimate(dynamics_terms(log, run.robot)).tau
+    flange = flange_signals(run.robot.model, log.q, log.require("dq"))
+    wrench, _ = force_estimate(flange.jacobian, tau)
+    moving, hung = (log.t > 0.6) & (log.t < 3.4), (log.t > 5.0) & (log.t < 8.5)
+    assert rms(wrench[moving])[2] < 0.6
+    # required 2 %; the noise of a mean over 3.5 s is 0.01 N
+    assert np.mean(wrench[hung, 2]) == pytest.approx(-9.2, rel=0.005)

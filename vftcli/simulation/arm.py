@@ -109,7 +109,7 @@ class Arm:
         h = scenario.step
         q, v = start.q[0], start.dq[0]
         self.plant = Plant(self.true.chain.to_pinocchio(), self.true.friction, q, v, h)
-        self.servo = Servo(scenario.servo, self.true.nominal, q, h)
+        self.servo = Servo(scenario.servo, self.true.nominal, h)
         self.steps = int(np.ceil(duration / h - 1e-9))
         self.touching = Touching(
             scenario.contacts, self.robot.chain, self.steps, h, self.seeds["contacts"]

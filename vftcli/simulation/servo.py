@@ -1,4 +1,4 @@
-"""The joint position controller: PD about the reference with the nominal model's feed-forward."""
+"""The joint position controller: computed torque about the reference with the nominal model."""
 
 from typing import Any
 
@@ -19,20 +19,20 @@ FASTEST_LOOP = 0.4
 
 
 class Servo:
-    """τ = τ_ff + K_p (q_d − q) + K_d (q̇_d − q̇), saturated at the drives' limits.
+    """τ = τ_ff + M(q) (ω² (q_d − q) + 2ζω (q̇_d − q̇)), saturated at the drives' limits.
 
-    K_p = ω² M_jj and K_d = 2ζω M_jj with the nominal inertia at the start pose, so that one number
-    sets the stiffness of every joint.
+    With the nominal inertia as gain one number sets the stiffness, and every mode of the arm has
+    the same bandwidth; gains joint by joint would leave a redundant arm a mode that chatters.
 
     Attributes:
-        kp: Position gains. (n,) [N·m/rad]
-        kd: Velocity gains. (n,) [N·m·s/rad]
+        omega: Natural frequency ω of the loop. [rad/s]
         limit: Torque limits; infinite where unknown. (n,) [N·m]
     """
 
-    def __init__(self, spec: ServoSpec, robot: Robot, start: Array, step: float) -> None:
+    def __init__(self, spec: ServoSpec, robot: Robot, step: float) -> None:
         import pinocchio as pin
 
+        self.inertia = pin.crba
         if isinstance(spec.stiffness, str) and spec.stiffness not in STIFFNESS:
             raise ParameterError(
                 unknown(f"servo.stiffness {spec.stiffness!r}", spec.stiffness, STIFFNESS)
@@ -47,8 +47,7 @@ class Servo:
             )
         self.spec, self.robot = spec, robot
         self.model, self.data = robot.model, robot.model.createData()
-        inertia = np.diag(pin.crba(self.model, self.data, start)).copy()
-        self.kp, self.kd = omega**2 * inertia, 2.0 * spec.damping * omega * inertia
+        self.omega, self.rate = omega, 2.0 * spec.damping * omega
         known = np.isfinite(robot.limits.tau_max) & spec.torque_limits
         self.limit = np.where(known, robot.limits.tau_max, np.inf)
         self.q_min = np.where(np.isfinite(robot.limits.q_min), robot.limits.q_min, -np.inf)
@@ -73,7 +72,8 @@ class Servo:
 
     def torque(self, forward: Array, q_d: Array, dq_d: Array, q: Array, dq: Array) -> Array:
         """The commanded torque. (n,) [N·m]"""
-        tau: Array = forward + self.kp * (q_d - q) + self.kd * (dq_d - dq)
+        pull = self.omega**2 * (q_d - q) + self.rate * (dq_d - dq)
+        tau: Array = forward + self.inertia(self.model, self.data, q) @ pull
         return np.minimum(np.maximum(tau, -self.limit), self.limit)
 
 
