@@ -52,6 +52,14 @@ class ExternalTorque:
         return int(self.tau.shape[1])
 
     @property
+    def mostly_rests(self) -> tuple[bool, ...]:
+        """Whether less than half of a joint's known samples may be relied on, joint by joint."""
+        if self.trusted is None:
+            return (False,) * self.joints
+        known = np.maximum(np.sum(self.finite, axis=0), 1.0)
+        return tuple(bool(x) for x in np.sum(self.trusted * self.finite, axis=0) < 0.5 * known)
+
+    @property
     def finite(self) -> Array:
         """1 where a sample is known for a joint, 0 elsewhere. (T, n)"""
         return np.isfinite(self.tau).astype(np.float64)

@@ -115,7 +115,7 @@ def test_the_script_gets_every_chart(html: str, analysis: Analysis) -> None:
     names = [series["name"] for series in data["charts"][0]["series"]]
     assert names == ["reference (vendor)", "fdo", "gmo", "kfo-fe", "kfo-zoh"]
     assert data["charts"][1]["band"] == [0.5] * 6
-    assert [chart["key"] for chart in data["responses"]] == ["gain", "phase"]
+    assert [chart["key"] for chart in data["responses"]] == ["gain", "phase", "delay"]
     lines = data["charts"][0]["series"][2]["lines"]
     assert len(lines) == 6
     drawn = floats(lines[3]["y"])

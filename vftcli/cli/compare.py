@@ -39,6 +39,10 @@ def compare(
     csv: Annotated[bool, typer.Option("--csv", help="One row per observer and joint.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="A Markdown table.")] = False,
     latex: Annotated[bool, typer.Option("--latex", help="A LaTeX table (booktabs).")] = False,
+    significance: Annotated[
+        bool,
+        typer.Option("--significance", help="Every pair of observers: difference, interval, p."),
+    ] = False,
 ) -> None:
     """Print the RMSE of every observer against a reference, with the reference's own floor.
 
@@ -48,8 +52,10 @@ def compare(
 
     from vftcli.cli.asking import chosen, paths, say_notes, say_recording
     from vftcli.cli.wrench_options import wrench_request
+    from vftcli.evaluation.pooling import Run, pooled_rows
     from vftcli.observers import DEFAULT
     from vftcli.outputs import tables
+    from vftcli.outputs.significance import pairs_text
     from vftcli.pipeline import Request, analyse, choose_robot, open_log
 
     wanted = {"json": json, "csv": csv, "markdown": markdown, "latex": latex}
@@ -83,12 +89,17 @@ def compare(
         low_pass=low_pass,
         match=match,
     )
-    errors = []
+    analyses = []
     for log in logs:
         recording = open_log(log, request)
         analysis = analyse(recording, choose_robot(request, recording), request)
         if not json:
             say_recording(recording)
             say_notes(analysis)
-        errors.append(analysis.errors)
-    typer.echo(show(pl.concat([table for table in errors if table is not None], how="diagonal")))
+        analyses.append(analysis)
+    if significance:
+        typer.echo(pairs_text(analyses, as_json=json))
+        return
+    errors = [a.errors for a in analyses if a.errors is not None]
+    runs = [Run(a.estimates, a.reference) for a in analyses if a.reference is not None]
+    typer.echo(show(pl.concat([*errors, *pooled_rows(runs)], how="diagonal")))

@@ -42,6 +42,12 @@ def evaluate_pooled(runs: Sequence[Run]) -> pl.DataFrame:
     )
 
 
+def pooled_rows(runs: Sequence[Run]) -> list[pl.DataFrame]:
+    """The pooled table as a list, empty where there is nothing to pool."""
+    rows = evaluate_pooled(runs)
+    return [rows] if len(rows) else []
+
+
 def together(parts: Sequence[Scored]) -> Scored:
     """One joint's samples of several logs as one series."""
     parts = [p for p in parts if len(p.reference)] or list(parts[:1])

@@ -150,7 +150,9 @@ def joint_lines(
     if reference is not None:
         names, columns = [f"reference ({reference.name})", *names], [reference.tau[:, j], *columns]
         shades, widths = [REFERENCE, *shades], [2.5, *widths]
-    path, title = f"/{group}/J{j + 1}", f"J{j + 1} {TITLES[group]}"
+    rests = analysis.reference is not None and analysis.reference.mostly_rests[j]
+    doubt = " (the joint rests: do not trust the reference)" if rests else ""
+    path, title = f"/{group}/J{j + 1}", f"J{j + 1} {TITLES[group]}{doubt}"
     return Lines(path, title, names, shades, widths, np.column_stack(columns))
 
 

@@ -6,10 +6,14 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
+from vftcli.outputs.error_details import markdown_details, terminal_details
 from vftcli.outputs.wrench_tables import latex_axes, markdown_axes, terminal_axes
 
 AT_FLOOR = 1.2
 """An RMSE within this factor of the reference's floor cannot be told from the reference's own."""
+
+DAGGER, LATEX_DAGGER = "†", r"\dag"
+RESTS = "the joint rests most of the time; the reference keeps its stiction: do not trust it"
 
 SPECIAL = {
     "\\": r"\textbackslash{}",
@@ -37,6 +41,7 @@ class Block(NamedTuple):
         rmse: NaN where it is not known. (observers, joints) [N·m]
         floor: The reference's own error, NaN where it is not known. (joints,) [N·m]
         samples: Fewest and most samples an entry is made of.
+        untrusted: Joints whose reference is not to be trusted, because they rest.
     """
 
     recording: str
@@ -46,6 +51,7 @@ class Block(NamedTuple):
     rmse: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
     floor: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
     samples: tuple[int, int]
+    untrusted: tuple[int, ...] = ()
 
     @property
     def at_floor(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
@@ -80,7 +86,14 @@ def block(recording: str, reference: str, rows: pl.DataFrame) -> Block:
         floor[at] = known(row["reference_floor_Nm"])
     counts = rows["samples"].drop_nulls().to_list() or [0]
     span = (int(min(counts)), int(max(counts)))
-    return Block(recording, reference, joints, observers, rmse, floor, span)
+    doubtful = rows.filter(~pl.col("reference_trusted").fill_null(True))["joint"].unique().sort()
+    untrusted = tuple(int(j) for j in doubtful)
+    return Block(recording, reference, joints, observers, rmse, floor, span, untrusted)
+
+
+def joint_heads(table: Block) -> list[str]:
+    """J1, J2, …; a dagger where the reference is not to be trusted."""
+    return [f"J{j}{DAGGER if j in table.untrusted else ''}" for j in table.joints]
 
 
 def known(value: float | None) -> float:
@@ -123,7 +136,7 @@ def terminal(errors: pl.DataFrame) -> str:
     if not found:
         return "no errors to show: the estimates and the reference have no sample in common\n"
     joints = "\n".join(terminal_block(table) for table in found)
-    return joints + explanation(found) + terminal_axes(errors)
+    return joints + explanation(found) + terminal_details(errors) + terminal_axes(errors)
 
 
 def terminal_block(table: Block) -> str:
@@ -135,7 +148,7 @@ def terminal_block(table: Block) -> str:
         ]
     for row in rows:
         row[1:] = [text if text.endswith(("*", " ")) else f"{text} " for text in row[1:]]
-    header = ["observer", *(f"J{j} " for j in table.joints), "mean "]
+    header = ["observer", *(f"{head} " for head in joint_heads(table)), "mean "]
     widths = [max(len(row[c]) for row in [header, *rows]) for c in range(len(header))]
     lines = [line(header, widths), *(line(row, widths) for row in rows)]
     if rows[-1][0] == "floor":
@@ -165,6 +178,8 @@ def explanation(found: tuple[Block, ...]) -> str:
         lines.append("floor: RMSE that the reference itself is known to have")
     if any(np.any(table.at_floor) for table in found):
         lines.append(f"*: within {AT_FLOOR:g} × the floor; the reference can tell no more")
+    if any(table.untrusted for table in found):
+        lines.append(f"{DAGGER}: {RESTS}")
     if any(not np.all(np.isfinite(table.rmse)) for table in found):
         lines.append("–: no sample where both the estimate and the reference are known")
     return "".join(f"{text}\n" for text in lines)
@@ -183,7 +198,14 @@ def to_csv(errors: pl.DataFrame) -> str:
 
 def to_markdown(errors: pl.DataFrame) -> str:
     """The RMSE tables as GitHub Markdown, best value of each joint bold."""
-    return "\n".join(markdown_block(table) for table in blocks(errors)) + markdown_axes(errors)
+    return "\n".join(markdown_block(table) for table in blocks(errors)) + markdown_more(errors)
+
+
+def markdown_more(errors: pl.DataFrame) -> str:
+    """What stands below the RMSE tables in Markdown: marks, intervals and lags, wrenches."""
+    doubtful = any(table.untrusted for table in blocks(errors))
+    mark = f"\n{DAGGER} {RESTS}\n" if doubtful else ""
+    return mark + markdown_details(errors) + markdown_axes(errors)
 
 
 def markdown_block(table: Block) -> str:
@@ -193,7 +215,7 @@ def markdown_block(table: Block) -> str:
         rows[k][1:-1] = [
             f"**{text}**" if bold else text for text, bold in zip(rows[k][1:-1], best, strict=True)
         ]
-    header = ["observer", *(f"J{j}" for j in table.joints), "mean"]
+    header = ["observer", *joint_heads(table), "mean"]
     marks = ["---", *("---:" for _ in header[1:])]
     lines = [f"| {' | '.join(escape_markdown(c) for c in header)} |", f"| {' | '.join(marks)} |"]
     lines += [f"| {' | '.join([escape_markdown(row[0]), *row[1:]])} |" for row in rows]
@@ -221,11 +243,13 @@ def latex_block(table: Block) -> str:
             for text, bold in zip(rows[k][1:-1], best, strict=True)
         ]
     body = [[escape_latex(row[0]), *(text.replace("–", "--") for text in row[1:])] for row in rows]
-    joints = [rf"$J_{{{j}}}$" for j in table.joints]
+    joints = [rf"$J_{{{j}}}${LATEX_DAGGER * (j in table.untrusted)}" for j in table.joints]
     lines = [latex_row(row) for row in body]
     if rows[-1][0] == "floor":
         lines.insert(-1, r"\midrule")
     caption = f"% {title(table)}, RMSE".replace("\n", " ")
+    if table.untrusted:
+        caption += f"\n% {LATEX_DAGGER}: {RESTS}"
     unit = rf" & \multicolumn{{{len(joints) + 1}}}{{c}}{{RMSE [N\,m]}} \\"
     head = [unit, latex_row(["Observer", *joints, "mean"])]
     parts = [rf"\begin{{tabular}}{{l{'r' * (len(joints) + 1)}}}", r"\toprule", *head, r"\midrule"]

@@ -12,10 +12,14 @@ from vftcli.arrays import Array
 from vftcli.dynamics.drive import drive_torque
 from vftcli.outputs.decimation import Line, decimated
 from vftcli.outputs.palette import DASHED, colours_of
+from vftcli.outputs.tables import blocks, joint_heads
 from vftcli.wrench.wrench import AXES
 
 STRETCHES = 2000
 """Stretches a long log is cut into: two samples a stretch are about what a wide screen can show."""
+
+RESTING = "#c2410c"
+"""Colour of a reference that is not to be trusted."""
 
 FREQUENCIES = 240
 """Points of a frequency response."""
@@ -64,6 +68,7 @@ def payload(analysis: Analysis) -> str:
     t = analysis.t
     data = {
         "joints": analysis.recording.joints,
+        "labels": joint_labels(analysis),
         "span": [float(t[0]), float(t[-1])],
         "charts": [packed(chart, t) for chart in time_charts(analysis)],
         "wrenches": [{**packed(chart, t), "at": 0} for chart in wrench_charts(analysis)],
@@ -104,7 +109,19 @@ def reference_series(analysis: Analysis) -> tuple[Series, ...]:
     """The reference in the page's ink, if there is one."""
     if analysis.reference is None:
         return ()
-    return (Series(legend_name(analysis, "reference"), analysis.reference.tau),)
+    tau, trusted = analysis.reference.tau, analysis.reference.trusted
+    whole = Series(legend_name(analysis, "reference"), tau)
+    if trusted is None or np.all((trusted > 0) | ~np.isfinite(tau)):
+        return (whole,)
+    resting = np.where(trusted > 0, np.nan, tau)
+    return (whole, Series("reference while the joint rests", resting, RESTING))
+
+
+def joint_labels(analysis: Analysis) -> list[str]:
+    """J1, J2, …; a dagger where the reference is not to be trusted, as in the tables."""
+    n, errors = analysis.recording.joints, analysis.errors
+    found = blocks(errors) if errors is not None else ()
+    return joint_heads(found[0]) if found else [f"J{j}" for j in range(1, n + 1)]
 
 
 def motion_charts(analysis: Analysis) -> Iterator[Chart]:
@@ -180,10 +197,10 @@ def known(values: Array | None) -> list[float | None] | None:
 
 
 def responses(analysis: Analysis) -> list[dict[str, Any]]:
-    """Gain and phase of every observer over frequency, up to half the sample rate."""
+    """Gain, phase and delay of every observer over frequency, up to half the sample rate."""
     step, n = analysis.recording.step, analysis.recording.joints
     frequency = np.geomspace(1e-2, 0.5 / step, FREQUENCIES)
-    gains, phases = [], []
+    gains, phases, delays = [], [], []
     colours = colours_of(analysis.estimates)
     for observer in analysis.observers:
         response = observer.frequency_response(frequency, step, n)
@@ -196,6 +213,8 @@ def responses(analysis: Analysis) -> list[dict[str, Any]]:
         phase = np.degrees(np.unwrap(np.angle(response), axis=0))
         gains.append({**style, "lines": lines_over(frequency, decibel)})
         phases.append({**style, "lines": lines_over(frequency, phase)})
+        delay = -1e3 * phase / (360.0 * frequency[:, None])
+        delays.append({**style, "lines": lines_over(frequency, delay)})
     shape = {"band": None, "bandLabel": "", "height": 1.0, "log": True}
     return [
         {
@@ -207,6 +226,7 @@ def responses(analysis: Analysis) -> list[dict[str, Any]]:
             "series": gains,
         },
         {"key": "phase", "title": "Phase of the estimate", "unit": "°", **shape, "series": phases},
+        {"key": "delay", "title": "Delay of the estimate", "unit": "ms", **shape, "series": delays},
     ]
 
 

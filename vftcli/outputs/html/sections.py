@@ -12,9 +12,20 @@ import polars as pl
 from vftcli.analysis import Analysis
 from vftcli.arrays import Array
 from vftcli.observers import OBSERVERS
+from vftcli.outputs.error_details import details
 from vftcli.outputs.html.payload import STRETCHES, is_decimated
 from vftcli.outputs.run import observer_record
-from vftcli.outputs.tables import AT_FLOOR, Block, blocks, mean_of, significant, title
+from vftcli.outputs.tables import (
+    AT_FLOOR,
+    DAGGER,
+    RESTS,
+    Block,
+    blocks,
+    joint_heads,
+    mean_of,
+    significant,
+    title,
+)
 from vftcli.outputs.wrench_tables import HEADER, AxisBlock, axis_blocks
 
 
@@ -77,7 +88,7 @@ def rmse_table(block: Block) -> str:
         floors = "".join(number_cell(significant(value)) for value in block.floor)
         mean = number_cell(significant(mean_of(block.floor)))
         rows.append(f'<tr class="floor"><th scope="row">floor</th>{floors}{mean}</tr>')
-    header = ["Observer", *(f"J{j}" for j in block.joints), "mean"]
+    header = ["Observer", *joint_heads(block), "mean"]
     return html_table(f"RMSE in N·m: {title(block)}", header, rows)
 
 
@@ -128,6 +139,8 @@ def meaning(found: Sequence[Block]) -> str:
             " The floor is the error the reference itself is known to have: an RMSE within "
             f"{AT_FLOOR:g} × the floor is <em>at the floor</em>; the reference can tell no more."
         )
+    if any(block.untrusted for block in found):
+        text += f" {DAGGER}: {RESTS}."
     return f'<p class="soft">{text}</p>'
 
 
@@ -148,7 +161,25 @@ def further(table: pl.DataFrame) -> str:
         head = f'<th scope="row">{escape(str(row["observer"]))}</th><td>J{row["joint"]}</td>'
         rows.append(f"<tr>{head}{cells}<td>{row['samples']}</td></tr>")
     shown = html_table("Estimate − reference", list(names.values()), rows)
-    return f"<details><summary>Bias, largest error and correlation</summary>{shown}</details>"
+    folded = f"<details><summary>Bias, largest error and correlation</summary>{shown}</details>"
+    return sureness(table) + folded
+
+
+def sureness(table: pl.DataFrame) -> str:
+    """Intervals, lags and the chance that the best is not the best, folded away."""
+    shown = []
+    for caption, header, lines in details(table):
+        rows = [
+            f"<tr>{observer_head(name)}{''.join(map(number_cell, cells))}</tr>"
+            for name, *cells in lines
+        ]
+        shown.append(html_table(caption, header, rows))
+    if not shown:
+        return ""
+    return (
+        "<details><summary>Confidence intervals, lags and significance</summary>"
+        f"{''.join(shown)}</details>"
+    )
 
 
 def number_text(value: float | None) -> str:
