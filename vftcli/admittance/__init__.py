@@ -1,4 +1,4 @@
-"""Admittance: the paper's variable-parameter law, replayed on recorded forces and in closed loop."""
+"""Admittance: the paper's variable-parameter law, on recorded forces and in closed loop."""
 
 from vftcli.admittance.law import Controller, controllers, traditional, variable
 from vftcli.admittance.motion import Motion, release, run

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vftcli.admittance.force import ForceRecord
 from vftcli.admittance.joints import FlangeSolver
 from vftcli.admittance.law import Controller
 from vftcli.admittance.motion import Recursion
@@ -41,6 +42,7 @@ class ClosedLoop:
         truth: Wrench of the contacts on the flange, about its origin, base axes. (T, 6) [N, N·m]
         dragged: Phases. (T, 6)
         commanded: Deviation X̃ that was commanded. (T, 6) [m, rad]
+        q: Joint positions. (T, n) [rad]
         moved: Deviation of the flange itself from where it started. (T, 6) [m, rad]
         reached: Whether the inverse kinematics found the commanded pose. (T,)
         zero: Zero of the wrench that was removed. (6,) [N, N·m]
@@ -53,6 +55,7 @@ class ClosedLoop:
     truth: Array
     dragged: Flags
     commanded: Array
+    q: Array
     moved: Array
     reached: Flags
     zero: Array
@@ -62,6 +65,16 @@ class ClosedLoop:
     def stable(self) -> bool:
         """Whether the arm stayed within `FARTHEST` of its start to the end."""
         return self.simulation is not None
+
+    @property
+    def record(self) -> ForceRecord:
+        """The wrench the controller acted on, to be replayed: the paper's way to Figs 7 and 10."""
+        return ForceRecord(
+            t=self.t,
+            wrench=self.estimate,
+            q=self.q,
+            source="the wrench that the controller in the loop acted on, base axes",
+        )
 
 
 @dataclass(kw_only=True)
@@ -118,9 +131,7 @@ class Loop:
     ) -> None:
         self.arm, self.controller, self.sensors = arm, controller, sensors
         averaged = sensors.torque == "average"
-        self.sensor = OnlineKalman(
-            observer, arm.true.nominal, sensors.interval, averaged=averaged
-        )
+        self.sensor = OnlineKalman(observer, arm.true.nominal, sensors.interval, averaged=averaged)
         self.solver = FlangeSolver(arm.true.nominal)
         self.start = self.solver.check_start(arm.q.copy())
         self.rotation, self.translation = self.solver.pose(self.start)
@@ -273,10 +284,8 @@ def whole(interval: float, step: float, what: str) -> int:
 def note(log: Log, loop: Loop, zero: tuple[float, float] | None) -> None:
     """Act once and write down what happened."""
     t = loop.arm.t
-    if zero is not None and t <= zero[1]:
-        wrench = loop.rest(counts=t >= zero[0])
-    else:
-        wrench = loop.control()
+    waits = zero is not None and t <= zero[1]
+    wrench = loop.rest(counts=zero is not None and t >= zero[0]) if waits else loop.control()
     log.t.append(t)
     log.estimate.append(wrench)
     log.dragged.append(loop.dragged.copy())
@@ -311,6 +320,7 @@ def finished(loop: Loop, log: Log, zero: tuple[float, float] | None) -> ClosedLo
         truth=truth,
         dragged=np.array(log.dragged),
         commanded=np.array(log.commanded),
+        q=np.array(log.q),
         moved=deviation_of(loop.solver, loop.start, np.array(log.q)),
         reached=np.array(log.reached),
         zero=loop.zero,

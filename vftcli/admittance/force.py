@@ -130,13 +130,11 @@ def from_sensor(
 
 def stated_frame(words: str) -> str | None:
     """The frame that a recording's words on its wrench begin with, or None."""
-    first = words.split()[0].strip(",;:") if words else ""
+    first = words.split(maxsplit=1)[0].strip(",;:") if words else ""
     return first if first in FRAMES else None
 
 
-def from_truth(
-    recording: Recording, t: Array, wrench: Array, source: str
-) -> ForceRecord:
+def from_truth(recording: Recording, t: Array, wrench: Array, source: str) -> ForceRecord:
     """A wrench in base axes on its own clock, brought to the log's by interpolation.
 
     Args:

@@ -66,8 +66,8 @@ class FlangeSolver:
         if np.any(wrong := ~((q >= self.lower) & (q <= self.upper))):
             j = int(np.argmax(wrong))
             raise ParameterError(
-                f"the start pose is outside the joint limits of {self.robot.name}: joint {j + 1} is "
-                f"at {q[j]:.4g} rad and may be from {self.lower[j]:.4g} to {self.upper[j]:.4g} rad"
+                f"the start pose is outside the joint limits of {self.robot.name}: joint {j + 1} "
+                f"is at {q[j]:.4g} rad and may be {self.lower[j]:.4g} to {self.upper[j]:.4g} rad"
             )
         return q
 

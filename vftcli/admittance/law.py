@@ -113,8 +113,8 @@ def energy(controller: Controller, x: Array, v: Array) -> Array:
     """The Lyapunov function of each axis in a recovery phase. (…, 6) [J]
 
     W = ½K_d x² + (M_d v₀²/α²) φ(|v|/v₀), with Ẇ = −B e^{−|v|/v₀} v²/α ≤ 0; for the traditional
-    controller ½K_d x² + ½M_d v². For rotation the sum over three axes of equal K_d falls, since x is
-    the rotation vector log(R R_dᵀ) and v the angular velocity.
+    controller ½K_d x² + ½M_d v². For rotation the sum over three axes of equal K_d falls, since x
+    is the rotation vector log(R R_dᵀ) and v the angular velocity.
 
     Args:
         controller: Whose recovery phase it is.

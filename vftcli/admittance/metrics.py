@@ -1,4 +1,4 @@
-"""What a motion is judged by: peak, time to peak, overshoot, return, idle time, work; axis by axis."""
+"""What a motion is judged by: peak, its time, overshoot, return, idle time, work; by axis."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from vftcli.admittance.parameters import AXES
 from vftcli.admittance.thresholds import Phases
 from vftcli.arrays import Array
 
-PAUSE = 0.5
+PAUSE = 1.0
 """Drags of one axis that follow each other within this time are one. [s]"""
 
 SHARES = {"return_10_s": 0.10, "return_2_s": 0.02}

@@ -34,7 +34,8 @@ class Motion:
     @property
     def escaped(self) -> Flags:
         """Controllers whose motion left the finite numbers: finite-time escape. (N,)"""
-        return ~np.all(np.isfinite(self.x) & np.isfinite(self.v), axis=(0, 2))
+        found: Flags = ~np.all(np.isfinite(self.x) & np.isfinite(self.v), axis=(0, 2))
+        return found
 
 
 class Recursion:
@@ -62,7 +63,8 @@ class Recursion:
             for name in ("mass", "damping", "stiffness", "speed_limit")
         )
         self.alpha, self.rate, self.recovery = (
-            np.array([getattr(c, name) for c in controllers]) for name in ("alpha", "rate", "damping")
+            np.array([getattr(c, name) for c in controllers])
+            for name in ("alpha", "rate", "damping")
         )
         self.x = np.array(np.broadcast_to(np.zeros(6) if x is None else x, shape))
         self.v = np.array(np.broadcast_to(np.zeros(6) if v is None else v, shape))
@@ -123,7 +125,9 @@ def run(
         for k in range(len(force)):
             state.step(force[k], dragged[k])
             xs[k + 1], vs[k + 1], clips[k + 1] = state.x, state.v, state.clipped
-    return Motion(t=np.arange(len(force) + 1) * state.period, x=xs, v=vs, clipped=clips)
+    return Motion(
+        t=np.arange(len(force) + 1, dtype=np.float64) * state.period, x=xs, v=vs, clipped=clips
+    )
 
 
 def release(

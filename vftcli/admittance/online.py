@@ -10,14 +10,15 @@ from vftcli.observers.kalman import KalmanObserver
 from vftcli.robots.robot import Robot
 from vftcli.wrench.solvers import LEAST_SIGMA, SCALE
 
+
 class OnlineKalman:
     """A disturbance Kalman filter run sample by sample at a constant rate, from x̂⁰ = [p⁰; 0].
 
-    A drive torque that is the mean over the sampling interval is what the momentum has gained by it,
-    exactly; the trapezoid over two such means is half a sample late, and in a loop that half sample
-    turns every jerk of the arm into a false force. So a mean enters as it is, and only the rest of
-    μ by the trapezoid. An instantaneous torque enters by the trapezoid: then the numbers are those
-    of `KalmanObserver.estimate` over the log.
+    A drive torque that is the mean over the sampling interval is what the momentum has gained by
+    it, exactly; the trapezoid over two such means is half a sample late, and in a loop that half
+    sample turns every jerk of the arm into a false force. So a mean enters as it is, and only the
+    rest of μ by the trapezoid. An instantaneous torque enters by the trapezoid: then the numbers
+    are those of `KalmanObserver.estimate` over the log.
 
     Attributes:
         tau: The estimate now. (n,) [N·m]
@@ -41,7 +42,7 @@ class OnlineKalman:
         self.tau = np.zeros(n)
 
     def terms(self, q: Array, dq: Array) -> tuple[Array, Array]:
-        """p = M q̇ and Cᵀq̇ − g − F_f, μ without the drives. (n,) each [kg·m²/s, N·m]"""
+        """P = M q̇ and Cᵀq̇ − g − F_f, μ without the drives. (n,) each [kg·m²/s, N·m]"""
         pin, model, data = self.pin, self.model, self.data
         C = pin.computeCoriolisMatrix(model, data, q, dq)
         p = pin.crba(model, data, q) @ dq

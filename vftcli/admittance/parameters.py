@@ -219,8 +219,8 @@ def check_complete(
             absent = [axis for axis, value in zip(AXES, row, strict=True) if np.isnan(value)]
             where = "its [admittance]" if has_table else "an [admittance] section, which it lacks,"
             raise ParameterError(
-                f"{robot}: no admittance {name} for {', '.join(absent)}; give it in {where} or with "
-                f"--set {absent[0]}.{name}=VALUE"
+                f"{robot}: no admittance {name} for {', '.join(absent)}; give it in {where} or "
+                f"with --set {absent[0]}.{name}=VALUE"
             )
     if "period" not in plain:
         raise ParameterError(
@@ -318,6 +318,6 @@ def release_deviation(assignments: Sequence[str]) -> Array:
         x[AXES.index(axis.strip())] = value
     if np.any(np.linalg.norm(x[3:]) >= np.pi):
         raise ParameterError(
-            f"--release turns by {np.linalg.norm(x[3:]):.3g} rad; a rotation vector is shorter than π"
+            f"--release turns by {np.linalg.norm(x[3:]):.3g} rad; it must be less than π"
         )
     return x

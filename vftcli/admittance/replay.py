@@ -11,7 +11,14 @@ from vftcli.admittance.joints import FlangeSolver, JointPath, follow
 from vftcli.admittance.law import Controller, energy, printed_energy
 from vftcli.admittance.metrics import drags_of, releases_of, rows_of
 from vftcli.admittance.motion import Motion, run
-from vftcli.admittance.parameters import AXES, Admittance
+from vftcli.admittance.parameters import Admittance
+from vftcli.admittance.remarks import (
+    motion_notes,
+    moved_note,
+    quiet_note,
+    resting_note,
+    travel_note,
+)
 from vftcli.admittance.stability import Verdict, check_stable
 from vftcli.admittance.thresholds import Flags, Phases, phases
 from vftcli.arrays import Array
@@ -19,7 +26,7 @@ from vftcli.errors import ParameterError
 from vftcli.robots.robot import Robot
 
 RISE = 1e-12
-"""A step in which W rises by more than this share of its value at the start of the phase is told."""
+"""A step in which W rises by more than this share of its value at the phase's start is told."""
 
 LONGEST = 600.0
 """Longest release that is computed. [s]"""
@@ -114,7 +121,8 @@ def replay(
         *record.notes,
         *complaints,
         *quiet_note(wrench, parameters, bool(drags)),
-        *motion_notes(controllers, motion, path, lyapunov),
+        *resting_note(drags, logged, parameters.period),
+        *motion_notes(controllers, motion, path, lyapunov.rises),
         *travel_note(parameters, controllers, motion, path),
         *moved_note(logged),
     )
@@ -192,7 +200,7 @@ def replay_release(
         rows=tuple(rows),
         notes=(
             *complaints,
-            *motion_notes(controllers, motion, path, lyapunov),
+            *motion_notes(controllers, motion, path, lyapunov.rises),
             *travel_note(parameters, controllers, motion, path),
         ),
     )
@@ -241,9 +249,7 @@ def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
     return np.concatenate([poses.translation[:, -1] - translation, turned], axis=1)
 
 
-def lyapunov_along(
-    controllers: Sequence[Controller], motion: Motion, dragged: Flags
-) -> Lyapunov:
+def lyapunov_along(controllers: Sequence[Controller], motion: Motion, dragged: Flags) -> Lyapunov:
     """Energies along a run, and where the corrected one rises inside a recovery phase."""
     shape = motion.x.shape
     corrected, printed = np.empty(shape), np.empty(shape)
@@ -270,72 +276,3 @@ def count_rises(W: Array, recovering: Flags) -> int:
         origin = np.maximum.accumulate(np.where(begins, np.arange(len(flags)), 0))
         rises += int(np.count_nonzero(flags & (np.diff(w) > RISE * w[:-1][origin])))
     return rises
-
-
-def quiet_note(wrench: Array, parameters: Admittance, dragged: bool) -> tuple[str, ...]:
-    """Say so if nothing ever passed a threshold."""
-    if dragged or not len(wrench):
-        return ()
-    share = np.nanmax(np.abs(np.nan_to_num(wrench)), axis=0) / np.maximum(parameters.threshold, 1e-12)
-    k = int(np.argmax(share))
-    return (
-        f"no axis ever passes its threshold, so nothing moves; the nearest is {AXES[k]} with "
-        f"{100.0 * share[k]:.0f} % of its {parameters.threshold[k]:g}",
-    )
-
-
-def motion_notes(
-    controllers: Sequence[Controller], motion: Motion, path: JointPath, lyapunov: Lyapunov
-) -> tuple[str, ...]:
-    """What went wrong or was limited on the way, one sentence each."""
-    found = []
-    for n, controller in enumerate(controllers):
-        name = controller.name
-        if motion.escaped[n]:
-            k = int(np.argmin(np.all(np.isfinite(motion.x[:, n]), axis=1)))
-            found.append(f"{name}: escaped in finite time, {motion.t[k]:.3f} s")
-        if limits := int(np.count_nonzero(np.any(motion.clipped[:, n], axis=1))):
-            found.append(f"{name}: the speed limit acted in {limits} control periods")
-        if lost := int(np.count_nonzero(~path.reached[:, n])):
-            first = motion.t[int(np.argmin(path.reached[:, n]))]
-            found.append(
-                f"{name}: {lost} of {len(motion.t)} poses cannot be reached inside the workspace "
-                f"and the joint limits, the first at {first:.3f} s; the arm waits at the last it can"
-            )
-        if path.speed[n] > 1.0:
-            found.append(f"{name}: a joint would need {path.speed[n]:.2g} times its speed limit")
-        if lyapunov.rises[n]:
-            found.append(
-                f"{name}: W rises by more than 1e-12 of its start in {lyapunov.rises[n]} steps of "
-                "recovery phases"
-            )
-    return tuple(found)
-
-
-def travel_note(
-    parameters: Admittance, controllers: Sequence[Controller], motion: Motion, path: JointPath
-) -> tuple[str, ...]:
-    """Whether the travel is one that the arm could make."""
-    travel = np.nan_to_num(np.linalg.norm(motion.x[:, :, :3], axis=2), nan=np.inf).max(axis=0)
-    lost = [n for n in range(len(controllers)) if not np.all(path.reached[:, n])]
-    if not lost:
-        return ()
-    largest = max(travel[n] for n in lost)
-    soft = "" if parameters.threshold_mode == "soft" else (
-        " With the hard threshold the whole force enters as soon as it passes; --threshold-mode soft "
-        "lets in only what exceeds it."
-    )
-    return (
-        f"the travel of up to {largest:.2f} m is implausible: this arm cannot make it.{soft}",
-    )
-
-
-def moved_note(logged: Array) -> tuple[str, ...]:
-    """Say so if the log's arm moved while the replay holds it at its first pose."""
-    far = float(np.linalg.norm(logged[:, :3], axis=1).max())
-    if far < 0.01:
-        return ()
-    return (
-        f"in the log the flange moves by up to {far:.3f} m; the replay holds the log's first pose "
-        "as its target and uses the force as it was recorded",
-    )

@@ -69,8 +69,16 @@ def log_matrix(matrix: Array) -> Array:
     d = np.diagonal(R, axis1=-2, axis2=-1)
     trace = d.sum(axis=-1)
     candidates = np.stack([trace, *np.moveaxis(2.0 * d - trace[..., None], -1, 0)], axis=-1)
-    xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
-    wx, wy, wz = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
+    xy, xz, yz = (
+        R[..., 0, 1] + R[..., 1, 0],
+        R[..., 0, 2] + R[..., 2, 0],
+        R[..., 1, 2] + R[..., 2, 1],
+    )
+    wx, wy, wz = (
+        R[..., 2, 1] - R[..., 1, 2],
+        R[..., 0, 2] - R[..., 2, 0],
+        R[..., 1, 0] - R[..., 0, 1],
+    )
     first = 1.0 + candidates
     rows = np.stack(
         [

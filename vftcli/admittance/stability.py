@@ -1,9 +1,9 @@
 """Stability before motion: what can be said of a law's parameters without running it.
 
-Two things can go wrong. Semi-implicit Euler (49)–(51) is stable for mass M, damping B and stiffness K
-only if 2TsB/M + Ts²K/M < 4, and the variable law's M shrinks and its K grows with speed. And without
-a speed limit the law itself escapes: K grows with e^{|v|}, M shrinks, and from a deviation large
-enough the speed becomes infinite in finite time, at any control period.
+Two things can go wrong. Semi-implicit Euler (49)–(51) is stable for mass M, damping B and
+stiffness K only if 2TsB/M + Ts²K/M < 4, and the variable law's M shrinks and its K grows with
+speed. And without a speed limit the law itself escapes: K grows with e^{|v|}, M shrinks, and from a
+deviation large enough the speed becomes infinite in finite time, at any control period.
 """
 
 from collections.abc import Sequence
@@ -57,11 +57,12 @@ class Verdict(NamedTuple):
                     f"{self.controller.name}, axis {AXES[k]}, {phase} phase{at}: "
                     f"2TsB/M + Ts²K/M = {numbers[k]:.3g}, and it must be below 4"
                 )
-        for k in np.flatnonzero(~self.limited & np.isfinite(self.escape)):
-            found.append(
-                f"{self.controller.name}, axis {AXES[k]} has no speed limit: the law escapes in "
-                f"finite time when released at rest from beyond {self.escape[k]:.3g} {UNITS[k]}"
-            )
+        escapes = np.flatnonzero(~self.limited & np.isfinite(self.escape))
+        found += [
+            f"{self.controller.name}, axis {AXES[k]} has no speed limit: the law escapes in "
+            f"finite time when released at rest from beyond {self.escape[k]:.3g} {UNITS[k]}"
+            for k in escapes
+        ]
         return tuple(found)
 
 
@@ -82,9 +83,10 @@ def escape_factor(xi: float) -> float:
     """Y*(ξ): the release Y*·v₀√(M_d/K_d)/α from rest is the last that does not escape.
 
     In y = xα√(K_d/M_d)/v₀ and u = |v|/v₀ the law without force is du/ds = e^u(e^u y − 2ξu),
-    dy/ds = −u. With z = e^u y its paths obey dz/du = z − u/(z − 2ξu); the one between those that turn
-    back and those that escape comes from infinity along z(z − 2ξu) = u. Followed back to u = 0, where
-    it attracts its neighbours, it ends at z = y = Y*. Y*(0) = 1/√2, the bound that holds for every ξ.
+    dy/ds = −u. With z = e^u y its paths obey dz/du = z − u/(z − 2ξu); the one between those that
+    turn back and those that escape comes from infinity along z(z − 2ξu) = u. Followed back to u =
+    0, where it attracts its neighbours, it ends at z = y = Y*. Y*(0) = 1/√2, the bound that holds
+    for every ξ.
 
     Args:
         xi: Damping ratio, at least 0.
@@ -125,9 +127,7 @@ def judge(controller: Controller) -> Verdict:
     with np.errstate(over="ignore", invalid="ignore"):
         swell = controller.alpha * np.exp(np.where(controller.rate > 0, limit * controller.rate, 0))
     drag = discrete_number(p.mass, p.damping, p.stiffness, p.period)
-    recovery = discrete_number(
-        p.mass / swell, controller.damping, p.stiffness * swell, p.period
-    )
+    recovery = discrete_number(p.mass / swell, controller.damping, p.stiffness * swell, p.period)
     return Verdict(controller, drag, recovery, escape_bound(controller), np.isfinite(limit))
 
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vftcli.admittance.closed_loop import ClosedLoop
+from vftcli.admittance.latency import latencies
 from vftcli.admittance.parameters import AXES, PER_AXIS
 from vftcli.admittance.replay import Replay
 from vftcli.admittance.stability import Verdict
@@ -32,8 +34,8 @@ FILES = (
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")
 
 CONVENTIONS = {
-    "deviation": "X̃ of the flange point from the target pose X_d, base axes; rotation as the vector "
-    "log(R R_dᵀ)",
+    "deviation": "X̃ of the flange point from the target pose X_d, base axes; rotation as the "
+    "vector log(R R_dᵀ)",
     "force": "force on the robot and moment about the flange point, base axes",
     "row": "a deviation follows from the force of the row before it",
     "units": "s, m, rad, N, N·m, J",
@@ -165,7 +167,50 @@ def padded(column: Array) -> Array:
     return np.append(column, np.nan)
 
 
-def admittance_record(replay: Replay, recording: Recording | None, command: str) -> dict[str, Any]:
+def title_of(recording: Recording | None, run: ClosedLoop | None) -> str:
+    """What the page is called."""
+    if run is not None and run.simulation is not None:
+        return f"{run.simulation.scenario.name}, closed loop"
+    return recording.name if recording is not None else "release"
+
+
+def latency_rows(run: ClosedLoop) -> list[dict[str, Any]]:
+    """The latencies of a closed loop as rows, None where something did not happen."""
+    return [
+        {
+            "axis": AXES[entry.axis],
+            "force_s": entry.force,
+            "detection_s": entry.detection,
+            "motion_s": entry.motion,
+            "withdrawal_s": entry.withdrawal,
+            "at_rest_before": entry.rested,
+        }
+        for entry in latencies(run)
+    ]
+
+
+def latency_text(run: ClosedLoop) -> str:
+    """The latencies of a closed loop in words, one line a contact."""
+    if not run.stable:
+        return f"closed loop: the arm ran away at {run.t[-1]:.2f} s"
+    lines = []
+    for row in latency_rows(run):
+        detection, motion, withdrawal = (
+            "never" if row[name] is None else f"{row[name]:.3f} s"
+            for name in ("detection_s", "motion_s", "withdrawal_s")
+        )
+        moving = "" if row["at_rest_before"] else " (the arm was moving already)"
+        lines.append(
+            f"closed loop: force past the threshold of {row['axis']} at {row['force_s']:.2f} s, "
+            f"detected after {detection}, moved after {motion}{moving}, "
+            f"withdrawal seen after {withdrawal}"
+        )
+    return "\n".join(lines) or "closed loop: no force passed a threshold"
+
+
+def admittance_record(
+    replay: Replay, recording: Recording | None, run: ClosedLoop | None, command: str
+) -> dict[str, Any]:
     """Everything `run.json` holds."""
     p = replay.parameters
     return {
@@ -174,6 +219,7 @@ def admittance_record(replay: Replay, recording: Recording | None, command: str)
         "input": input_record(recording) if recording is not None else None,
         "robot": robot_record(replay.robot),
         "force": replay.source,
+        "closed_loop": None if run is None else loop_record(run),
         "start_rad": replay.start,
         "parameters": {
             "axes": AXES,
@@ -188,6 +234,19 @@ def admittance_record(replay: Replay, recording: Recording | None, command: str)
         "notes": list(replay.notes),
         "repairs": list(recording.source.repairs) if recording is not None else [],
     }
+
+
+def loop_record(run: ClosedLoop) -> dict[str, Any]:
+    """What a closed loop was and how fast it was."""
+    about: dict[str, Any] = {
+        "controller": run.controller.name,
+        "stable": run.stable,
+        "zero_removed": run.zero,
+        "poses_out_of_reach": int(np.count_nonzero(~run.reached)),
+    }
+    if run.simulation is not None:
+        about |= {"scenario": run.simulation.scenario.name, "seed": run.simulation.seed}
+    return about | {"latencies": latency_rows(run)}
 
 
 def verdict_record(verdict: Verdict) -> dict[str, Any]:
@@ -208,6 +267,7 @@ def write_admittance(
     path: Path,
     replay: Replay,
     recording: Recording | None,
+    run: ClosedLoop | None = None,
     command: str = "",
     force: bool = False,
 ) -> None:
@@ -216,7 +276,8 @@ def write_admittance(
     Args:
         path: The folder.
         replay: What to show.
-        recording: The log it was made from, None for a release.
+        recording: The log it was made from, None without one.
+        run: The closed loop it was made from, None without one.
         command: The command line, as the user typed it.
         force: Whether existing files may be replaced.
 
@@ -226,10 +287,10 @@ def write_admittance(
     from vftcli.outputs.admittance_page import render_admittance
     from vftcli.outputs.admittance_recording import write_ghosts
 
-    record = admittance_record(replay, recording, command)
-    title = recording.name if recording is not None else "release"
+    record = admittance_record(replay, recording, run, command)
+    title = title_of(recording, run)
     texts = {
-        "index.html": render_admittance(replay, record, title),
+        "index.html": render_admittance(replay, record, title, run),
         "comparison.csv": comparison_csv(replay.rows),
         "comparison.json": comparison_json(replay.rows) + "\n",
         "run.json": to_json(record),

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from vftcli.admittance.closed_loop import ClosedLoop
 from vftcli.admittance.law import Controller
 from vftcli.admittance.paper import DIFFERENCES
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
 from vftcli.arrays import Array
-from vftcli.outputs.admittance import COLUMNS, cells, ordered
+from vftcli.outputs.admittance import COLUMNS, cells, latency_rows, ordered
 from vftcli.outputs.html.page import asset, document, headline
 from vftcli.outputs.html.payload import Chart, Series, packed
 from vftcli.outputs.html.sections import bullets, fact, html_table, pairs, provenance, remarks
@@ -22,7 +23,9 @@ UNITS = {"x": ("m", "rad"), "v": ("m/s", "rad/s"), "force": ("N", "N·m"), "ener
 """Chart → unit of a translational and of a rotational axis."""
 
 
-def render_admittance(replay: Replay, record: Mapping[str, Any], title: str) -> str:
+def render_admittance(
+    replay: Replay, record: Mapping[str, Any], title: str, run: ClosedLoop | None = None
+) -> str:
     """The page: self-contained, nothing is loaded from anywhere."""
     text = f"Admittance replay on {replay.robot.title or replay.robot.name}: {replay.source}"
     body = "".join(
@@ -30,6 +33,7 @@ def render_admittance(replay: Replay, record: Mapping[str, Any], title: str) -> 
             headline(title, text),
             facts(replay),
             remarks(replay.notes),
+            closed_loop(run),
             comparison(replay),
             charts_section(),
             parameters(replay),
@@ -37,7 +41,7 @@ def render_admittance(replay: Replay, record: Mapping[str, Any], title: str) -> 
             differences(),
             f"<h2>Conventions</h2>{pairs(record['conventions'])}",
             origin(record),
-            f'<script type="application/json" id="data">{data(replay)}</script>',
+            f'<script type="application/json" id="data">{data(replay, run)}</script>',
             f"<script>{asset('page.js')}</script>",
         )
     )
@@ -58,6 +62,29 @@ def facts(replay: Replay) -> str:
     return f'<dl class="facts">{"".join(fact(*item) for item in found.items())}</dl>'
 
 
+def closed_loop(run: ClosedLoop | None) -> str:
+    """Latencies of the loop, as the paper reports them, or nothing without one."""
+    if run is None:
+        return ""
+    rows = []
+    for row in latency_rows(run):
+        values = (row["force_s"], row["detection_s"], row["motion_s"], row["withdrawal_s"])
+        shown = "".join(f"<td>{'–' if v is None else f'{v:.3f}'}</td>" for v in values)
+        still = "yes" if row["at_rest_before"] else "no"
+        rows.append(f'<tr><th scope="row">{row["axis"]}</th>{shown}<td>{still}</td></tr>')
+    header = ["Axis", "force [s]", "detected [s]", "moved [s]", "withdrawal [s]", "at rest before"]
+    caption = (
+        "From the true force past its threshold to the estimate's, to 5 mm (0.02 rad) of the "
+        "flange; from its fall below to the estimate's"
+    )
+    state = "" if run.stable else f"<p>The arm ran away at {run.t[-1]:.2f} s.</p>"
+    return (
+        f"<h2>Closed loop in simulation</h2>{state}{html_table(caption, header, rows)}"
+        '<p class="soft">The paper measured 0.24 and 0.28 s to motion, 0.26 and 0.12 s to '
+        "withdrawal on its UR5; its sensor's noise convention decides (docs/admittance.md).</p>"
+    )
+
+
 def comparison(replay: Replay) -> str:
     """Every controller on the same force, axis by axis (Figs 7 and 10)."""
     if not replay.rows:
@@ -76,10 +103,10 @@ def comparison(replay: Replay) -> str:
         f"<h2>Comparison</h2>{table}"
         '<p class="soft">Times to the peak and idle times count from the start of a drag, return '
         "times from its release: the last moment at which the deviation is beyond that share of "
-        "its value at the release. “–” did not happen before the next drag or the end. Advance: how "
-        "much sooner than with the traditional controller the peak is reached. Overshoot: to the "
-        "other side, as a share of the deviation at the release. Work: what the hand does on the "
-        "arm while it drags.</p>"
+        "its value at the release. “–” did not happen before the next drag or the end. Advance: "
+        "how much sooner than with the traditional controller the peak is reached. Overshoot: to "
+        "the other side, as a share of the deviation at the release. Work: what the hand does on "
+        "the arm while it drags.</p>"
     )
 
 
@@ -94,21 +121,21 @@ def charts_section() -> str:
     """Where the script puts the charts, and how to read them."""
     return (
         "<h2>Force and motion over time</h2>"
-        '<p class="soft">Deviation of the flange (Figs 6b, 9b, 7, 10, 13), force with the threshold '
-        "band (Figs 6a, 9a, 12), speed with its limit, and the Lyapunov function W of the recovery "
-        "phases beside the printed V, which rises.</p>"
-        '<p class="soft help">Drag to zoom in, double-click to see all, shift and drag to pan; keys '
-        "+ − ← → Home. Click a small chart to choose its axis.</p>"
+        '<p class="soft">Deviation of the flange (Figs 6b, 9b, 7, 10, 13), force with the '
+        "threshold band (Figs 6a, 9a, 12), speed with its limit, and the Lyapunov function W of "
+        "the recovery phases beside the printed V, which rises.</p>"
+        '<p class="soft help">Drag to zoom in, double-click to see all, shift and drag to pan; '
+        "keys + − ← → Home. Click a small chart to choose its axis.</p>"
         '<div id="toolbar"><div class="buttons" id="joints" role="group" aria-label="Axis">'
         '<span class="name">Axis</span></div>'
-        '<div id="legend" role="group" aria-label="Controllers"><span class="name">Controller</span>'
+        '<div id="legend" role="group" aria-label="Controller"><span class="name">Controller</span>'
         '</div><div class="buttons"><button type="button" id="all">Whole span</button></div></div>'
         '<div id="overview"></div><div id="detail"></div>'
         "<noscript><p>The charts need JavaScript; the tables do not.</p></noscript>"
     )
 
 
-def data(replay: Replay) -> str:
+def data(replay: Replay, run: ClosedLoop | None) -> str:
     """What the page's script draws; nothing in it can end the element."""
     t = replay.motion.t
     shown = {
@@ -117,7 +144,7 @@ def data(replay: Replay) -> str:
         "span": [float(t[0]), float(t[-1])],
         "charts": [
             packed(chart, t) | {"units": [UNITS[chart.key.split("-")[0]][k // 3] for k in range(6)]}
-            for chart in charts(replay)
+            for chart in charts(replay, run)
         ],
         "responses": [],
     }
@@ -131,18 +158,23 @@ def colours(replay: Replay) -> list[str]:
     return [next(spare) if c.kind == "variable" else "ink" for c in replay.controllers]
 
 
-def charts(replay: Replay) -> Iterator[Chart]:
+def charts(replay: Replay, run: ClosedLoop | None = None) -> Iterator[Chart]:
     """The charts, top to bottom; one column an axis."""
     p, paint = replay.parameters, colours(replay)
     pairs_of = list(zip(replay.controllers, paint, strict=True))
-    yield Chart("x", "Deviation", "m", lines(pairs_of, replay.motion.x), height=1.6)
-    force = np.vstack([replay.wrench, np.full((1, 6), np.nan)])
-    entered = np.vstack([replay.phases.force, np.full((1, 6), np.nan)])
+    moved = () if run is None else (Series("closed loop", padded(run.moved), "#8a929a", True),)
+    shown = (*lines(pairs_of, replay.motion.x), *moved)
+    yield Chart("x", "Deviation", "m", shown, height=1.6)
+    true = () if run is None else (Series("true force", padded(run.truth)),)
     yield Chart(
         "force",
         "Force on the robot",
         "N",
-        (Series("force", force, "#8a929a"), Series("force that enters the law", entered, SPARE[1])),
+        (
+            *true,
+            Series("force", padded(replay.wrench), "#8a929a"),
+            Series("force that enters the law", padded(replay.phases.force), SPARE[1]),
+        ),
         np.asarray(p.threshold),
         "± threshold",
     )
@@ -158,6 +190,11 @@ def charts(replay: Replay) -> Iterator[Chart]:
     yield Chart(
         "energy-v", "The printed V (52): it rises", "J", lines(pairs_of, replay.lyapunov.printed)
     )
+
+
+def padded(values: Array) -> Array:
+    """Rows with an unknown one more: the last deviation follows from the force before it."""
+    return np.vstack([values, np.full((1, values.shape[1]), np.nan)])
 
 
 def lines(controllers: list[tuple[Controller, str]], values: Array) -> tuple[Series, ...]:

@@ -185,8 +185,8 @@ def words(replay: Replay) -> str:
         f"# Admittance replay: {replay.robot.title or replay.robot.name}",
         f"{replay.source}. {parameter_text(replay)}.",
         "",
-        "Grey: traditional; colours: variable, see the legend of the plots. The orange arrow is the "
-        f"force that enters the law; 1 m is {NEWTON_PER_METRE:g} N.",
+        "Grey: traditional; colours: variable, see the legend of the plots. The orange arrow is "
+        f"the force that enters the law; 1 m is {NEWTON_PER_METRE:g} N.",
         "",
         *(f"- {note}" for note in replay.notes),
         "",
