@@ -22,6 +22,9 @@ GAP = 0.25
 BAND = 1.3
 """The free band reaches this far beyond the largest departure seen in the free part."""
 
+EARLY = 0.1
+"""An alarm that begins earlier than this before a true contact is false, whatever it meets. [s]"""
+
 TRUE_FORCE, TRUE_MOMENT = 1.0, 0.2
 """A true wrench beyond this is a contact. [N], [N·m]"""
 
@@ -124,7 +127,7 @@ class Detection:
     Attributes:
         contacts: True contacts.
         missed: True contacts that no detection overlaps.
-        false_alarms: Detections that overlap no true contact.
+        false_alarms: Detections that begin where nothing touches the arm.
         false_alarms_per_h: Those per hour without contact. [1/h]
         delay: Time from each found contact's start to its detection; NaN where missed. [s]
     """
@@ -166,9 +169,7 @@ def detection(
     for contact in true:
         hits = [f for f in found if f.stop >= contact.start and f.start <= contact.stop + late]
         delays.append(max(hits[0].start - contact.start, 0.0) if hits else float("nan"))
-    false = [
-        f for f in found if not any(f.stop >= c.start and f.start <= c.stop + late for c in true)
-    ]
+    false = [f for f in found if not any(begins(f, c, late) for c in true)]
     free = duration - sum(c.stop - c.start for c in true)
     return Detection(
         contacts=len(true),
@@ -177,6 +178,11 @@ def detection(
         false_alarms_per_h=len(false) * 3600.0 / free if free > 0 else float("nan"),
         delay=tuple(delays),
     )
+
+
+def begins(found: Contact, true: Contact, late: float) -> bool:
+    """Whether a detection begins at a true contact: little before it, or until `late` after it."""
+    return true.start - EARLY <= found.start <= true.stop + late
 
 
 class Operating(NamedTuple):

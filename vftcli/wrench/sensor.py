@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vftcli.arrays import Array, frozen, is_uniform, median
 from vftcli.errors import ParameterError
@@ -187,7 +188,7 @@ def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offs
     spectrum = np.fft.rfft(x, size, axis=0) * np.conj(np.fft.rfft(y, size, axis=0))
     cross = np.fft.irfft(spectrum, size, axis=0).sum(axis=1)
     lags = np.arange(-reach, reach + 1)
-    value = cross[lags % size] / np.sqrt(np.sum(x**2) * np.sum(y**2) + np.finfo(float).tiny)
+    value = cross[lags % size] / np.sqrt(overlap_energy(x, lags) * overlap_energy(y, -lags))
     best = int(np.argmax(value))
     shift = 0.0
     if 0 < best < len(lags) - 1:
@@ -195,6 +196,18 @@ def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offs
         bend = low - 2.0 * peak + high
         shift = 0.5 * (low - high) / bend if bend < 0 else 0.0
     return Offset(lag=float((lags[best] + shift) * step), correlation=float(value[best]))
+
+
+def overlap_energy(series: Array, lags: NDArray[np.intp]) -> Array:
+    """Sum of squares of what overlaps when a series is moved back by each lag. (L,)
+
+    Without it a correlation would favour small lags, which overlap longer.
+    """
+    total = np.concatenate([[0.0], np.cumsum(np.sum(series**2, axis=1))])
+    count = len(series)
+    energy = total[np.minimum(count, count + lags)] - total[np.maximum(0, lags)]
+    positive: Array = np.maximum(energy, np.finfo(np.float64).tiny)
+    return positive
 
 
 def resampled(t: Array, series: Array, even: Array) -> Array:

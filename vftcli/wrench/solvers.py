@@ -160,3 +160,26 @@ def null_space(parts: Decomposed, tau: Array) -> Array:
     explained = np.squeeze(tall @ (share * along)[:, :, None], axis=2)
     residual: Array = tau - explained
     return residual
+
+
+def wrench_of(
+    tau: Array, jacobian: Array, solver: str = "pinv", sd: Array | float = TORQUE_SD
+) -> tuple[Array, Array, Array]:
+    """Wrench, its standard deviation and σ_min from torques and given Jacobians.
+
+    For logs that hold a Jacobian; `VirtualSensor` takes it from the robot.
+
+    Args:
+        tau: Joint torque on the robot. (T, n) [N·m]
+        jacobian: Jacobian; its frame is the wrench's. (T, 6, n)
+        solver: A key of `SOLVERS`.
+        sd: Joint torque error, one, one a joint or one a sample and joint. [N·m]
+
+    Returns:
+        Wrench (T, 6) and its standard deviation (T, 6) [N, N·m], and σ_min (T,) [m].
+    """
+    parts = decompose(jacobian)
+    deviation = np.broadcast_to(np.asarray(sd, dtype=np.float64), tau.shape)
+    gain, root = SOLVERS[check_solver(solver)](parts, deviation)
+    values = np.squeeze(gain @ tau[:, :, None], axis=2)
+    return values, np.sqrt(np.sum(root**2, axis=2)), parts.sigma_min
