@@ -20,6 +20,9 @@ GARBAGE_VALUE = 1e6
 
 DENORMAL = 1e-300
 
+ABSURD_STAMP = 1e19
+"""Nanoseconds since 1970 stay below this for some centuries."""
+
 ABSURD = 1e9
 """Values as large as this are no measurement in any unit; anywhere in a log they are refused."""
 
@@ -61,12 +64,12 @@ def cleaned(
 def _cleaned(
     raw: RawLog, path: Path, format_name: str, sha256: str | Callable[[], str]
 ) -> Recording:
-    findings = Findings(list(raw.repairs), list(raw.warnings))
     rows = len(raw.stamps)
     if rows == 0:
         raise ClockError(f"{path}: no samples; the log holds a header only.")
     if raw.segment is not None:
         raw = segment_of(raw, raw.segment, path)
+    findings = Findings(list(raw.repairs), list(raw.warnings))
     raw = without_leading_garbage(raw, findings)
     refuse_unknown_numbers(raw, path)
     refuse_backward_steps(raw, path)
@@ -130,7 +133,7 @@ def without_leading_garbage(raw: RawLog, findings: Findings) -> RawLog:
         size = np.abs(value[head])
         bad = ~(size < GARBAGE_VALUE) | ((size > 0) & (size < DENORMAL))
         absurd |= bad.any(axis=1)
-    absurd |= ~np.isfinite(raw.stamps[head].astype(np.float64))
+    absurd |= ~(np.abs(raw.stamps[head].astype(np.float64)) < ABSURD_STAMP)
     if not absurd.any() or absurd.all():
         return raw
     count = int(np.flatnonzero(absurd)[-1]) + 1

@@ -80,10 +80,11 @@ class TextTable:
 
     @staticmethod
     def _names_in(comment: str, row: str) -> bool:
-        """Whether a comment line has one name for each cell of a row, as np.savetxt writes it."""
+        """Whether a comment has one name for each number of a row, as np.savetxt writes it."""
         names = re.split(r"[,;\t ]+", comment.lstrip("# ").strip())
         cells = re.split(r"[,;\t ]+", row.strip())
-        return len(names) == len(cells) and all(as_number(name) is None for name in names)
+        words = all(as_number(name) is None for name in names)
+        return words and len(names) == len(cells) and all(as_number(c) is not None for c in cells)
 
     @cached_property
     def separator(self) -> str:
