@@ -10,7 +10,7 @@ from vftcli.analysis import Analysis
 from vftcli.arrays import Array
 from vftcli.errors import OutputError
 from vftcli.outputs.files import one_line
-from vftcli.wrench.wrench import AXES
+from vftcli.wrench.wrench import AXES, Wrench
 
 if TYPE_CHECKING:
     import polars as pl
@@ -23,7 +23,8 @@ def estimates_table(analysis: Analysis) -> "pl.DataFrame":
     ``sd/<observer>/1``… [N·m] where the observer gives one; ``tau_ext/reference/1``… [N·m];
     where a wrench is asked for, ``wrench/<observer>/fx``…``mz`` [N, N·m], null where the pose
     cannot tell it, ``wrench_sd/<observer>/fx``…, ``null_space/<observer>`` [N·m] and
-    ``sigma_min`` [m].
+    ``sigma_min`` [m]; with a bounded solver, what it says of the masked samples stands apart in
+    ``wrench_masked/<observer>/fx``….
     What is not known is null.
     """
     import polars as pl
@@ -59,15 +60,24 @@ def per_joint(name: str, values: Array) -> Iterator[tuple[str, Array]]:
 
 def wrench_columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
     """The wrenches, their standard deviations and what the pose can tell, where asked for."""
+    sensed = analysis.virtual_sensor
+    bounded = sensed is not None and sensed.sensor.solver != "pinv"
     for wrench in analysis.wrenches:
         yield from per_axis(f"wrench/{wrench.name}", wrench.known)
         if wrench.known_sd is not None:
             yield from per_axis(f"wrench_sd/{wrench.name}", wrench.known_sd)
+        if bounded and wrench.hidden.any():
+            yield from per_axis(f"wrench_masked/{wrench.name}", masked_only(wrench))
         if wrench.null_space is not None:
             yield f"null_space/{wrench.name}", wrench.null_space
     sigma = next((w.sigma_min for w in analysis.wrenches if w.sigma_min is not None), None)
     if sigma is not None:
         yield "sigma_min", sigma
+
+
+def masked_only(wrench: Wrench) -> Array:
+    """What a bounded solver says where the pose cannot tell, NaN elsewhere. (T, 6)"""
+    return np.where(wrench.hidden[:, None], wrench.values, np.nan)
 
 
 def per_axis(name: str, values: Array) -> Iterator[tuple[str, Array]]:

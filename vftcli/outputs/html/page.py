@@ -6,7 +6,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.html import sections
+from vftcli.outputs.html import comparisons, sections
 from vftcli.outputs.html.payload import payload
 from vftcli.outputs.run import run_record
 from vftcli.outputs.tables import blocks, mean_of, significant
@@ -28,9 +28,11 @@ def render(analysis: Analysis) -> str:
             sections.facts(analysis),
             sections.remarks(remarks),
             sections.errors(analysis),
+            comparisons.published(analysis.published),
             sections.series(analysis),
             sections.wrenches(analysis),
             sections.observers(analysis),
+            comparisons.selection_guide(analysis),
             sections.conventions(record),
             sections.provenance(record),
             f'<script type="application/json" id="data">{payload(analysis)}</script>',

@@ -71,7 +71,7 @@ def payload(analysis: Analysis) -> str:
         "labels": joint_labels(analysis),
         "span": [float(t[0]), float(t[-1])],
         "charts": [packed(chart, t) for chart in time_charts(analysis)],
-        "wrenches": [{**packed(chart, t), "at": 0} for chart in wrench_charts(analysis)],
+        "wrenches": [{**packed(chart, t), "at": 0} for chart in all_wrench_charts(analysis)],
         "responses": responses(analysis),
     }
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
@@ -149,6 +149,14 @@ def wrench_charts(analysis: Analysis) -> Iterator[Chart]:
             for w in found
         )
         yield Chart(axis, f"{axis} in {found[0].frame} axes", "N" if k < 3 else "N·m", series)
+
+
+def all_wrench_charts(analysis: Analysis) -> Iterator[Chart]:
+    """The wrenches axis by axis, then what the pose and the null space say of them."""
+    from vftcli.outputs.html.wrench_part import condition_charts
+
+    yield from wrench_charts(analysis)
+    yield from condition_charts(analysis)
 
 
 def legend_name(analysis: Analysis, name: str) -> str:

@@ -14,6 +14,7 @@ from vftcli.arrays import Array
 from vftcli.observers import OBSERVERS
 from vftcli.outputs.error_details import details
 from vftcli.outputs.html.payload import STRETCHES, is_decimated
+from vftcli.outputs.html.wrench_part import story as wrench_story
 from vftcli.outputs.run import observer_record
 from vftcli.outputs.tables import (
     AT_FLOOR,
@@ -220,7 +221,7 @@ def wrenches(analysis: Analysis) -> str:
         "<h2>Wrench over time</h2>"
         '<p class="soft">Force and moment on the robot, as the virtual sensor tells them; the line '
         "breaks where the pose cannot.</p>"
-        '<div class="responses" id="wrenches"></div>'
+        f'{wrench_story(analysis)}<div class="responses" id="wrenches"></div>'
     )
 
 
