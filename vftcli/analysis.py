@@ -14,6 +14,7 @@ from vftcli.robots.robot import Robot
 from vftcli.torque import ExternalTorque
 
 if TYPE_CHECKING:
+    from vftcli.published import Comparison
     from vftcli.wrench.detection import Told
     from vftcli.wrench.measurement import Measurement
     from vftcli.wrench.wrench import Wrench
@@ -34,6 +35,7 @@ class Analysis:
         errors: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
         virtual_sensor: The wrenches and what is known of them, or None where none was asked for.
         contacts: How each observer tells contacts, or empty where it was not asked.
+        published: A printed table beside these errors, or None where none was asked for.
         notes: What the reader of the numbers should know, one sentence each.
         run: The command, versions and conventions, as `run.json` holds them.
     """
@@ -48,6 +50,7 @@ class Analysis:
     errors: pl.DataFrame | None = None
     virtual_sensor: "Measurement | None" = None
     contacts: "tuple[Told, ...]" = ()
+    published: "Comparison | None" = None
     notes: tuple[str, ...] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
 

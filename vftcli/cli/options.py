@@ -179,6 +179,10 @@ Match = Annotated[
         help="Gains that give every observer the same delay or −3 dB bandwidth on every joint.",
     ),
 ]
+PublishedTable = Annotated[
+    str | None,
+    typer.Option("--published", metavar="table1", help="Set the paper's table beside the errors."),
+]
 Folder = Annotated[
     Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write into.")
 ]

@@ -1,5 +1,7 @@
 """`vftcli report`: everything about a log in one folder."""
 
+from dataclasses import replace
+
 import typer
 
 from vftcli.cli import options as opt
@@ -25,6 +27,7 @@ def report(
     alignment: opt.Alignment = "auto",
     low_pass: opt.LowPass = "auto",
     match: opt.Match = None,
+    published: opt.PublishedTable = None,
     wrench: opt.WrenchFlag = False,
     frame: opt.Frame = None,
     solver: opt.Solver = None,
@@ -47,9 +50,11 @@ def report(
     from vftcli.cli.asking import command_line, paths, say, say_notes, say_recording
     from vftcli.cli.wrench_options import wrench_request
     from vftcli.observers import DEFAULT
+    from vftcli.outputs.published import terminal_published
     from vftcli.outputs.report import write_report, write_reports
     from vftcli.outputs.tables import terminal
     from vftcli.pipeline import Request, analyse, choose_robot, open_log
+    from vftcli.published import check_published, compare_with
 
     request = Request(
         format=format_,
@@ -74,10 +79,15 @@ def report(
         low_pass=low_pass,
         match=match,
     )
+    if published is not None:
+        check_published(published, reference)
     analyses = []
     for log in logs:
         recording = open_log(log, request)
         analysis = analyse(recording, choose_robot(request, recording), request)
+        if published is not None and analysis.errors is not None:
+            found = compare_with(published, analysis.errors, analysis.observers, analysis.tunings)
+            analysis = replace(analysis, published=found)
         analyses.append(analysis)
         if not json:
             say_recording(recording)
@@ -93,4 +103,6 @@ def report(
     for analysis in analyses:
         if analysis.errors is not None:
             typer.echo(terminal(analysis.errors))
+        if analysis.published is not None:
+            typer.echo(terminal_published(analysis.published))
     say(f"wrote {output}: open {output / 'index.html'}; rerun {output / 'recording.rrd'}")

@@ -1,0 +1,184 @@
+"""The paper's guidelines for choosing an observer (Sec. IV-A), as facts computed on a log."""
+
+from collections.abc import Mapping, Sequence
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+import polars as pl
+
+from vftcli.arrays import Array
+from vftcli.dynamics.terms import DynamicsTerms
+from vftcli.observers.observer import Observer, Tuning
+
+STEP_TIME = 3.0
+"""Length of the step that response times are read from. [s]"""
+
+REACHED = 0.9
+"""Share of a step at which it counts as seen."""
+
+FAST = 5.0
+"""Contacts by a person's deliberate action lie below this frequency, the rest is noise. [Hz]"""
+
+REPEATS = 3
+"""Runs of which the shortest computation time counts."""
+
+
+class Facts(NamedTuple):
+    """What one observer does on one log.
+
+    Attributes:
+        name: The observer.
+        response: Time until 90 % of a step is seen, the slowest joint. [s]
+        delay: Delay behind a slow ramp, the slowest joint. [s]
+        noise: Noise of the estimate, mean of joints: the drive torque's white noise through the
+            observer's own response. [N·m]
+        passed: Share of the drive torque's noise above `FAST` that comes through, mean of joints.
+        rmse: Root-mean-square error against the reference, mean of joints, NaN without. [N·m]
+        time: Computation time a sample. [s]
+        numbers: Numbers to tune.
+    """
+
+    name: str
+    response: float
+    delay: float
+    noise: float
+    passed: float
+    rmse: float
+    time: float
+    numbers: int
+
+
+class Advice(NamedTuple):
+    """One guideline and what this log says of it.
+
+    Attributes:
+        purpose: What the observer is wanted for.
+        criterion: What decides.
+        best: The observers that are best by it, alike within 2 %.
+        paper: What the paper advises.
+    """
+
+    purpose: str
+    criterion: str
+    best: tuple[str, ...]
+    paper: str
+
+
+def facts(
+    observers: Sequence[Observer],
+    tunings: Mapping[str, Tuning],
+    terms: DynamicsTerms,
+    errors: pl.DataFrame | None,
+) -> tuple[Facts, ...]:
+    """The facts of every observer that has a response of its own.
+
+    Args:
+        observers: The observers that ran.
+        tunings: What their gains mean, by name.
+        terms: The log's p and μ; the noise is that of μ.
+        errors: The tidy error table, or None.
+    """
+    noise = white_noise(terms.mu)
+    step = float(np.median(np.diff(terms.t)))
+    return tuple(
+        facts_of(observer, tunings[observer.name], terms, noise, step, errors)
+        for observer in observers
+        if observer.name in tunings
+    )
+
+
+def facts_of(
+    observer: Observer,
+    tuning: Tuning,
+    terms: DynamicsTerms,
+    noise: Array,
+    step: float,
+    errors: pl.DataFrame | None,
+) -> Facts:
+    """One observer's facts."""
+    frequency = np.linspace(0.0, 0.5 / step, 513)[1:]
+    gain = np.abs(observer.frequency_response(frequency, step, terms.joints)) ** 2
+    return Facts(
+        name=observer.name,
+        response=float(np.max(step_response(observer, step, terms.joints))),
+        delay=float(np.max(tuning.delay)),
+        noise=float(np.mean(noise * np.sqrt(gain.mean(axis=0)))),
+        passed=float(np.mean(np.sqrt(gain[frequency > FAST].mean(axis=0)))),
+        rmse=mean_rmse(observer.name, errors),
+        time=computation_time(observer, terms),
+        numbers=tuning.numbers,
+    )
+
+
+def white_noise(x: Array) -> Array:
+    """Standard deviation of the white part of each column, from second differences. (n,)"""
+    if len(x) < 3:
+        return np.full(x.shape[1], np.nan)
+    curvature = x[:-2] - 2.0 * x[1:-1] + x[2:]
+    noise: Array = np.sqrt(np.mean(curvature**2, axis=0) / 6.0)
+    return noise
+
+
+def step_response(observer: Observer, step: float, joints: int) -> Array:
+    """Time until the estimate of a unit step reaches 90 %, NaN if it never does. (n,) [s]
+
+    The step begins after the first sample; its momentum is the integral of it.
+    """
+    t = np.arange(0.0, STEP_TIME, step)
+    p = np.repeat(t[:, None], joints, axis=1)
+    seen = observer.estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))).tau >= REACHED
+    times: Array = np.where(seen.any(axis=0), t[seen.argmax(axis=0)], np.nan)
+    return times
+
+
+def computation_time(observer: Observer, terms: DynamicsTerms) -> float:
+    """Shortest time a sample of a few runs over the log. [s]"""
+    spent = []
+    for _ in range(REPEATS):
+        start = perf_counter()
+        observer.estimate(terms)
+        spent.append(perf_counter() - start)
+    return min(spent) / terms.samples
+
+
+def mean_rmse(name: str, errors: pl.DataFrame | None) -> float:
+    """Mean of the joints' RMSE of an observer, NaN where there is none. [N·m]"""
+    if errors is None:
+        return float("nan")
+    wanted = pl.col("joint").is_not_null() & (pl.col("observer") == name)
+    values = errors.filter(wanted)["rmse_Nm"].drop_nulls()
+    return float(np.mean(values.to_numpy())) if len(values) else float("nan")
+
+
+def advice(found: Sequence[Facts]) -> tuple[Advice, ...]:
+    """The paper's three guidelines with the observers that are best by each on this log."""
+    return (
+        Advice(
+            "collision detection",
+            "shortest response",
+            best(found, [f.response for f in found]),
+            "GMO or FDO: fast to compute and to respond",
+        ),
+        Advice(
+            "safe response",
+            f"least noise above {FAST:g} Hz",
+            best(found, [f.passed for f in found]),
+            "FDO: its one cutoff chooses what passes",
+        ),
+        Advice(
+            "force estimation",
+            "smallest RMSE against the reference",
+            best(found, [f.rmse for f in found]),
+            "KFO: ZOH for accuracy, FE for computation",
+        ),
+    )
+
+
+def best(found: Sequence[Facts], values: Sequence[float]) -> tuple[str, ...]:
+    """Names of those within 2 % of the smallest value; none where no value is known."""
+    known = [v for v in values if np.isfinite(v)]
+    if not known:
+        return ()
+    least = min(known)
+    return tuple(f.name for f, v in zip(found, values, strict=True) if v <= 1.02 * least)
