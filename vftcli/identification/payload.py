@@ -1,0 +1,249 @@
+"""A load on the flange, from a pair of logs with and without it or from poses at rest."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.dynamics.drive import drive_torque
+from vftcli.errors import IdentificationError
+from vftcli.identification.filtering import resampled, zero_phase
+from vftcli.identification.least_squares import fit_column, robust_sd, solve
+from vftcli.identification.processing import Motion, Processing, gravity_torque, prepare, runs
+from vftcli.identification.regressor import LINK, chain_parameters, torque_regressor
+from vftcli.recording import Recording
+from vftcli.robots.chain import Payload
+from vftcli.robots.robot import Robot
+
+STATIC = 4
+"""Parameters that gravity tells: mass and three first moments."""
+
+SAME_MOTION = 5e-3
+"""Position difference up to which two logs are the same motion. [rad rms]"""
+
+COARSE, FINE = 0.05, 5e-4
+"""Steps in which the shift between two logs is sought. [s]"""
+
+DWELL = 0.5
+"""Shortest rest that counts as a pose. [s]"""
+
+POSES = 4
+"""Fewest different poses for mass and centre of mass."""
+
+
+class LoadFit(NamedTuple):
+    """An identified load.
+
+    Attributes:
+        payload: The load on the flange, as a point mass.
+        mass_sd: Standard deviation of the mass. [kg]
+        com_sd: Standard deviations of the centre of mass. (3,) [m]
+        residual: RMS torque left in each joint. (n,) [N·m]
+        loaded: Name of the log that carries it.
+        notes: How it was found.
+    """
+
+    payload: Payload
+    mass_sd: float
+    com_sd: Array
+    residual: Array
+    loaded: str
+    notes: tuple[str, ...]
+
+
+def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
+    """Find a load from the same motion with and without it; which is which shows by itself.
+
+    The torque difference at the same phase is the load's, since friction and model errors are
+    alike in both, but for friction that grows with the load: that is fitted along.
+
+    Raises:
+        IdentificationError: If the logs are not the same motion, or differ by no load.
+    """
+    fit = pair_fit(second, first, robot)
+    if fit.payload_mass < 0:
+        fit = pair_fit(first, second, robot)
+    return fit.finished(robot)
+
+
+class PairFit(NamedTuple):
+    """The equations' solution before it is judged.
+
+    Attributes:
+        x: Mass and first moments in the last link's frame. (4,)
+        sd: Standard deviations. (4,)
+        residual: RMS left in each joint. (n,) [N·m]
+        loaded: Name of the log with the load.
+        notes: How it was found.
+    """
+
+    x: Array
+    sd: Array
+    residual: Array
+    loaded: str
+    notes: tuple[str, ...]
+
+    @property
+    def payload_mass(self) -> float:
+        """Mass. [kg]"""
+        return float(self.x[0])
+
+    def finished(self, robot: Robot) -> LoadFit:
+        """Move the load to flange axes and check that it can be one.
+
+        Raises:
+            IdentificationError: If the mass is not positive, uncertain, or lies out of reach.
+        """
+        mass, sd = self.payload_mass, float(self.sd[0])
+        if mass <= 0 or sd > 0.5 * mass:
+            raise IdentificationError(
+                f"{self.loaded}: no load can be told: mass {mass:.3g} ± {sd:.2g} kg; "
+                "use poses or motions in which gravity loads several joints differently"
+            )
+        chain = robot.chain
+        com = self.x[1:STATIC] / mass
+        at_flange = chain.flange_rotation.T @ (com - chain.flange_translation)
+        com_sd = chain.flange_rotation.T @ np.diag((self.sd[1:STATIC] / mass) ** 2)
+        spread = np.sqrt(np.diag(com_sd @ chain.flange_rotation))
+        if np.linalg.norm(at_flange) > 1.0:
+            raise IdentificationError(
+                f"{self.loaded}: the load's centre of mass comes out {np.linalg.norm(at_flange):.2g}"
+                " m from the flange; the logs do not fit this robot"
+            )
+        load = Payload(mass=mass, com=at_flange, inertia=np.zeros((3, 3)))
+        return LoadFit(load, sd, spread, self.residual, self.loaded, self.notes)
+
+
+def pair_fit(loaded: Recording, free: Recording, robot: Robot) -> PairFit:
+    """Fit what the loaded log's torque has beyond the free one's at the same phase."""
+    processing = Processing()
+    motion = prepare(loaded, robot, processing)
+    shift, distance = time_shift(motion, free)
+    torque = zero_phase(free.t, drive_torque(free, robot), processing.cutoff)
+    at = motion.t + shift
+    inside = (at >= free.t[0]) & (at <= free.t[-1])
+    extra = (motion.tau - resampled(at, free.t, torque))[inside]
+    sign = motion.filtered(np.tanh(loaded.require("dq") / 0.01))[inside]
+    q, dq, ddq = motion.q[inside], motion.dq[inside], motion.ddq[inside]
+    Y = torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK:][:, :, :STATIC]
+    usable = motion.usable[inside].astype(float)
+    x = weighted(Y, extra, usable)
+    for _ in range(4):
+        A = np.concatenate([Y, load_friction(robot, q, sign, x)], axis=2)
+        solution = weighted(A, extra, usable)
+        x = solution[:STATIC]
+    left = extra - np.einsum("knp,p->kn", A, solution)
+    sd = column_sd(A, left, usable)[:STATIC]
+    note = (
+        f"load from the pair {loaded.name} − {free.name}: same motion, shifted by {-shift:.3f} s, "
+        f"positions {1e3 * distance:.2g} mrad rms apart; Coulomb friction that grows with the load "
+        "fitted along; the load is taken as a point mass"
+    )
+    return PairFit(x, sd, np.sqrt(np.mean(left**2, axis=0)), loaded.name, (note,))
+
+
+def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
+    """Columns sign(q̇)·(|g with load| − |g without|), one a joint. (N, n, n)"""
+    n = robot.joints
+    Y = torque_regressor(robot.chain, q, np.zeros_like(q), np.zeros_like(q))
+    phi = chain_parameters(robot.loaded_chain)
+    heavier = phi.copy()
+    heavier[-LINK : -LINK + STATIC] += x
+    growth = np.abs(Y @ heavier) - np.abs(Y @ phi)
+    out = np.zeros((len(q), n, n))
+    out[:, range(n), range(n)] = growth * sign
+    return out
+
+
+def weighted(A: Array, y: Array, usable: Array, passes: int = 3) -> Array:
+    """Least squares over all joints, each divided by its own residual. (k,)"""
+    scale = np.maximum(np.std(y, axis=0), 1e-9)
+    for _ in range(passes):
+        w = np.sqrt(usable) / scale
+        x = solve((A * w[:, :, None]).reshape(-1, A.shape[2]), (y * w).ravel())
+        left = y - np.einsum("knp,p->kn", A, x)
+        scale = np.maximum(np.sqrt(np.mean(left**2, axis=0)), 1e-9)
+    return x
+
+
+def column_sd(A: Array, left: Array, usable: Array) -> Array:
+    """Standard deviations, the residuals' correlation along time counted. (k,)"""
+    scale = np.maximum(np.sqrt(np.mean(left**2, axis=0)), 1e-9)
+    w = np.sqrt(usable) / scale
+    flat, rest = (A * w[:, :, None]).transpose(1, 0, 2), (left * w).T
+    fit = fit_column(
+        flat.reshape(-1, A.shape[2]), rest.ravel(), (usable.T.ravel() > 0).astype(float)
+    )
+    return fit.sd
+
+
+def time_shift(motion: Motion, other: Recording) -> tuple[float, float]:
+    """Shift [s] to add to the motion's clock for the other log's, and what is left. [rad rms]
+
+    Raises:
+        IdentificationError: If the two are not the same motion.
+    """
+    def distance(shift: float) -> float:
+        at = motion.t + shift
+        inside = (at >= other.t[0]) & (at <= other.t[-1])
+        if np.count_nonzero(inside) < 0.5 * len(at):
+            return float("inf")
+        there = resampled(at[inside], other.t, other.q)
+        return float(np.sqrt(np.mean((there - motion.q[inside]) ** 2)))
+
+    low, high = other.t[0] - motion.t[-1], other.t[-1] - motion.t[0]
+    best = min(np.arange(low, high, COARSE), key=distance)
+    for step in (COARSE / 5, COARSE / 25, FINE):
+        best = min(best + step * np.arange(-6, 7), key=distance)
+    left = distance(float(best))
+    if left > SAME_MOTION:
+        raise IdentificationError(
+            f"{motion.recording.name} and {other.name} are not the same motion: positions differ "
+            f"by {1e3 * left:.3g} mrad rms at best; a pair must repeat one trajectory"
+        )
+    return float(best), left
+
+
+def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
+    """Find a load from poses at rest: what the torque has beyond the robot's own gravity.
+
+    Stiction hides in every pose; its size is what the residual shows, and many poses average it.
+
+    Raises:
+        IdentificationError: If there are too few different poses.
+    """
+    q, torque = poses(recordings, robot)
+    names = ", ".join(r.name for r in recordings)
+    if len(q) < POSES or np.max(np.ptp(q, axis=0), initial=0.0) < 0.1:
+        raise IdentificationError(
+            f"{names}: {len(q)} poses at rest of at least {DWELL:g} s; a load needs {POSES} "
+            "different ones, or a pair of logs of one motion with and without it"
+        )
+    zero = np.zeros_like(q)
+    Y = torque_regressor(robot.chain, q, zero, zero)[:, :, -LINK:][:, :, :STATIC]
+    extra = torque - gravity_torque(robot, q)
+    usable = np.ones_like(extra)
+    x = weighted(Y, extra, usable)
+    left = extra - np.einsum("knp,p->kn", Y, x)
+    note = f"load from {len(q)} poses at rest; stiction is part of the residual; a point mass"
+    fit = PairFit(x, column_sd(Y, left, usable), np.std(left, axis=0), names, (note,))
+    return fit.finished(robot)
+
+
+def poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:
+    """Mean position and torque of every rest. (P, n) [rad], (P, n) [N·m]"""
+    still = Processing().still
+    q, torque = [], []
+    for recording in recordings:
+        effort, dq = drive_torque(recording, robot), recording.require("dq")
+        limit = max(still, 4.0 * max(robust_sd(v) for v in dq.T))
+        smooth = zero_phase(recording.t, dq, 2.0) if recording.duration > 2.0 else dq
+        for start, stop in runs(np.all(np.abs(smooth) <= limit, axis=1)):
+            if recording.t[stop - 1] - recording.t[start] >= DWELL:
+                edge = (stop - start) // 5
+                span = slice(start + edge, stop - edge)
+                q.append(recording.q[span].mean(axis=0))
+                torque.append(effort[span].mean(axis=0))
+    n = robot.joints
+    return np.reshape(q, (-1, n)), np.reshape(torque, (-1, n))

@@ -1,0 +1,262 @@
+"""What a UR controller believes: K, rotor inertia and friction, read off its own targets.
+
+The controller logs the torque its inverse dynamics asks for (target_moment) and the current it
+expects (target_current). At rest their ratio is K; in motion target_moment less the maker's rigid
+body is J q̈, and K·target_current − target_moment is the controller's friction. Nothing of this
+needs free motion: a hand on the arm changes what is measured, not what was asked for.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.errors import IdentificationError
+from vftcli.identification.filtering import derivative, zero_phase
+from vftcli.identification.friction_shapes import FrictionColumns, Shape
+from vftcli.identification.least_squares import fit_column, solve
+from vftcli.identification.processing import Motion, Processing, gravity_torque, prepare, runs
+from vftcli.identification.regressor import chain_parameters, torque_regressor
+from vftcli.recording import Recording
+from vftcli.robots.robot import Robot
+
+CUTOFF = 4.0
+"""Cutoff for targets: above it the measured motion no longer follows the asked one. [Hz]"""
+
+CONSTANT_KNOWN = 1e-2
+"""Relative standard deviation up to which a drive constant counts as determined."""
+
+ROTOR_KNOWN = 2e-2
+"""Relative standard deviation up to which a rotor inertia counts as determined."""
+
+SHAPES = (
+    Shape(("coulomb", "viscous", "quadratic")),
+    Shape(("coulomb", "viscous", "quadratic", "offset")),
+)
+"""Friction shapes whose drive constants must agree; the first is what is written."""
+
+SPEEDS = (0.0, 0.05, 0.1, 0.2)
+"""Lowest speeds of the samples used, which must agree too. [rad/s]"""
+
+SETTLE = 0.1
+"""Left out at both ends of a rest. [s]"""
+
+STEADY = 5e-3
+"""Relative change of the target current during a rest up to which it is one."""
+
+
+class Estimate(NamedTuple):
+    """One number with its standard deviation and whether the log determines it."""
+
+    value: float
+    sd: float
+    known: bool
+
+
+class ControllerModel(NamedTuple):
+    """What the controller believes of one joint.
+
+    Attributes:
+        constant: Drive constant K. [N·m/A]
+        rotor: Reflected rotor inertia. [kg·m²]
+        friction: Coefficients of `SHAPES[0]`, None where the joint does not move.
+        friction_sd: Their standard deviations.
+        gravity: Its gravity torque over the profile's.
+    """
+
+    constant: Estimate
+    rotor: Estimate
+    friction: Array | None
+    friction_sd: Array | None
+    gravity: Estimate
+
+
+class Targets(NamedTuple):
+    """One log's targets beside its motion, filtered alike.
+
+    Attributes:
+        recording: The log.
+        motion: Measured motion.
+        columns: Friction columns.
+        current: Target current. (M, n) [A]
+        moment: Target moment. (M, n) [N·m]
+        lead: Its time derivative: what a shift in time would add. (M, n) [N·m/s]
+        rigid: The profile's rigid-body torque. (M, n) [N·m]
+        gravity: The profile's gravity torque. (M, n) [N·m]
+    """
+
+    recording: Recording
+    motion: Motion
+    columns: FrictionColumns
+    current: Array
+    moment: Array
+    lead: Array
+    rigid: Array
+    gravity: Array
+
+
+def read_targets(recording: Recording, robot: Robot) -> Targets:
+    """Filter a log's targets like its motion.
+
+    Raises:
+        MissingSignalError: If the log has no target currents or target moments.
+    """
+    wanted, asked = recording.require("target_current"), recording.require("target_torque")
+    motion = prepare(recording, robot, Processing(cutoff=CUTOFF))
+    load = gravity_torque(robot, recording.q)
+    smooth = zero_phase(recording.t, asked, CUTOFF)
+    phi = chain_parameters(robot.loaded_chain)
+    rigid = [
+        torque_regressor(robot.chain, motion.q[s], motion.dq[s], motion.ddq[s]) @ phi
+        for s in motion.chunks()
+    ]
+    return Targets(
+        recording=recording,
+        motion=motion,
+        columns=FrictionColumns(motion, np.abs(load)),
+        current=motion.filtered(wanted),
+        moment=smooth[motion.kept],
+        lead=derivative(recording.t, smooth)[motion.kept],
+        rigid=np.concatenate(rigid),
+        gravity=gravity_torque(robot, motion.q),
+    )
+
+
+def controller_models(
+    recordings: Sequence[Recording], robot: Robot
+) -> tuple[ControllerModel, ...]:
+    """Read the controller's model of every joint off its targets.
+
+    Args:
+        recordings: Logs with target currents and moments.
+        robot: The profile, whose rigid body is the maker's; its K stands in where none is found.
+
+    Raises:
+        IdentificationError: If the robot has no drive constants.
+        MissingSignalError: If the targets are missing.
+    """
+    if robot.torque_constant is None:
+        raise IdentificationError(
+            f"robot {robot.name!r} has no torque constants, so its log has no target currents to "
+            "read a model off; use --method friction, base or consistent"
+        )
+    logs = [read_targets(recording, robot) for recording in recordings]
+    return tuple(joint_model(j, logs, float(robot.torque_constant[j])) for j in range(robot.joints))
+
+
+def joint_model(j: int, logs: Sequence[Targets], before: float) -> ControllerModel:
+    """Read one joint's model; K first, since friction needs it."""
+    still, moving = constant_at_rest(j, logs), constant_in_motion(j, logs)
+    constant = min((still, moving), key=relative)
+    K = constant.value if constant.known else before
+    rotor, gravity = rotor_inertia(j, logs)
+    friction = controller_friction(j, logs, K)
+    values, sd = friction if friction is not None else (None, None)
+    return ControllerModel(constant, rotor, values, sd, gravity)
+
+
+def relative(estimate: Estimate) -> float:
+    """Standard deviation over value; infinite where there is none."""
+    return estimate.sd / abs(estimate.value) if np.isfinite(estimate.sd) else float("inf")
+
+
+def constant_at_rest(j: int, logs: Sequence[Targets]) -> Estimate:
+    """K from the ratio at rest, where friction asks for nothing; sd from the current's digits."""
+    points = []
+    for log in logs:
+        current, moment = log.recording.target_current, log.recording.target_torque
+        dq, t = log.recording.dq, log.recording.t
+        if current is None or moment is None or dq is None:
+            continue
+        step = resolution(current[:, j])
+        at_rest = np.all(np.abs(dq) <= log.motion.processing.still, axis=1)
+        for start, stop in runs(at_rest):
+            inside = (t[start:stop] > t[start] + SETTLE) & (t[start:stop] < t[stop - 1] - SETTLE)
+            if np.count_nonzero(inside) > 3:
+                i, m = current[start:stop, j][inside], moment[start:stop, j][inside]
+                if np.ptp(i) <= max(4 * step, STEADY * abs(np.median(i))) and (
+                    abs(np.median(i)) > 20 * step
+                ):
+                    points.append((float(np.median(i)), float(np.median(m)), step))
+    if not points:
+        return Estimate(float("nan"), float("inf"), False)
+    i, m, steps = np.array(points).T
+    value = float(i @ m / (i @ i))
+    scatter = float(np.std(m - value * i)) if len(i) > 1 else 0.0
+    rounding = abs(value) * float(np.max(steps)) / np.sqrt(12.0)
+    sd = float(np.hypot(rounding, scatter) / np.sqrt(i @ i))
+    return Estimate(value, sd, value > 0 and sd <= CONSTANT_KNOWN * value)
+
+
+def resolution(values: Array) -> float:
+    """The smallest step between two values of a signal: its digits."""
+    steps = np.diff(np.unique(np.round(values, 9)))
+    return float(steps.min()) if steps.size else 0.0
+
+
+def constant_in_motion(j: int, logs: Sequence[Targets]) -> Estimate:
+    """K from currents that follow moments; sd from how little the friction's shape matters."""
+    current = np.concatenate([log.current[:, j] for log in logs])
+    moment = np.concatenate([log.moment[:, j] for log in logs])
+    speed = np.abs(np.concatenate([log.motion.dq[:, j] for log in logs]))
+    found, spread = [], []
+    for shape in SHAPES:
+        friction = np.concatenate([log.columns.joint(j, shape) for log in logs])
+        A = np.column_stack([moment, friction])
+        for low in SPEEDS:
+            used = (speed >= low).astype(float)
+            if np.count_nonzero(used) < 50 or np.ptp(moment[used > 0]) == 0.0:
+                continue
+            fit = fit_column(A, current, used)
+            if fit.values[0] > 0:
+                found.append(1.0 / float(fit.values[0]))
+                spread.append(float(fit.sd[0] / fit.values[0] ** 2))
+    if len(found) < len(SPEEDS):
+        return Estimate(float("nan"), float("inf"), False)
+    value = float(np.median(found))
+    sd = float(np.hypot(np.median(spread), 0.5 * np.ptp(found)))
+    return Estimate(value, sd, sd <= CONSTANT_KNOWN * value)
+
+
+def rotor_inertia(j: int, logs: Sequence[Targets]) -> tuple[Estimate, Estimate]:
+    """J from what the moment has beyond the rigid body, and the gravity the controller uses.
+
+    y = J q̈ + s g + c + δ·dy/dt: the scale s tells 9.82 from 9.81 m/s², δ a shift in time.
+    """
+    stacked = [
+        np.column_stack(
+            [
+                log.motion.ddq[:, j],
+                log.gravity[:, j],
+                np.ones(log.motion.samples),
+                log.lead[:, j],
+                log.moment[:, j] - log.rigid[:, j],
+            ]
+        )
+        for log in logs
+    ]
+    rows = np.concatenate(stacked)
+    nothing = Estimate(float("nan"), float("inf"), False)
+    if np.std(rows[:, 0]) < 1e-2:
+        return nothing, nothing
+    used = np.ones(len(rows))
+    fit = fit_column(rows[:, :-1], rows[:, -1], used)
+    plain = solve(rows[:, :-1], rows[:, -1])
+    value, sd = float(plain[0]), float(np.hypot(fit.sd[0], 0.5 * (fit.values[0] - plain[0])))
+    rotor = Estimate(value, sd, value > 0 and sd <= ROTOR_KNOWN * value)
+    scale, scale_sd = 1.0 + float(plain[1]), float(fit.sd[1])
+    return rotor, Estimate(scale, scale_sd, scale_sd < 1e-3)
+
+
+def controller_friction(
+    j: int, logs: Sequence[Targets], constant: float
+) -> tuple[Array, Array] | None:
+    """Coefficients of K·target_current − target_moment, or None where the joint does not move."""
+    speed = np.abs(np.concatenate([log.motion.dq[:, j] for log in logs]))
+    if np.quantile(speed, 0.9) < 0.05:
+        return None
+    y = np.concatenate([constant * log.current[:, j] - log.moment[:, j] for log in logs])
+    A = np.concatenate([log.columns.joint(j, SHAPES[0]) for log in logs])
+    fit = fit_column(A, y, np.ones(len(y)))
+    return fit.values, fit.sd
