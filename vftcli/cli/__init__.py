@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from vftcli.cli import admit, bench, compare, convert, estimate, formats, inspect, listings, report
+from vftcli.cli import (
+    admit,
+    bench,
+    compare,
+    convert,
+    estimate,
+    formats,
+    inspect,
+    listings,
+    report,
+    simulate,
+)
 from vftcli.errors import VftError
 
 app = typer.Typer(
@@ -23,6 +34,7 @@ app.command("report")(report.report)
 app.command("inspect")(inspect.inspect_log)
 app.command("convert")(convert.convert_log)
 app.command("admit")(admit.admit)
+app.command("simulate")(simulate.simulate_log)
 app.command("bench")(bench.bench)
 app.command("robots")(listings.robots)
 app.command("observers")(listings.observers)

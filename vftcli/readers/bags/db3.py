@@ -10,7 +10,6 @@ from vftcli.errors import LogError
 from vftcli.readers.bags.container import Batch, Channel, Ingest, printable, type_name
 from vftcli.readers.reader import LogFile
 
-MAGIC = b"SQLite format 3\0"
 ROWS = 4096
 ZSTD = b"\x28\xb5\x2f\xfd"
 MESSAGE_LIMIT = 64 * 1024 * 1024

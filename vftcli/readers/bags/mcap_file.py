@@ -24,8 +24,8 @@ from vftcli.readers.bags.container import (
     u64,
     unpack_chunk,
 )
+from vftcli.readers.bags.storage import MCAP
 
-MAGIC = b"\x89MCAP0\r\n"
 SCHEMA, CHANNEL, MESSAGE, CHUNK, STATISTICS, FOOTER, DATA_END = 3, 4, 5, 6, 11, 2, 15
 HEADER = 9
 """Bytes before a record's content: opcode and length."""
@@ -97,7 +97,7 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
         LogError: If a chunk or a record is damaged.
     """
     catalogue = Catalogue(ingest)
-    position = len(MAGIC)
+    position = len(MCAP)
     try:
         while position + HEADER <= len(content) and not catalogue.closed:
             opcode, end = content[position], position + HEADER + u64(content, position + 1)
@@ -141,9 +141,9 @@ def _check_end(catalogue: Catalogue, left: int) -> None:
             f"{ingest.path}: its statistics count {catalogue.counted} messages, the chunks hold "
             f"{catalogue.messages}; the file is damaged."
         )
-    if catalogue.closed and left != len(MAGIC):
+    if catalogue.closed and left != len(MCAP):
         raise LogError(
-            f"{ingest.path}: {left} bytes follow its end where {len(MAGIC)} should; it is damaged."
+            f"{ingest.path}: {left} bytes follow its end where {len(MCAP)} should; it is damaged."
         )
     if not catalogue.ended:
         ingest.note(

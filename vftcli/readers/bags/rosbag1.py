@@ -22,8 +22,8 @@ from vftcli.readers.bags.container import (
     u32,
     unpack_chunk,
 )
+from vftcli.readers.bags.storage import ROSBAG1
 
-MAGIC = b"#ROSBAG V2.0\n"
 OP_MESSAGE, OP_BAG, OP_INDEX, OP_CHUNK, OP_CHUNK_INFO, OP_CONNECTION = 2, 3, 4, 5, 6, 7
 MAX_HEADER = 64 * 1024
 RUN_AFTER = 3
@@ -106,7 +106,7 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
     """
     connections: dict[int, Channel] = {}
     counts: dict[int, int] = {}
-    position, indexed = len(MAGIC), False
+    position, indexed = len(ROSBAG1), False
     while position < len(content):
         try:
             record = record_at(content, position)

@@ -1,0 +1,81 @@
+"""Reading bags: containers of messages, walked in bulk and decoded by topic."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+
+from vftcli.errors import LogError
+from vftcli.readers.bags import db3, mcap_file, rosbag1
+from vftcli.readers.bags.container import Batch, Ingest
+from vftcli.readers.bags.decode import Decoder
+from vftcli.readers.bags.documents import Documents, read_documents
+from vftcli.readers.bags.storage import MCAP, ROSBAG1, SQLITE, storage_files
+from vftcli.readers.bags.topics import aligned
+from vftcli.readers.reader import LogFile, RawLog, Request, open_log
+
+METADATA_BYTES = 1024 * 1024
+
+
+def read_bag(file: LogFile, request: Request) -> RawLog:
+    """Read any container of messages.
+
+    Raises:
+        LogError: If it is damaged before its first whole chunk, or holds no joint positions.
+    """
+    ingest = Ingest(path=file.path, size=_size(file))
+    decoder, documents = Decoder(ingest), Documents(ingest)
+    messages = 0
+    for batch in _batches(file, ingest):
+        messages += len(batch.offsets)
+        if not documents.take(batch):
+            decoder.take(batch)
+    _check_count(file, messages, ingest)
+    if messages == 0:
+        cut = f" ({ingest.repairs[0]})" if ingest.repairs else ""
+        raise LogError(f"{file.path}: no messages in any whole chunk{cut}.")
+    streams = decoder.streams()
+    if documents.rows and not any("q" in stream.signals for stream in streams):
+        raw = read_documents(file, documents, request)
+    else:
+        others = decoder.others | {c.topic: c.type or c.encoding for c in documents.rows}
+        raw = aligned(streams, file.path, request, others)
+    return replace(raw, repairs=(*ingest.repairs, *raw.repairs))
+
+
+def _size(file: LogFile) -> int:
+    if not file.is_folder:
+        return len(file.content)
+    return sum((file.path / name).stat().st_size for name in storage_files(file))
+
+
+def _batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
+    if not file.is_folder:
+        yield from _file_batches(file, ingest)
+        return
+    for name in storage_files(file):
+        inner = open_log(file.path / name)
+        yield from _file_batches(inner, ingest)
+        for repair in inner.repairs:
+            ingest.note(f"{name}: {repair}")
+
+
+def _file_batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
+    if file.head.startswith(ROSBAG1):
+        yield from rosbag1.batches(file.content, ingest)
+    elif file.head.startswith(MCAP):
+        yield from mcap_file.batches(file.content, ingest)
+    elif file.head.startswith(SQLITE):
+        yield from db3.batches(file, ingest)
+    else:
+        raise LogError(f"{file.path}: neither a ROS bag nor an MCAP file.")
+
+
+def _check_count(file: LogFile, messages: int, ingest: Ingest) -> None:
+    """Say so if metadata.yaml counts another number of messages than were found."""
+    if "metadata.yaml" not in file.entries:
+        return
+    with (file.path / "metadata.yaml").open("rb") as metadata:
+        text = metadata.read(METADATA_BYTES)
+    match = re.search(rb"^  message_count: (\d{1,15})\s*$", text, flags=re.MULTILINE)
+    if match is not None and int(match[1]) != messages:
+        ingest.note(f"metadata.yaml counts {int(match[1])} messages, {messages} were found")
