@@ -160,7 +160,7 @@ def judge(mutant: Mutant, path: Path, seed: Recording) -> str:
         return "refused" if "\n" not in str(error) else "SEVERAL LINES"
     except TimeoutError:
         return "HANG"
-    except BaseException:
+    except BaseException:  # noqa: BLE001 - whatever it is, it is what is looked for
         return "TRACEBACK " + traceback.format_exc()
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)

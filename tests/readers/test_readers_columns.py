@@ -37,9 +37,7 @@ def test_minus_turns_the_sign_and_is_said(tmp_path: Path) -> None:
     assert "turned the sign of current (--columns)" in turned.source.repairs
 
 
-@pytest.mark.parametrize(
-    ("unit", "factor"), [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)]
-)
+@pytest.mark.parametrize(("unit", "factor"), [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)])
 def test_time_units(tmp_path: Path, unit: str, factor: float) -> None:
     rows = "\n".join(f"{k},{0.1 * k}" for k in range(5))
     recording = read(write(tmp_path / "x", rows + "\n"), columns=f"t[{unit}],q")
@@ -64,9 +62,7 @@ def test_degrees_without_a_unit_are_refused(tmp_path: Path) -> None:
 def test_named_columns_start_at_the_smallest_index(tmp_path: Path) -> None:
     head = "clock,eff_3,eff_4,pos_3,pos_4\n"
     rows = "".join(f"{k / 10},{k},{2 * k},{0.1 * k},{0.2 * k}\n" for k in range(4))
-    recording = read(
-        write(tmp_path / "x", head + rows), columns="t=clock,q=pos_{i},tau=eff_{i}"
-    )
+    recording = read(write(tmp_path / "x", head + rows), columns="t=clock,q=pos_{i},tau=eff_{i}")
     np.testing.assert_allclose(recording.q, np.outer(np.arange(4), [0.1, 0.2]), rtol=1e-12)
     assert recording.torque is not None
     np.testing.assert_array_equal(recording.torque[:, 1], 2 * np.arange(4))

@@ -69,7 +69,8 @@ def test_columns_that_begin_with_whole_numbers_stay_numbers(tmp_path: Path) -> N
 
 
 INDEXED = ["q_0 q_1", "q[0] q[1]", "q.0 q.1", "q0 q1", "q1 q2", "qj1 qj2", "Q_joint1 Q_joint2",
-           "actual_q_1 actual_q_2", "joint_pos_0 joint_pos_1", "state.q[0] state.q[1]", "q/1 q/2"]  # fmt: skip
+           "actual_q_1 actual_q_2", "joint_pos_0 joint_pos_1", "state.q[0] state.q[1]",
+           "q/1 q/2"]  # fmt: skip
 
 
 @pytest.mark.parametrize("names", INDEXED)
@@ -113,9 +114,7 @@ def test_vendor_residual_is_turned_and_plain_tau_ext_is_not(tmp_path: Path) -> N
     [("0", 1, 1e-3), ("1700000000000000000", 1_000_000, 1e-3), ("1700000000000", 8, 8e-3),
      ("0", 2, 2.0), ("1700000000000000", 8000, 8e-3)],
 )  # fmt: skip
-def test_time_units_are_told_by_size(
-    tmp_path: Path, first: str, step: int, seconds: float
-) -> None:
+def test_time_units_are_told_by_size(tmp_path: Path, first: str, step: int, seconds: float) -> None:
     lines = [f"{int(first) + k * step},0.1,0.2" for k in range(20)]
     recording = read(write(tmp_path / "x", table(lines)))
     np.testing.assert_allclose(recording.t, seconds * np.arange(20), rtol=1e-9)

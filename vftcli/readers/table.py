@@ -188,10 +188,11 @@ def tick_of(stamps: Column, name: str) -> tuple[float, str]:
     units = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
     if match := re.search(r"[_\[(.](ns|us|ms|s)[\])]?$", name.lower()):
         return units[match[1]], match[1]
-    if len(stamps) == 0 or not np.isfinite(stamps[0]):
+    if len(stamps) == 0:
         return 1.0, "s"
+    usual = abs(float(stamps[len(stamps) // 2]))  # the first may be garbage
     for size, unit in ((1e17, "ns"), (1e14, "us"), (1e11, "ms")):
-        if abs(float(stamps[0])) > size:
+        if size < usual < 1e20:
             return units[unit], unit
     step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
     whole = stamps.dtype.kind in "iu" or bool(np.all(np.mod(stamps[:1000], 1) == 0))

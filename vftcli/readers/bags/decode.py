@@ -11,6 +11,7 @@ from vftcli.readers.bags.container import Batch, Channel, Ingest, Integers
 from vftcli.readers.bags.definitions import types_for
 from vftcli.readers.bags.kinds import KINDS, Kind, constant_in, paths_in
 from vftcli.readers.bags.layout import Layout, LayoutError, Types, Walker
+from vftcli.readers.joints import kinematic_order
 
 CHECKED_ROWS = 4
 """Random messages of some batches that are walked one by one to confirm their layout."""
@@ -23,7 +24,8 @@ class Stream:
     Attributes:
         channel: The topic.
         kind: What its type means.
-        names: The joints' names in the messages' order, or empty.
+        names: The joints' names, base to tip, or empty.
+        mixed: Whether the messages had them in another order, or other joints among them.
         frame: Frame of its stamps' headers, or nothing.
         receive: When each was recorded. (T,) [ns]
         header: Stamp in each header. (T,) [ns]
@@ -36,6 +38,7 @@ class Stream:
     channel: Channel
     kind: Kind
     names: tuple[str, ...]
+    mixed: bool
     frame: str
     receive: Integers
     header: Integers | None
@@ -58,6 +61,7 @@ class _Part:
     robot: Array | None
     signals: dict[str, Array]
     order: Integers
+    mixed: bool
 
 
 @dataclass
@@ -149,6 +153,11 @@ class Decoder:
                 last = layout.numbers(path, batch.buffer, offsets[-1:])[0]
                 topic.constants[name] = tuple(float(value) for value in last)
         names = next((layout.texts[p] for p in kind.names if p in layout.texts), ())
+        order = kinematic_order(names)
+        mixed = order != tuple(range(len(names)))
+        if mixed:
+            signals = {n: _picked(n, v, order, len(names)) for n, v in signals.items()}
+            names = tuple(names[k] for k in order)
         frame = "".join(layout.texts.get(kind.frame, ()))
         robot = None
         if kind.robot_time in layout.leaves:
@@ -159,6 +168,7 @@ class Decoder:
             robot=robot,
             signals=signals,
             order=topic.seen + rows,
+            mixed=mixed,
         )
         topic.parts.setdefault((names, frame, tuple(signals)), []).append(part)
 
@@ -169,6 +179,13 @@ class Decoder:
             for channel, topic in self.topics.items()
             for key, parts in topic.parts.items()
         ]
+
+
+def _picked(signal: str, value: Array, order: tuple[int, ...], width: int) -> Array:
+    """A joint signal's columns in kinematic order; others as they are."""
+    if signal == "wrench" or value.shape[1] != width:
+        return value
+    return value[:, list(order)]
 
 
 def _stamps(layout: Layout, batch: Batch, offsets: Integers) -> Integers | None:
@@ -206,6 +223,7 @@ def _joined(
         channel=channel,
         kind=KINDS[channel.type],
         names=names,
+        mixed=any(part.mixed for part in parts),
         frame=frame,
         receive=np.concatenate([part.receive for part in parts])[order],
         header=np.concatenate(headers)[order] if len(headers) == len(parts) else None,

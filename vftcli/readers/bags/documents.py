@@ -186,9 +186,10 @@ def _read(
         if not k.lower().startswith(("timestamp", "stamp", "header"))
     }
     if (stamps := _stamps(rows)) is not None:
-        clock, columns["timestamp"] = f"stamps in the messages of {channel.topic}", stamps
+        clock = f"stamps in the messages of {channel.topic}"
+        columns["timestamp_ns" if stamps.dtype == np.int64 else "timestamp"] = stamps
     else:
-        columns["timestamp"] = np.array(times, dtype=np.int64)
+        columns["timestamp_ns"] = np.array(times, dtype=np.int64)
     table = ArrayTable(path=file.path, columns=columns)
     ordered = tuple(names[k] for k in kinematic_order(names))
     more: dict[str, Any] = {"clock_name": clock}

@@ -14,7 +14,7 @@ from vftcli.readers.aliases import TURNED_NOTE
 from vftcli.readers.bags.container import Integers
 from vftcli.readers.bags.decode import Stream
 from vftcli.readers.columns import SIGNALS, parse_columns
-from vftcli.readers.joints import UR_NAMES, kinematic_order, robot_of
+from vftcli.readers.joints import UR_NAMES, robot_of
 from vftcli.readers.reader import RawLog, Request
 
 TARGETS = re.compile(r"desired|command|target|goal|reference", re.IGNORECASE)
@@ -56,21 +56,8 @@ def aligned(
             _own_topic(signals, stream, lead, times)
         elif stream is not lead and _same_arm(stream, lead):
             _supplement(signals, stream, lead, times, notes)
-    frame = lead.kind.wrench_frame
-    sensor = _sensor(streams, lead)
-    if sensor is not None and sensor.channel.topic.startswith(OWN):
-        frame = sensor.frame
-    elif sensor is not None and "wrench" not in _chosen(request):
-        values = interpolated(sensor, "wrench", lead, times, notes)
-        if values is not None:
-            signals["wrench"] = values
-            frame = (
-                f"axes {sensor.frame or 'unknown'}, as force on the robot ({sensor.channel.topic})"
-            )
-    topics = {s.channel.topic for s in streams if not s.channel.topic.startswith(OWN)}
-    left = sorted(topics - {lead.channel.topic} - _taken(notes))
-    if left:
-        notes.repairs.append(f"left out {', '.join(left[:6])}: other joints, targets, or repeated")
+    frame = _take_wrench(signals, streams, lead, times, notes, request)
+    _tell_left(streams, lead, notes)
     hint = robot_of(names)
     if not names:
         names, hint = _names_elsewhere(streams, lead)
@@ -88,6 +75,42 @@ def aligned(
         payload_mass=next(iter(lead.constants.get("mass", ())), None),
         payload_com=lead.constants.get("com"),
     )
+
+
+def _take_wrench(
+    signals: dict[str, Array],
+    streams: Sequence[Stream],
+    lead: Stream,
+    times: Integers,
+    notes: Notes,
+    request: Request,
+) -> str | None:
+    """Put a sensor's wrench in place of the vendor's estimate; return its frame in words."""
+    frame = lead.kind.wrench_frame
+    sensor = _sensor(streams, lead)
+    if sensor is None or "wrench" in _chosen(request):
+        return frame
+    if sensor.channel.topic.startswith(OWN):
+        return sensor.frame
+    values = interpolated(sensor, "wrench", lead, times, notes)
+    if values is None:
+        return frame
+    signals["wrench"] = values
+    return f"axes {sensor.frame or 'unknown'}, as force on the robot ({sensor.channel.topic})"
+
+
+def _tell_left(streams: Sequence[Stream], lead: Stream, notes: Notes) -> None:
+    """Say which messages and topics were left out."""
+    for stream in streams:
+        if stream.channel == lead.channel and stream.names == lead.names and stream is not lead:
+            notes.warnings.append(
+                f"left out {stream.messages} messages of {lead.channel.topic} that hold only "
+                f"{', '.join(stream.signals) or 'names'}"
+            )
+    topics = {s.channel.topic for s in streams if not s.channel.topic.startswith(OWN)}
+    left = sorted(topics - {lead.channel.topic} - _taken(notes))
+    if left:
+        notes.repairs.append(f"left out {', '.join(left[:6])}: other joints, targets, or repeated")
 
 
 def _own_topic(signals: dict[str, Array], stream: Stream, lead: Stream, times: Integers) -> None:
@@ -109,10 +132,8 @@ def _names_elsewhere(streams: Sequence[Stream], lead: Stream) -> tuple[tuple[str
     """Joint names, and the robot they settle, that only another topic about the arm has."""
     width = lead.signals["q"].shape[1]
     for stream in streams:
-        if (hint := robot_of(stream.names)) is not None:
-            names = tuple(stream.names[k] for k in kinematic_order(stream.names))
-            if len(names) == width:
-                return names, hint
+        if len(stream.names) == width and (hint := robot_of(stream.names)) is not None:
+            return stream.names, hint
     return (), None
 
 
@@ -194,27 +215,21 @@ def host_times(stream: Stream) -> tuple[Integers, str]:
 def _joint_signals(
     lead: Stream, notes: Notes, request: Request
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """The leading topic's signals, joints in kinematic order and further joints set aside."""
-    order = kinematic_order(lead.names) if lead.names else ()
-    names = tuple(lead.names[k] for k in order)
-    if order and order != tuple(range(len(lead.names))):
-        aside = len(lead.names) - len(order)
+    """The leading topic's signals, the vendor's signs turned into ours."""
+    if lead.mixed:
         notes.repairs.append(
-            f"put the joints of {lead.channel.topic} in kinematic order by name"
-            + (f", {aside} further joints set aside" if aside else "")
+            f"put the joints of {lead.channel.topic} in kinematic order by name, others set aside"
         )
     width = lead.signals["q"].shape[1]
     signals = {}
     for signal, value in lead.signals.items():
-        sign = -1.0 if signal in lead.kind.turned else 1.0
         if signal == "wrench":
             signals[signal] = value
         elif value.shape[1] == width and not _empty(signal, value, notes):
-            picked = value[:, list(order)] if order else value
-            signals[signal] = picked if sign > 0 else 0.0 - picked
+            signals[signal] = 0.0 - value if signal in lead.kind.turned else value
     if lead.kind.turned & set(signals):
         notes.repairs.append(TURNED_NOTE)
-    return _with_effort(signals, lead, names, notes, request), names
+    return _with_effort(signals, lead, notes, request), lead.names
 
 
 def _empty(signal: str, value: Array, notes: Notes) -> bool:
@@ -241,7 +256,7 @@ FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}
 
 
 def _with_effort(
-    signals: dict[str, Array], lead: Stream, names: tuple[str, ...], notes: Notes, request: Request
+    signals: dict[str, Array], lead: Stream, notes: Notes, request: Request
 ) -> dict[str, Array]:
     """Decide what effort is: what --columns says, else current for UR joints, torque for others."""
     found = dict(signals)
@@ -258,7 +273,8 @@ def _with_effort(
         turned = "with its sign turned " if factor < 0 else ""
         notes.repairs.append(f"took {last} as {signal} {turned}(--columns)")
     if "effort" in found:
-        is_ur = all(name.endswith(UR_NAMES) for name in names) and len(names) == len(UR_NAMES)
+        names = lead.names
+        is_ur = len(names) == len(UR_NAMES) and all(name.endswith(UR_NAMES) for name in names)
         found["current" if is_ur else "torque"] = found.pop("effort")
         if is_ur:
             notes.repairs.append(EFFORT_IS_CURRENT)
@@ -280,15 +296,12 @@ def _supplement(
     signals: dict[str, Array], stream: Stream, lead: Stream, times: Integers, notes: Notes
 ) -> None:
     """Add the signals that only another topic about the same joints has, interpolated."""
-    order = kinematic_order(stream.names) if stream.names else ()
     for signal in stream.signals:
         if signal in signals or signal == "effort":
             continue
         values = interpolated(stream, signal, lead, times, notes)
         if values is None:
             continue
-        if signal != "wrench" and order:
-            values = values[:, list(order)]
         signals[signal] = 0.0 - values if signal in stream.kind.turned else values
 
 
