@@ -7,6 +7,7 @@ import numpy as np
 from vftcli.arrays import Array
 from vftcli.errors import ReferenceTorqueError
 from vftcli.recording import Recording
+from vftcli.truth.rest import Flags, runs
 from vftcli.truth.zero_phase import resampled
 
 LEAST_OVERLAP = 0.3
@@ -17,6 +18,9 @@ SAME_TRAJECTORY = 0.05
 
 SAME_RATE = 0.01
 """Clocks whose rates differ by more than this share are refused, by less corrected."""
+
+COARSE = 300
+"""Instants at which a recording is compared while the shared part is looked for."""
 
 RATES = np.concatenate([np.linspace(0.5, 2.0, 61), [1e-3, 1e3]])
 """Clock rates tried to explain why two logs do not fit."""
@@ -29,13 +33,13 @@ class Alignment(NamedTuple):
         shift: The other log's clock reads rate·t + shift at the same place. [s]
         rate: Rate of the other log's clock against this one's, 1 for equal clocks.
         deviation: Root mean square of the remaining position difference over all joints. [rad]
-        overlap: Samples of the log whose partner lies within the other. (T,) bool
+        overlap: Samples of the log whose partner lies within the other. (T,)
     """
 
     shift: float
     rate: float
     deviation: float
-    overlap: Array
+    overlap: Flags
 
 
 def align(recording: Recording, free: Recording) -> Alignment:
@@ -54,7 +58,10 @@ def align(recording: Recording, free: Recording) -> Alignment:
     shift, rate = refined(recording, free, coarse_shift(recording, free, step), 1.0)
     deviation, overlap = deviation_at(recording, free, shift, rate)
     if not deviation <= SAME_TRAJECTORY:
-        raise ReferenceTorqueError(misfit(recording, free, shift, deviation))
+        shared = shared_part(recording, free)
+        if shared is None:
+            raise ReferenceTorqueError(misfit(recording, free, shift, deviation))
+        shift, rate, deviation, overlap = shared
     if abs(rate - 1.0) > SAME_RATE:
         raise ReferenceTorqueError(other_rate(recording, free, rate))
     return Alignment(shift, rate, deviation, overlap)
@@ -73,6 +80,41 @@ def check_same_arm(recording: Recording, free: Recording) -> None:
             f"{free.name} is a log of {hints[0]}, {recording.name} of {hints[1]}: a free run must "
             "be of the same arm; give another log with --free"
         )
+
+
+def shared_part(recording: Recording, free: Recording) -> Alignment | None:
+    """Where two logs share only a part of their motion: that part, None if it is too short.
+
+    The shift is the one at which most of the recording's motion is within `SAME_TRAJECTORY`; it
+    must be at least `LEAST_OVERLAP` of it. The partners are the unbroken stretches of a second or
+    more.
+    """
+    t = np.linspace(recording.t[0], recording.t[-1], COARSE)
+    q = resampled(t, recording.t, recording.q)
+    path = np.append(np.max(np.abs(np.diff(q, axis=0)), axis=1), 0.0)
+    span = recording.duration + free.duration
+    step = max(0.02, span / 5000.0)
+    shifts = free.t[0] - recording.t[-1] + np.arange(0.0, span, step)
+    found = [float(np.sum(path * near(q, t + shift, free))) for shift in shifts]
+    best = float(shifts[int(np.argmax(found))])
+    if max(found) < LEAST_OVERLAP * float(np.sum(path)):
+        return None
+    shift, rate = refined(recording, free, best, 1.0)
+    matched = near(recording.q, rate * recording.t + shift, free)
+    overlap = np.zeros(recording.samples, dtype=bool)
+    for first, last in runs(matched):
+        overlap[first : last + 1] = recording.t[last] - recording.t[first] >= 1.0
+    there = resampled(rate * recording.t[overlap] + shift, free.t, free.q)
+    if not len(there):
+        return None
+    deviation = float(np.sqrt(np.mean((there - recording.q[overlap]) ** 2)))
+    return Alignment(shift, rate, deviation, overlap)
+
+
+def near(q: Array, t: Array, free: Recording) -> Flags:
+    """Whether positions lie within `SAME_TRAJECTORY` of the free run at instants of its clock."""
+    distance = np.max(np.abs(resampled(t, free.t, free.q) - q), axis=1)
+    return np.asarray((t >= free.t[0]) & (t <= free.t[-1]) & (distance <= SAME_TRAJECTORY))
 
 
 def misfit(recording: Recording, free: Recording, shift: float, deviation: float) -> str:
@@ -190,8 +232,8 @@ def gauss_newton_step(
 
 def deviation_at(
     recording: Recording, free: Recording, shift: float, rate: float = 1.0
-) -> tuple[float, Array]:
-    """Rms position difference at a shift [rad], and the samples that overlap. (T,) bool"""
+) -> tuple[float, Flags]:
+    """Rms position difference at a shift [rad], and the samples that overlap. (T,)"""
     t = rate * recording.t + shift
     overlap = (t >= free.t[0]) & (t <= free.t[-1])
     if np.count_nonzero(overlap) < 2:

@@ -51,16 +51,18 @@ class Cycles(NamedTuple):
 def segment(recording: Recording, period: Period) -> Cycles:
     """Find where the repeated path begins and ends; the log may start amid a cycle.
 
-    A sample is on the path if one period later or earlier the arm is at the same place. Contacts
-    push it off for a moment only, so the path begins with the first sample after which at least
-    three quarters of a cycle are on it, and ends likewise.
+    A sample is on the path if one period later or earlier the arm is at the same place, or if the
+    log is so short that neither is in it. Contacts push it off for a moment only, so the path
+    begins with the first sample after which at least three quarters of a cycle are on it, and ends
+    likewise.
 
     Raises:
         ReferenceTorqueError: If less than a whole cycle and a part of the next are there.
     """
     t, q = moving_part(recording)
     seconds = period.seconds
-    on_path = comes_back(t, q, seconds) | comes_back(t, q, -seconds)
+    alone = (t + seconds > t[-1]) & (t - seconds < t[0])
+    on_path = alone | comes_back(t, q, seconds) | comes_back(t, q, -seconds)
     begin = settled(t, on_path, seconds)
     end = -settled(-t[::-1], on_path[::-1], seconds)
     cycles = Cycles(seconds, begin, end)

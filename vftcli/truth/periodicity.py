@@ -13,8 +13,11 @@ from vftcli.truth.zero_phase import resampled
 LEAST_REPEATED = 0.15
 """Share of the moving part of the log that must be there twice."""
 
-RETURNS = 0.05
-"""Positions return if half of them come back within this share of their own spread."""
+RETURNS = 0.015
+"""Positions return if a quarter of them come back within this share of their own spread.
+
+A quarter: a soft servo is off its path while it is pushed, which may be most of the time.
+"""
 
 AROUND = 0.03
 """How far from a stated period the true one is looked for, relative: clocks drift."""
@@ -25,7 +28,7 @@ class Period(NamedTuple):
 
     Attributes:
         seconds: On the log's own clock. [s]
-        deviation: Median over time of the joint-position distance after one period. [rad]
+        deviation: Lower quartile over time of the joint-position distance after one period. [rad]
     """
 
     seconds: float
@@ -37,7 +40,7 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
 
     The mean squared distance between the log and itself later (the autocorrelation with its
     overlap accounted for) has a valley at every multiple of the period. The first valley from
-    which half of the samples return is refined below the sample time by Gauss–Newton steps on all
+    which enough samples return is refined below the sample time by Gauss–Newton steps on all
     its multiples together, robust against contacts that push the arm off its path.
 
     Args:
@@ -138,8 +141,8 @@ def valleys(distance: Array, x: Array, step: float, stated: float | None) -> lis
 
 
 def returned(x: Array, lag: int) -> float:
-    """Median over time of the distance between x and itself `lag` samples later. [rad]"""
-    return float(np.median(np.sqrt(np.sum((x[lag:] - x[:-lag]) ** 2, axis=1))))
+    """Lower quartile over time of the distance between x and itself `lag` samples later. [rad]"""
+    return float(np.quantile(np.sqrt(np.sum((x[lag:] - x[:-lag]) ** 2, axis=1)), 0.25))
 
 
 def refined_period(t: Array, q: Array, period: float) -> float:
@@ -176,7 +179,8 @@ def no_repetition(
     if found:
         lag, deviation = min(found, key=lambda c: c[1])
         closest = (
-            f" (closest after {lag * step:.4g} s, where half of them are {deviation:.2g} rad off)"
+            f" (closest after {lag * step:.4g} s, where three quarters of them are more than "
+            f"{deviation:.2g} rad off)"
         )
     return (
         f"{recording.name}: no repetition found{wanted}: the joint positions do not return within "

@@ -145,7 +145,8 @@ def partners_in_logs(
                 "for free cycles within one log leave --free away"
             )
         found = align(recording, other)
-        pairings.append(pair_with_run(motion, motion_of(other, robot), found.shift, found.rate))
+        pairing = pair_with_run(motion, motion_of(other, robot), found.shift, found.rate)
+        pairings.append(pairing._replace(times=np.where(found.overlap, pairing.times, np.nan)))
         rate = f", clock rate {found.rate:.6f}" if abs(found.rate - 1.0) > 1e-4 else ""
         covered = float(np.count_nonzero(pairings[-1].known)) * recording.step
         notes.append(
