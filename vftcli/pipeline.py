@@ -1,5 +1,6 @@
 """The whole way from a log to its numbers, in the order the data flows."""
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from vftcli.robots import PROFILES, Robot, load_robot
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
+    from vftcli.dynamics.terms import DynamicsTerms
     from vftcli.torque import ExternalTorque
     from vftcli.wrench.detection import Told
     from vftcli.wrench.frames import Mounting
@@ -147,7 +149,7 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
     observers, notes = choose_observers(request, robot, recording)
     estimates = tuple(observer.estimate(terms) for observer in observers)
     tunings = {o.name: o.tuning(recording.step, robot.joints) for o in observers}
-    measured, mounting, sensed = sense(recording, robot, estimates, request)
+    measured, mounting, sensed = sense(recording, robot, estimates, request, terms, observers)
     reference, errors = None, None
     contacts: tuple[Told, ...] = ()
     if request.reference is not None:
@@ -200,16 +202,21 @@ def sense(
     robot: Robot,
     estimates: tuple["ExternalTorque", ...],
     request: Request,
+    terms: "DynamicsTerms",
+    observers: tuple[Observer, ...],
 ) -> "tuple[Measurement | None, Mounting | None, Recording]":
     """What the virtual sensor measures, where things sit, and the log with its sensor relieved."""
     if request.wrench is None:
         return None, None, recording
     from vftcli.wrench.measurement import measure
     from vftcli.wrench.placing import placed, weighed
+    from vftcli.wrench.torque_error import Disturbance
 
     mounting, notes = placed(recording, robot, estimates, request.wrench)
     unloaded = unloaded_run(recording, robot, request)
-    measured = measure(recording, robot, estimates, request.wrench, unloaded, mounting)
+    free = unloaded.terms if unloaded is not None else None
+    raw = Disturbance(terms=terms, observers=observers, free=free)
+    measured = measure(recording, robot, estimates, request.wrench, unloaded, mounting, raw)
     if request.wrench.sensor_weight:
         recording, found = weighed(recording, robot.chain, mounting, measured.free)
         notes += found
@@ -231,11 +238,11 @@ def unloaded_run(recording: Recording, robot: Robot, request: Request) -> "Unloa
     terms = dynamics_terms(free, robot, literal=request.as_printed)
     observers, _ = choose_observers(request, robot, free)
     estimates = tuple(observer.estimate(terms) for observer in observers)
-    try:
+    shift: float | None = None
+    with suppress(ReferenceTorqueError):
         shift = align(recording, free).shift
-    except ReferenceTorqueError:
-        return unloaded_from(free.name, estimates, None, recording.t)
-    return unloaded_from(free.name, estimates, shift, recording.t)
+    read = unloaded_from(free.name, estimates, shift, recording.t)
+    return replace(read, terms=terms)
 
 
 def analyse_log(path: Path, request: Request) -> "Analysis":

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vftcli.arrays import Array, handed_over
+from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.errors import ParameterError
 from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
@@ -14,7 +15,7 @@ from vftcli.torque import ExternalTorque
 from vftcli.wrench.frames import Mounting, own_pose, read_pose
 from vftcli.wrench.null_space import Elsewhere, contact_elsewhere
 from vftcli.wrench.sensor import time_offset
-from vftcli.wrench.solvers import TORQUE_SD
+from vftcli.wrench.torque_error import Disturbance, TorqueError, assumed, measured, stated
 from vftcli.wrench.vendor import VendorCheck, check_vendor
 from vftcli.wrench.virtual_sensor import VirtualSensor
 from vftcli.wrench.wrench import Mask, Wrench
@@ -30,9 +31,6 @@ from vftcli.wrench.zero import (
 
 FIT = "fit"
 """The word for a sensor pose that is to be estimated from the log."""
-
-OWN = "own"
-"""The word for the observers' own covariance as the torque error."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,12 +84,14 @@ class Unloaded:
         mean: Observer → its mean over the free run. (n,) [N·m]
         rms: Observer → its root mean square over the free run. (n,) [N·m]
         note: Where it comes from, one sentence.
+        terms: p and μ along the free run, or None.
     """
 
     torque: Mapping[str, Array]
     mean: Mapping[str, Array]
     rms: Mapping[str, Array]
     note: str
+    terms: DynamicsTerms | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,6 +133,7 @@ def measure(
     request: WrenchRequest,
     unloaded: Unloaded | None = None,
     mounting: Mounting | None = None,
+    disturbance: Disturbance | None = None,
 ) -> Measurement:
     """Turn estimates into wrenches, remove the zero, and judge them.
 
@@ -143,6 +144,7 @@ def measure(
         request: What is asked.
         unloaded: What a free run reads, for ``--zero LOG``.
         mounting: Tool and sensor poses, where they are not those of the request.
+        disturbance: What tells the observers' lag, for the band.
 
     Raises:
         ParameterError: If a frame, solver, pose or zero interval cannot be used.
@@ -154,13 +156,18 @@ def measure(
         mounting=mounting if mounting is not None else request.mounting(robot),
     )
     torques = relieved(estimates, unloaded)
-    sd = torque_deviations(request, torques, recording.t, unloaded)
-    wrenches = sensor.wrenches(torques, recording.q, robot.chain, sd)
-    spans, found = zero_spans(request, wrenches)
+    first = sensor.wrenches(torques, recording.q, robot.chain)
+    spans, found = zero_spans(request, first)
+    told = free_samples(recording.t, spans)
+    error = torque_error(request, torques, told, unloaded, disturbance)
+    wrenches = (
+        sensor.wrenches(torques, recording.q, robot.chain, dict(error.sd)) if error.sd else first
+    )
     drifts = tuple(zero_drift(wrench, span) for span in spans for wrench in wrenches)
     warnings = tuple(w for drift in drifts if (w := warned(wrenches, drift)))
     free = free_samples(recording.t, spans or found)
     notes = [*mask_note(recording, wrenches), *drift_notes(drifts, len(wrenches))]
+    notes += band_notes(error, wrenches)
     if unloaded is not None:
         notes.append(unloaded.note)
     if spans and (request.zero or request.zero_start):
@@ -184,6 +191,13 @@ def measure(
     )
 
 
+def band_notes(error: TorqueError, wrenches: Sequence[Wrench]) -> list[str]:
+    """Where the 95 % band comes from: one sentence for all, or one an observer."""
+    if error.note:
+        return [error.note]
+    return [f"{wrench.name}: {note}" for wrench in wrenches for note in wrench.notes]
+
+
 def vendor_check(
     recording: Recording, robot: Robot, torques: Sequence[ExternalTorque]
 ) -> VendorCheck | None:
@@ -194,16 +208,16 @@ def vendor_check(
     return check_vendor(recording, ours, robot.chain)
 
 
-def referred(measured: Measurement, reference: Wrench) -> Measurement:
+def referred(sensed: Measurement, reference: Wrench) -> Measurement:
     """The measurement with a reference beside it: its zero removed, its time offset told."""
-    notes = list(measured.notes)
-    if reference.name == "sensor" and measured.drifts and measured.drifts[0].removed:
-        drift = replace(zero_drift(reference, measured.drifts[0].span), removed=True)
+    notes = list(sensed.notes)
+    if reference.name == "sensor" and sensed.drifts and sensed.drifts[0].removed:
+        drift = replace(zero_drift(reference, sensed.drifts[0].span), removed=True)
         reference = replace(reference, values=reference.values - drift.mean)
         notes.append(drift.sentence())
     if reference.name == "sensor":
-        notes.append(offset_note(measured.wrenches, reference))
-    return replace(measured, reference=reference, notes=tuple(notes))
+        notes.append(offset_note(sensed.wrenches, reference))
+    return replace(sensed, reference=reference, notes=tuple(notes))
 
 
 def offset_note(wrenches: Sequence[Wrench], reference: Wrench) -> str:
@@ -228,46 +242,29 @@ def relieved(
     )
 
 
-def torque_deviations(
+def torque_error(
     request: WrenchRequest,
     torques: Sequence[ExternalTorque],
-    t: Array,
+    free: Mask,
     unloaded: Unloaded | None,
-) -> dict[str, Array]:
-    """Torque error per observer where it is not the observer's own account. (n,) [N·m]
+    disturbance: Disturbance | None,
+) -> TorqueError:
+    """The torque error behind the band: what was stated, else measured, else assumed.
 
-    In order: what was asked for; the root mean square over a free run; for the MAP solver, which
-    must weigh it against its prior, and for observers without a covariance, the spread over the
-    unloaded span, at least `TORQUE_SD`.
+    Args:
+        request: What is asked.
+        torques: The estimates.
+        free: Samples of the zero spans; none if no zero was given. (T,)
+        unloaded: What a free run reads, or None.
+        disturbance: What tells the observers' lag, or None.
     """
-    if request.torque_sd == OWN:
-        return {}
     if request.torque_sd is not None:
-        given = stated_deviation(request.torque_sd, torques[0].joints if torques else 0)
-        return {torque.name: given for torque in torques}
+        return stated(request.torque_sd, torques)
     if unloaded is not None:
-        return dict(unloaded.rms)
-    wanted = [e for e in torques if e.sd is None or request.solver == "map"]
-    spread = {e.name: np.full(e.joints, TORQUE_SD) for e in wanted}
-    for start, stop in request.zero[:1]:
-        inside = (t >= start) & (t <= stop)
-        for e in wanted if np.count_nonzero(inside) > 1 else ():
-            spread[e.name] = np.maximum(np.nanstd(e.tau[inside], axis=0), TORQUE_SD)
-    return spread if request.zero or request.solver == "map" else {}
-
-
-def stated_deviation(text: str, joints: int) -> Array:
-    """One number a joint from ``--torque-sd``. (n,) [N·m]"""
-    try:
-        values = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        values = np.array([])
-    if len(values) not in {1, joints} or not np.all(np.isfinite(values) & (values > 0)):
-        raise ParameterError(
-            f"--torque-sd {text!r} is not {OWN!r}, one positive number, or one for each of "
-            f"{joints} joints [N·m]"
-        )
-    return np.array(np.broadcast_to(values, (joints,)))
+        return measured(torques, free, unloaded.rms, disturbance)
+    if np.count_nonzero(free) > 1:
+        return measured(torques, free, None, disturbance)
+    return assumed(torques, request.solver)
 
 
 def unloaded_from(
@@ -295,7 +292,7 @@ def unloaded_from(
         torque=there,
         mean={name: tau.mean(axis=0) for name, tau in settled.items()},
         rms={name: np.sqrt(np.mean(tau**2, axis=0)) for name, tau in settled.items()},
-        note=f"zero from the free run {name}: {words}; its rms is the band's torque error",
+        note=f"zero from the free run {name}: {words}",
     )
 
 

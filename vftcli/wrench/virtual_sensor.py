@@ -144,12 +144,10 @@ def deviation_of(torque: ExternalTorque, given: Array | None) -> Deviation:
     """
     least = 1e-6
     if given is not None:
-        words = "the band is from the torque errors measured while unloaded"
+        words = "the band assumes the torque error that was given"
         return Deviation(sd=np.maximum(np.asarray(given), least), notes=(words,))
     if torque.sd is not None:
-        words = (
-            "the band is the observer's own covariance through the solver; model error is not in it"
-        )
+        words = "the band is the observer's own covariance; errors of the model are not in it"
         sd = torque.sd
         if len(sd) > 1 and np.all(sd == sd[0]):
             sd = sd[0]

@@ -18,6 +18,9 @@ LEAST_SPAN = 0.5
 FORCE_STEP, MOMENT_STEP = 3.0, 0.6
 """A departure from the start's own level that counts as load whatever the noise. [N], [N·m]"""
 
+BACK = 0.3
+"""An unloaded start ends this long before the load shows: it began to rise earlier. [s]"""
+
 SPREADS = 6.0
 """A departure of so many robust standard deviations counts as load."""
 
@@ -123,7 +126,7 @@ def unloaded_start(wrench: Wrench) -> tuple[float, float] | None:
     least = np.repeat([FORCE_STEP, MOMENT_STEP], 3)
     away = np.any(np.abs(wrench.values - level) > np.maximum(least, SPREADS * spread), axis=1)
     loaded = lasting(away & known, t, 0.1) & (t >= SETTLING)
-    stop = float(t[np.argmax(loaded)]) - 0.1 if loaded.any() else float(t[-1])
+    stop = float(t[np.argmax(loaded)]) - BACK if loaded.any() else float(t[-1])
     if stop - SETTLING < LEAST_SPAN:
         return None
     start = float(wrench.t[0])
