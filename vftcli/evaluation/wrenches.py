@@ -5,10 +5,11 @@ from collections.abc import Iterable
 import numpy as np
 import polars as pl
 
+from vftcli.arrays import Array
 from vftcli.evaluation.errors import SCHEMA, correlation, number, rmse
 from vftcli.wrench.detection import Told
 from vftcli.wrench.measurement import Measurement
-from vftcli.wrench.wrench import AXES, Wrench
+from vftcli.wrench.wrench import AXES, Mask, Wrench
 
 WRENCH_SCHEMA: dict[str, type[pl.DataType]] = {
     **SCHEMA,
@@ -16,8 +17,12 @@ WRENCH_SCHEMA: dict[str, type[pl.DataType]] = {
     "rmse_N": pl.Float64,
     "bias_N": pl.Float64,
     "max_N": pl.Float64,
+    "band_share": pl.Float64,
 }
-"""Columns where wrenches are compared: `axis` fx…mz, `joint` null; forces fill rmse_N."""
+"""Columns where wrenches are compared: `axis` fx…mz, `joint` null; forces fill rmse_N.
+
+`band_share` is the share of the samples whose 95 % band holds the reference.
+"""
 
 
 def evaluate_wrenches(
@@ -46,12 +51,20 @@ def evaluate_wrenches(
                     f"rmse_{unit}": number(overall[k]),
                     f"bias_{unit}": number(error.mean()) if some else None,
                     f"max_{unit}": number(np.max(np.abs(error))) if some else None,
+                    "band_share": band_share(wrench, k, x - y, known),
                     "correlation": number(correlation(x[known], y[known])) if some else None,
                     "reference": reference.name,
                     "samples": len(error),
                 }
             )
     return pl.DataFrame(rows, schema=WRENCH_SCHEMA)
+
+
+def band_share(wrench: Wrench, k: int, error: Array, known: Mask) -> float | None:
+    """Share of the known samples whose error lies within 1.96 standard deviations."""
+    if wrench.sd is None or not known.any():
+        return None
+    return float(np.mean(np.abs(error[known]) <= 1.96 * wrench.sd[known, k]))
 
 
 def with_wrenches(errors: pl.DataFrame, recording: str, sensed: Measurement) -> pl.DataFrame:
