@@ -27,8 +27,8 @@ def phases(wrench: Array, parameters: Admittance) -> Phases:
     """Split a record into drag and recovery phases, axis by axis.
 
     An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i. "hard" passes
-    the whole force, "soft" only what exceeds the threshold, F − F_tsd·sign(F), so that the force that
-    enters starts from zero. An unknown (NaN) force counts as none.
+    the whole force, "soft" only what exceeds the threshold, F − F_tsd·sign(F), so that
+    the force that enters starts from zero. An unknown (NaN) force counts as none.
 
     Args:
         wrench: Force and moment on the flange. (T, 6) [N, N·m]
