@@ -69,11 +69,15 @@ class Request:
     wrench: "WrenchRequest | None" = None
 
 
-def open_log(path: Path, request: Request) -> Recording:
-    """Read a log and cut it to the asked interval."""
+ESTIMATED_FROM = ("dq", "current", "torque")
+"""All that observers need beside clock and positions; the rest of a log may be left unread."""
+
+
+def open_log(path: Path, request: Request, signals: tuple[str, ...] | None = None) -> Recording:
+    """Read a log, or some of its signals, and cut it to the asked interval."""
     from vftcli.readers import read
 
-    recording = read(path, format=request.format, columns=request.columns)
+    recording = read(path, format=request.format, columns=request.columns, signals=signals)
     if request.interval is None:
         return recording
     start, stop = parse_interval(request.interval)

@@ -43,7 +43,13 @@ def estimate(
     from vftcli.cli.wrench_options import wrench_request
     from vftcli.observers import DEFAULT
     from vftcli.outputs.estimates import write_estimate_folder
-    from vftcli.pipeline import Request, analyse, choose_robot, open_log
+    from vftcli.pipeline import (
+        ESTIMATED_FROM,
+        Request,
+        analyse,
+        choose_robot,
+        open_log,
+    )
 
     request = Request(
         format=format_,
@@ -59,9 +65,9 @@ def estimate(
             wrench, frame, solver, tool, sensor_pose, zero, sensor_weight, torque_sd
         ),
     )
-    recording = open_log(log, request)
-    analysis = analyse(recording, choose_robot(request, recording), request)
     extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
+    recording = open_log(log, request, None if wrench or extras else ESTIMATED_FROM)
+    analysis = analyse(recording, choose_robot(request, recording), request)
     record = write_estimate_folder(
         output, analysis, command=command_line(), extras=extras, force=force
     )

@@ -63,10 +63,11 @@ def read(
     file = open_log(path)
     reader = _reader(file, format, columns)
     request = Request(columns=columns, signals=frozenset(signals) if signals is not None else None)
+    digest = Digest(path)
     with np.errstate(all="ignore"):  # whatever a damaged file holds is judged when it is cleaned
         raw = reader.read(file, request)
         raw = replace(raw, repairs=(*file.repairs, *raw.repairs)) if file.repairs else raw
-    return cleaned(raw, path, reader.name, Digest(path).hexdigest)
+    return cleaned(raw, path, reader.name, digest.hexdigest)
 
 
 def read_first_recording(
