@@ -1,0 +1,35 @@
+"""docs/formats.md says of every format what READERS says, and of every signal its aliases."""
+
+from pathlib import Path
+
+import pytest
+
+from vftcli.readers import READERS
+from vftcli.readers.aliases import ALIASES, CLOCKS
+from vftcli.readers.columns import SIGNALS
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "formats.md"
+
+
+def rows() -> dict[str, str]:
+    lines = [line for line in DOCUMENT.read_text("utf-8").splitlines() if line.startswith("| `")]
+    return {line.split("`")[1]: line for line in lines}
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_every_format_has_its_row(name: str) -> None:
+    reader = READERS[name]
+    cells = [cell.strip() for cell in rows()[name].strip("|").split(" | ")]
+    texts = [reader.title, reader.recording, reader.takes, reader.pitfalls]
+    assert cells[1:] == [text.replace("|", "\\|") for text in texts]
+
+
+@pytest.mark.parametrize("field", ALIASES)
+def test_every_signal_has_its_aliases(field: str) -> None:
+    name = next(name for name, target in SIGNALS.items() if target == field)
+    assert all(f"`{alias}`" in rows()[name] for alias in ALIASES[field])
+
+
+def test_every_name_of_the_clock_is_told() -> None:
+    text = DOCUMENT.read_text("utf-8")
+    assert all(f"`{name}`" in text for name in CLOCKS)
