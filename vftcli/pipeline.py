@@ -69,15 +69,15 @@ class Request:
     wrench: "WrenchRequest | None" = None
 
 
-ESTIMATED_FROM = ("dq", "current", "torque")
-"""All that observers need beside clock and positions; the rest of a log may be left unread."""
-
-
-def open_log(path: Path, request: Request, signals: tuple[str, ...] | None = None) -> Recording:
-    """Read a log, or some of its signals, and cut it to the asked interval."""
+def open_log(path: Path, request: Request) -> Recording:
+    """Read a log and cut it to the asked interval."""
     from vftcli.readers import read
 
-    recording = read(path, format=request.format, columns=request.columns, signals=signals)
+    return cut(read(path, format=request.format, columns=request.columns), request)
+
+
+def cut(recording: Recording, request: Request) -> Recording:
+    """The part of a log that the request's interval names, or all of it."""
     if request.interval is None:
         return recording
     start, stop = parse_interval(request.interval)

@@ -39,17 +39,18 @@ def estimate(
 
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5 -o out
     """
+    from vftcli.cli.meanwhile import Meanwhile
+    from vftcli.readers import read
+
+    extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
+    signals = None if wrench or extras else ("dq", "current", "torque")
+    reading = Meanwhile(lambda: read(log, format=format_, columns=columns, signals=signals))
+
     from vftcli.cli.asking import command_line, say, say_notes, say_recording
     from vftcli.cli.wrench_options import wrench_request
     from vftcli.observers import DEFAULT
     from vftcli.outputs.estimates import write_estimate_folder
-    from vftcli.pipeline import (
-        ESTIMATED_FROM,
-        Request,
-        analyse,
-        choose_robot,
-        open_log,
-    )
+    from vftcli.pipeline import Request, analyse, choose_robot, cut
 
     request = Request(
         format=format_,
@@ -65,8 +66,7 @@ def estimate(
             wrench, frame, solver, tool, sensor_pose, zero, sensor_weight, torque_sd
         ),
     )
-    extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
-    recording = open_log(log, request, None if wrench or extras else ESTIMATED_FROM)
+    recording = cut(reading.result(), request)
     analysis = analyse(recording, choose_robot(request, recording), request)
     record = write_estimate_folder(
         output, analysis, command=command_line(), extras=extras, force=force
