@@ -20,6 +20,8 @@ class ExternalTorque:
         floor: Root-mean-square error that the estimate itself is known to have. (n,) [N·m]
         trusted: 1 where a sample may be relied on, 0 where it is shown but may not, as the
             two-cycle difference of a joint at rest; None where nothing speaks against any. (T, n)
+        band: One standard deviation of the error of `tau` as the log itself shows it, model error
+            and lag included; None where no free part is known to measure it on. (T, n) [N·m]
         notes: What a reader of the numbers should know, one sentence each.
     """
 
@@ -29,10 +31,11 @@ class ExternalTorque:
     sd: Array | None = None
     floor: Array | None = None
     trusted: Array | None = None
+    band: Array | None = None
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("t", "tau", "sd", "floor", "trusted"):
+        for name in ("t", "tau", "sd", "floor", "trusted", "band"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(getattr(self, name)))
         if self.tau.ndim != 2:
@@ -43,6 +46,8 @@ class ExternalTorque:
             check_shape(self.sd, self.tau.shape, "sd", self.name)
         if self.trusted is not None:
             check_shape(self.trusted, self.tau.shape, "trusted", self.name)
+        if self.band is not None:
+            check_shape(self.band, self.tau.shape, "band", self.name)
         if self.floor is not None:
             check_shape(self.floor, self.tau.shape[1:], "floor", self.name)
 

@@ -7,12 +7,14 @@ import numpy as np
 
 from vftcli.arrays import Array
 from vftcli.errors import ParameterError
+from vftcli.observers.auto_tuning import AutoTuned, tuned
 from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
 from vftcli.observers.kalman import KalmanObserver
 from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer, Tuning, per_joint
 from vftcli.observers.settings import PARAMETERS, Settings, joint_values, merged, parse_settings
 from vftcli.observers.smoother import KalmanSmoother
+from vftcli.observers.spectra import Spectra
 
 FALLBACK_RATE = 10.0
 """First-order gain where a robot gives no gains at all. [1/s]"""
@@ -27,6 +29,7 @@ class Setup(NamedTuple):
         joints: Number of joints n.
         step: Nominal sample time. [s]
         as_printed: Use the paper's printed formulas.
+        spectra: What the log shows of noise and contact, None where its free part is not known.
     """
 
     gains: Mapping[str, Mapping[str, Any]]
@@ -34,6 +37,7 @@ class Setup(NamedTuple):
     joints: int
     step: float
     as_printed: bool
+    spectra: Spectra | None = None
 
 
 class Entry(NamedTuple):
@@ -45,6 +49,7 @@ class Entry(NamedTuple):
         equations: The paper's equations.
         summary: What it does, in a sentence.
         build: Makes it from a Setup, with notes on gains nobody gave.
+        from_spectra: Whether it takes its gains from the log's spectra.
     """
 
     title: str
@@ -52,6 +57,7 @@ class Entry(NamedTuple):
     equations: str
     summary: str
     build: Callable[[Setup], tuple[Observer, tuple[str, ...]]]
+    from_spectra: bool = False
 
 
 def build_fdo(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
@@ -82,12 +88,18 @@ def build_gmo(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
     return MomentumObserver(gain=values, as_printed=setup.as_printed), notes
 
 
-def build_kfo(scheme: str) -> Callable[[Setup], tuple[Observer, tuple[str, ...]]]:
-    """The builder of a Kalman observer with one discretisation."""
+def build_kfo(
+    scheme: str, section: str | None = None
+) -> Callable[[Setup], tuple[Observer, tuple[str, ...]]]:
+    """The builder of a Kalman observer with one discretisation.
+
+    Args:
+        scheme: "fe" or "zoh".
+        section: Its own ``--set`` section, if that is not the observer's name.
+    """
 
     def build(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
-        name = f"kfo-{scheme}"
-        given = merged("kfo", name, setup.gains, setup.settings)
+        given = merged("kfo", section or f"kfo-{scheme}", setup.gains, setup.settings)
         convention = str(given.pop("noise_convention", "density"))
         values = {
             key: joint_values(value, setup.joints, f"kfo.{key}")
@@ -114,8 +126,23 @@ def build_kfo(scheme: str) -> Callable[[Setup], tuple[Observer, tuple[str, ...]]
 
 def build_rts(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
     """The smoother on the zero-order-hold filter, whose process noise leaves no bias on a ramp."""
-    kalman, notes = build_kfo("zoh")(setup)
+    kalman, notes = build_kfo("zoh", "kfo-rts")(setup)
     return KalmanSmoother(filter=cast("KalmanObserver", kalman)), notes
+
+
+def build_auto(
+    name: str, by_hand: Callable[[Setup], tuple[Observer, tuple[str, ...]]]
+) -> Callable[[Setup], tuple[Observer, tuple[str, ...]]]:
+    """The builder of an observer whose gains come from the log, else from `by_hand`."""
+
+    def build(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
+        if setup.spectra is not None:
+            return tuned(name, setup.spectra), ()
+        observer, notes = by_hand(setup)
+        fallback = f"{name}: no free part to tune on, so it runs with the gains of {observer.name}"
+        return AutoTuned(name=name, observer=observer), (*notes, fallback)
+
+    return build
 
 
 OBSERVERS: dict[str, Entry] = {
@@ -153,6 +180,22 @@ OBSERVERS: dict[str, Entry] = {
         "not in the paper",
         "the same with the whole log in view: no delay, but it leads before a tap",
         build_rts,
+    ),
+    "kfo-auto": Entry(
+        "disturbance Kalman filter tuned by the log",
+        "kfo",
+        "not in the paper",
+        "ω_n of each joint from the spectra of the log's free and loaded part",
+        build_auto("kfo-auto", build_kfo("zoh")),
+        from_spectra=True,
+    ),
+    "rts-auto": Entry(
+        "Rauch–Tung–Striebel smoother tuned by the log",
+        "kfo",
+        "not in the paper",
+        "the same for the smoother",
+        build_auto("rts-auto", build_rts),
+        from_spectra=True,
     ),
 }
 """Name at the command line → the observer."""

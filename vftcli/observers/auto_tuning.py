@@ -1,0 +1,148 @@
+"""Gains from a log's own spectra: the natural frequency with the smallest expected error.
+
+A Kalman filter's ω_n trades what its lag leaves out of the external torque against what it lets
+through of the noise. Both follow from the spectra of the free and the loaded part of the log, so
+that nobody has to guess:
+
+    ω_n = argmin ∫ |1 − H(ω_n)|² S_τ + |H(ω_n)|² S_n df,  joint by joint, ζ = 1/√2
+
+with H the filter's exact complex response, or the smoother's real one.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array, frozen
+from vftcli.dynamics.terms import DynamicsTerms
+from vftcli.observers.kalman import KalmanObserver
+from vftcli.observers.observer import Complex, Observer, Tuning
+from vftcli.observers.smoother import KalmanSmoother
+from vftcli.observers.spectra import Spectra
+from vftcli.torque import ExternalTorque
+
+SLOWEST = 1.0
+"""Smallest natural frequency that is tried. [rad/s]"""
+
+FASTEST = 2.0
+"""Largest natural frequency that is tried, times the sample time. [rad]"""
+
+TRIED = 96
+"""Natural frequencies tried, on a logarithmic scale."""
+
+
+class Curve(NamedTuple):
+    """The expected error of one kind of filter against its natural frequency.
+
+    Attributes:
+        omega_n: Natural frequencies tried. (G,) [rad/s]
+        rmse: Expected error. (G, n) [N·m]
+        best: The natural frequency with the smallest. (n,) [rad/s]
+    """
+
+    omega_n: Array
+    rmse: Array
+    best: Array
+
+    @property
+    def least(self) -> Array:
+        """The expected error at the best. (n,) [N·m]"""
+        return np.asarray(self.rmse.min(axis=0))
+
+
+def kalman_filter(omega_n: Array, r: Array | float = 1.0) -> KalmanObserver:
+    """A Kalman observer with natural frequencies, ζ = 1/√2: Q_τ = R ω_n⁴ and Q_p = 0. (n,)"""
+    density = np.broadcast_to(np.asarray(r, dtype=np.float64), omega_n.shape)
+    return KalmanObserver(
+        discretisation="zoh", r_diag=density, q_p_diag=0.0, q_tau_diag=density * omega_n**4
+    )
+
+
+def kalman_smoother(omega_n: Array, r: Array | float = 1.0) -> KalmanSmoother:
+    """The smoother on that filter."""
+    return KalmanSmoother(filter=kalman_filter(omega_n, r))
+
+
+Kind = Callable[[Array], Observer]
+"""Natural frequencies, one a joint → the observer."""
+
+KINDS: dict[str, Kind] = {"kfo-auto": kalman_filter, "rts-auto": kalman_smoother}
+"""Name at the command line → what is tuned."""
+
+
+def tried(step: float) -> Array:
+    """Natural frequencies worth trying at a sample time. (G,) [rad/s]"""
+    return np.geomspace(SLOWEST, FASTEST / step, TRIED)
+
+
+def expected_error(kind: Kind, omega_n: Array, spectra: Spectra) -> Array:
+    """Expected rmse of every joint at every natural frequency. (G, n) [N·m]"""
+    # Every natural frequency is a joint of one observer: one call gives all responses.
+    response = kind(omega_n).frequency_response(spectra.frequency, spectra.step, len(omega_n))
+    missed = (np.abs(1.0 - response) ** 2).T @ spectra.external
+    passed = (np.abs(response) ** 2).T @ spectra.free
+    return np.asarray(np.sqrt((missed + passed) * spectra.width))
+
+
+def curve(kind: Kind, spectra: Spectra) -> Curve:
+    """The expected error over all natural frequencies, and where it is smallest."""
+    omega_n = tried(spectra.step)
+    rmse = expected_error(kind, omega_n, spectra)
+    return Curve(omega_n, rmse, omega_n[np.argmin(rmse, axis=0)])
+
+
+def noise_level(omega_n: Array, spectra: Spectra) -> Array:
+    """R with which the filter's innovations have the variance that it expects. (n,)
+
+    Gains depend on Q/R alone; R sets the scale of the covariance. The innovation is what the
+    estimate jumps by, ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂, so its variance follows from S_d.
+    """
+    n = len(omega_n)
+    unit = kalman_filter(omega_n)
+    settled, model = unit.steady(spectra.step, n), unit.model(spectra.step, n)
+    response = unit.frequency_response(spectra.frequency, spectra.step, n)
+    jump = 2.0 * np.sin(np.pi * spectra.frequency * spectra.step)[:, None]
+    share = (np.abs(response) * jump / settled.gains.l2) ** 2
+    variance = np.sum(share * spectra.loaded, axis=0) * spectra.width
+    scale = variance / (settled.prior.p11 + model.r)
+    return np.asarray(np.maximum(scale, np.finfo(float).tiny))
+
+
+@dataclass(frozen=True, kw_only=True)
+class AutoTuned:
+    """An observer under its own name whose gains came from the log, or fell back to hand-set ones.
+
+    Attributes:
+        name: Name at the command line.
+        observer: The observer itself.
+        curve: What was minimised, None where it fell back.
+    """
+
+    name: str
+    observer: Observer
+    curve: Curve | None = field(default=None, repr=False)
+
+    def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
+        """Run over a whole log."""
+        return replace(self.observer.estimate(terms), name=self.name)
+
+    def tuning(self, step: float, joints: int) -> Tuning:
+        """What the gains mean at a sample time. [s]"""
+        return self.observer.tuning(step, joints)
+
+    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
+        """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""
+        return self.observer.frequency_response(frequency, step, joints)
+
+
+def tuned(name: str, spectra: Spectra) -> AutoTuned:
+    """The observer `name` with the natural frequencies its spectra call for."""
+    found = curve(KINDS[name], spectra)
+    best = frozen(found.best)
+    r = noise_level(best, spectra)
+    observer: Observer = (
+        kalman_smoother(best, r) if KINDS[name] is kalman_smoother else kalman_filter(best, r)
+    )
+    return AutoTuned(name=name, observer=observer, curve=found)

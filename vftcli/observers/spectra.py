@@ -1,0 +1,188 @@
+"""Spectra of what the model leaves unexplained, over the free and the loaded part of a log.
+
+The raw disturbance d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) is the external torque, averaged over a
+sample, plus everything else: noise, friction and model error. Its spectrum over the free part, S_n,
+is the error's; what the loaded part has beyond it, S_τ = (S_d − S_n)₊, is the external torque's.
+From the two follows the error of every linear estimator with frequency response H:
+
+    rms² = ∫ |1 − H|² S_τ + |H|² S_n df
+
+H is complex, so that delay counts. The spectra are one-sided and not detrended: a constant error is
+an error too.
+
+References:
+    P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra",
+    IEEE Trans. Audio Electroacoust. 15(2), 1967, for the averaging of segments.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.arrays import Array, frozen, handed_over, is_uniform, median
+from vftcli.dynamics.terms import DynamicsTerms
+from vftcli.errors import ParameterError
+
+Flags = NDArray[np.bool_]
+
+SEGMENT = 4.0
+"""Length of a segment: what changes more slowly counts as constant. [s]"""
+
+LEAST_SEGMENT = 32
+"""Fewest samples of a segment; a shorter free or loaded part has no spectrum."""
+
+GAP = 5.5
+"""A step of more than this many median steps is a gap; no segment reaches across."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spectra:
+    """One-sided power spectral densities of the raw disturbance.
+
+    Attributes:
+        frequency: (F,) [Hz]
+        free: S_n, over the free part. (F, n) [(N·m)²/Hz]
+        loaded: S_d, over the rest. (F, n) [(N·m)²/Hz]
+        step: Sample time. [s]
+        segments: Segments averaged over the free part and over the loaded one.
+    """
+
+    frequency: Array
+    free: Array
+    loaded: Array
+    step: float
+    segments: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        for name in ("frequency", "free", "loaded"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return int(self.free.shape[1])
+
+    @property
+    def width(self) -> float:
+        """Distance of two frequencies. [Hz]"""
+        return float(self.frequency[1] - self.frequency[0])
+
+    @property
+    def external(self) -> Array:
+        """S_τ = (S_d − S_n)₊, the spectrum of the external torque. (F, n) [(N·m)²/Hz]"""
+        return np.maximum(self.loaded - self.free, 0.0)
+
+    def missed(self, response: NDArray[np.complex128]) -> Array:
+        """∫|1 − H|² S_τ df, what an estimator's lag and bandwidth leave out. (n,) [(N·m)²]
+
+        Args:
+            response: H at `frequency`, one column a joint. (F, n)
+        """
+        share: Array = np.abs(1.0 - response) ** 2
+        return np.asarray(np.sum(share * self.external, axis=0) * self.width)
+
+    def passed(self, response: NDArray[np.complex128]) -> Array:
+        """∫|H|² S_n df, what of the error comes through. (n,) [(N·m)²]"""
+        share: Array = np.abs(response) ** 2
+        return np.asarray(np.sum(share * self.free, axis=0) * self.width)
+
+
+class Part(NamedTuple):
+    """A log's p and μ, and which of its samples belong to the part.
+
+    Attributes:
+        terms: p and μ.
+        inside: (T,)
+    """
+
+    terms: DynamicsTerms
+    inside: Flags
+
+
+def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
+    """The spectra of a loaded part and a free one, by the same estimator.
+
+    Args:
+        loaded: The log and its loaded samples.
+        free: The same log and its free samples, or free runs in other logs.
+
+    Raises:
+        ParameterError: If one of the parts is too short for a spectrum.
+    """
+    t = loaded.terms.t
+    nominal = median(np.diff(t)) if len(t) > 1 else 0.0
+    heavy = list(runs(loaded, nominal))
+    quiet = [run for part in free for run in runs(part, nominal)]
+    longest = [max((len(run) for run in found), default=0) for found in (heavy, quiet)]
+    size = min(round(SEGMENT / nominal) if nominal else 0, *longest)
+    if size < LEAST_SEGMENT:
+        raise ParameterError(
+            f"a spectrum needs {LEAST_SEGMENT} samples in a row; the loaded part has "
+            f"{longest[0]}, the free part {longest[1]}"
+        )
+    size -= size % 2
+    (noise, few), (both, many) = (welch(found, size, nominal) for found in (quiet, heavy))
+    return Spectra(
+        frequency=np.asarray(np.fft.rfftfreq(size, nominal), dtype=np.float64),
+        free=handed_over(noise),
+        loaded=handed_over(both),
+        step=nominal,
+        segments=(few, many),
+    )
+
+
+def raw_disturbance(terms: DynamicsTerms) -> Array:
+    """Return d of every sample but the first, by the log's own sample times. (T−1, n) [N·m]"""
+    d = np.diff(terms.p, axis=0)
+    d /= np.diff(terms.t)[:, None]
+    d -= 0.5 * (terms.mu[1:] + terms.mu[:-1])
+    return d
+
+
+def runs(part: Part, step: float) -> Iterator[Array]:
+    """The unbroken stretches of a part's raw disturbance, on a uniform clock. (N, n) each
+
+    On an uneven clock the integral of d is interpolated, which averages d over each new step.
+    """
+    t = part.terms.t
+    d = raw_disturbance(part.terms)
+    uniform = is_uniform(t) and len(t) > 1
+    whole = part.inside[1:] & part.inside[:-1]
+    if not uniform:
+        whole = whole & (np.diff(t) <= GAP * step)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], whole.astype(np.int8), [0]])))
+    for first, stop in edges.reshape(-1, 2):
+        stretch = d[first:stop]
+        if uniform:
+            yield stretch
+            continue
+        clock = t[first : stop + 1]
+        even = np.arange(clock[0], clock[-1], step)
+        total = np.concatenate([np.zeros((1, d.shape[1])), stretch * np.diff(clock)[:, None]])
+        np.cumsum(total, axis=0, out=total)
+        at = np.column_stack([np.interp(even, clock, column) for column in total.T])
+        yield np.diff(at, axis=0) / step
+
+
+def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, int]:
+    """Mean periodogram of Hann-windowed, half overlapping segments, and their number.
+
+    Nothing is detrended; the density at 0 Hz holds the square of the mean.
+    """
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(size) / size)
+    joints = stretches[0].shape[1]
+    power, count = np.zeros((joints, size // 2 + 1)), 0
+    for stretch in stretches:
+        columns = stretch.T
+        for first in range(0, len(stretch) - size + 1, size // 2):
+            spectrum = np.fft.rfft(columns[:, first : first + size] * window)
+            power += spectrum.real**2
+            power += spectrum.imag**2
+            count += 1
+    power *= 2.0 * step / (float(np.sum(window**2)) * count)
+    power[:, 0] *= 0.5
+    power[:, -1] *= 0.5
+    return np.ascontiguousarray(power.T), count
