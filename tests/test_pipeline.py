@@ -118,7 +118,7 @@ def test_panda_in_free_motion_from_its_four_text_files(logs: Path) -> None:
 
 
 def test_ur10e_in_free_motion_needs_rotor_and_friction(logs: Path) -> None:
-    """Real: mean of the six rms 1.64 N·m in the prototype; without rotor or friction it is worse."""
+    """Real: the prototype's mean of six rms is 1.64 N·m; without rotor or friction it is worse."""
     path = logs / "ur10e" / "free_14harm.csv"
     request = Request(robot="ur10e", columns=UR10E, reference="zero", observers=("gmo",))
     full = rmse_of(analyse_log(path, request)).mean()

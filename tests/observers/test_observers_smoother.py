@@ -99,8 +99,8 @@ def test_a_constant_torque_and_a_ramp_are_recovered_without_bias() -> None:
         log = DynamicsTerms(t=t, p=np.column_stack([p, p]), mu=np.zeros((4000, 2)))
         estimate = smoother("zoh").estimate(log).tau
         middle = slice(1500, 2500)
-        # Forward Euler would lead a ramp by half a sample, for want of the hold's Q₁₂. Either end is
-        # 12 s away, more than a hundred time constants of 0.1 s.
+        # Forward Euler would lead a ramp by half a sample, for want of the hold's Q₁₂. Either end
+        # is 12 s away, more than a hundred time constants of 0.1 s.
         np.testing.assert_allclose(
             estimate[middle], np.repeat(truth[middle, None], 2, 1), rtol=1e-9
         )
