@@ -14,6 +14,7 @@ from vftcli.cli import (
     convert,
     estimate,
     formats,
+    identify,
     inspect,
     listings,
     report,
@@ -34,6 +35,7 @@ app.command("report")(report.report)
 app.command("inspect")(inspect.inspect_log)
 app.command("convert")(convert.convert_log)
 app.command("admit")(admit.admit)
+app.command("identify")(identify.identify_robot)
 app.command("simulate")(simulate.simulate_log)
 app.command("bench")(bench.bench)
 app.command("robots")(listings.robots)

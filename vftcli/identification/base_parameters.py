@@ -75,9 +75,7 @@ def structure(chain: Chain, rotor: bool) -> Grouping:
     beta = np.linalg.solve(R[:rank, :rank], R[:rank, rank:])
     beta[np.abs(beta) < 1e-9] = 0.0
     first = np.argsort(order[:rank])
-    return Grouping(
-        tuple(order[:rank][first].tolist()), tuple(order[rank:].tolist()), beta[first]
-    )
+    return Grouping(tuple(order[:rank][first].tolist()), tuple(order[rank:].tolist()), beta[first])
 
 
 def extended(grouping: Grouping, layout: Layout) -> Grouping:

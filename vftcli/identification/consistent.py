@@ -21,7 +21,7 @@ from vftcli.identification.regressor import LINK, TENSOR
 from vftcli.identification.stacking import Layout, Triangles
 
 WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3)
-"""Weights of the distance to the profile that cross-validation chooses from, in effective samples."""
+"""Weights of the distance to the profile that cross-validation chooses from."""
 
 STEPS = 100
 """Newton steps at most; a dozen or two are usual."""
@@ -218,7 +218,7 @@ def fit_consistent(triangles: Triangles, profile: Array) -> ConsistentFit:
 
 
 def nearest_physical(triangles: Triangles, profile: Array, weight: float = WEIGHTS[0]) -> Array:
-    """The physical model that predicts what least squares predicts, as nearly as one can. (size,)"""
+    """The physical model that predicts nearly what least squares predicts. (size,)"""
     start = starting_point(triangles.layout, profile)
     x = start
     for pull in (w for w in WEIGHTS[::-1] if w >= weight):

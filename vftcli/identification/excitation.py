@@ -19,6 +19,9 @@ ENOUGH = 1.0
 TOUCH = 7.0
 """Residual that counts as contact, in robust standard deviations of its joint."""
 
+STICKING = 0.05
+"""Speed near which a joint may stick. [rad/s]"""
+
 TOUCH_TIME = 0.15
 """Time it must last. [s]"""
 
@@ -81,16 +84,21 @@ class Contact(NamedTuple):
     size: float
 
 
-def contacts(motion: Motion, residual: Array) -> list[Contact]:
+def contacts(motion: Motion, residual: Array, dry: Array) -> list[Contact]:
     """Find stretches whose residual is far outside what the rest of the log shows.
+
+    Near a reversal a joint may stick, and the residual be as large as its dry friction: only what
+    exceeds that counts there.
 
     Args:
         motion: The prepared log.
         residual: Torque that the fitted model does not explain. (M, n) [N·m]
+        dry: Coulomb torque of each joint. (M, n) [N·m]
     """
     usable = motion.usable
     sd = np.array([robust_sd(r[u]) for r, u in zip(residual.T, usable.T, strict=True)])
-    z = np.abs(residual) * usable / np.maximum(sd, 1e-9)
+    excess = np.maximum(np.abs(residual) - np.abs(dry) * sticking(motion), 0.0)
+    z = excess * usable / np.maximum(sd, 1e-9)
     worst = z.max(axis=1)
     found = []
     for start, stop in runs(worst > TOUCH):
@@ -105,6 +113,20 @@ def contacts(motion: Motion, residual: Array) -> list[Contact]:
                 )
             )
     return merged(found)
+
+
+def sticking(motion: Motion) -> Samples:
+    """Whether a joint is slower than `STICKING` within a filter's length of a sample. (M, n)"""
+    slow = np.abs(motion.dq) < STICKING
+    if motion.samples < 2:
+        return slow
+    step = float(np.median(np.diff(motion.t)))
+    reach = max(1, round(1.0 / (motion.processing.cutoff * step)))
+    spread = slow.copy()
+    for k in range(1, min(reach, motion.samples - 1) + 1):
+        spread[k:] |= slow[:-k]
+        spread[:-k] |= slow[k:]
+    return spread
 
 
 def merged(found: Sequence[Contact]) -> list[Contact]:
@@ -142,7 +164,8 @@ def check_robot(name: str, robot: str, torque: Array, residual: Array, heavy: Sa
         IdentificationError: With the joint and the share that is explained.
     """
     for j in np.flatnonzero(heavy):
-        explained = 1.0 - float(np.var(residual[:, j]) / max(np.var(torque[:, j]), 1e-12))
+        spread = max(float(np.var(torque[:, j])), 1e-12)
+        explained = 1.0 - float(np.var(residual[:, j])) / spread
         if explained < WRONG:
             raise IdentificationError(
                 f"{name}: with robot {robot!r} the model explains {100 * max(explained, 0):.0f} % "

@@ -8,6 +8,7 @@ from vftcli.errors import ClockError
 ORDER = 4
 """Order of the Butterworth low-pass, run forwards and backwards (so its roll-off counts twice)."""
 
+
 def even_clock(t: Array) -> Array:
     """Instants at the clock's median step, from its first sample to its last. (K,) [s]"""
     step = float(np.median(np.diff(t)))

@@ -1,5 +1,6 @@
 """Weighted, robust least squares of one column, with honest standard deviations."""
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -108,7 +109,7 @@ def deviations(A: Array, residual: Array, weights: Array) -> Array:
 def folds(samples: int, count: int = FOLDS) -> list[slice]:
     """Contiguous stretches of equal length that cover all samples."""
     edges = np.linspace(0, samples, count + 1).astype(int)
-    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [slice(a, b) for a, b in itertools.pairwise(edges)]
 
 
 def cross_validated(A: Array, y: Array, weights: Array) -> float:

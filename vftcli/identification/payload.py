@@ -107,8 +107,9 @@ class PairFit(NamedTuple):
         com_sd = chain.flange_rotation.T @ np.diag((self.sd[1:STATIC] / mass) ** 2)
         spread = np.sqrt(np.diag(com_sd @ chain.flange_rotation))
         if np.linalg.norm(at_flange) > 1.0:
+            away = float(np.linalg.norm(at_flange))
             raise IdentificationError(
-                f"{self.loaded}: the load's centre of mass comes out {np.linalg.norm(at_flange):.2g}"
+                f"{self.loaded}: the load's centre of mass comes out {away:.2g}"
                 " m from the flange; the logs do not fit this robot"
             )
         load = Payload(mass=mass, com=at_flange, inertia=np.zeros((3, 3)))
@@ -184,6 +185,7 @@ def time_shift(motion: Motion, other: Recording) -> tuple[float, float]:
     Raises:
         IdentificationError: If the two are not the same motion.
     """
+
     def distance(shift: float) -> float:
         at = motion.t + shift
         inside = (at >= other.t[0]) & (at <= other.t[-1])

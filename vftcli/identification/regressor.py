@@ -23,7 +23,7 @@ TENSOR = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 
 def cross(a: Array, b: Array) -> Array:
-    """a × b of vectors that stand in the last axis but one. (..., 3, N)"""
+    """A × b of vectors that stand in the last axis but one. (..., 3, N)"""
     x, y, z = a[..., 0, :], a[..., 1, :], a[..., 2, :]
     u, v, w = b[..., 0, :], b[..., 1, :], b[..., 2, :]
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-2)

@@ -5,8 +5,8 @@ coefficients joint by joint. Of the stacked equations only the R factor of their
 is kept, so that memory does not grow with the log.
 """
 
+import itertools
 from collections.abc import Iterator, Sequence
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -53,12 +53,12 @@ class Layout(NamedTuple):
     def frictions(self) -> tuple[slice, ...]:
         """Place of each joint's friction coefficients."""
         edges = np.cumsum([self.inertial + self.rotors, *(len(s.terms) for s in self.shapes)])
-        return tuple(slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True))
+        return tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(edges))
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self.frictions[-1].stop
+        return int(self.frictions[-1].stop)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -116,13 +116,19 @@ class Triangles(NamedTuple):
     def joined(self, leave_out: int | None = None) -> tuple[Array, Array]:
         """R (size, size) and the right-hand side (size,) of all stretches but one."""
         kept = [part for k, part in enumerate(self.parts) if k != leave_out]
-        whole = np.linalg.qr(np.vstack(kept), mode="r")
+        whole = triangle(np.vstack(kept))
         return whole[:-1, :-1], whole[:-1, -1]
 
     def misfit(self, part: int, x: Array) -> float:
         """Weighted sum of squares that x leaves in one stretch."""
         R = self.parts[part]
         return float(np.sum((R[:, -1] - R[:, :-1] @ x) ** 2))
+
+
+def triangle(rows: Array) -> Array:
+    """R of the QR decomposition of stacked equations."""
+    R: Array = np.asarray(np.linalg.qr(rows, mode="r"))
+    return R
 
 
 def residuals(layout: Layout, data: Data, x: Array) -> Array:
@@ -161,9 +167,7 @@ def joint_sigma(logs: Sequence[Data], left: Sequence[Array]) -> Array:
     return sigma
 
 
-def reduced(
-    layout: Layout, logs: Sequence[Data], left: Sequence[Array], sigma: Array
-) -> Triangles:
+def reduced(layout: Layout, logs: Sequence[Data], left: Sequence[Array], sigma: Array) -> Triangles:
     """QR updates over all chunks of all logs, one triangle a cross-validation stretch."""
     parts = [np.zeros((0, layout.size + 1)) for _ in range(FOLDS)]
     total, correlation = 0.0, []
@@ -175,7 +179,7 @@ def reduced(
                 correlation.append(correlation_time(r[w > 0]))
         for k, fold in enumerate(folds(data.motion.samples)):
             for rows in weighted_rows(layout, data, np.sqrt(weights) / sigma, fold):
-                parts[k] = np.linalg.qr(np.vstack([parts[k], rows]), mode="r")
+                parts[k] = triangle(np.vstack([parts[k], rows]))
     inflation = float(np.mean(correlation)) if correlation else 1.0
     return Triangles(layout, tuple(parts), sigma, inflation, total / inflation)
 

@@ -123,9 +123,7 @@ def read_targets(recording: Recording, robot: Robot) -> Targets:
     )
 
 
-def controller_models(
-    recordings: Sequence[Recording], robot: Robot
-) -> tuple[ControllerModel, ...]:
+def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[ControllerModel, ...]:
     """Read the controller's model of every joint off its targets.
 
     Args:

@@ -1,0 +1,321 @@
+"""Logs in, a robot out: the whole way of `vftcli identify`, in the order the data flows."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from vftcli.arrays import Array
+from vftcli.errors import IdentificationError, ParameterError
+from vftcli.identification.base_parameters import BaseParameters
+from vftcli.identification.friction_fit import Contest
+from vftcli.identification.methods import METHODS
+from vftcli.identification.outcome import Outcome
+from vftcli.identification.payload import LoadFit, payload_from_pair, payload_from_poses
+from vftcli.identification.processing import Motion, Processing, prepare
+from vftcli.identification.repeats import repeated_share, repeats
+from vftcli.identification.result import (
+    BASE,
+    CONTESTS,
+    PARAMETERS,
+    RESIDUALS,
+    Identification,
+    Number,
+    Trace,
+)
+from vftcli.identification.scoring import diagnosis, mean_text, predicted_torque, rms
+from vftcli.identification.training import training
+from vftcli.recording import Recording
+from vftcli.robots.robot import Robot
+from vftcli.robots.writing import robot_document
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """What shall be identified.
+
+    Attributes:
+        method: A name in `METHODS`, or None for a payload alone.
+        name: Name of the new robot.
+        find_payload: Whether a load on the flange is sought.
+        fit_constants: Whether the friction method also fits drive constants.
+        processing: Filters and decimation.
+    """
+
+    method: str | None = "friction"
+    name: str = ""
+    find_payload: bool = False
+    fit_constants: bool = False
+    processing: Processing = field(default_factory=Processing)
+
+    def __post_init__(self) -> None:
+        if self.method is not None and self.method not in METHODS:
+            raise ParameterError(f"--method {self.method!r}; there is {', '.join(METHODS)}")
+        if self.method is None and not self.find_payload:
+            raise ParameterError(f"nothing to identify: give --method {'|'.join(METHODS)}")
+        if self.fit_constants and self.method != "friction":
+            raise ParameterError("--fit-constants is an option of --method friction")
+
+
+def identify(
+    logs: Sequence[Recording],
+    robot: Robot,
+    task: Task,
+    held_out: Sequence[Recording] = (),
+    free: Recording | None = None,
+) -> Identification:
+    """Identify a robot from logs of free motion, a load from logs that carry it.
+
+    Args:
+        logs: Training logs; with `find_payload` the logs that carry the load, or the pair.
+        robot: The profile to start from.
+        task: What to identify.
+        held_out: Logs to score on.
+        free: The same motion without the load.
+
+    Raises:
+        IdentificationError: If the logs do not determine it, or contradict the robot.
+        MissingSignalError: If a signal is missing.
+    """
+    load = find_load(logs, robot, free) if task.find_payload else None
+    train = free_logs(logs, free, load)
+    if load is not None and (task.method is None or not train):
+        method, outcome = "payload", Outcome(robot, [], [], None, [])
+    else:
+        method = task.method or "payload"
+        data = training(train, robot, task.processing, task.fit_constants)
+        outcome = METHODS[method](data)
+    new, numbers, notes = outcome.robot, [*outcome.numbers], [*outcome.notes]
+    scored = [prepare(r, robot, task.processing) for r in (train or ())]
+    others = [prepare(r, robot, task.processing) for r in held_out]
+    rows, traces = residual_rows(scored, "train", robot, new)
+    more, tested = residual_rows(others, "held-out", robot, new)
+    notes += remarks(new, scored, others, traces, tested)
+    if load is not None:
+        new, numbers, notes = with_load(new, load, numbers, notes)
+    processing = task.processing.described(logs[0].step)
+    table = pl.DataFrame([*rows, *more], schema=RESIDUALS, orient="row")
+    sources = tuple(logs) if free is None else (*logs, free)
+    new = documented(new, robot, task.name, method, sources, processing, table, outcome, load)
+    return Identification(
+        robot=new,
+        profile=robot,
+        method=method,
+        residuals=table,
+        parameters=pl.DataFrame([n.row for n in numbers], schema=PARAMETERS, orient="row"),
+        contests=contest_table(outcome.contests),
+        base=base_table(outcome.base),
+        traces=(*traces, *tested),
+        processing=processing,
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:
+    """Find the load: from a pair if there is one, else from poses at rest."""
+    bare = robot.with_payload(None)
+    if free is not None:
+        fit = payload_from_pair(logs[0], free, bare)
+        if fit.loaded == free.name and free.name != logs[0].name:
+            raise IdentificationError(
+                f"{free.name}, given as free of load, is the heavier one; swap the two logs"
+            )
+        return fit
+    if len(logs) == 2 and all(moves(r) for r in logs):
+        try:
+            return payload_from_pair(logs[0], logs[1], bare)
+        except IdentificationError as error:
+            if "not the same motion" not in str(error):
+                raise
+    return payload_from_poses(logs, bare)
+
+
+def moves(recording: Recording) -> bool:
+    """Whether some joint travels."""
+    return bool(np.max(np.ptp(recording.q, axis=0)) > 0.05)
+
+
+def free_logs(
+    logs: Sequence[Recording], free: Recording | None, load: LoadFit | None
+) -> tuple[Recording, ...]:
+    """The logs that carry no unknown load: what the arm itself is identified from."""
+    if load is None:
+        return tuple(logs)
+    if free is not None:
+        return (free,)
+    if len(logs) == 2:
+        return tuple(r for r in logs if r.name != load.loaded and load.loaded in _names(logs))
+    return ()
+
+
+def _names(logs: Sequence[Recording]) -> set[str]:
+    return {r.name for r in logs}
+
+
+def residual_rows(
+    motions: Sequence[Motion], role: str, profile: Robot, robot: Robot
+) -> tuple[list[tuple[str, str, str, int, float, int]], list[Trace]]:
+    """Score logs under the profile and the identified robot."""
+    rows, traces = [], []
+    for motion in motions:
+        if motion.samples < 2:
+            continue
+        name = motion.recording.name
+        expected = predicted_torque(robot, motion)
+        measured = motion.tau * constant_ratio(profile, robot, motion)
+        for model, left in (
+            ("identified", measured - expected),
+            ("profile", motion.tau - predicted_torque(profile, motion)),
+        ):
+            for j, value in enumerate(rms(left), start=1):
+                rows.append((name, role, model, j, float(value), motion.samples))
+        traces.append(Trace(motion.recording, role, motion.t, motion.dq, measured, expected))
+    return rows, traces
+
+
+def constant_ratio(profile: Robot, robot: Robot, motion: Motion) -> Array | float:
+    """New over old drive constants, for torque that was made from currents with the old. (n,)"""
+    old, new = profile.torque_constant, robot.torque_constant
+    if old is None or new is None or motion.recording.current is None:
+        return 1.0
+    from vftcli.dynamics.drive import uses_current
+
+    ratio: Array = new / old
+    return ratio if uses_current(motion.recording, profile) else 1.0
+
+
+def remarks(
+    robot: Robot,
+    train: Sequence[Motion],
+    test: Sequence[Motion],
+    trained: Sequence[Trace],
+    tested: Sequence[Trace],
+) -> list[str]:
+    """What the scores mean: repeated trajectories, and joints that are much worse elsewhere."""
+    notes = []
+    for motion in test:
+        for other in train:
+            if repeats(other, motion):
+                share = 100.0 * repeated_share(other, motion)
+                notes.append(
+                    f"{motion.recording.name} repeats the trajectory of {other.recording.name} "
+                    f"({share:.0f} % of it): its score says nothing about other motions"
+                )
+    if trained and tested:
+        level = np.mean([rms(trace.residual) for trace in trained], axis=0)
+        for motion, trace in zip([m for m in test if m.samples > 1], tested, strict=True):
+            notes += diagnosis(robot, motion, trace.residual, level)
+    if trained:
+        mean = mean_text(np.mean([rms(trace.residual) for trace in trained], axis=0))
+        notes.append(f"training residual {mean}, mean of the joints")
+    return notes
+
+
+def with_load(
+    robot: Robot, load: LoadFit, numbers: list[Number], notes: list[str]
+) -> tuple[Robot, list[Number], list[str]]:
+    """The robot with the found load mounted, and its numbers."""
+    known = load.mass_sd < 0.2 * load.payload.mass
+    nothing = float("nan")
+    values = zip(("com_x", "com_y", "com_z"), load.payload.com, load.com_sd, strict=True)
+    found = [
+        Number(robot.joints, "mass", load.payload.mass, load.mass_sd, nothing, known),
+        *(Number(robot.joints, k, float(v), float(sd), nothing, sd < 0.05) for k, v, sd in values),
+    ]
+    return robot.with_payload(load.payload), [*numbers, *found], [*notes, *load.notes]
+
+
+def contest_table(contests: Sequence[Contest]) -> pl.DataFrame:
+    """The friction candidates as a table."""
+    rows = [(c.joint, c.shape.words, c.error, c.chosen) for c in contests]
+    return pl.DataFrame(rows, schema=CONTESTS, orient="row")
+
+
+def base_table(base: BaseParameters | None) -> pl.DataFrame | None:
+    """Base parameters as a table."""
+    if base is None:
+        return None
+    rows = zip(base.names, base.values.tolist(), base.sd.tolist(), base.determined, strict=True)
+    return pl.DataFrame(list(rows), schema=BASE, orient="row")
+
+
+def documented(
+    robot: Robot,
+    profile: Robot,
+    name: str,
+    method: str,
+    logs: Sequence[Recording],
+    processing: Mapping[str, Any],
+    residuals: pl.DataFrame,
+    outcome: Outcome,
+    load: LoadFit | None,
+) -> Robot:
+    """The robot under its own name, its document telling where every number comes from."""
+    named = replace(
+        robot,
+        name=name or f"{profile.name}-identified",
+        title=f"{profile.title or profile.name}, identified",
+        path=None,
+    )
+    document = robot_document(named)
+    words = f"identified ({method}) from " + ", ".join(log.name for log in logs)
+    changed = {(n.joint, n.parameter) for n in outcome.numbers if n.determined}
+    for j, table in enumerate(document["joints"], start=1):
+        links = method in {"base", "consistent"}
+        table["inertial_source"] = words if links else f"profile {profile.name}"
+        for key in ("rotor_inertia", "torque_constant"):
+            if key in table:
+                new = (j, key) in changed or (links and key == "rotor_inertia")
+                table[f"{key}_source"] = words if new else f"profile {profile.name}"
+    sources = [*document.get("sources", ()), *(source_table(k, r) for k, r in enumerate(logs, 1))]
+    account: dict[str, Any] = {
+        "method": method,
+        "profile": profile.name,
+        "logs": [log.name for log in logs],
+        "sha256": [log.source.sha256 or "unknown" for log in logs],
+        "processing": dict(processing),
+        "residuals": residual_tables(residuals),
+    }
+    if load is not None:
+        document["payload"]["source"] = load.notes[0]
+        account["payload"] = {
+            "loaded": load.loaded,
+            "mass_sd": load.mass_sd,
+            "com_sd": load.com_sd.tolist(),
+            "residual_Nm": load.residual.tolist(),
+        }
+    if outcome.base is not None:
+        account["base_parameters"] = base_tables(outcome.base)
+    return replace(named, document={**document, "sources": sources, "identification": account})
+
+
+def source_table(index: int, recording: Recording) -> dict[str, Any]:
+    """One log as a source."""
+    return {
+        "id": f"log-{index}",
+        "what": "what `identification` and the joints' confidence name",
+        "ref": f"{recording.name}, {recording.samples} samples, {recording.duration:.3f} s",
+        "sha256": recording.source.sha256 or "unknown",
+    }
+
+
+def residual_tables(residuals: pl.DataFrame) -> list[dict[str, Any]]:
+    """RMS per joint of each log under the identified robot."""
+    tables = []
+    for (log, role), rows in residuals.filter(pl.col("model") == "identified").group_by(
+        ["log", "role"], maintain_order=True
+    ):
+        values = [round(v, 4) for v in rows["rms_Nm"].to_list()]
+        tables.append({"log": log, "role": role, "rms_Nm": values})
+    return tables
+
+
+def base_tables(base: BaseParameters) -> list[dict[str, Any]]:
+    """Base parameters as tables of the robot file; an unknown spread is infinite."""
+    rows = zip(base.names, base.values, base.sd, base.determined, strict=True)
+    return [
+        {"parameter": name, "value": float(value), "sd": float(sd), "determined": ok}
+        for name, value, sd, ok in rows
+    ]

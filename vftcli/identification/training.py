@@ -1,0 +1,216 @@
+"""Training data: logs prepared, joints fitted one by one, contacts left out."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.dynamics.drive import drive_torque, uses_current
+from vftcli.errors import IdentificationError
+from vftcli.identification import excitation as exciting
+from vftcli.identification.excitation import Excitation
+from vftcli.identification.friction_fit import Contest, Given, choose_shape
+from vftcli.identification.friction_shapes import FrictionColumns, Shape
+from vftcli.identification.least_squares import Fit, fit_column
+from vftcli.identification.processing import Motion, Processing, gravity_torque, prepare
+from vftcli.identification.scoring import rigid_torque
+from vftcli.recording import Recording
+from vftcli.robots.robot import Robot
+
+CONSTANT_KNOWN = 0.02
+"""Relative standard deviation up to which a drive constant is taken from free motion."""
+
+HEAVY = 0.1
+"""A joint carries the arm's weight if its gravity torque varies by this share of the largest."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Training:
+    """The training logs, prepared.
+
+    Attributes:
+        robot: The profile.
+        recordings: The logs.
+        motions: Those that move, filtered and decimated.
+        columns: Their friction columns.
+        rigid: Torque of the profile's rigid body. (M, n) each [N·m]
+        excited: Which joints move.
+        source: The logs in words, for the robot file.
+        fit_constants: Whether drive constants are unknowns of the friction method.
+    """
+
+    robot: Robot
+    recordings: tuple[Recording, ...]
+    motions: tuple[Motion, ...]
+    columns: tuple[FrictionColumns, ...]
+    rigid: tuple[Array, ...]
+    excited: Excitation
+    source: str
+    fit_constants: bool = False
+
+    @property
+    def rotor(self) -> bool:
+        """Whether the torque is measured before the gear, so that it accelerates the rotor too."""
+        return self.robot.torque_source != "link_torque"
+
+
+def training(
+    recordings: Sequence[Recording], robot: Robot, processing: Processing, fit_constants: bool
+) -> Training:
+    """Prepare the training logs.
+
+    Raises:
+        MissingSignalError: If velocities or efforts are missing.
+        RobotError: If the number of joints differs.
+        IdentificationError: If nothing moves.
+    """
+    for recording in recordings:
+        drive_torque(recording, robot)
+    motions = tuple(prepare(recording, robot, processing) for recording in recordings)
+    if fit_constants and not all(uses_current(r, robot) for r in recordings):
+        raise IdentificationError(
+            "--fit-constants needs motor currents; the logs have torques. Leave it out"
+        )
+    excited = exciting.excitation(motions)
+    moved = tuple(m for m in motions if m.samples > 1)
+    columns = tuple(FrictionColumns(m, np.abs(gravity_torque(robot, m.recording.q))) for m in moved)
+    digests = ", ".join(f"{r.name} (sha256 {r.source.sha256 or 'unknown'})" for r in recordings)
+    return Training(
+        robot=robot,
+        recordings=tuple(recordings),
+        motions=moved,
+        columns=columns,
+        rigid=tuple(rigid_torque(robot, m) for m in moved),
+        excited=excited,
+        source=digests,
+        fit_constants=fit_constants,
+    )
+
+
+class JointFit(NamedTuple):
+    """Friction of one joint, with what was fitted beside it; None for a joint that is held.
+
+    Attributes:
+        shape: The chosen structure.
+        fit: Friction coefficients, then q̈'s, then the rigid torque's.
+        contests: The candidates.
+        constant: Whether the drive constant was fitted too.
+    """
+
+    shape: Shape
+    fit: Fit
+    contests: list[Contest]
+    constant: bool
+
+
+def fit_frictions(data: Training, weights: Sequence[Array]) -> list[JointFit | None]:
+    """Fit every joint that moves, the links held at the profile."""
+    fits: list[JointFit | None] = []
+    for j in range(data.robot.joints):
+        if not data.excited.moves[j]:
+            fits.append(None)
+            continue
+        found = fit_joint(data, j, weights, data.fit_constants)
+        if data.fit_constants and not constant_known(found.fit):
+            found = fit_joint(data, j, weights, False)
+        fits.append(found)
+    return fits
+
+
+def fit_joint(data: Training, j: int, weights: Sequence[Array], constant: bool) -> JointFit:
+    """Choose and fit one joint's model, with its drive constant or without."""
+    given = joint_data(data, j, weights, constant)
+    shape, contests = choose_shape(j, given)
+    fit = fit_column(given.columns(j, shape), given.y, given.weights)
+    return JointFit(shape, fit, contests, constant)
+
+
+def constant_known(fit: Fit) -> bool:
+    """Whether a joint's load tells its drive constant: the last coefficient, 1 by the profile."""
+    return bool(fit.sd[-1] < CONSTANT_KNOWN * abs(fit.values[-1]))
+
+
+def joint_data(data: Training, j: int, weights: Sequence[Array], constant: bool) -> Given:
+    """The data of one joint over all logs."""
+    motions = data.motions
+    torque = np.concatenate([m.tau[:, j] for m in motions])
+    rigid = np.concatenate([r[:, j] for r in data.rigid])
+    fixed = []
+    if data.rotor:
+        fixed.append(np.concatenate([m.ddq[:, j] for m in motions]))
+    if constant:
+        fixed.append(rigid)
+    load = np.concatenate([c.load[:, j] for c in data.columns])
+    return Given(
+        y=torque if constant else torque - rigid,
+        fixed=np.stack(fixed, axis=1) if fixed else np.zeros((len(torque), 0)),
+        weights=np.concatenate([w[:, j] for w in weights]),
+        sources=data.columns,
+        loads=float(np.std(load)),
+        reverses=bool(data.excited.reverses[j]),
+    )
+
+
+def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array]:
+    """What the friction fits leave of each log; zero for joints that are held. (M, n) each"""
+    edges = np.cumsum([0, *(m.samples for m in data.motions)])
+    whole = np.zeros((edges[-1], data.robot.joints))
+    for j, fit in enumerate(fits):
+        if fit is not None:
+            whole[:, j] = fit.fit.residual
+    return [whole[a:b] for a, b in itertools.pairwise(edges)]
+
+
+def fitted(data: Training) -> tuple[list[JointFit | None], list[Array], list[str]]:
+    """Fit friction, leave out contacts, and fit again without them.
+
+    Returns:
+        The fits, the weights of every sample (M, n) a log, and remarks.
+
+    Raises:
+        IdentificationError: If the model misses most of the torque: another robot.
+    """
+    weights = [m.usable.astype(float) for m in data.motions]
+    fits = fit_frictions(data, weights)
+    left, notes, touched = all_residuals(data, fits), [], False
+    for k, (motion, residual) in enumerate(zip(data.motions, left, strict=True)):
+        dry = dry_friction(data, k, fits)
+        found = exciting.contacts(motion, residual, dry)
+        if not found:
+            continue
+        touched = True
+        weights[k] = weights[k] * exciting.without(motion, found)[:, None]
+        spans = ", ".join(
+            f"{c.start:.1f}–{c.stop:.1f} s (joint {c.joint}, {c.size:+.0f} N·m)" for c in found[:6]
+        )
+        more = f" and {len(found) - 6} more" if len(found) > 6 else ""
+        notes.append(
+            f"{motion.recording.name}: something seems to touch the arm at {spans}{more}; "
+            "left out of the fit"
+        )
+    if touched:
+        fits = fit_frictions(data, weights)
+        left = all_residuals(data, fits)
+    spread = np.std(np.concatenate([c.load for c in data.columns]), axis=0)
+    heavy = (spread > HEAVY * spread.max()) & data.excited.moves
+    for motion, residual, w in zip(data.motions, left, weights, strict=True):
+        exciting.check_robot(
+            motion.recording.name, data.robot.name, motion.tau, residual * (w > 0), heavy
+        )
+    return fits, weights, notes
+
+
+def dry_friction(data: Training, log: int, fits: Sequence[JointFit | None]) -> Array:
+    """Coulomb torque of each joint along a log, load included. (M, n) [N·m]"""
+    motion, columns = data.motions[log], data.columns[log]
+    out = np.zeros(motion.q.shape)
+    for j, fit in enumerate(fits):
+        if fit is not None:
+            values = dict(zip(fit.shape.terms, fit.fit.values, strict=False))
+            load = columns.load[motion.kept, j]
+            out[:, j] = values.get("coulomb", 0.0) + values.get("stribeck", 0.0)
+            out[:, j] += values.get("load_coulomb", 0.0) * load
+    return out
