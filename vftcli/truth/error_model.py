@@ -14,6 +14,9 @@ from vftcli.truth.zero_phase import band_pass, low_pass, passed
 STUCK = 0.3
 """A stop of this length leaves the whole of the dry friction open, a shorter one its share. [s]"""
 
+LEAST_BAND = 12.0
+"""Noise is not measured in a band about less than this: contacts live there. [Hz]"""
+
 LEAST_SHARE = 0.05
 """Share of the correction that is wrong even where the model is as good as it gets."""
 
@@ -137,12 +140,14 @@ def noise_of(t: Array, x: Array, moving: Flags, step: float, cutoff: float | Non
     """Noise of a difference. (n,) [N·m]
 
     Without a low-pass from second differences: for white noise of deviation σ on a smooth signal
-    x_{k−1} − 2x_k + x_{k+1} has √6·σ. With one, from the band about its cutoff, taken to be as
-    dense below.
+    x_{k−1} − 2x_k + x_{k+1} has √6·σ. With one, from the band about its cutoff, or about
+    `LEAST_BAND` if that is higher, because contacts fill what is below; taken to be as dense
+    throughout.
     """
     if cutoff is None:
         return white(x, moving)
-    limits = (0.6 * cutoff, min(1.2 * cutoff, 0.45 / step))
+    middle = max(cutoff, min(LEAST_BAND, 0.2 / step))
+    limits = (0.6 * middle, min(1.2 * middle, 0.45 / step))
     dense = rms(band_pass(t, x, *limits), moving) / np.sqrt(passed(step, limits, "bandpass"))
     return np.asarray(dense * np.sqrt(passed(step, cutoff, "lowpass")))
 

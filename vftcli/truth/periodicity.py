@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vftcli.arrays import Array
 from vftcli.errors import ReferenceTorqueError
@@ -18,6 +19,15 @@ RETURNS = 0.015
 
 A quarter: a soft servo is off its path while it is pushed, which may be most of the time.
 """
+
+SHORTLIST = 0.15
+"""A valley is worth refining if a quarter of the samples come back within this share."""
+
+CANDIDATES = 40
+"""Valleys looked at, the deepest ones."""
+
+MULTIPLES = 12
+"""Multiples of the period that refine it."""
 
 AROUND = 0.03
 """How far from a stated period the true one is looked for, relative: clocks drift."""
@@ -53,18 +63,18 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     t, q = moving_part(recording)
     check_stated(recording, stated, float(t[-1] - t[0]))
     step = recording.step
-    even = np.arange(t[0], t[-1], step)
-    x = resampled(even, t, q)
-    candidates = valleys(distances(x), x, step, stated)
+    x = resampled(np.arange(t[0], t[-1], step), t, q)
     spread = float(np.sqrt(np.mean((x - x.mean(axis=0)) ** 2) * x.shape[1]))
-    found = [(lag, returned(x, lag)) for lag in candidates]
-    good = [c for c in found if c[1] <= RETURNS * spread]
-    if not good:
-        raise ReferenceTorqueError(no_repetition(recording, found, step, stated))
-    closest = min(deviation for _, deviation in good)
-    lag = next(k for k, deviation in good if deviation <= max(3.0 * closest, 0.01 * spread))
-    seconds = refined_period(t, q, lag * step)
-    return Period(seconds, returned(x, max(1, round(seconds / step))))
+    closest = (float("nan"), float("inf"))
+    for lag in valleys(distances(x), len(x), step, stated):
+        seconds, deviation = lag * step, returned(t, q, lag * step)
+        if deviation <= SHORTLIST * spread:
+            seconds = refined_period(t, q, seconds)
+            deviation = returned(t, q, seconds)
+        if deviation <= RETURNS * spread:
+            return Period(seconds, deviation)
+        closest = min(closest, (seconds, deviation), key=lambda c: c[1])
+    raise ReferenceTorqueError(no_repetition(recording, closest, stated))
 
 
 def check_stated(recording: Recording, stated: float | None, duration: float) -> None:
@@ -123,66 +133,75 @@ def distances(x: Array) -> Array:
     return mean
 
 
-def valleys(distance: Array, x: Array, step: float, stated: float | None) -> list[int]:
-    """Lags at local minima of the distance that leave enough overlap, nearest first. [samples]"""
-    last = int((1.0 - LEAST_REPEATED) * len(x))
-    low, high = 4, last
+def valleys(distance: Array, samples: int, step: float, stated: float | None) -> list[float]:
+    """Lags at local minima of the distance that leave enough overlap, shortest first. [samples]"""
+    low, high = 4, int((1.0 - LEAST_REPEATED) * samples)
     if stated is not None:
         low = max(2, int(np.floor((1.0 - AROUND) * stated / step)))
-        high = min(last, int(np.ceil((1.0 + AROUND) * stated / step)) + 1)
+        high = min(high, int(np.ceil((1.0 + AROUND) * stated / step)) + 1)
     lags = np.arange(low, max(high, low + 1))
-    inner = distance[lags]
-    before, after = distance[lags - 1], distance[np.minimum(lags + 1, len(distance) - 1)]
-    found = lags[(inner <= before) & (inner <= after)]
+    before, here, after = distance[lags - 1], distance[lags], distance[lags + 1]
+    found = lags[(here <= before) & (here <= after)]
     if stated is not None and not len(found):
-        found = lags[[int(np.argmin(inner))]]
-    deep = found[np.argsort(distance[found])[:40]]
-    return [int(lag) for lag in np.sort(deep)]
+        found = lags[[int(np.argmin(here))]]
+    deep = np.sort(found[np.argsort(distance[found])[:CANDIDATES]])
+    bend = distance[deep - 1] - 2.0 * distance[deep] + distance[deep + 1]
+    tilt = 0.5 * (distance[deep - 1] - distance[deep + 1])
+    return [float(x) for x in deep + np.clip(tilt / np.where(bend > 0, bend, np.inf), -0.5, 0.5)]
 
 
-def returned(x: Array, lag: int) -> float:
-    """Lower quartile over time of the distance between x and itself `lag` samples later. [rad]"""
-    return float(np.quantile(np.sqrt(np.sum((x[lag:] - x[:-lag]) ** 2, axis=1)), 0.25))
+def returned(t: Array, q: Array, seconds: float) -> float:
+    """Lower quartile over time of the distance between q and itself `seconds` later. [rad]"""
+    inside = t + seconds <= t[-1]
+    distance = resampled(t[inside] + seconds, t, q) - q[inside]
+    return float(np.quantile(np.sqrt(np.sum(distance**2, axis=1)), 0.25))
 
 
 def refined_period(t: Array, q: Array, period: float) -> float:
     """Refine a period below the sample time, on the log's own clock. [s]
 
-    Gauss–Newton on q(t + mP) = q(t) for every multiple m the log holds, each joint weighted by its
-    own spread, samples by Cauchy's weight, so that pushes do not pull the period.
+    Gauss–Newton on q(t + mP) = q(t), first for m = 1, then for up to `MULTIPLES` multiples the log
+    holds, each joint weighted by its own spread, samples by Cauchy's weight, so that pushes do not
+    pull the period.
     """
-    dq = np.gradient(q, t, axis=0)
-    for _ in range(20):
-        move, weight = 0.0, 0.0
-        for m in range(1, max(1, int((t[-1] - t[0]) / period - LEAST_REPEATED)) + 1):
-            there = t + m * period
-            inside = there <= t[-1]
-            distance = resampled(there[inside], t, q) - q[inside]
-            slope = m * resampled(there[inside], t, dq)
-            scale = 1.4826 * np.median(np.abs(distance), axis=0) + 1e-7
-            share = 1.0 / (scale**2 + distance**2)
-            move += float(np.sum(share * slope * distance))
-            weight += float(np.sum(share * slope**2))
-        change = move / weight
-        period -= change
-        if abs(change) < 1e-9 * period:
-            break
+    last = max(1, int((t[-1] - t[0]) / period - LEAST_REPEATED))
+    several = np.unique(np.linspace(1, last, min(last, MULTIPLES)).astype(int))
+    for multiples in (several[:1], several):
+        for _ in range(20):
+            change = period_step(t, q, period, multiples)
+            period -= change
+            if abs(change) < 1e-9 * period:
+                break
     return period
 
 
-def no_repetition(
-    recording: Recording, found: list[tuple[int, float]], step: float, stated: float | None
-) -> str:
+def period_step(t: Array, q: Array, period: float, multiples: NDArray[np.int64]) -> float:
+    """How far a period is off, to first order, over some of its multiples. [s]"""
+    dq = np.gradient(q, t, axis=0)
+    move = weight = 0.0
+    for m in multiples:
+        there = t + m * period
+        inside = there <= t[-1]
+        distance = resampled(there[inside], t, q) - q[inside]
+        slope = m * resampled(there[inside], t, dq)
+        scale = 1.4826 * np.median(np.abs(distance), axis=0) + 1e-7
+        share = 1.0 / (scale**2 + distance**2)
+        move += float(np.sum(share * slope * distance))
+        weight += float(np.sum(share * slope**2))
+    return float(np.clip(move / weight, -0.1 * period, 0.1 * period)) if weight > 0 else 0.0
+
+
+def no_repetition(recording: Recording, closest: tuple[float, float], stated: float | None) -> str:
     """One line on why no period was found."""
     wanted = f" near {stated:g} s" if stated is not None else ""
-    closest = ""
-    if found:
-        lag, deviation = min(found, key=lambda c: c[1])
-        closest = (
-            f" (closest after {lag * step:.4g} s, where three quarters of them are more than "
+    seconds, deviation = closest
+    near = ""
+    if np.isfinite(deviation):
+        near = (
+            f" (closest after {seconds:.4g} s, where three quarters of them are more than "
             f"{deviation:.2g} rad off)"
         )
     return (
         f"{recording.name}: no repetition found{wanted}: the joint positions do not return within "
-        f"the log{closest}; give a free run of the same motion with --free"
+        f"the log{near}; give a free run of the same motion with --free"
     )

@@ -1,0 +1,90 @@
+"""Equal footing: what --match promises, read back from the observers themselves."""
+
+import numpy as np
+import pytest
+
+from vftcli.dynamics.terms import DynamicsTerms
+from vftcli.errors import ParameterError
+from vftcli.observers import DEFAULT, Setup, build_observers
+from vftcli.observers.matching import matched
+from vftcli.observers.observer import Observer
+
+GAINS = {
+    "fdo": {"omega": 10.0},
+    "gmo": {"gain": [5.0, 3.0, 4.0]},
+    "kfo": {"r_diag": [0.5, 0.5, 1.3], "q_p_diag": [0.01, 0.01, 0.02], "q_tau_diag": 5000.0},
+}
+
+
+def setup(step: float = 0.008, **changed: object) -> Setup:
+    given = {"gains": GAINS, "settings": {}, "joints": 3, "step": step, "as_printed": False}
+    return Setup(**(given | changed))  # type: ignore[arg-type]
+
+
+def tuned(goal: str, step: float = 0.008, convention: str | None = None) -> list[Observer]:
+    settings = {"kfo": {"noise_convention": convention}} if convention else {}
+    how = setup(step, settings=settings)
+    return list(matched(build_observers(DEFAULT, how)[0], goal, how)[0])
+
+
+@pytest.mark.parametrize("step", [0.001, 0.008])
+@pytest.mark.parametrize("convention", ["density", "discrete", "literal"])
+@pytest.mark.parametrize("delay", [0.02, 0.1, 0.5])
+def test_the_same_delay_on_every_joint(delay: float, convention: str, step: float) -> None:
+    for observer in tuned(f"delay={delay}", step, convention):
+        found = observer.tuning(step, 3).delay
+        assert found == pytest.approx(np.full(3, delay), rel=1e-9), observer.name
+
+
+@pytest.mark.parametrize("step", [0.001, 0.008])
+@pytest.mark.parametrize("hertz", [0.5, 5.0, 20.0])
+def test_the_same_bandwidth_on_every_joint(hertz: float, step: float) -> None:
+    for observer in tuned(f"bandwidth={hertz}", step):
+        gain = np.abs(observer.frequency_response(np.array([hertz]), step, 3))
+        assert gain[0] == pytest.approx(np.full(3, np.sqrt(0.5)), rel=1e-9), observer.name
+
+
+def test_a_ramp_lags_by_the_matched_delay() -> None:
+    """τ_ext = t: after the transient every estimate is t − delay."""
+    t = np.arange(0.0, 6.0, 0.008)
+    p = np.repeat(0.5 * t[:, None] ** 2, 3, axis=1)
+    terms = DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))
+    for observer in tuned("delay=0.08"):
+        lag = t[-1] - observer.estimate(terms).tau[-1]
+        # 6 s are 75 time constants; what is left is rounding of p ≈ 18.
+        assert lag == pytest.approx(np.full(3, 0.08), abs=1e-9), observer.name
+
+
+def test_matched_fdo_and_gmo_are_one_filter() -> None:
+    """Required to 1e-6; they are identical to rounding."""
+    rng = np.random.default_rng(5)
+    t = np.arange(0.0, 8.0, 0.008)
+    p, mu = (np.cumsum(rng.standard_normal((len(t), 3)), axis=0) for _ in range(2))
+    terms = DynamicsTerms(t=t, p=p, mu=mu)
+    fdo, gmo = (o.estimate(terms).tau for o in tuned("delay=0.05")[:2])
+    assert np.max(np.abs(fdo - gmo)) < 1e-10 * np.max(np.abs(p)) / 0.05
+    _, notes = matched(build_observers(DEFAULT, setup())[0], "delay=0.05", setup())
+    assert "one and the same filter" in notes[0]
+
+
+@pytest.mark.parametrize(
+    ("goal", "message"),
+    [
+        ("delay", "delay=S"),
+        ("speed=3", "bandwidth=HZ"),
+        ("delay=-1", "positive"),
+        ("delay=nan", "positive"),
+        ("delay=0.002", "more than half a sample"),
+        ("bandwidth=200", "half the sample rate"),
+    ],
+)
+def test_goals_out_of_reach(goal: str, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        tuned(goal)
+
+
+def test_printed_formulas_are_not_matched() -> None:
+    how = setup(as_printed=True)
+    observers, _ = build_observers(DEFAULT, how)
+    with pytest.raises(ParameterError, match="--as-printed"):
+        matched(observers, "delay=0.05", how)
