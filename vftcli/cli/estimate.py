@@ -43,7 +43,8 @@ def estimate(
     from vftcli.readers import read
 
     extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
-    signals = None if wrench or extras else ("dq", "current", "torque")
+    of_wrench = (wrench, frame, solver, tool, sensor_pose, zero, sensor_weight, torque_sd)
+    signals = None if any(of_wrench) or extras else ("dq", "current", "torque")
     reading = Meanwhile(lambda: read(log, format=format_, columns=columns, signals=signals))
 
     from vftcli.cli.asking import command_line, say, say_notes, say_recording
@@ -62,9 +63,7 @@ def estimate(
         friction=friction,
         payload=payload,
         as_printed=as_printed,
-        wrench=wrench_request(
-            wrench, frame, solver, tool, sensor_pose, zero, sensor_weight, torque_sd
-        ),
+        wrench=wrench_request(*of_wrench),
     )
     recording = cut(reading.result(), request)
     analysis = analyse(recording, choose_robot(request, recording), request)

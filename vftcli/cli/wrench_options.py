@@ -41,8 +41,12 @@ def wrench_request(
             continue
         if Path(text).exists():
             logs.append(Path(text))
-        else:
+        elif ":" in text:
             spans.append(parse_interval(text))
+        else:
+            raise ParameterError(
+                f"--zero {text!r} is neither A:B in seconds, nor start, nor a log that exists"
+            )
     start = START in (zero or ())
     if len(logs) > 1 or (spans and start):
         raise ParameterError("--zero takes one free run, and either start or spans A:B")

@@ -110,7 +110,8 @@ def line_groups(analysis: Analysis) -> dict[str, list[Lines]]:
             joint_lines("residual", analysis, j, None, reference.tau[:, j]) for j in joints
         ]
     if analysis.wrenches:
-        groups["Wrench"] = [wrench_lines(analysis, k) for k in range(len(AXES))]
+        axes = [wrench_lines(analysis, k) for k in range(len(AXES))]
+        groups["Wrench"] = [*axes, *condition_lines(analysis)]
     return {**groups, "Motion": motion_lines(analysis)}
 
 
@@ -169,6 +170,27 @@ def wrench_lines(analysis: Analysis, k: int) -> Lines:
         [1.5 if wrench.name in colours else 2.5 for wrench in found],
         np.column_stack([wrench.known[:, k] for wrench in found]),
     )
+
+
+def condition_lines(analysis: Analysis) -> list[Lines]:
+    """What the pose can tell, and the torque that no wrench at the flange explains."""
+    colours = colours_of(analysis.estimates)
+    wrenches = [wrench for wrench in analysis.wrenches if wrench.name in colours]
+    found = []
+    sigma = next((w.sigma_min for w in wrenches if w.sigma_min is not None), None)
+    if sigma is not None and analysis.virtual_sensor is not None:
+        least = np.full_like(sigma, analysis.virtual_sensor.sensor.least_sigma)
+        names, shades = ["σ_min", "masked below"], [REFERENCE, SPARE[0]]
+        values = np.column_stack([sigma, least])
+        title = "σ_min of J, angular rows × 0.3 m [m]"
+        found.append(Lines("/wrench/sigma_min", title, names, shades, [1.5, 1.0], values))
+    left = {w.name: w.null_space for w in wrenches if w.null_space is not None}
+    if left:
+        shades, widths = [colours[name] for name in left], [1.5] * len(left)
+        title = "torque that no wrench at the flange explains [N·m]"
+        values = np.column_stack(list(left.values()))
+        found.append(Lines("/wrench/null_space", title, list(left), shades, widths, values))
+    return found
 
 
 def motion_lines(analysis: Analysis) -> list[Lines]:

@@ -1,1 +1,1 @@
-"""Wrench."""
+"""The virtual force/torque sensor: torques to wrenches, frames, zero drift, sensors, contacts."""

@@ -29,6 +29,9 @@ from vftcli.wrench.zero import (
     zero_drift,
 )
 
+PAYLOAD_SLACK = 0.05
+"""Difference of payloads that is not worth a remark. [kg]"""
+
 FIT = "fit"
 """The word for a sensor pose that is to be estimated from the log."""
 
@@ -166,7 +169,11 @@ def measure(
     drifts = tuple(zero_drift(wrench, span) for span in spans for wrench in wrenches)
     warnings = tuple(w for drift in drifts if (w := warned(wrenches, drift)))
     free = free_samples(recording.t, spans or found)
-    notes = [*mask_note(recording, wrenches), *drift_notes(drifts, len(wrenches))]
+    notes = [
+        *payload_note(recording, robot),
+        *mask_note(recording, wrenches),
+        *drift_notes(drifts, len(wrenches)),
+    ]
     notes += band_notes(error, wrenches)
     if unloaded is not None:
         notes.append(unloaded.note)
@@ -329,6 +336,19 @@ def free_samples(t: Array, spans: Spans) -> Mask:
 def warned(wrenches: Sequence[Wrench], drift: Drift) -> str:
     """A warning if the zero interval looks like a contact, else ""."""
     return loaded_zero(next(w for w in wrenches if w.name == drift.name), drift)
+
+
+def payload_note(recording: Recording, robot: Robot) -> tuple[str, ...]:
+    """A remark where the controller was told of another load than the robot's file mounts."""
+    told = recording.payload_mass
+    mounted_mass = robot.payload.mass if robot.payload is not None else 0.0
+    if told is None or abs(told - mounted_mass) < PAYLOAD_SLACK:
+        return ()
+    return (
+        f"the controller was told of a payload of {told:.3g} kg, the robot file mounts "
+        f"{mounted_mass:.3g} kg: the difference of {9.81 * (told - mounted_mass):.3g} N reads as a "
+        "force; mount it with [payload] or --payload NAME, or remove it with --zero",
+    )
 
 
 def mask_note(recording: Recording, wrenches: Sequence[Wrench]) -> tuple[str, ...]:
