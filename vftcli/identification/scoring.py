@@ -8,7 +8,7 @@ from vftcli.arrays import Array
 from vftcli.dynamics.friction import friction_torque
 from vftcli.identification.excitation import SLOW
 from vftcli.identification.least_squares import fit_column
-from vftcli.identification.processing import Motion, gravity_torque
+from vftcli.identification.processing import Motion, Samples, gravity_torque
 from vftcli.identification.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 
@@ -17,6 +17,9 @@ EXPLAINS = 0.4
 
 HEAVY = 0.3
 """Smallest load that is remarked on. [kg]"""
+
+TOLD = 50
+"""Samples in motion that a remark on friction needs."""
 
 WORSE = 1.5
 """A held-out joint whose residual is this many times the training's is remarked on."""
@@ -69,8 +72,19 @@ def diagnosis(robot: Robot, motion: Motion, residual: Array, trained: Array) -> 
             f"{name}: the residual looks like {mass:+.2f} kg on the flange "
             f"({100 * explained:.0f} % of it); find the load with --find-payload"
         ]
-    remarks = [rubbing(motion, residual, j, sizes[j], trained[j]) for j in worse]
+    resting = [int(j) for j in worse if np.count_nonzero(in_motion(motion, int(j))) < TOLD]
+    moving = [int(j) for j in worse if int(j) not in resting]
+    remarks = [rubbing(motion, residual, j, float(sizes[j]), float(trained[j])) for j in moving]
+    if resting:
+        names = ", ".join(str(j + 1) for j in resting)
+        remarks.append(f"joints that rest ({names}) keep what stiction holds; they say nothing")
     return [f"{name}: {text}" for text in remarks]
+
+
+def in_motion(motion: Motion, j: int) -> Samples:
+    """Where a joint moves fast enough to tell its friction. (M,)"""
+    moving: Samples = motion.usable[:, j] & (np.abs(motion.dq[:, j]) > SLOW)
+    return moving
 
 
 def apparent_load(robot: Robot, motion: Motion, residual: Array) -> tuple[float, float]:
@@ -86,12 +100,10 @@ def apparent_load(robot: Robot, motion: Motion, residual: Array) -> tuple[float,
 
 
 def rubbing(motion: Motion, residual: Array, j: int, size: float, trained: float) -> str:
-    """How a joint's residual differs from the training's: at rest, by friction, or unexplained."""
+    """How a moving joint's residual differs from the training's: by friction, or unexplained."""
     text = f"joint {j + 1} leaves {size:.2f} N·m, {size / trained:.1f} × the training's"
     dq = motion.recording.require("dq")[:, j]
-    used = motion.usable[:, j] & (np.abs(motion.dq[:, j]) > SLOW)
-    if np.count_nonzero(used) < 50:
-        return f"{text}; it rests in this log, and stiction holds what it will"
+    used = in_motion(motion, j)
     sign = np.tanh(dq / 0.01)
     A = np.column_stack([motion.filtered(np.column_stack([sign, dq])), np.ones(motion.samples)])
     fit = fit_column(A, residual[:, j], used.astype(float))
