@@ -1,0 +1,92 @@
+"""The command line of the virtual sensor, on the circle of the repository's own fixture."""
+
+import json
+import sys
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from vftcli.cli import main
+
+CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
+COMMON = [str(CIRCLE), "--robot", "ur5", "--observer", "gmo"]
+
+
+def run(monkeypatch, capsys, *words: str) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of a command."""
+    monkeypatch.setattr(sys, "argv", ["vftcli", *words])
+    code = 0
+    try:
+        main()
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_estimate_writes_the_wrench_and_nulls_what_the_pose_cannot_tell(
+    monkeypatch, capsys, tmp_path
+) -> None:
+    words = ("--wrench", "--frame", "base", "-o", str(tmp_path / "out"))
+    code, _, err = run(monkeypatch, capsys, "estimate", *COMMON, *words)
+    assert code == 0, err
+    table = pl.read_parquet(tmp_path / "out" / "estimates.parquet")
+    axes = [f"wrench/gmo/{axis}" for axis in ("fx", "fy", "fz", "mx", "my", "mz")]
+    masked = table.filter(pl.col("sigma_min") < 0.05)
+    clear = table.filter(pl.col("sigma_min") >= 0.05)
+    assert len(clear) > 0
+    for axis in axes:
+        assert masked[axis].null_count() == len(masked)
+        assert clear[axis].null_count() == 0
+    record = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
+    assert record["wrench"]["frame"] == "base"
+    assert "ON the robot" in record["wrench"]["meaning"]
+
+
+@pytest.mark.parametrize("option", [("--frame", "base"), ("--solver", "map"), ("--zero", "1:3")])
+def test_any_wrench_option_asks_for_the_wrench(monkeypatch, capsys, tmp_path, option) -> None:
+    code, _, err = run(monkeypatch, capsys, "estimate", *COMMON, *option, "-o", str(tmp_path))
+    assert code == 0, err
+    assert "wrench/gmo/fx" in pl.read_parquet_schema(tmp_path / "estimates.parquet")
+
+
+def test_without_one_there_is_none(monkeypatch, capsys, tmp_path) -> None:
+    code, _, err = run(monkeypatch, capsys, "estimate", *COMMON, "-o", str(tmp_path))
+    assert code == 0, err
+    assert not [n for n in pl.read_parquet_schema(tmp_path / "estimates.parquet") if "wrench" in n]
+
+
+def test_compare_adds_one_row_an_axis(monkeypatch, capsys) -> None:
+    words = ("compare", *COMMON, "--reference", "zero", "--interval", "1:4", "--wrench", "--json")
+    code, out, err = run(monkeypatch, capsys, *words)
+    assert code == 0, err
+    rows = {row["axis"]: row for row in json.loads(out) if row.get("axis")}
+    assert list(rows) == ["fx", "fy", "fz", "mx", "my", "mz"]
+    for axis, row in rows.items():
+        unit, other = ("rmse_N", "rmse_Nm") if axis.startswith("f") else ("rmse_Nm", "rmse_N")
+        assert row[unit] > 0
+        assert row[other] is None
+        assert row["observer"] == "gmo"
+        assert row["samples"] > 0
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (("--frame", "wrist"), "no frame 'wrist' for a wrench; there is flange"),
+        (("--frame", "tool"), "the robot has no tool"),
+        (("--solver", "svd"), "no solver 'svd'"),
+        (("--zero", "500:600"), "lies outside the log"),
+        (("--frame", "sensor", "--sensor-pose", "0,0,0,2,0,0,0,1,0,0,0,1"), "not a rotation"),
+    ],
+)
+def test_bad_options_are_one_line_and_leave_nothing(
+    monkeypatch, capsys, tmp_path, option, words
+) -> None:
+    out = tmp_path / "out"
+    code, _, err = run(monkeypatch, capsys, "estimate", *COMMON, *option, "-o", str(out))
+    assert code == 1
+    assert words in err
+    assert len(err.strip().splitlines()) == 1
+    assert not out.exists()
