@@ -17,7 +17,7 @@ LAYERS = [
     ("dynamics",),
     ("observers", "wrench", "doctor"),
     ("truth",),
-    ("evaluation", "identification", "simulation", "published"),
+    ("evaluation", "identification", "simulation", "published", "offline"),
     ("analysis",),
     ("admittance",),
     ("outputs",),

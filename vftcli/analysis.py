@@ -14,6 +14,7 @@ from vftcli.robots.robot import Robot
 from vftcli.torque import ExternalTorque
 
 if TYPE_CHECKING:
+    from vftcli.offline.workup import Workup
     from vftcli.published import Comparison
     from vftcli.wrench.detection import Told
     from vftcli.wrench.measurement import Measurement
@@ -36,6 +37,8 @@ class Analysis:
         virtual_sensor: The wrenches and what is known of them, or None where none was asked for.
         contacts: How each observer tells contacts, or empty where it was not asked.
         published: A printed table beside these errors, or None where none was asked for.
+        workup: What the complete log told, its free part, spectra and limits, or None where nothing
+            asked for it.
         notes: What the reader of the numbers should know, one sentence each.
         run: The command, versions and conventions, as `run.json` holds them.
     """
@@ -51,6 +54,7 @@ class Analysis:
     virtual_sensor: "Measurement | None" = None
     contacts: "tuple[Told, ...]" = ()
     published: "Comparison | None" = None
+    workup: "Workup | None" = None
     notes: tuple[str, ...] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
 

@@ -1,19 +1,28 @@
 """The whole way from a log to its numbers, in the order the data flows."""
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from vftcli.dynamics.terms import dynamics_terms
 from vftcli.errors import ParameterError, RobotError
-from vftcli.observers import DEFAULT, Observer, Setup, build_observers, observer_settings
+from vftcli.observers import (
+    DEFAULT,
+    OBSERVERS,
+    Observer,
+    Setup,
+    build_observers,
+    observer_settings,
+)
 from vftcli.recording import Recording
 from vftcli.robots import PROFILES, Robot, load_robot
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.dynamics.terms import DynamicsTerms
+    from vftcli.offline.survey import Survey
     from vftcli.torque import ExternalTorque
     from vftcli.wrench.detection import Told
     from vftcli.wrench.frames import Mounting
@@ -46,6 +55,10 @@ class Request:
         match: ``delay=S`` or ``bandwidth=HZ`` for all observers alike, or None.
         contacts: Whether to judge each observer's contacts by the reference's.
         wrench: What is asked of the virtual force/torque sensor, None for joint torques alone.
+        free_part: Span of the log that is free of contact, ``A:B`` in seconds, or None to find it.
+        bands: Whether to measure on the free part how far the estimates may be off.
+        remove_bias: "none", "free-cycle" or "model".
+        gains_file: A file of gains that go before the robot's own, or None.
     """
 
     format: str | None = None
@@ -67,6 +80,16 @@ class Request:
     match: str | None = None
     contacts: bool = False
     wrench: "WrenchRequest | None" = None
+    free_part: str | None = None
+    bands: bool = False
+    remove_bias: str = "none"
+    gains_file: Path | None = None
+
+    @property
+    def looks_back(self) -> bool:
+        """Whether anything is asked that needs the complete log and its free part."""
+        tuned = any(name in OBSERVERS and OBSERVERS[name].from_spectra for name in self.observers)
+        return tuned or self.bands or self.remove_bias != "none" or self.free_part is not None
 
 
 def open_log(path: Path, request: Request) -> Recording:
@@ -126,15 +149,16 @@ def choose_robot(request: Request, recording: Recording) -> Robot:
 
 
 def choose_observers(
-    request: Request, robot: Robot, recording: Recording
+    request: Request, robot: Robot, recording: Recording, survey: "Survey | None" = None
 ) -> tuple[tuple[Observer, ...], tuple[str, ...]]:
     """Build the observers that are asked for, with notes on gains that nobody gave."""
     setup = Setup(
-        gains=robot.gains,
+        gains=chosen_gains(request, robot),
         settings=observer_settings(request.settings),
         joints=robot.joints,
         step=recording.step,
         as_printed=request.as_printed,
+        spectra=survey.spectra if survey is not None else None,
     )
     observers, notes = build_observers(request.observers, setup)
     if request.match is None:
@@ -145,13 +169,50 @@ def choose_observers(
     return observers, (*notes, *remarks)
 
 
+def chosen_gains(request: Request, robot: Robot) -> Mapping[str, Mapping[str, Any]]:
+    """The robot's gains, those of a gains file put over them."""
+    if request.gains_file is None:
+        return robot.gains
+    from vftcli.observers import sections
+    from vftcli.observers.gains_file import layered, load_gains
+
+    return layered(robot.gains, load_gains(request.gains_file, sections()))
+
+
+def look_over(
+    recording: Recording, robot: Robot, terms: "DynamicsTerms", request: Request
+) -> "Survey | None":
+    """The log's free part and spectra, None where nothing asks for them."""
+    if not request.looks_back:
+        return None
+    from vftcli.offline.bias import check_removal
+    from vftcli.offline.survey import Asked, survey
+
+    check_removal(request.remove_bias)
+    asked = Asked(
+        span=parse_interval(request.free_part) if request.free_part is not None else None,
+        runs=tuple(open_log(path, without_interval(request)) for path in request.free),
+        period=request.period if not request.free else None,
+        free_cycles=request.free_cycles,
+    )
+    return survey(recording, robot, terms, asked)
+
+
 def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
     """Go from a recording to estimates and, if a reference is asked for, their errors."""
     from vftcli.analysis import Analysis
 
     terms = dynamics_terms(recording, robot, literal=request.as_printed)
-    observers, notes = choose_observers(request, robot, recording)
+    survey = look_over(recording, robot, terms, request)
+    observers, notes = choose_observers(request, robot, recording, survey)
     estimates = tuple(observer.estimate(terms) for observer in observers)
+    workup = None
+    if survey is not None:
+        from vftcli.offline.workup import work_up
+
+        removal = request.remove_bias
+        estimates, workup = work_up(survey, recording, robot, observers, estimates, removal)
+        notes = (*notes, *workup.notes)
     tunings = {o.name: o.tuning(recording.step, robot.joints) for o in observers}
     measured, mounting, sensed = sense(recording, robot, estimates, request, terms, observers)
     reference, errors = None, None
@@ -160,7 +221,8 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
         from vftcli.evaluation import evaluate, with_wrenches
         from vftcli.truth.reference import ReferenceRequest, make_reference
 
-        free = tuple(open_log(path, without_interval(request)) for path in request.free)
+        wanted = request.free if request.reference == "two-cycle" or survey is None else ()
+        free = tuple(open_log(path, without_interval(request)) for path in wanted)
         asked = ReferenceRequest(
             name=request.reference,
             free=free,
@@ -197,6 +259,7 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
         errors=errors,
         virtual_sensor=measured,
         contacts=contacts,
+        workup=workup,
         notes=(*notes, *printed_note(request)),
     )
 
@@ -217,7 +280,7 @@ def sense(
     from vftcli.wrench.torque_error import Disturbance
 
     mounting, notes = placed(recording, robot, estimates, request.wrench)
-    unloaded = unloaded_run(recording, robot, request)
+    unloaded = unloaded_run(recording, robot, request, observers)
     free = unloaded.terms if unloaded is not None else None
     raw = Disturbance(terms=terms, observers=observers, free=free)
     measured = measure(recording, robot, estimates, request.wrench, unloaded, mounting, raw)
@@ -227,7 +290,9 @@ def sense(
     return replace(measured, notes=(*notes, *measured.notes)), mounting, recording
 
 
-def unloaded_run(recording: Recording, robot: Robot, request: Request) -> "Unloaded | None":
+def unloaded_run(
+    recording: Recording, robot: Robot, request: Request, observers: tuple[Observer, ...]
+) -> "Unloaded | None":
     """What the observers read in the free run of ``--zero LOG``, None if none is given.
 
     Where it is the same trajectory, their torque at the same place of it is taken; else its mean.
@@ -240,7 +305,6 @@ def unloaded_run(recording: Recording, robot: Robot, request: Request) -> "Unloa
 
     free = open_log(request.wrench.zero_log, without_interval(request))
     terms = dynamics_terms(free, robot, literal=request.as_printed)
-    observers, _ = choose_observers(request, robot, free)
     estimates = tuple(observer.estimate(terms) for observer in observers)
     shift: float | None = None
     with suppress(ReferenceTorqueError):

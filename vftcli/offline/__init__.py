@@ -1,0 +1,1 @@
+"""Estimates only a complete log allows: its free part tells noise, bias, bands and best gains."""

@@ -1,0 +1,123 @@
+"""A log's free part and spectra, and what they make of the observers' estimates."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vftcli.arrays import Array, frozen
+from vftcli.dynamics.terms import DynamicsTerms, dynamics_terms
+from vftcli.errors import ParameterError, ReferenceTorqueError
+from vftcli.observers.observer import Observer
+from vftcli.observers.spectra import Part, Spectra, spectra_of
+from vftcli.offline.free_part import Asked, Flags, FreePart, find_free_part
+from vftcli.recording import Recording
+from vftcli.robots.robot import Robot
+from vftcli.torque import ExternalTorque
+from vftcli.truth.rest import at_rest, stops
+
+QUIETER = 0.3
+"""The loaded part must have this share of its power beyond the free one's on some joint."""
+
+RESTS = 0.5
+"""A joint that rests in more than this share of the samples is limited by stiction."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Survey:
+    """What a log shows of itself before any observer has run.
+
+    Attributes:
+        terms: p and μ of the log.
+        part: Its free part, None where there is none.
+        run_terms: p and μ of the free runs in other logs.
+        spectra: Spectra of the raw disturbance, None where the free part is too short or not free.
+        rest: 1 where a joint rests. (T, n)
+        notes: What was found, and what was not and why.
+    """
+
+    terms: DynamicsTerms
+    part: FreePart | None
+    run_terms: tuple[DynamicsTerms, ...] = ()
+    spectra: Spectra | None = None
+    rest: Array
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rest", frozen(self.rest))
+
+    @property
+    def stuck(self) -> Array:
+        """1 for a joint that rests in most samples, where stiction decides. (n,)"""
+        return np.asarray(self.rest.mean(axis=0) > RESTS, dtype=np.float64)
+
+
+def survey(recording: Recording, robot: Robot, terms: DynamicsTerms, asked: Asked) -> Survey:
+    """Find the free part of a log and its spectra, or say why there are none."""
+    rest = at_rest(recording.t, stops(recording.t, recording.require("dq")))
+    try:
+        part = find_free_part(recording, robot, asked)
+    except ReferenceTorqueError as error:
+        why = f"no free part: {error}. State one with --free-part A:B or --free LOG"
+        return Survey(terms=terms, part=None, rest=rest, notes=(why,))
+    run_terms = tuple(dynamics_terms(run, robot) for run in part.runs)
+    found = Survey(terms=terms, part=part, run_terms=run_terms, rest=rest, notes=(part.note,))
+    try:
+        spectra = spectra_of(Part(terms, ~part.inside), free_samples(found))
+    except ParameterError as error:
+        return replace(found, notes=(part.note, f"no spectra: {error}"))
+    if stated(asked) or looks_free(spectra):
+        return replace(found, spectra=spectra)
+    return replace(found, notes=(part.note, not_free(recording)))
+
+
+def free_samples(found: Survey) -> list[Part]:
+    """The free part's terms and samples, of the log itself or of the free runs."""
+    if found.run_terms:
+        return [Part(terms, np.ones(terms.samples, dtype=bool)) for terms in found.run_terms]
+    inside = found.part.inside if found.part is not None else np.zeros(found.terms.samples, bool)
+    return [Part(found.terms, inside)]
+
+
+def stated(asked: Asked) -> bool:
+    """Whether the user said what is free; then nothing is doubted."""
+    return asked.span is not None or bool(asked.runs) or asked.free_cycles is not None
+
+
+def looks_free(spectra: Spectra) -> bool:
+    """Whether some joint has clearly less power in the free part than in the loaded one."""
+    power = np.maximum(spectra.loaded.sum(axis=0), np.finfo(float).tiny)
+    return bool(np.max(spectra.external.sum(axis=0) / power) > QUIETER)
+
+
+def not_free(recording: Recording) -> str:
+    """One line on a free part that is as loud as the rest."""
+    return (
+        f"{recording.name}: the free part is as loud as the rest, so either nothing touches the "
+        "arm at all or something always does; nothing is tuned on it. State the free part with "
+        "--free-part A:B or --free LOG"
+    )
+
+
+def free_estimates(
+    found: Survey, observer: Observer, estimate: ExternalTorque
+) -> tuple[ExternalTorque, ...]:
+    """What an observer reads in the free runs, or its estimate of the log where that is free."""
+    if found.run_terms:
+        return tuple(observer.estimate(terms) for terms in found.run_terms)
+    return (estimate,)
+
+
+def free_rms(found: Survey, estimates: Sequence[ExternalTorque]) -> Array:
+    """Root mean square of an estimator's own output on the free part, bias included. (n,) [N·m]"""
+    parts = free_samples(found)
+    rows = [e.tau[part.inside] for e, part in zip(estimates, parts, strict=True)]
+    return np.asarray(np.sqrt(np.nanmean(np.concatenate(rows) ** 2, axis=0)))
+
+
+def stuck_joints(found: Survey) -> tuple[str, ...]:
+    """The names of the joints that rest, as J5."""
+    return tuple(f"J{j + 1}" for j in np.flatnonzero(found.stuck))
+
+
+__all__ = ["Asked", "Flags", "Survey", "free_estimates", "free_rms", "stuck_joints", "survey"]
