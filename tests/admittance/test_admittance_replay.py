@@ -131,7 +131,7 @@ def test_start_outside_the_limits_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"joint 6 is at 7 rad and may be -6\.283 to 6\.283"):
         run(replace(record, q=q))
     p = parameters()
-    with pytest.raises(ParameterError, match="the start pose has 5 joints; ur5 has 6"):
+    with pytest.raises(ParameterError, match=r"the start pose has 5 joints; ur5 has 6"):
         replay_release(np.array([0.3, 0, 0, 0, 0, 0]), UR5, p, controllers(p), start=np.zeros(5))
 
 
@@ -176,7 +176,7 @@ def test_release_without_a_limit_inside_the_bound_is_let_pass() -> None:
 
 def test_release_needs_a_deviation() -> None:
     p = parameters()
-    with pytest.raises(ParameterError, match="--release x=0.3"):
+    with pytest.raises(ParameterError, match=r"--release x=0\.3"):
         replay_release(np.zeros(6), UR5, p, controllers(p), start=START)
 
 
@@ -215,7 +215,7 @@ def test_sensor_frames() -> None:
 def test_a_wrench_in_no_named_frame_is_refused() -> None:
     q, wrench = np.tile(START, (3, 1)), np.zeros((3, 6))
     with pytest.raises(
-        ParameterError, match="the frame of the wrench is not named.*--frame flange"
+        ParameterError, match=r"the frame of the wrench is not named.*--frame flange"
     ):
         from_sensor(sensed(None, wrench, q), UR5)
     with pytest.raises(ParameterError, match="there is flange"):

@@ -1,4 +1,4 @@
-"""Stability before motion: the discrete condition and the escape bound, each against another way."""
+"""Stability before motion: the discrete condition and the escape bound, each in two ways."""
 
 import numpy as np
 import pytest

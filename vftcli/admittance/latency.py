@@ -13,8 +13,8 @@ STARTED = 5e-3
 TURNED = 0.02
 """Rotation of the flange at which it is said to have turned. [rad]"""
 
-STILL = 0.005
-"""Speed below which the flange counts as at rest when a force comes. [m/s, rad/s]"""
+STILL = (0.005, 0.05)
+"""Speeds below which the flange counts as at rest when a force comes. [m/s, rad/s]"""
 
 REST = 1.0
 """A contact begins where the force had been below the threshold for this long. [s]"""
@@ -76,7 +76,7 @@ def one(run: ClosedLoop, k: int, threshold: Array) -> Latency:
         detection=None if begin is None else float(t[begin] - t[k]),
         motion=None if moving is None else float(t[moving] - t[k]),
         withdrawal=None if gone is None or ends is None else float(t[gone] - t[ends]),
-        rested=bool(speed < STILL),
+        rested=bool(speed < STILL[0 if axis < 3 else 1]),
     )
 
 
