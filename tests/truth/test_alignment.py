@@ -78,7 +78,7 @@ def test_a_shared_part() -> None:
     found = align(log, free)
     assert found.shift == pytest.approx(0.0, abs=1e-3)
     shared = log.t[found.overlap]
-    assert shared[0] <= log.step
+    assert shared[0] == pytest.approx(0.0, abs=0.02)  # the first sample may lie just outside
     assert 12.0 <= shared[-1] <= 13.0
 
 

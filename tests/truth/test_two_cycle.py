@@ -65,7 +65,7 @@ def test_every_rung_knows_its_error(circle: Circle, ur5: Robot, rung: str, low_p
     reference = two_cycle_difference(circle.recording, (), ur5, options)
     assert reference.floor is not None
     ratio = (error_of(reference, circle.truth) / reference.floor)[MOVING]
-    # Required of the default rung; on the others J4's short stops are taken for worse than they are.
+    # Required of the default rung; the others take J4's short stops for worse than they are.
     least = HONEST[0] if (rung, low_pass) == ("model", "12") else 0.6
     assert np.all((ratio >= least) & (ratio <= HONEST[1])), ratio
 

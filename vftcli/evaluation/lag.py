@@ -18,8 +18,8 @@ LEAST_FIT = 0.3
 def lags(estimate: Array, reference: Array, step: float) -> Array:
     """Delay at which the estimate fits the reference best, NaN where nothing fits. (n,) [s]
 
-    Maximises the cross-correlation over delays from −`LEAD` to `LONGEST`, refined between samples
-    by a parabola. Unknown samples count as zero.
+    Maximises the correlation over the samples that overlap, for delays from −`LEAD` to `LONGEST`,
+    refined between samples by a parabola.
 
     Args:
         estimate: (T, n) [N·m]
@@ -28,15 +28,20 @@ def lags(estimate: Array, reference: Array, step: float) -> Array:
     """
     known = np.isfinite(estimate) & np.isfinite(reference)
     x, y = (centred(signal, known) for signal in (estimate, reference))
-    size = 1 << int(np.ceil(np.log2(2 * len(x))))
-    spectra = np.conj(np.fft.rfft(y, size, axis=0)) * np.fft.rfft(x, size, axis=0)
-    product = np.fft.irfft(spectra, size, axis=0)
     first = -min(round(LEAD / step), len(x) // 4)
     last = max(1, min(round(LONGEST / step), len(x) // 4))
-    product = product[np.arange(first - 1, last + 2) % size]
-    power = np.sqrt(np.sum(x**2, axis=0) * np.sum(y**2, axis=0))
-    fit = product / np.where(power > 0, power, 1.0)
+    size = 1 << int(np.ceil(np.log2(2 * len(x))))
+    at = np.arange(first - 1, last + 2) % size
+    there = known.astype(np.float64)
+    power = sliding(x**2, there, size, at) * sliding(there, y**2, size, at)
+    fit = sliding(x, y, size, at) / np.sqrt(np.where(power > 0, power, np.inf))
     return np.array([step * (first - 1 + peak(column)) for column in fit.T])
+
+
+def sliding(later: Array, earlier: Array, size: int, at: NDArray[np.int64]) -> Array:
+    """Sum over time of `later`, `at` samples on, times `earlier`. (len(at), n)"""
+    spectra = np.conj(np.fft.rfft(earlier, size, axis=0)) * np.fft.rfft(later, size, axis=0)
+    return np.asarray(np.fft.irfft(spectra, size, axis=0)[at])
 
 
 def centred(signal: Array, known: NDArray[np.bool_]) -> Array:

@@ -1,0 +1,133 @@
+"""Moving-block bootstrap: block lengths, coverage, and paired differences."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from vftcli.arrays import Array
+from vftcli.evaluation import paired_significance
+from vftcli.evaluation.intervals import (
+    LEAST_BLOCKS,
+    MEMORY,
+    MOST_BLOCKS,
+    block_length,
+    correlation_time,
+    interval,
+    resample,
+)
+from vftcli.torque import ExternalTorque
+
+STEP = 0.008
+
+
+def autoregressive(rng: np.random.Generator, samples: int, decay: float) -> Array:
+    """x_t = decay·x_{t−1} + noise, of unit variance, settled."""
+    noise = np.sqrt(1.0 - decay**2) * rng.standard_normal(samples + 2000)
+    return np.asarray(lfilter([1.0], [1.0, -decay], noise)[2000:])
+
+
+def estimation_error(rng: np.random.Generator, samples: int) -> Array:
+    """What a first-order observer (K = 10 1/s) misses of random pushes, noise included. [N·m]
+
+    Pushes of 0.14 to 1.2 s come at random, 0.9 a second, of 6 to 20 N·m either way.
+    """
+    count = samples + 600
+    t = STEP * np.arange(count)
+    tau = np.zeros(count)
+    for _ in range(rng.poisson(0.9 * t[-1])):
+        start, length = rng.uniform(0.0, t[-1]), rng.uniform(0.14, 1.2)
+        size = 20.0 * rng.uniform(0.3, 1.0) * rng.choice([-1, 1])
+        pushed = (t >= start) & (t < start + length)
+        tau[pushed] += size * np.sin(np.pi * (t[pushed] - start) / length) ** 2
+    a = 10.0 * STEP / 2.0
+    seen = lfilter([a / (1 + a)] * 2, [1.0, -(1 - a) / (1 + a)], tau + rng.standard_normal(count))
+    return np.asarray((seen - tau)[600:])
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.9, 0.98])
+def test_correlation_time_of_a_known_process(decay: float) -> None:
+    """(1 + a)/(1 − a) of a first-order process, 1 of white noise; cut where ρ falls below 0.05."""
+    x = autoregressive(np.random.default_rng(0), 200_000, decay)[:, None]
+    cut = 1.0 - 2.0 * 0.05 / (1.0 + decay) if decay else 1.0
+    # 200 000 samples of correlation time 100 tell it to some per cent.
+    assert correlation_time(x)[0] == pytest.approx(cut * (1 + decay) / (1 - decay), rel=0.15)
+
+
+def test_blocks_follow_the_memory() -> None:
+    rng = np.random.default_rng(1)
+    white = rng.standard_normal((30_000, 1)) ** 2
+    assert block_length(white) == 30_000 // MOST_BLOCKS
+    slow = np.repeat(rng.standard_normal((30, 1)) ** 2, 100, axis=0)
+    assert block_length(slow) == 3000 // LEAST_BLOCKS
+    middle = np.repeat(rng.standard_normal((3000, 1)) ** 2, 10, axis=0)
+    assert block_length(middle) == pytest.approx(10 * MEMORY, abs=50)
+    assert block_length(np.ones((5, 1))) == 1
+
+
+def test_the_same_log_gives_the_same_interval() -> None:
+    squares = autoregressive(np.random.default_rng(2), 3000, 0.9)[:, None] ** 2
+    first, second = resample(squares), resample(squares)
+    assert np.array_equal(first.draws, second.draws)
+    assert first.draws.mean() == pytest.approx(squares.mean(), rel=0.02)  # 1000 draws
+
+
+def test_white_noise_has_the_textbook_interval() -> None:
+    """RMSE of N white samples: relative standard deviation 1/√(2N)."""
+    squares = np.random.default_rng(3).standard_normal((20_000, 1)) ** 2
+    drawn = resample(squares)
+    low, high = interval(float(squares.mean()), drawn.draws[:, 0], drawn.blocks)
+    width = (high - low) / np.sqrt(squares.mean())
+    assert width == pytest.approx(2.0 * 1.96 / np.sqrt(2.0 * 20_000), rel=0.15)
+
+
+def test_a_perfect_estimate_has_no_interval() -> None:
+    drawn = resample(np.zeros((100, 1)))
+    assert np.isnan(interval(0.0, drawn.draws[:, 0], drawn.blocks)).all()
+
+
+def pair(first: Array, second: Array) -> tuple[list[ExternalTorque], ExternalTorque]:
+    t = STEP * np.arange(len(first))
+    make = [
+        ExternalTorque(name=name, t=t, tau=error[:, None])
+        for name, error in (("fdo", first), ("gmo", second))
+    ]
+    return make, ExternalTorque(name="zero", t=t, tau=np.zeros((len(t), 1)))
+
+
+def test_a_small_sure_difference() -> None:
+    """Errors that differ by 2 % of themselves: hopeless unpaired, certain when paired."""
+    error = estimation_error(np.random.default_rng(4), 3000)
+    row = paired_significance("log", *pair(error, 1.02 * error)).row(0, named=True)
+    assert row["difference_Nm"] < 0
+    assert row["high_Nm"] < 0
+    assert row["p"] <= 0.002
+
+
+def test_two_lucky_observers() -> None:
+    """Independent errors of one process: no difference to be sure of."""
+    rng = np.random.default_rng(5)
+    errors = (autoregressive(rng, 3000, 0.95) for _ in range(2))
+    row = paired_significance("log", *pair(*errors)).row(0, named=True)
+    assert row["p"] > 0.05
+    assert row["low_Nm"] < 0 < row["high_Nm"]
+
+
+def test_the_same_filter_twice() -> None:
+    error = estimation_error(np.random.default_rng(6), 2000)
+    row = paired_significance("log", *pair(error, error * (1.0 + 1e-13))).row(0, named=True)
+    assert row["p"] == 1.0
+
+
+@pytest.mark.statistical
+@pytest.mark.parametrize("samples", [1000, 2000, 8000])
+def test_intervals_cover_the_true_rmse(samples: int) -> None:
+    """Required: 90 to 98 % of 200 repetitions; 400 are drawn so that chance is ±2.2 %."""
+    rng = np.random.default_rng(7)
+    true = np.sqrt(np.mean([np.mean(estimation_error(rng, samples) ** 2) for _ in range(2000)]))
+    covered = 0
+    for _ in range(400):
+        squares = estimation_error(rng, samples)[:, None] ** 2
+        drawn = resample(squares)
+        low, high = interval(float(squares.mean()), drawn.draws[:, 0], drawn.blocks)
+        covered += low <= true <= high
+    assert 0.90 <= covered / 400 <= 0.98
