@@ -85,11 +85,10 @@ def test_log_becomes_a_folder(admit: Run, tmp_path: Path) -> None:
 
 
 def test_estimates_and_truth_are_forces_too(admit: Run, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(
-        "sys.argv",
-        ["vftcli", "estimate", str(FIXTURE), "--robot", "panda", "-o", str(tmp_path / "e")],
-    )
-    main()
+    words = ["vftcli", "estimate", str(FIXTURE), "--robot", "panda", "-o", str(tmp_path / "e")]
+    monkeypatch.setattr("sys.argv", words)
+    with pytest.raises(SystemExit, match="0"):
+        main()
     asked = ("--robot", "panda", "--json")
     estimates = tmp_path / "e" / "estimates.parquet"
     from_log = json.loads(admit(FIXTURE, *asked)[1])
