@@ -19,6 +19,7 @@ from vftcli.cli import (
     listings,
     report,
     simulate,
+    tune,
 )
 from vftcli.errors import VftError
 
@@ -36,6 +37,7 @@ app.command("inspect")(inspect.inspect_log)
 app.command("convert")(convert.convert_log)
 app.command("admit")(admit.admit)
 app.command("identify")(identify.identify_robot)
+app.command("tune")(tune.tune_gains)
 app.command("simulate")(simulate.simulate_log)
 app.command("bench")(bench.bench)
 app.command("robots")(listings.robots)

@@ -35,6 +35,10 @@ def compare(
     sensor_weight: opt.SensorWeight = False,
     torque_sd: opt.TorqueSd = None,
     contacts: opt.Contacts = False,
+    gains_file: opt.GainsFile = None,
+    free_part: opt.FreePart = None,
+    bands: opt.Bands = False,
+    remove_bias: opt.RemoveBias = "none",
     json: opt.Json = False,
     csv: Annotated[bool, typer.Option("--csv", help="One row per observer and joint.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="A Markdown table.")] = False,
@@ -88,6 +92,10 @@ def compare(
         alignment=alignment,
         low_pass=low_pass,
         match=match,
+        gains_file=gains_file,
+        free_part=free_part,
+        bands=bands,
+        remove_bias=remove_bias,
     )
     analyses = []
     for log in logs:

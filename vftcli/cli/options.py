@@ -179,6 +179,32 @@ Match = Annotated[
         help="Gains that give every observer the same delay or −3 dB bandwidth on every joint.",
     ),
 ]
+GainsFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--set-file", metavar="FILE", help="Gains that `vftcli tune` wrote; --set goes before them."
+    ),
+]
+FreePart = Annotated[
+    str | None,
+    typer.Option(
+        metavar="A:B",
+        help="Span of the log that nothing touches; else --free logs, or its own free cycles.",
+    ),
+]
+Bands = Annotated[
+    bool,
+    typer.Option("--bands", help="Measure on the free part how far the estimates may be off."),
+]
+RemoveBias = Annotated[
+    str,
+    typer.Option(
+        "--remove-bias",
+        metavar="free-cycle|model|none",
+        help="Subtract what the observers read in free motion at the same phase, or a model of it "
+        "over position and velocity.",
+    ),
+]
 PublishedTable = Annotated[
     str | None,
     typer.Option("--published", metavar="table1", help="Set the paper's table beside the errors."),

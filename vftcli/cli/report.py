@@ -37,6 +37,10 @@ def report(
     sensor_weight: opt.SensorWeight = False,
     torque_sd: opt.TorqueSd = None,
     contacts: opt.Contacts = False,
+    gains_file: opt.GainsFile = None,
+    free_part: opt.FreePart = None,
+    bands: opt.Bands = False,
+    remove_bias: opt.RemoveBias = "none",
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
@@ -78,6 +82,10 @@ def report(
         alignment=alignment,
         low_pass=low_pass,
         match=match,
+        gains_file=gains_file,
+        free_part=free_part,
+        bands=bands,
+        remove_bias=remove_bias,
     )
     if published is not None:
         check_published(published, reference)

@@ -1,0 +1,114 @@
+"""`vftcli tune`: gains from the log itself, for a stated goal."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vftcli.cli import options as opt
+
+if TYPE_CHECKING:
+    from vftcli.offline.tuning import Goal, Tuned
+
+
+def tune_gains(
+    log: opt.Log,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE.toml", help="The gains file.")
+    ],
+    robot: opt.RobotName = None,
+    goal: Annotated[
+        str,
+        typer.Option(
+            metavar="rmse|delay=S|bandwidth=HZ|false-alarms=PER_HOUR",
+            help="What the gains are for.",
+        ),
+    ] = "rmse",
+    threshold: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NUMBER(S)", help="Torque that raises an alarm [N·m], one or one a joint."
+        ),
+    ] = None,
+    free_part: opt.FreePart = None,
+    free: opt.Free = None,
+    period: opt.Period = None,
+    free_cycles: opt.FreeCycles = None,
+    format_: opt.Format = None,
+    columns: opt.Columns = None,
+    interval: opt.Interval = None,
+    friction: opt.Friction = "profile",
+    payload: opt.PayloadName = None,
+    json: opt.Json = False,
+    force: opt.Force = False,
+) -> None:
+    """Find gains on a log for a stated goal, and write them to a file for --set-file.
+
+    The spectra of the log's free and loaded part tell how much error every gain makes.
+
+    Example: vftcli tune fixtures/ur5_circle.csv --robot ur5 -o gains.toml
+    """
+    import json as json_module
+
+    from vftcli.cli.asking import command_line, paths, say, say_recording
+    from vftcli.dynamics.terms import dynamics_terms
+    from vftcli.errors import ParameterError
+    from vftcli.offline.tuning import gains_document, parse_goal, tune_all
+    from vftcli.outputs.files import refuse_existing, write_text
+    from vftcli.outputs.run import plain
+    from vftcli.pipeline import Request, choose_robot, look_over, open_log
+    from vftcli.robots.writing import lines_of
+
+    wanted = parse_goal(goal, threshold)
+    refuse_existing(output, force)
+    request = Request(
+        format=format_,
+        columns=columns,
+        robot=robot,
+        interval=interval,
+        friction=friction,
+        payload=payload,
+        free=paths(free),
+        period=period,
+        free_cycles=free_cycles,
+        free_part=free_part,
+        bands=True,
+    )
+    recording = open_log(log, request)
+    arm = choose_robot(request, recording)
+    found = look_over(recording, arm, dynamics_terms(recording, arm), request)
+    notes = found.notes if found is not None else ()
+    if found is None or found.spectra is None:
+        raise ParameterError(f"nothing to tune on: {notes[-1] if notes else 'no free part'}")
+    tuned = tune_all(found.spectra, wanted)
+    heading = [command_line(), f"goal: {goal}", f"robot: {arm.name}", *notes]
+    comments = "".join(f"# {line}\n" for line in heading)
+    write_text(output, comments + "".join(lines_of(gains_document(tuned))), force)
+    if json:
+        rows = [plain({**line._asdict()}) for line in tuned]
+        typer.echo(json_module.dumps({"goal": goal, "notes": notes, "observers": rows}, indent=2))
+        return
+    say_recording(recording)
+    for note in notes:
+        say(f"note: {note}")
+    typer.echo(table(tuned, wanted))
+    say(f"wrote {output}: use it with --set-file {output}")
+
+
+def table(tuned: "tuple[Tuned, ...]", goal: "Goal") -> str:
+    """What was chosen and what to expect of it, joint by joint."""
+    joints = len(tuned[0].rate)
+    head = "".join(f"{f'J{j + 1}':>9}" for j in range(joints))
+    lines = [f"{'observer':<10}{'':<22}{head}"]
+    for line in tuned:
+        rows = [
+            ("ω [rad/s]", line.rate),
+            ("delay [ms]", 1e3 * line.delay),
+            ("expected rmse [N·m]", line.rmse),
+        ]
+        if goal.threshold is not None and line.alarms is not None:
+            rows.append(("false alarms [1/h]", line.alarms.round(3)))
+        for k, (what, values) in enumerate(rows):
+            numbers = "".join(f"{value:>9.3g}" for value in values)
+            lines.append(f"{line.observer if k == 0 else '':<10}{what:<22}{numbers}")
+    return "\n".join(lines)
