@@ -21,26 +21,25 @@ EPISODE = "episode_index"
 class ParquetTable:
     """A Parquet file; only the columns asked for are decoded.
 
+    pyarrow decodes it: on a damaged page polars would end the whole process.
+
     Attributes:
         path: The file.
         names: Column names.
     """
 
     def __init__(self, path: Path, source: Any, rows: Any = None) -> None:  # noqa: ANN401
+        import pyarrow.parquet as pq
+
         self.path = path
-        self._source = source
         self._rows = rows
-        self.names: tuple[str, ...] | None = tuple(self._schema)
-
-    @cached_property
-    def _schema(self) -> dict[str, Any]:
-        import polars as pl
-
         with guarded(self.path):
-            return dict(pl.read_parquet_schema(self._seekable()))
-
-    def _seekable(self) -> Any:  # noqa: ANN401 - a path or a stream
-        return self._source if isinstance(self._source, Path) else BytesIO(self._source)
+            self._file = pq.ParquetFile(
+                source if isinstance(source, Path) else BytesIO(source),
+                memory_map=isinstance(source, Path),
+            )
+            self._schema = self._file.schema_arrow
+        self.names: tuple[str, ...] | None = tuple(self._schema.names)
 
     @property
     def width(self) -> int:
@@ -54,10 +53,7 @@ class ParquetTable:
 
     def told(self) -> dict[str, Any]:
         """What vftcli convert wrote beside the columns; nothing for files of other programs."""
-        import polars as pl
-
-        with guarded(self.path):
-            text = pl.read_parquet_metadata(self._seekable()).get("vftcli", "{}")
+        text = (self._file.metadata.metadata or {}).get(b"vftcli", b"{}")
         try:
             told = json.loads(text)
         except (ValueError, RecursionError):
@@ -68,16 +64,19 @@ class ParquetTable:
     @cached_property
     def lists(self) -> Mapping[int, int]:
         """Columns of lists and their length in the first row."""
-        import polars as pl
+        kinds = list(enumerate(self._schema.types))
+        return {k: self._first_length(k) for k, kind in kinds if is_list(kind)}
 
-        kinds = list(self._schema.items())
-        found = {k: name for k, (name, kind) in enumerate(kinds) if kind in (pl.List, pl.Array)}
-        if not found:
-            return {}
+    def _first_length(self, column: int) -> int:
         with guarded(self.path):
-            row = pl.read_parquet(self._seekable(), columns=list(found.values()), n_rows=1)
-        firsts = {k: row[name].to_list() for k, name in found.items()}
-        return {k: len(first[0]) for k, first in firsts.items() if first and first[0] is not None}
+            batches = self._file.iter_batches(
+                batch_size=1, columns=[self._schema.names[column]], use_threads=False
+            )
+            first = next(iter(batches), None)
+            if first is None or first.num_rows == 0:
+                return 0
+            value = first.column(self._schema.names[column])[0].as_py()
+        return len(value) if value is not None else 0
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
         """Decode some columns.
@@ -85,41 +84,60 @@ class ParquetTable:
         Raises:
             LogError: If a column holds no numbers or its lists differ in length.
         """
-        import polars as pl
-
-        names = list(self._schema)
+        names = self._schema.names
+        if any(names.count(names[c]) > 1 for c in columns):
+            raise LogError(f"{self.path}: two columns have one name; rename one of them.")
         with guarded(self.path):
-            frame = pl.read_parquet(
-                self._seekable(), columns=[names[c] for c in columns], use_pyarrow=False
-            )
-        if self._rows is not None:
-            frame = frame[self._rows]
-        return {c: self._numbers(frame[names[c]], c, clock) for c in columns}
+            table = self._file.read(columns=[names[c] for c in columns], use_threads=False)
+            if self._rows is not None:
+                table = table.take(self._rows)
+            return {c: self._numbers(table.column(names[c]), c, clock) for c in columns}
 
-    def _numbers(self, series: Any, column: int, clock: int | None) -> Column:  # noqa: ANN401
-        import polars as pl
+    def _numbers(self, values: Any, column: int, clock: int | None) -> Column:  # noqa: ANN401
+        import pyarrow as pa
 
         if column in self.lists:
-            return self._matrix(series, self.lists[column])
-        if series.dtype in (pl.Datetime, pl.Duration):
-            series = series.dt.cast_time_unit("ns").to_physical()
-        elif not series.dtype.is_numeric() and series.dtype != pl.Boolean:
-            raise LogError(f"{self.path}: column {series.name} holds {series.dtype}, not numbers.")
-        whole = column == clock and series.dtype.is_integer() and not series.null_count()
-        cast = series.cast(pl.Int64 if whole else pl.Float64, strict=False)
-        return np.array(cast.to_numpy())
+            return self._matrix(values, column)
+        kind, name = values.type, self._schema.names[column]
+        if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
+            unit = pa.timestamp("ns") if pa.types.is_timestamp(kind) else pa.duration("ns")
+            values = values.cast(unit).cast(pa.int64())
+        elif pa.types.is_boolean(kind):
+            values = values.cast(pa.uint8())
+        elif not is_number(kind):
+            raise LogError(f"{self.path}: column {name} holds {kind}, not numbers.")
+        whole = column == clock and pa.types.is_integer(values.type) and not values.null_count
+        target = np.int64 if whole else np.float64
+        return np.asarray(values.to_numpy()).astype(target)
 
-    def _matrix(self, series: Any, length: int) -> Column:  # noqa: ANN401 - polars
-        import polars as pl
+    def _matrix(self, values: Any, column: int) -> Column:  # noqa: ANN401 - pyarrow
+        length, name = self.lists[column], self._schema.names[column]
+        values = values.combine_chunks()
+        if hasattr(values, "chunks"):  # pyarrow keeps an empty or split column as chunks
+            values = values.chunk(0) if values.num_chunks else values
+        flat = values.flatten()
+        even = np.all(np.asarray(values.value_lengths()) == length) if len(values) else True
+        if values.null_count or not even or len(flat) != length * len(values):
+            raise LogError(f"{self.path}: the lists of {name} are not all {length} long.")
+        if not is_number(flat.type):
+            raise LogError(f"{self.path}: the lists of {name} hold {flat.type}.")
+        numbers = np.asarray(flat.to_numpy(zero_copy_only=False)).astype(np.float64)
+        return numbers.reshape(len(values), length)
 
-        lengths = series.list.len() if series.dtype == pl.List else None
-        if series.null_count() or (lengths is not None and (lengths != length).any()):
-            raise LogError(f"{self.path}: the lists of {series.name} are not all {length} long.")
-        inner = series.explode() if len(series) else series
-        if not inner.dtype.is_numeric():
-            raise LogError(f"{self.path}: the lists of {series.name} hold {inner.dtype}.")
-        values = np.array(inner.cast(pl.Float64).to_numpy())
-        return values.reshape(len(series), length)
+
+def is_list(kind: Any) -> bool:  # noqa: ANN401 - a pyarrow type
+    """Whether a column holds lists."""
+    import pyarrow as pa
+
+    tests = (pa.types.is_list, pa.types.is_large_list, pa.types.is_fixed_size_list)
+    return any(test(kind) for test in tests)
+
+
+def is_number(kind: Any) -> bool:  # noqa: ANN401 - a pyarrow type
+    """Whether a column holds numbers."""
+    import pyarrow as pa
+
+    return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
 
 
 class guarded:  # noqa: N801 - a context manager reads as a verb
@@ -137,10 +155,10 @@ class guarded:  # noqa: N801 - a context manager reads as a verb
         Raises:
             LogError: If it raised.
         """
-        import polars as pl
+        import pyarrow as pa
 
-        panic = error is not None and type(error).__name__ == "PanicException"
-        if panic or isinstance(error, pl.exceptions.PolarsError | OSError | ValueError):
+        damaged = (pa.ArrowException, OSError, ValueError, KeyError, MemoryError, OverflowError)
+        if isinstance(error, damaged):
             reason = str(error).split("\n")[0][:120]
             raise LogError(f"{self.path}: a damaged Parquet file ({reason})") from None
 

@@ -28,8 +28,9 @@ def batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
             _check_topics(db, channels, ingest)
             for number, channel in channels.items():
                 yield from _messages(db, number, channel, ingest)
-    except (sqlite3.Error, OverflowError) as error:
-        raise LogError(f"{ingest.path}: not a readable ROS 2 bag ({error!s:.80})") from None
+    except (sqlite3.Error, OverflowError, UnicodeDecodeError) as error:
+        reason = printable(str(error))[:80]
+        raise LogError(f"{ingest.path}: not a readable ROS 2 bag ({reason})") from None
 
 
 def _opened(file: LogFile) -> sqlite3.Connection:
@@ -59,8 +60,10 @@ def _channels(db: sqlite3.Connection, ingest: Ingest) -> dict[int, Channel]:
     for number, topic, kind, encoding in db.execute(
         "SELECT id, name, type, serialization_format FROM topics"
     ):
+        if not isinstance(number, int):
+            raise LogError(f"{ingest.path}: a topic without a number; the database is damaged.")
         text, idl = texts.get(str(kind), ("", False))
-        channels[int(number)] = Channel(
+        channels[number] = Channel(
             topic=printable(str(topic)),
             type=type_name(str(kind)),
             encoding="cdr" if encoding == "cdr" else "other",
