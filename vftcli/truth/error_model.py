@@ -147,7 +147,7 @@ def noise_of(t: Array, x: Array, moving: Flags, step: float, cutoff: float | Non
     if cutoff is None:
         return white(x, moving)
     middle = max(cutoff, min(LEAST_BAND, 0.2 / step))
-    limits = (0.6 * middle, min(1.2 * middle, 0.45 / step))
+    limits = (0.7 * middle, min(1.3 * middle, 0.45 / step))
     dense = rms(band_pass(t, x, *limits), moving) / np.sqrt(passed(step, limits, "bandpass"))
     return np.asarray(dense * np.sqrt(passed(step, cutoff, "lowpass")))
 
