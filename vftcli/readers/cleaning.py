@@ -128,16 +128,19 @@ def without_leading_garbage(raw: RawLog, findings: Findings) -> RawLog:
     Without an absurd value nothing is dropped, so that a jump of the clock alone is not hidden.
     """
     head = slice(0, min(GARBAGE_ROWS, len(raw.stamps)))
-    absurd = np.zeros(head.stop, dtype=bool)
+    absurd, tiny = np.zeros((2, head.stop), dtype=bool)
     for value in raw.signals.values():
         size = np.abs(value[head])
-        bad = ~(size < GARBAGE_VALUE) | ((size > 0) & (size < DENORMAL))
-        absurd |= bad.any(axis=1)
+        absurd |= (~(size < GARBAGE_VALUE)).any(axis=1)
+        tiny |= ((size > 0) & (size < DENORMAL)).any(axis=1)
     absurd |= ~(np.abs(raw.stamps[head].astype(np.float64)) < ABSURD_STAMP)
     if not absurd.any() or absurd.all():
         return raw
-    count = int(np.flatnonzero(absurd)[-1]) + 1
-    count = max(count, _last_jump(raw, head.stop))
+    absurd |= tiny  # tiny values alone are a simulation at rest
+    jump = _last_jump(raw, head.stop)
+    if not absurd[0] and jump == 0:
+        return raw  # a lone bad value among good rows of one clock is not a misaligned packet
+    count = max(int(np.flatnonzero(absurd)[-1]) + 1, jump)
     if count >= len(raw.stamps) - 1 or absurd[:count].mean() < 0.1:
         return raw
     findings.repairs.append(
