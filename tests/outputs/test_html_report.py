@@ -152,8 +152,8 @@ def test_without_a_reference_the_page_says_so(without_reference: Analysis) -> No
 def test_wrenches_have_a_chart_an_axis(with_wrench: Analysis, html: str) -> None:
     shown = render(with_wrench)
     charts = embedded(shown)["wrenches"]
-    assert [chart["key"] for chart in charts] == ["fx", "fy", "fz", "mx", "my", "mz"]
-    assert [chart["unit"] for chart in charts] == ["N"] * 3 + ["N·m"] * 3
+    assert [c["key"] for c in charts] == ["fx", "fy", "fz", "mx", "my", "mz", "sigma_min"]
+    assert [chart["unit"] for chart in charts[:6]] == ["N"] * 3 + ["N·m"] * 3
     drawn = floats(charts[2]["series"][0]["lines"][0]["y"])
     expected = with_wrench.wrenches[0].known[:, 2]
     kept, known = drawn[np.isfinite(drawn)], expected[np.isfinite(expected)]

@@ -119,7 +119,7 @@ def test_without_a_reference_there_are_no_residuals(
 
 def test_wrenches_have_their_own_tab(with_wrench: Analysis) -> None:
     lines = line_groups(with_wrench)["Wrench"]
-    assert [entry.path for entry in lines] == [f"/wrench/{a}" for a in AXES]
+    assert [entry.path for entry in lines] == [f"/wrench/{a}" for a in (*AXES, "sigma_min")]
     np.testing.assert_array_equal(lines[4].values[:, 1], with_wrench.wrenches[1].known[:, 4])
 
 
@@ -165,3 +165,25 @@ def test_a_recording_without_its_footer_is_no_recording(tmp_path: Path) -> None:
     (tmp_path / "cut.rrd").write_bytes(b"RRF2" + bytes(1000))
     with pytest.raises(OutputError, match=r"cut\.rrd cannot be written whole"):
         finish(Stream(), tmp_path / "cut.rrd")
+
+
+def test_the_arrow_is_the_wrench_that_was_asked_for(with_wrench: Analysis) -> None:
+    from dataclasses import replace
+
+    from vftcli.outputs.arm import motion
+    from vftcli.outputs.rerun_recording import arrow_force, force_source
+
+    source = force_source(with_wrench.estimates)
+    assert source is not None
+    poses = motion(with_wrench)
+    sampled = np.searchsorted(with_wrench.t, poses.t)
+    wrench = with_wrench.wrenches[0]
+    base = replace(wrench, name=source.name, frame="base")
+    shown = arrow_force(replace(with_wrench, wrenches=(base,)), source, poses, sampled)
+    np.testing.assert_array_equal(shown, base.known[sampled, :3])
+    flange = replace(base, frame="flange")
+    turned = arrow_force(replace(with_wrench, wrenches=(flange,)), source, poses, sampled)
+    # a rotation keeps lengths: rounding
+    np.testing.assert_allclose(
+        np.linalg.norm(turned, axis=1), np.linalg.norm(shown, axis=1), rtol=1e-12
+    )

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
 from vftcli.arrays import Array
@@ -286,8 +287,26 @@ def send_arm(stream: Stream, analysis: Analysis, poses: Motion) -> None:
             stream,
             poses.t,
             poses.translation[:, -1],
-            flange_force(chain, poses.q, force.tau[sampled]),
+            arrow_force(analysis, force, poses, sampled),
         )
+
+
+def arrow_force(
+    analysis: Analysis, source: ExternalTorque, poses: Motion, sampled: NDArray[np.intp]
+) -> Array:
+    """Force on the robot in base axes at the drawn poses: the wrench that was asked for. (N, 3) [N]
+
+    Where none was asked for, or in other axes than the base's or the flange's, it is the
+    pseudo-inverse of the torque as it stands.
+    """
+    asked = [w for w in analysis.wrenches if w.name == source.name]
+    if not asked or asked[0].frame not in {"base", "flange"}:
+        return flange_force(analysis.robot.chain, poses.q, source.tau[sampled])
+    force: Array = asked[0].known[sampled, :3]
+    if asked[0].frame == "base":
+        return force
+    turned: Array = np.einsum("tij,tj->ti", poses.rotation[:, -1], force)
+    return turned
 
 
 def capsule_batch(shapes: Sequence[Any]) -> Any:  # noqa: ANN401 - Rerun is untyped
