@@ -34,6 +34,9 @@ SEGMENT = 4.0
 LEAST_SEGMENT = 32
 """Fewest samples of a segment; a shorter free or loaded part has no spectrum."""
 
+NEIGHBOURS = 0.2
+"""How far the average of neighbouring frequencies reaches, as a share of the frequency."""
+
 GAP = 5.5
 """A step of more than this many median steps is a gap; no segment reaches across."""
 
@@ -72,8 +75,13 @@ class Spectra:
 
     @property
     def external(self) -> Array:
-        """S_τ = (S_d − S_n)₊, the spectrum of the external torque. (F, n) [(N·m)²/Hz]"""
-        return np.maximum(self.loaded - self.free, 0.0)
+        """S_τ = (S_d − S_n)₊, the spectrum of the external torque. (F, n) [(N·m)²/Hz]
+
+        The difference is averaged over neighbouring frequencies before it is cut at zero: bin by
+        bin, chance would count where it is positive and not where it is negative.
+        """
+        excess = smoothed(self.loaded - self.free)
+        return np.maximum(excess, 0.0)
 
     def missed(self, response: NDArray[np.complex128]) -> Array:
         """∫|1 − H|² S_τ df, what an estimator's lag and bandwidth leave out. (n,) [(N·m)²]
@@ -88,6 +96,16 @@ class Spectra:
         """∫|H|² S_n df, what of the error comes through. (n,) [(N·m)²]"""
         share: Array = np.abs(response) ** 2
         return np.asarray(np.sum(share * self.free, axis=0) * self.width)
+
+
+def smoothed(spectrum: Array) -> Array:
+    """Mean of each bin and its neighbours within ±`NEIGHBOURS` of its frequency. (F, n)"""
+    bins = np.arange(len(spectrum))
+    reach = (NEIGHBOURS * bins).astype(int)
+    reach = np.minimum(reach, len(spectrum) - 1 - bins)
+    total = np.concatenate([np.zeros((1, spectrum.shape[1])), np.cumsum(spectrum, axis=0)])
+    mean: Array = (total[bins + reach + 1] - total[bins - reach]) / (2.0 * reach + 1.0)[:, None]
+    return mean
 
 
 class Part(NamedTuple):
@@ -170,14 +188,19 @@ def runs(part: Part, step: float) -> Iterator[Array]:
 def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, int]:
     """Mean periodogram of Hann-windowed, half overlapping segments, and their number.
 
-    Nothing is detrended; the density at 0 Hz holds the square of the mean.
+    Nothing is detrended; the density at 0 Hz holds the square of the mean. Each stretch is
+    mirrored at its ends by half a segment, so that its first and last samples count like all
+    others: a free part is often no longer than a segment.
     """
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(size) / size)
     joints = stretches[0].shape[1]
     power, count = np.zeros((joints, size // 2 + 1)), 0
     for stretch in stretches:
-        columns = stretch.T
-        for first in range(0, len(stretch) - size + 1, size // 2):
+        if len(stretch) < size:
+            continue
+        columns = np.pad(stretch, ((size // 2, size // 2), (0, 0)), mode="symmetric").T
+        last = columns.shape[1] - size
+        for first in np.linspace(0, last, 1 + -(-last // (size // 2))).astype(int):
             spectrum = np.fft.rfft(columns[:, first : first + size] * window)
             power += spectrum.real**2
             power += spectrum.imag**2
