@@ -18,7 +18,7 @@ from vftcli.identification.training import Training, fitted
 
 def friction_method(data: Training) -> Outcome:
     """Friction, rotor inertia and, if asked, drive constants; links at the maker's table."""
-    fits, _, notes = fitted(data)
+    fits, _, notes = fitted(data, strict=True)
     robot = data.robot
     rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
     constants = None if robot.torque_constant is None else robot.torque_constant.copy()

@@ -15,6 +15,9 @@ is 1.2 % of the samples."""
 PASSES = 6
 """Reweighting passes."""
 
+NULL = 1e-12
+"""Eigenvalues of scaled normal equations below this share of the largest tell nothing."""
+
 FOLDS = 5
 """Contiguous stretches of the log for cross-validation."""
 
@@ -53,20 +56,54 @@ def fit_column(A: Array, y: Array, weights: Array) -> Fit:
         )
     outliers = np.ones_like(y)
     for _ in range(PASSES):
-        root = np.sqrt(weights * outliers)
-        x = solve(A * root[:, None], y * root)
+        x = normal(A, y, weights * outliers).solution()
         residual = y - A @ x
         outliers = huber(residual / max(robust_sd(residual[weights > 0]), 1e-12))
     final = weights * outliers
     return Fit(x, deviations(A, residual, final), residual, final)
 
 
+class Normal(NamedTuple):
+    """Normal equations: all that least squares needs of any number of rows.
+
+    Attributes:
+        gram: AᵀA. (k, k)
+        right: Aᵀy. (k,)
+        square: yᵀy.
+    """
+
+    gram: Array
+    right: Array
+    square: float
+
+    def minus(self, other: "Normal") -> "Normal":
+        """What is left when some rows are taken away."""
+        return Normal(self.gram - other.gram, self.right - other.right, self.square - other.square)
+
+    def solution(self) -> Array:
+        """Least squares with scaled columns; what the data leaves free stays zero. (k,)"""
+        scale = np.sqrt(np.maximum(np.diag(self.gram), 0.0))
+        scale[scale == 0.0] = 1.0
+        values, vectors = np.linalg.eigh(self.gram / np.outer(scale, scale))
+        keep = values > NULL * max(float(values[-1]), 0.0)
+        V = vectors[:, keep]
+        x: Array = V @ ((V.T @ (self.right / scale)) / values[keep]) / scale
+        return x
+
+    def misfit(self, x: Array) -> float:
+        """Sum of squares that x leaves."""
+        return max(self.square - 2.0 * float(x @ self.right) + float(x @ self.gram @ x), 0.0)
+
+
+def normal(A: Array, y: Array, weights: Array) -> Normal:
+    """Accumulate weighted rows."""
+    weighted = A * weights[:, None]
+    return Normal(weighted.T @ A, weighted.T @ y, float(weights @ (y * y)))
+
+
 def solve(A: Array, y: Array) -> Array:
     """Least squares with scaled columns; what the data leaves free stays zero. (k,)"""
-    scale = np.linalg.norm(A, axis=0)
-    scale[scale == 0.0] = 1.0
-    x: Array = np.linalg.lstsq(A / scale, y, rcond=1e-8)[0] / scale
-    return x
+    return normal(A, y, np.ones_like(y)).solution()
 
 
 def huber(z: Array, limit: float = HUBER) -> Array:
@@ -114,13 +151,13 @@ def folds(samples: int, count: int = FOLDS) -> list[slice]:
 
 def cross_validated(A: Array, y: Array, weights: Array) -> float:
     """RMS of what fits on four fifths of the log miss on the fifth left out, weighted."""
-    total, count = 0.0, 0.0
-    root = np.sqrt(weights)
-    X, z = A * root[:, None], y * root
-    for out in folds(len(y)):
-        keep = np.ones(len(y), dtype=bool)
-        keep[out] = False
-        x = solve(X[keep], z[keep])
-        total += float(np.sum((z[out] - X[out] @ x) ** 2))
-        count += float(np.sum(weights[out]))
+    stretches = folds(len(y))
+    parts = [normal(A[part], y[part], weights[part]) for part in stretches]
+    whole = Normal(
+        np.sum([p.gram for p in parts], axis=0),
+        np.sum([p.right for p in parts], axis=0),
+        float(sum(p.square for p in parts)),
+    )
+    total = sum(part.misfit(whole.minus(part).solution()) for part in parts)
+    count = float(np.sum(weights))
     return float(np.sqrt(total / count)) if count > 0 else float("nan")

@@ -15,7 +15,6 @@ from vftcli.arrays import Array
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.least_squares import (
     FOLDS,
-    PASSES,
     correlation_time,
     folds,
     huber,
@@ -131,6 +130,10 @@ def triangle(rows: Array) -> Array:
     return R
 
 
+REWEIGHTINGS = 3
+"""Passes of reweighting; each evaluates the regressor twice."""
+
+
 def residuals(layout: Layout, data: Data, x: Array) -> Array:
     """Torque that x does not explain. (M, n) [N·m]"""
     motion = data.motion
@@ -149,7 +152,7 @@ def stack(layout: Layout, logs: Sequence[Data], start: Array) -> Triangles:
         start: A solution to start from: the profile with its fitted friction. (size,)
     """
     x = start
-    for _ in range(PASSES):
+    for _ in range(REWEIGHTINGS):
         left = [residuals(layout, data, x) for data in logs]
         sigma = joint_sigma(logs, left)
         triangles = reduced(layout, logs, left, sigma)

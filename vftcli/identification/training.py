@@ -12,7 +12,7 @@ from vftcli.dynamics.drive import drive_torque, uses_current
 from vftcli.errors import IdentificationError
 from vftcli.identification import excitation as exciting
 from vftcli.identification.excitation import Excitation
-from vftcli.identification.friction_fit import Contest, Given, choose_shape
+from vftcli.identification.friction_fit import LIGHT, Contest, Given, choose_shape
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.least_squares import Fit, fit_column
 from vftcli.identification.processing import Motion, Processing, gravity_torque, prepare
@@ -164,8 +164,12 @@ def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array
     return [whole[a:b] for a, b in itertools.pairwise(edges)]
 
 
-def fitted(data: Training) -> tuple[list[JointFit | None], list[Array], list[str]]:
+def fitted(data: Training, strict: bool) -> tuple[list[JointFit | None], list[Array], list[str]]:
     """Fit friction, leave out contacts, and fit again without them.
+
+    Args:
+        data: The training logs.
+        strict: Whether links that do not explain the torque are an error, not a remark.
 
     Returns:
         The fits, the weights of every sample (M, n) a log, and remarks.
@@ -194,13 +198,26 @@ def fitted(data: Training) -> tuple[list[JointFit | None], list[Array], list[str
     if touched:
         fits = fit_frictions(data, weights)
         left = all_residuals(data, fits)
-    spread = np.std(np.concatenate([c.load for c in data.columns]), axis=0)
-    heavy = (spread > HEAVY * spread.max()) & data.excited.moves
-    for motion, residual, w in zip(data.motions, left, weights, strict=True):
-        exciting.check_robot(
-            motion.recording.name, data.robot.name, motion.tau, residual * (w > 0), heavy
-        )
+    for remark in doubts(data, left, weights):
+        if strict:
+            raise IdentificationError(
+                f"{remark}. Choose another --robot, find the load with --find-payload, or let "
+                "--method base identify the links too"
+            )
+        notes.append(f"{remark}; the links that come out stand for that too")
     return fits, weights, notes
+
+
+def doubts(data: Training, left: Sequence[Array], weights: Sequence[Array]) -> list[str]:
+    """Remarks on logs whose torque the profile's links do not explain."""
+    spread = np.std(np.concatenate([c.load for c in data.columns]), axis=0)
+    heavy = (spread > HEAVY * spread.max()) & (spread > LIGHT) & data.excited.moves
+    remarks = []
+    for motion, residual, w in zip(data.motions, left, weights, strict=True):
+        told = np.where(w > 0, residual, 0.0)
+        name = motion.recording.name
+        remarks.append(exciting.doubt(name, data.robot.name, motion.tau, told, heavy))
+    return [remark for remark in remarks if remark]
 
 
 def dry_friction(data: Training, log: int, fits: Sequence[JointFit | None]) -> Array:

@@ -37,7 +37,7 @@ def consistent_method(data: Training) -> Outcome:
 
 def whole_arm(data: Training, method: str) -> Outcome:
     """Identify all parameters of the arm together."""
-    fits, weights, notes = fitted(data)
+    fits, weights, notes = fitted(data, strict=False)
     layout, start = layout_of(data, fits)
     logs = [Data(m, c, w) for m, c, w in zip(data.motions, data.columns, weights, strict=True)]
     check_size(layout, logs)
