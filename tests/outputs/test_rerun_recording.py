@@ -175,7 +175,8 @@ def test_the_arrow_is_the_wrench_that_was_asked_for(with_wrench: Analysis) -> No
 
     source = force_source(with_wrench.estimates)
     assert source is not None
-    poses = motion(with_wrench)
+    recording = with_wrench.recording
+    poses = motion(with_wrench.robot.chain, recording.t, recording.q, 50.0)
     sampled = np.searchsorted(with_wrench.t, poses.t)
     wrench = with_wrench.wrenches[0]
     base = replace(wrench, name=source.name, frame="base")

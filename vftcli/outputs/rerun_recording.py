@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from vftcli.analysis import Analysis
 from vftcli.arrays import Array
 from vftcli.dynamics.drive import drive_torque
+from vftcli.dynamics.kinematics import link_poses
 from vftcli.errors import OutputError
 from vftcli.outputs.arm import Motion, capsules, flange_force, motion
 from vftcli.outputs.files import one_line
@@ -305,7 +306,8 @@ def arrow_force(
     force: Array = asked[0].known[sampled, :3]
     if asked[0].frame == "base":
         return force
-    turned: Array = np.einsum("tij,tj->ti", poses.rotation[:, -1], force)
+    rotation = link_poses(analysis.robot.chain, poses.q).rotation[:, -1]
+    turned: Array = np.einsum("tij,tj->ti", rotation, force)
     return turned
 
 
