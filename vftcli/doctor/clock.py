@@ -9,9 +9,11 @@ from vftcli.recording import JOINT_SIGNALS, Recording
 
 SLOW_RATE = 50.0
 """Below this rate a contact of a tenth of a second is a handful of samples. [Hz]"""
-JITTER = 0.02
-"""Spread of the steps, relative to their median, from which a fixed step is visibly wrong."""
+JITTER = 0.05
+"""Spread of nine steps in ten, relative to their median, at which a fixed step is visibly wrong."""
 GAP_STEPS = 4.0
+MISSED = (1.6, 3.4)
+"""Steps this many times the median are one or two samples that were missed."""
 SHORT = 2.0
 """A log shorter than this tells little of noise and nothing of repeated motion. [s]"""
 STALE = 0.01
@@ -60,15 +62,24 @@ def _length_and_rate(recording: Recording) -> Iterator[Finding]:
 def _jitter(recording: Recording) -> Iterator[Finding]:
     steps = np.diff(recording.t)
     usual = float(np.median(steps))
-    regular = steps[steps < GAP_STEPS * usual]
-    spread = float(np.std(regular)) / usual
+    regular = steps[(steps > MISSED[0] * usual) & (steps < MISSED[1] * usual)]
+    missed = int(regular.size)
+    if missed > 0.001 * len(steps):
+        yield Finding(
+            name="missing-samples",
+            severity="note",
+            evidence=f"{missed} of {len(steps)} steps are two or three sample times long",
+            consequence="Torque between the samples is guessed by a straight line",
+            remedy="Record from the receiving thread, or to a local disk",
+        )
+    low, high = np.percentile(steps[steps < GAP_STEPS * usual], [5, 95])
+    spread = float(high - low) / usual
     if spread > JITTER:
-        low, high = np.percentile(regular, [5, 95])
         yield Finding(
             name="jitter",
             severity="note",
             evidence=(
-                f"steps vary by {100 * spread:.0f} % of their median; nine in ten lie between "
+                f"steps vary by {100 * spread:.0f} % of their median: nine in ten lie between "
                 f"{1e3 * low:.3g} and {1e3 * high:.3g} ms ({recording.source.clock})"
             ),
             consequence="Filters of a fixed step would be wrong; every step is used as recorded",

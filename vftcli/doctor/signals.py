@@ -17,6 +17,8 @@ STRONG = -0.4
 
 Joints hand energy to one another through gravity, so a single joint may well give some back.
 """
+ALONE = -0.85
+"""The same for a joint whose neighbours' effort is sound."""
 LARGE_CURRENT = 60.0
 """No joint of these arms draws this much; readings in mA do. [A]"""
 
@@ -158,7 +160,10 @@ def inverted_joints(recording: Recording) -> tuple[list[int], int]:
         return [], 0
     shares = work_shares(recording, effort[1])
     judged = np.flatnonzero(np.isfinite(shares))
-    return [int(j) for j in judged if shares[j] < STRONG], int(judged.size)
+    found = [int(j) for j in judged if shares[j] < STRONG]
+    if len(found) < max(2, round(0.6 * judged.size)):  # a few joints only: nearly all their work
+        found = [j for j in found if shares[j] < ALONE]
+    return found, int(judged.size)
 
 
 def _effort_sign(recording: Recording) -> Iterator[Finding]:
@@ -208,7 +213,7 @@ def _still_joints(recording: Recording) -> Iterator[Finding]:
         yield Finding(
             name="still-joints",
             severity="note",
-            evidence=f"{named(still)} never move",
+            evidence=f"{named(still)} never move{'s' if still.size == 1 else ''}",
             consequence="Their estimate keeps their stiction, and no friction can be identified",
             remedy="Move every joint in logs that are meant for identification",
         )
