@@ -15,6 +15,7 @@ from vftcli.truth.alignment import align
 from vftcli.truth.cycles import check_cycles, parse_cycles, segment
 from vftcli.truth.error_model import TRUSTED_SHARE, rms
 from vftcli.truth.free_cycles import find_free_cycles, named
+from vftcli.truth.friction_change import friction_change
 from vftcli.truth.ladder import LOW_PASS, RUNGS, Difference, best, climb
 from vftcli.truth.motion import Motion, motion_of
 from vftcli.truth.pairing import Pairing, pair_with_cycle, pair_with_run
@@ -89,15 +90,22 @@ def two_cycle_difference(
     ladder = climb(motion, partners.clocks, rungs_for(options), cutoffs)
     chosen = best(ladder)
     measured = measured_scale(partners, chosen)
+    trusted = np.isfinite(chosen.tau) * (1.0 - chosen.error.rest)
     scale = measured if measured is not None else np.ones(motion.torque.shape[1])
+    change = friction_change(motion, chosen.tau, trusted) if runs else np.zeros(len(scale))
     return ExternalTorque(
         name="two-cycle",
         t=recording.t,
         tau=chosen.tau,
-        sd=chosen.error.sd * scale,
-        floor=chosen.floor * scale,
-        trusted=np.isfinite(chosen.tau) * (1.0 - chosen.error.rest),
-        notes=(*partners.notes, *ladder_notes(ladder, chosen), *floor_notes(chosen, measured)),
+        sd=np.hypot(chosen.error.sd * scale, change),
+        floor=np.hypot(chosen.floor * scale, change),
+        trusted=trusted,
+        notes=(
+            *partners.notes,
+            *ladder_notes(ladder, chosen),
+            *floor_notes(chosen, measured),
+            *change_notes(change),
+        ),
     )
 
 
@@ -264,6 +272,17 @@ def floor_notes(chosen: Difference, measured: Array | None) -> tuple[str, ...]:
             f"stiction ({size}): {marked}"
         )
     return tuple(notes)
+
+
+def change_notes(change: Array) -> tuple[str, ...]:
+    """Joints whose friction changed between the free run and the log."""
+    found = [f"J{j + 1} {change[j]:+.2f}" for j in np.flatnonzero(change)]
+    if not found:
+        return ()
+    return (
+        f"friction changed between the free run and the log ({', '.join(found)} N·m along the "
+        "motion; joints warm up): it does not cancel and is in the floor",
+    )
 
 
 def listed(values: Array) -> str:
