@@ -7,6 +7,9 @@ import numpy as np
 from vftcli.arrays import Array, check_clock, check_shape, frozen
 from vftcli.errors import ShapeError
 
+COVERS = 1.96
+"""Half width of a 95 % band, in standard deviations."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ExternalTorque:

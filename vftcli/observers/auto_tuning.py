@@ -129,8 +129,9 @@ class AutoTuned:
         return replace(self.observer.estimate(terms), name=self.name)
 
     def tuning(self, step: float, joints: int) -> Tuning:
-        """What the gains mean at a sample time. [s]"""
-        return self.observer.tuning(step, joints)
+        """What the gains mean at a sample time; tuned by the log, there is none left to tune. [s]"""
+        meaning = self.observer.tuning(step, joints)
+        return replace(meaning, numbers=0) if self.curve is not None else meaning
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""

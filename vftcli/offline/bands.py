@@ -16,9 +16,6 @@ from vftcli.observers.observer import Observer
 from vftcli.offline.survey import Survey, free_estimates, free_rms, stuck_joints
 from vftcli.torque import ExternalTorque
 
-COVERS = 1.96
-"""Half width of a 95 % band, in standard deviations."""
-
 
 def with_band(found: Survey, observer: Observer, estimate: ExternalTorque) -> ExternalTorque:
     """The estimate with its band, and its samples at rest marked; itself without spectra."""

@@ -7,7 +7,7 @@ reference), `/residual/J1` … (every estimate minus the reference), `/drive_tor
 
 import itertools
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +26,7 @@ from vftcli.outputs.rerun_blueprint import Plot, Scene, Tab, arrangement
 from vftcli.outputs.rerun_text import drawable
 from vftcli.outputs.run import CONVENTIONS, all_notes
 from vftcli.outputs.tables import escape_markdown, to_markdown
-from vftcli.torque import ExternalTorque
+from vftcli.torque import COVERS, ExternalTorque
 from vftcli.wrench.wrench import AXES
 
 ARM_RATE = 50.0
@@ -150,6 +150,10 @@ def joint_lines(
     names = [e.name for e in analysis.estimates]
     columns = [e.tau[:, j] - minus for e in analysis.estimates]
     shades, widths = [colours[name] for name in names], [1.5] * len(names)
+    if group == "tau_ext":
+        for name, column, shade in band_lines(analysis, j):
+            names, columns = [*names, name], [*columns, column]
+            shades, widths = [*shades, shade], [*widths, 0.6]
     if reference is not None:
         names, columns = [f"reference ({reference.name})", *names], [reference.tau[:, j], *columns]
         shades, widths = [REFERENCE, *shades], [2.5, *widths]
@@ -157,6 +161,20 @@ def joint_lines(
     doubt = " (the joint rests: do not trust the reference)" if rests else ""
     path, title = f"/{group}/J{j + 1}", f"J{j + 1} {TITLES[group]}{doubt}"
     return Lines(path, title, names, shades, widths, np.column_stack(columns))
+
+
+def band_lines(analysis: Analysis, j: int) -> Iterator[tuple[str, Array, str]]:
+    """Both edges of the last observer's 95 % band of one joint, thin in its colour.
+
+    Every observer's would hide them all; the tables and the page hold the others.
+    """
+    colours = colours_of(analysis.estimates)
+    for estimate in reversed(analysis.estimates):
+        if estimate.band is not None:
+            for sign, edge in ((1.0, "upper"), (-1.0, "lower")):
+                column = estimate.tau[:, j] + sign * COVERS * estimate.band[:, j]
+                yield f"{estimate.name} 95 % {edge}", column, colours[estimate.name]
+            return
 
 
 def wrench_lines(analysis: Analysis, k: int) -> Lines:

@@ -14,6 +14,7 @@ import numpy as np
 
 import vftcli
 from vftcli.analysis import Analysis
+from vftcli.observers.auto_tuning import AutoTuned
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
@@ -64,6 +65,7 @@ def run_record(
         ],
         "reference": reference_record(analysis.reference),
         "wrench": wrench_record(analysis),
+        "complete_log": workup_record(analysis),
         "conventions": CONVENTIONS,
         "repairs": list(analysis.recording.source.repairs),
         "warnings": list(analysis.recording.source.warnings),
@@ -178,6 +180,8 @@ def observer_record(observer: Observer, tuning: Tuning | None) -> dict[str, Any]
 
 def parameters(observer: Observer) -> dict[str, Any]:
     """An observer's parameters by name, as JSON can hold them."""
+    if isinstance(observer, AutoTuned):
+        return parameters(observer.observer)
     if not is_dataclass(observer):
         return {}
     return {
@@ -210,6 +214,29 @@ def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
         "sensor": plain(sensed.sensor.mounting.sensor),
         "zero_drift": [plain(drift) for drift in sensed.drifts],
         "warnings": list(sensed.warnings),
+    }
+
+
+def workup_record(analysis: Analysis) -> dict[str, Any] | None:
+    """What the complete log told: free part, chosen gains, error budget, consistency."""
+    found = analysis.workup
+    if found is None:
+        return None
+    return {
+        "bias_removed": found.removed,
+        "segments_free_loaded": found.survey.spectra.segments if found.survey.spectra else None,
+        "tuned": {
+            name: {"omega_n_rad_s": curve.best, "expected_rmse_Nm": curve.least}
+            for name, curve in found.curves.items()
+        },
+        "error_budget_Nm": {budget.name: budget.parts for budget in found.budgets},
+        "consistency": {one.name: one._asdict() for one in found.consistency},
+        "band_sd_Nm": {
+            e.name: np.sqrt(np.mean(e.band**2, axis=0))
+            for e in analysis.estimates
+            if e.band is not None
+        },
+        "notes": list(found.notes),
     }
 
 

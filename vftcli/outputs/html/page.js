@@ -91,12 +91,15 @@
     bounds(lines) {
       const [a, b] = state.view[this.axis];
       let low = Infinity, high = -Infinity;
-      for (const { line } of lines) {
+      for (const series of lines) {
+        const { line } = series;
         const from = Math.max(0, below(line.x, a) - 1), to = Math.min(line.x.length, below(line.x, b) + 2);
         for (let k = from; k < to; k++) {
           const y = line.y[k];
           if (Number.isFinite(y)) { if (y < low) low = y; if (y > high) high = y; }
         }
+        const half = this.half(series);
+        if (half) { low -= half; high += half; }
       }
       const band = this.spec.band && this.spec.band[this.at];
       if (band) { low = Math.min(low, -band); high = Math.max(high, band); }
@@ -123,6 +126,7 @@
       c.save();
       c.beginPath(); c.rect(this.box.l, this.box.t, this.box.w, this.box.h); c.clip();
       this.band(c);
+      for (const item of lines) this.ribbon(c, item);
       for (const item of lines) this.trace(c, item);
       c.restore();
       this.hover();
@@ -177,6 +181,28 @@
       if (!half) return;
       c.fillStyle = css("--band");
       c.fillRect(this.box.l, this.top(half), this.box.w, this.top(-half) - this.top(half));
+    }
+    half(series) { return series.half && !this.small ? series.half[this.at] : null; }
+    ribbon(c, series) { // the 95 % band about an estimate
+      const half = this.half(series), { line } = series;
+      if (!half) return;
+      const [a, b] = state.view[this.axis];
+      const from = Math.max(0, below(line.x, a) - 1), to = Math.min(line.x.length, below(line.x, b) + 1);
+      c.fillStyle = series.colour; c.globalAlpha = 0.13;
+      let begin = -1;
+      const fill = (end) => {
+        if (begin >= 0 && end > begin) {
+          c.beginPath();
+          for (let k = begin; k < end; k++) c.lineTo(this.left(line.x[k]), this.top(line.y[k] + half));
+          for (let k = end - 1; k >= begin; k--) c.lineTo(this.left(line.x[k]), this.top(line.y[k] - half));
+          c.fill();
+        }
+        begin = -1;
+      };
+      for (let k = from; k < to; k++) {
+        if (!Number.isFinite(line.y[k])) fill(k); else if (begin < 0) begin = k;
+      }
+      fill(to); c.globalAlpha = 1;
     }
     trace(c, { line, colour, dashed }) {
       const [a, b] = state.view[this.axis], ink = colour === "ink";

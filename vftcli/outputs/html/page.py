@@ -6,7 +6,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.html import comparisons, sections
+from vftcli.outputs.html import comparisons, sections, workup_part
 from vftcli.outputs.html.payload import payload
 from vftcli.outputs.run import run_record
 from vftcli.outputs.tables import blocks, mean_of, significant
@@ -32,6 +32,7 @@ def render(analysis: Analysis) -> str:
             sections.series(analysis),
             sections.wrenches(analysis),
             sections.observers(analysis),
+            workup_part.workup(analysis),
             comparisons.selection_guide(analysis),
             sections.conventions(record),
             sections.provenance(record),

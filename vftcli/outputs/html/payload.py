@@ -13,6 +13,7 @@ from vftcli.dynamics.drive import drive_torque
 from vftcli.outputs.decimation import Line, decimated
 from vftcli.outputs.palette import DASHED, colours_of
 from vftcli.outputs.tables import blocks, joint_heads
+from vftcli.torque import COVERS, ExternalTorque
 from vftcli.wrench.wrench import AXES
 
 STRETCHES = 2000
@@ -33,12 +34,14 @@ class Series(NamedTuple):
         values: One column a joint. (T, n)
         colour: ``#rrggbb``, or "ink" for the page's own text colour.
         dashed: Whether the line is dashed.
+        half: Half the width of a ribbon about the line, one a joint, or None. (n,)
     """
 
     name: str
     values: Array
     colour: str = "ink"
     dashed: bool = False
+    half: Array | None = None
 
 
 class Chart(NamedTuple):
@@ -92,7 +95,7 @@ def time_charts(analysis: Analysis) -> Iterator[Chart]:
     yield Chart("tau", "External torque on the robot", "N·m", (*reference, *estimates), height=1.5)
     if analysis.reference is not None:
         truth = analysis.reference.tau
-        errors = tuple(s._replace(values=s.values - truth) for s in estimates)
+        errors = tuple(s._replace(values=s.values - truth, half=None) for s in estimates)
         yield Chart("error", "Estimate − reference", "N·m", errors, floor, label)
     yield from motion_charts(analysis)
 
@@ -101,8 +104,16 @@ def estimate_series(analysis: Analysis) -> tuple[Series, ...]:
     """Every observer's torque in its colour."""
     colours = colours_of(analysis.estimates)
     return tuple(
-        Series(e.name, e.tau, colours[e.name], e.name in DASHED) for e in analysis.estimates
+        Series(e.name, e.tau, colours[e.name], e.name in DASHED, half_band(e))
+        for e in analysis.estimates
     )
+
+
+def half_band(estimate: ExternalTorque) -> Array | None:
+    """Half the width of the 95 % band, its root mean square over time. (n,)"""
+    if estimate.band is None:
+        return None
+    return np.asarray(COVERS * np.sqrt(np.mean(estimate.band**2, axis=0)))
 
 
 def reference_series(analysis: Analysis) -> tuple[Series, ...]:
@@ -180,6 +191,7 @@ def packed(chart: Chart, t: Array) -> dict[str, Any]:
                 "name": series.name,
                 "colour": series.colour,
                 "dashed": series.dashed,
+                "half": known(series.half),
                 "lines": [packed_line(line) for line in decimated(t, series.values, STRETCHES)],
             }
             for series in chart.series
@@ -235,7 +247,22 @@ def responses(analysis: Analysis) -> list[dict[str, Any]]:
         },
         {"key": "phase", "title": "Phase of the estimate", "unit": "°", **shape, "series": phases},
         {"key": "delay", "title": "Delay of the estimate", "unit": "ms", **shape, "series": delays},
+        *tuning_curves(analysis, shape),
     ]
+
+
+def tuning_curves(analysis: Analysis, shape: dict[str, Any]) -> list[dict[str, Any]]:
+    """What was minimised for every observer that the log tuned, if there is one."""
+    from vftcli.outputs.html.workup_part import curves
+
+    colours = colours_of(analysis.estimates)
+    series = [
+        {"name": name, "colour": colours[name], "dashed": False, "lines": lines_over(hertz, rmse)}
+        for name, hertz, rmse in curves(analysis)
+    ]
+    title = "Expected error against natural frequency ω_n/2π"
+    chart = {"key": "curve", "title": title, "unit": "N·m", **shape, "series": series}
+    return [chart] if series else []
 
 
 def lines_over(frequency: Array, values: Array) -> list[dict[str, str]]:
