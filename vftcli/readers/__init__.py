@@ -1,5 +1,6 @@
 """Readers: a log in any known format becomes a Recording. The content decides, never the name."""
 
+import sys
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
@@ -64,9 +65,12 @@ def read(
     reader = _reader(file, format, columns)
     request = Request(columns=columns, signals=frozenset(signals) if signals is not None else None)
     digest = Digest(path)
+    if "polars" not in sys.modules:
+        digest.start()  # its import takes longer than the hash and leaves a core idle
     with np.errstate(all="ignore"):  # whatever a damaged file holds is judged when it is cleaned
         raw = reader.read(file, request)
         raw = replace(raw, repairs=(*file.repairs, *raw.repairs)) if file.repairs else raw
+    digest.start()
     return cleaned(raw, path, reader.name, digest.hexdigest)
 
 

@@ -145,13 +145,23 @@ class Unpacker:
 
 
 class Digest:
-    """SHA-256 of a file, or of all files of a folder in name order, computed beside the reading."""
+    """SHA-256 of a file, or of all files of a folder in name order, computed beside other work.
+
+    It keeps a core busy, so it should start while the reader's own libraries are being imported,
+    or else when the reader is done with the cores.
+    """
 
     def __init__(self, path: Path) -> None:
         self._paths = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
         self._sum = hashlib.sha256()
         self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
+        self._started = False
+
+    def start(self) -> None:
+        """Start computing, if that has not begun."""
+        if not self._started:
+            self._started = True
+            self._thread.start()
 
     def _run(self) -> None:
         buffer = bytearray(CHUNK)
@@ -163,5 +173,6 @@ class Digest:
 
     def hexdigest(self) -> str:
         """Wait for the end and return the digest."""
+        self.start()
         self._thread.join()
         return self._sum.hexdigest()
