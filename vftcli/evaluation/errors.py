@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vftcli.arrays import Array
 from vftcli.errors import ShapeError
+from vftcli.evaluation.coverage import coverage
 from vftcli.evaluation.intervals import Resampled, interval, resample
 from vftcli.evaluation.lag import lags
 from vftcli.evaluation.significance import p_value
@@ -31,9 +32,13 @@ SCHEMA: dict[str, type[pl.DataType]] = {
     "reference_trusted": pl.Boolean,
     "at_rest": pl.Float64,
     "rmse_moving_Nm": pl.Float64,
+    "coverage_95": pl.Float64,
     "samples": pl.Int64,
 }
-"""Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the samples."""
+"""Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the samples.
+
+`coverage_95` is the share of samples within the estimate's 95 % band, where it has one.
+"""
 
 TRUSTED_SHARE = 0.5
 """A joint's reference is trusted if at least this share of its samples is."""
@@ -74,6 +79,7 @@ class Scored(NamedTuple):
         floor: The reference's own error, NaN where it is not known. [N·m]
         resampled: Bootstrap draws of the mean squared errors, one column an observer.
         lag: Best-fitting delay of each observer, NaN where nothing fits. (m,) [s]
+        covered: Share of samples within each observer's band, NaN without one. (m,)
     """
 
     names: tuple[str, ...]
@@ -84,6 +90,7 @@ class Scored(NamedTuple):
     floor: float
     resampled: Resampled
     lag: Array
+    covered: Array
 
     @property
     def error(self) -> Array:
@@ -118,6 +125,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> li
     names = tuple(estimate.name for estimate in estimates)
     step = float(np.median(np.diff(reference.t))) if len(reference.t) > 1 else 1.0
     lag = np.array([lags(e.tau, reference.tau, step) for e in estimates])
+    covered = np.array([coverage(e, reference) for e in estimates])
     trusted = reference.trusted if reference.trusted is not None else reference.finite
     found = []
     for j in range(reference.joints if estimates else 0):
@@ -127,7 +135,8 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> li
         draws = resample(squares) if len(squares) else Resampled(np.ones((1, len(names))), 0)
         floor = float(reference.floor[j]) if reference.floor is not None else float("nan")
         sure = trusted[known, j] > 0
-        found.append(Scored(names, j + 1, x[known], y[known], sure, floor, draws, lag[:, j]))
+        told = (draws, lag[:, j], covered[:, j])
+        found.append(Scored(names, j + 1, x[known], y[known], sure, floor, *told))
     return found
 
 
@@ -194,6 +203,7 @@ def trust(joint: Scored, k: int) -> dict[str, object]:
         "reference_trusted": share >= TRUSTED_SHARE,
         "at_rest": 1.0 - share,
         "rmse_moving_Nm": number(np.sqrt(np.mean(moving**2))) if len(moving) else None,
+        "coverage_95": number(joint.covered[k]),
     }
 
 

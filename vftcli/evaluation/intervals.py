@@ -22,6 +22,9 @@ LEAST_BLOCKS = 10
 MEMORY = 5.0
 """Length of a block in correlation times of the squared error."""
 
+WIDEST = 0.96
+"""Largest share taken off: the upper end of an interval is at most five times the RMSE."""
+
 LEVEL = 0.95
 """Coverage of the intervals."""
 
@@ -92,8 +95,10 @@ def correlation_time(x: Array) -> Array:
 def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, float]:
     """95 % interval of an RMSE from bootstrap draws of its mean square. [N·m]
 
-    Taken on the logarithm, where the mean of squares is nearest to normal, as its value plus and
-    minus Student's quantile for the number of blocks times the draws' standard deviation.
+    The scatter of a mean square is a share of the true value, not of the observed one: a log with
+    few contacts shows both a small mean and a small scatter. With h, that share times Student's
+    quantile for the number of blocks, the true value is at most observed/(1 − h); downwards, where
+    the mean square is skewed, its logarithm is taken: observed·e^{−h}.
 
     Args:
         mean_square: The observed mean square. [(N·m)²]
@@ -104,11 +109,9 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
 
     if not mean_square > 0 or blocks < 2:
         return float("nan"), float("nan")
-    spread = float(np.std(np.log(np.maximum(draws, 1e-300))))
     quantile = float(stdtrit(blocks - 1, 0.5 + 0.5 * LEVEL)) * np.sqrt(blocks / (blocks - 1.0))
-    half = 0.5 * quantile * spread
-    root = float(np.sqrt(mean_square))
-    return root * float(np.exp(-half)), root * float(np.exp(half))
+    half = min(quantile * float(np.std(draws)) / mean_square, WIDEST)
+    return float(np.sqrt(mean_square * np.exp(-half))), float(np.sqrt(mean_square / (1.0 - half)))
 
 
 def known_rows(errors: Array) -> NDArray[np.bool_]:

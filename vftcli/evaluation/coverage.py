@@ -1,0 +1,28 @@
+"""How often the truth lies within an estimate's 95 % band."""
+
+import numpy as np
+
+from vftcli.arrays import Array
+from vftcli.torque import COVERS, ExternalTorque
+
+LEAST = 10
+"""Fewest samples that a share is told of."""
+
+
+def coverage(estimate: ExternalTorque, reference: ExternalTorque) -> Array:
+    """Share of the samples in which the reference lies within ±1.96 sd of the estimate. (n,)
+
+    Samples in which the joint rests do not count: stiction hides there what the band cannot know.
+    NaN where the estimate has no band or the joint hardly moves.
+    """
+    if estimate.band is None:
+        return np.full(estimate.joints, np.nan)
+    error = estimate.tau - reference.tau
+    counted = np.isfinite(error)
+    for torque in (estimate, reference):
+        if torque.trusted is not None:
+            counted &= torque.trusted > 0
+    inside = counted & (np.abs(np.nan_to_num(error)) <= COVERS * estimate.band)
+    count = np.count_nonzero(counted, axis=0)
+    share = np.count_nonzero(inside, axis=0) / np.maximum(count, 1)
+    return np.where(count >= LEAST, share, np.nan)
