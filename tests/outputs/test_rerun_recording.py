@@ -18,7 +18,7 @@ from vftcli.outputs.rerun_recording import (
     write_rrd,
 )
 from vftcli.outputs.rerun_text import drawable
-from vftcli.wrench.wrench import AXES
+from vftcli.wrench.wrench import AXES, Wrench
 
 
 @pytest.fixture(scope="module")
@@ -178,12 +178,17 @@ def test_the_arrow_is_the_wrench_that_was_asked_for(with_wrench: Analysis) -> No
     recording = with_wrench.recording
     poses = motion(with_wrench.robot.chain, recording.t, recording.q, 50.0)
     sampled = np.searchsorted(with_wrench.t, poses.t)
-    wrench = with_wrench.wrenches[0]
-    base = replace(wrench, name=source.name, frame="base")
-    shown = arrow_force(replace(with_wrench, wrenches=(base,)), source, poses, sampled)
+    measured = with_wrench.virtual_sensor
+    assert measured is not None
+    base = replace(measured.wrenches[0], name=source.name, frame="base")
+
+    def arrow(wrench: Wrench) -> np.ndarray:
+        one = replace(with_wrench, virtual_sensor=replace(measured, wrenches=(wrench,)))
+        return arrow_force(one, source, poses, sampled)
+
+    shown = arrow(base)
     np.testing.assert_array_equal(shown, base.known[sampled, :3])
-    flange = replace(base, frame="flange")
-    turned = arrow_force(replace(with_wrench, wrenches=(flange,)), source, poses, sampled)
+    turned = arrow(replace(base, frame="flange"))
     # a rotation keeps lengths: rounding
     np.testing.assert_allclose(
         np.linalg.norm(turned, axis=1), np.linalg.norm(shown, axis=1), rtol=1e-12
