@@ -209,7 +209,7 @@ def remarks(
             notes += diagnosis(robot, motion, trace.residual, level)
     if trained:
         mean = mean_text(np.mean([rms(trace.residual) for trace in trained], axis=0))
-        notes.append(f"training residual {mean}, mean of the joints")
+        notes.append(f"training residual {mean}, mean of the joints, contacts if any included")
     return notes
 
 

@@ -16,9 +16,15 @@ from vftcli.identification.friction_fit import LIGHT, Contest, Given, choose_sha
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.least_squares import Fit, fit_column
 from vftcli.identification.processing import Motion, Processing, gravity_torque, prepare
-from vftcli.identification.scoring import rigid_torque
+from vftcli.identification.scoring import apparent_load, predicted_torque, rigid_torque
 from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
+
+LOAD_EXPLAINS = 0.8
+"""Share of what the profile misses that a load must explain to be suspected."""
+
+UNKNOWN_LOAD = 0.5
+"""Smallest load that is suspected. [kg]"""
 
 CONSTANT_KNOWN = 0.02
 """Relative standard deviation up to which a drive constant is taken from free motion."""
@@ -216,8 +222,21 @@ def doubts(data: Training, left: Sequence[Array], weights: Sequence[Array]) -> l
     for motion, residual, w in zip(data.motions, left, weights, strict=True):
         told = np.where(w > 0, residual, 0.0)
         name = motion.recording.name
+        remarks.append(unknown_load(data, motion))
         remarks.append(exciting.doubt(name, data.robot.name, motion.tau, told, heavy))
     return [remark for remark in remarks if remark]
+
+
+def unknown_load(data: Training, motion: Motion) -> str:
+    """Say if a log's torque looks like a load on the flange that the robot has not, or ""."""
+    before = motion.tau - predicted_torque(data.robot, motion)
+    mass, explained = apparent_load(data.robot, motion, before)
+    if explained < LOAD_EXPLAINS or abs(mass) < UNKNOWN_LOAD:
+        return ""
+    return (
+        f"{motion.recording.name}: the torque looks like {mass:+.2f} kg on the flange of "
+        f"{data.robot.name!r} ({100 * explained:.0f} % of what the profile does not explain)"
+    )
 
 
 def dry_friction(data: Training, log: int, fits: Sequence[JointFit | None]) -> Array:
