@@ -129,7 +129,7 @@ class AutoTuned:
         return replace(self.observer.estimate(terms), name=self.name)
 
     def tuning(self, step: float, joints: int) -> Tuning:
-        """What the gains mean at a sample time; tuned by the log, there is none left to tune. [s]"""
+        """What the gains mean at a sample time; where the log tuned them, none is left to. [s]"""
         meaning = self.observer.tuning(step, joints)
         return replace(meaning, numbers=0) if self.curve is not None else meaning
 

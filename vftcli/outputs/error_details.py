@@ -41,9 +41,16 @@ def chance_text(row: dict[str, Any]) -> str:
     return "best" if p >= 1.0 else f"{p:.3f}"
 
 
+def coverage_text(row: dict[str, Any]) -> str:
+    """The share of samples within the estimate's own 95 % band."""
+    share = row.get("coverage_95")
+    return DASH if share is None else f"{100 * share:.0f} %"
+
+
 DETAILS = (
     Detail("95 % interval of the RMSE, moving-block bootstrap [N·m]", interval_text),
     Detail("lag of the estimate behind the reference, best fit [ms]", lag_text),
+    Detail("samples within the estimate's 95 % band, while the joint moves", coverage_text),
     Detail("p of being no worse than the best, paired bootstrap", chance_text),
 )
 """The tables below the RMSE table, in order."""

@@ -15,7 +15,7 @@ from vftcli.torque import ExternalTorque
 from vftcli.wrench.frames import Mounting, own_pose, read_pose
 from vftcli.wrench.null_space import Elsewhere, contact_elsewhere
 from vftcli.wrench.sensor import time_offset
-from vftcli.wrench.torque_error import Disturbance, TorqueError, assumed, measured, stated
+from vftcli.wrench.torque_error import Disturbance, TorqueError, assumed, banded, measured, stated
 from vftcli.wrench.vendor import VendorCheck, check_vendor
 from vftcli.wrench.virtual_sensor import VirtualSensor
 from vftcli.wrench.wrench import Mask, Wrench
@@ -271,6 +271,8 @@ def torque_error(
         return measured(torques, free, unloaded.rms, disturbance)
     if np.count_nonzero(free) > 1:
         return measured(torques, free, None, disturbance)
+    if torques and all(torque.band is not None for torque in torques):
+        return banded(torques)
     return assumed(torques, request.solver)
 
 

@@ -147,6 +147,15 @@ def stated(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
     return TorqueError(sd={torque.name: given for torque in torques})
 
 
+def banded(torques: Sequence[ExternalTorque]) -> TorqueError:
+    """The band that each estimate brings along, measured on the log's free part."""
+    sd = {torque.name: torque.band for torque in torques if torque.band is not None}
+    return TorqueError(
+        sd={name: band[0] if np.all(band == band[0]) else band for name, band in sd.items()},
+        note="the wrenches' bands are the joint torques' own, measured on the log's free part",
+    )
+
+
 def assumed(torques: Sequence[ExternalTorque], solver: str) -> TorqueError:
     """`TORQUE_SD` for observers without a covariance, and for all where a prior is weighed.
 
