@@ -17,6 +17,8 @@ from vftcli.dynamics.kernels import momentum_terms
 from vftcli.dynamics.literal import literal_momentum_terms
 from vftcli.dynamics.terms import DynamicsTerms, dynamics_terms
 from vftcli.observers import DEFAULT, OBSERVERS, KalmanObserver, Observer, Setup
+from vftcli.observers.auto_tuning import KINDS, tuned
+from vftcli.observers.spectra import Part, Spectra, spectra_of
 from vftcli.recording import Recording
 from vftcli.robots import Robot, load_robot
 
@@ -25,6 +27,12 @@ SAMPLES = 30_060
 
 SCRIPT_SAMPLES = 1_500
 """Samples the slow per-sample scripts run over; their time is scaled to all samples."""
+
+FREE_SECONDS = 8.0
+"""Length of the part that counts as free for the observers that the log tunes. [s]"""
+
+LOOKING_BACK = ("kfo-rts", "kfo-auto", "rts-auto")
+"""Observers that need a complete log."""
 
 PAPER_TABLE_2 = {"fdo": 10.869, "gmo": 10.541, "kfo-fe": 17.578, "kfo-zoh": 58.363}
 """The paper's total times over 30 060 samples on its laptop. [s]"""
@@ -177,7 +185,9 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
     Returns:
         ``observers``: rows (name, total_s, per_sample_us, paper_s), dynamics included in none;
         ``dynamics``: the batched terms; ``ratios``: core_over_rnea_loop, analytic_script_over_core,
-        literal_script_over_core; and what was run.
+        literal_script_over_core, complete_over_core; and what was run. ``complete_log`` holds the
+        observers that need a complete log (the tuned ones with their tuning, not the spectra) and
+        the spectra.
     """
     robot = load_robot(robot_name)
     recording = circle(robot, samples)
@@ -186,8 +196,16 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
     )
     observers = {name: OBSERVERS[name].build(setup)[0] for name in DEFAULT}
     timings = Timings()
-    run_rounds(timings, robot, recording, observers, rounds)
+    run_rounds(timings, robot, recording, observers, setup, rounds)
     core = timings.median("core")
+    looking_back = [
+        {
+            "name": name,
+            "total_s": timings.median(name),
+            "per_sample_us": timings.median(name) / samples * 1e6,
+        }
+        for name in ("spectra", *LOOKING_BACK)
+    ]
     rows = [
         {
             "name": name,
@@ -202,6 +220,7 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
         "samples": samples,
         "rounds": rounds,
         "observers": rows,
+        "complete_log": looking_back,
         "dynamics": {
             "total_s": timings.median("dynamics"),
             "per_sample_us": timings.median("dynamics") / samples * 1e6,
@@ -210,6 +229,7 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
             "core_over_rnea_loop": core / timings.median("rnea loop"),
             "analytic_script_over_core": timings.median("analytic script") / core,
             "literal_script_over_core": timings.median("literal script") / core,
+            "complete_over_core": timings.median("complete") / core,
         },
     }
 
@@ -219,6 +239,7 @@ def run_rounds(
     robot: Robot,
     recording: Recording,
     observers: dict[str, Observer],
+    setup: Setup,
     rounds: int,
 ) -> None:
     """Run everything once unmeasured, then interleaved for `rounds` rounds."""
@@ -234,10 +255,33 @@ def run_rounds(
             observer.estimate(terms)
         return terms
 
+    smoother = OBSERVERS["kfo-rts"].build(setup)[0]
+    free = recording.t < FREE_SECONDS
+
+    def spectra(terms: DynamicsTerms) -> Spectra:
+        return spectra_of(Part(terms, ~free), [Part(terms, free)])
+
+    def auto(name: str, terms: DynamicsTerms, found: Spectra) -> None:
+        tuned(name, found).estimate(terms)
+
+    def complete() -> None:
+        terms = core()
+        smoother.estimate(terms)
+        found = spectra(terms)
+        for name in KINDS:
+            auto(name, terms, found)
+
     terms = core()
+    found = spectra(terms)
+    complete()
     momentum_terms(robot.loaded_chain, q, dq)
     for _ in range(rounds):
         timings.measure("core", core)
+        timings.measure("complete", complete)
+        timings.measure("spectra", lambda: spectra(terms))
+        timings.measure("kfo-rts", lambda: smoother.estimate(terms))
+        for name in KINDS:
+            timings.measure(name, partial(auto, name, terms, found))
         timings.measure("rnea loop", lambda: rnea_loop(model, q, dq))
         timings.measure("dynamics", lambda: dynamics_terms(recording, robot))
         for name, observer in observers.items():

@@ -30,8 +30,8 @@ from vftcli.observers.recursion import Steps, recursion, steps_of
 from vftcli.observers.steady_filter import steady_filter
 from vftcli.torque import ExternalTorque
 
-SETTLED = 1e-15
-"""Relative change of the smoother's information a sample back, below which it has settled."""
+SETTLED = 1e-16
+"""Share of the smoother's settled information that may be missing where it counts as settled."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,22 +78,13 @@ class KalmanSmoother:
 
     def _steady_deviation(self, gains: Gains, model: Discrete, S: Array, samples: int) -> Array:
         """√P₂₂ of the smoother: it settles within a few time constants of the log's end. (T, n)"""
-        L = np.zeros((3, len(S)))
-        steps, variances = [], []
         step = information_step(gains, model.a12, model.a22)
-        for _ in range(samples):
-            variances.append(smoothed_variance(gains.posterior, L))
-            new = np.einsum("abj,bj->aj", step, L)
-            new += information_gain(model.a12, S)
-            moved = np.max(np.abs(new - L) / np.maximum(np.abs(new), np.finfo(float).tiny))
-            L = new
-            steps.append(moved)
-            if moved <= SETTLED:
-                break
+        missing = still_missing(step, information_gain(model.a12, S), samples)
+        information = (missing[0] - missing).transpose(1, 0, 2)
+        variances = smoothed_variance(gains.posterior, information)
         sd = empty_series(samples, len(S))
-        count = len(variances)
         sd[:] = np.sqrt(variances[-1])
-        sd[samples - count :] = np.sqrt(np.array(variances[::-1]))
+        sd[samples - len(variances) :] = np.sqrt(variances[::-1])
         return sd
 
     def _step_by_step(self, terms: DynamicsTerms, steps: Steps) -> tuple[Array, Array]:
@@ -207,6 +198,24 @@ def smoothed_variance(P: Covariance, information: Array) -> Array:
     gained = P.p12**2 * l11 + 2.0 * P.p12 * P.p22 * l12 + P.p22**2 * l22
     variance: Array = P.p22 - gained
     return variance
+
+
+def still_missing(step: Array, gain: Array, samples: int) -> Array:
+    """What Λ̃ lacks of its settled value, 0, 1, 2 … samples from the end of a log. (N, 3, n)
+
+    Λ̃ ← SΛ̃ + g settles at Λ̃∞ = (I − S)⁻¹g, from which it is Sᵏ Λ̃∞ away after k samples. The
+    powers come by doubling, until nothing is missing or the log ends.
+    """
+    S, g = np.moveaxis(step, -1, 0), np.moveaxis(gain, -1, 0)
+    settled = np.linalg.solve(np.eye(3) - S, g[..., None])[..., 0]
+    missing, power = settled.T[None], S
+    while len(missing) < samples:
+        missing = np.concatenate([missing, np.einsum("jab,kbj->kaj", power, missing)])
+        power = power @ power
+        if np.all(np.abs(missing[-1]) <= SETTLED * np.abs(settled.T)):
+            break
+    kept: Array = np.asarray(missing[:samples], dtype=np.float64)
+    return kept
 
 
 def shifted_back(series: Array) -> Array:
