@@ -23,6 +23,9 @@ from vftcli.identification.stacking import Layout, Triangles
 WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3)
 """Weights of the distance to the profile that cross-validation chooses from."""
 
+MARGIN = 1.01
+"""The strongest pull within this factor of the best cross-validated misfit is taken."""
+
 STEPS = 100
 """Newton steps at most; a dozen or two are usual."""
 
@@ -213,7 +216,7 @@ def fit_consistent(triangles: Triangles, profile: Array) -> ConsistentFit:
     rows = triangles.samples * triangles.correlation
     errors = {weight: float(np.sqrt(total / rows)) for weight, total in totals.items()}
     best = min(errors.values())
-    weight = max(w for w, error in errors.items() if error <= 1.002 * best)
+    weight = max(w for w, error in errors.items() if error <= MARGIN * best)
     return ConsistentFit(fit_at(triangles, start, weight, start), weight, errors)
 
 

@@ -9,8 +9,15 @@ from vftcli.arrays import Array
 from vftcli.dynamics.drive import drive_torque
 from vftcli.errors import IdentificationError
 from vftcli.identification.filtering import resampled, zero_phase
-from vftcli.identification.least_squares import fit_column, robust_sd, solve
-from vftcli.identification.processing import Motion, Processing, gravity_torque, prepare, runs
+from vftcli.identification.least_squares import fit_column, solve
+from vftcli.identification.processing import (
+    Motion,
+    Processing,
+    Samples,
+    gravity_torque,
+    prepare,
+    runs,
+)
 from vftcli.identification.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.recording import Recording
 from vftcli.robots.chain import Payload
@@ -27,6 +34,9 @@ COARSE, FINE = 0.05, 5e-4
 
 DWELL = 0.5
 """Shortest rest that counts as a pose. [s]"""
+
+WINDOW, HELD = 0.2, 1e-3
+"""A pose is held while no joint moves further than `HELD` [rad] within `WINDOW` [s]."""
 
 POSES = 4
 """Fewest different poses for mass and centre of mass."""
@@ -235,13 +245,10 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
 
 def poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:
     """Mean position and torque of every rest. (P, n) [rad], (P, n) [N·m]"""
-    still = Processing().still
     q, torque = [], []
     for recording in recordings:
-        effort, dq = drive_torque(recording, robot), recording.require("dq")
-        limit = max(still, 4.0 * max(robust_sd(v) for v in dq.T))
-        smooth = zero_phase(recording.t, dq, 2.0) if recording.duration > 2.0 else dq
-        for start, stop in runs(np.all(np.abs(smooth) <= limit, axis=1)):
+        effort = drive_torque(recording, robot)
+        for start, stop in runs(holds(recording)):
             if recording.t[stop - 1] - recording.t[start] >= DWELL:
                 edge = (stop - start) // 5
                 span = slice(start + edge, stop - edge)
@@ -249,3 +256,13 @@ def poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:
                 torque.append(effort[span].mean(axis=0))
     n = robot.joints
     return np.reshape(q, (-1, n)), np.reshape(torque, (-1, n))
+
+
+def holds(recording: Recording) -> Samples:
+    """Whether no joint travels further than `HELD` around a sample. (T,)"""
+    reach = max(1, round(0.5 * WINDOW / recording.step))
+    held = np.zeros(recording.samples, dtype=bool)
+    if recording.samples > 2 * reach:
+        travel = np.abs(recording.q[2 * reach :] - recording.q[: -2 * reach])
+        held[reach:-reach] = np.all(travel <= HELD, axis=1)
+    return held

@@ -1,16 +1,16 @@
 """Methods "base" and "consistent": all parameters of the arm together."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from vftcli.arrays import Array
 from vftcli.errors import IdentificationError
-from vftcli.identification.base_parameters import base_parameters
+from vftcli.identification.base_parameters import BaseParameters, base_parameters
 from vftcli.identification.consistent import fit_consistent, nearest_physical
 from vftcli.identification.friction_fit import PLAIN
-from vftcli.identification.friction_shapes import Shape, rounded
+from vftcli.identification.friction_shapes import FrictionColumns, Shape, rounded
 from vftcli.identification.outcome import (
     Outcome,
     confidence,
@@ -19,9 +19,11 @@ from vftcli.identification.outcome import (
     odd_friction,
     profile_friction,
 )
+from vftcli.identification.processing import gravity_torque
 from vftcli.identification.regressor import chain_parameters, with_parameters
-from vftcli.identification.stacking import Data, Layout, stack
-from vftcli.identification.training import JointFit, Training, fitted
+from vftcli.identification.scoring import rigid_torque
+from vftcli.identification.stacking import Data, Layout, Triangles, stack
+from vftcli.identification.training import JointFit, Training, fit_frictions, fitted
 from vftcli.robots.robot import JointFriction, Robot
 
 
@@ -36,31 +38,21 @@ def consistent_method(data: Training) -> Outcome:
 
 
 def whole_arm(data: Training, method: str) -> Outcome:
-    """Identify all parameters of the arm together."""
+    """Identify all parameters of the arm together.
+
+    Friction models are chosen twice: with the profile's links, and again with the links that come
+    out, so that an error of the profile is not taken for friction.
+    """
     fits, weights, notes = fitted(data, strict=False)
     layout, start = layout_of(data, fits)
-    logs = [Data(m, c, w) for m, c, w in zip(data.motions, data.columns, weights, strict=True)]
-    check_size(layout, logs)
-    triangles = stack(layout, logs, start)
+    x = nearest_physical(stacked(data, layout, start, weights), start)
+    refined = with_links(data, layout, x)
+    fits = fit_frictions(refined, weights)
+    layout, start = layout_of(data, fits)
+    triangles = stacked(refined, layout, start, weights)
     base = base_parameters(triangles, start)
-    if method == "base":
-        x = nearest_physical(triangles, start)
-        notes.append(
-            "the robot file holds the physically consistent model nearest to the base parameters; "
-            "observers use that, [[identification.base_parameters]] lists the least-squares values"
-        )
-    else:
-        found = fit_consistent(triangles, start)
-        x = found.x
-        notes.append(
-            f"pull to the profile {found.weight:g}, chosen by cross-validation among "
-            f"{', '.join(f'{w:g}' for w in sorted(found.errors))}"
-        )
-    doubtful = sum(not ok for ok in base.determined[: -len(layout.names) + layout.inertial])
-    notes.append(
-        f"{len(base.values)} base parameters and friction coefficients; {doubtful} of the inertial "
-        "ones are not determined by these logs (standard deviation above 30 % of the value)"
-    )
+    x, remark = METHODS[method](triangles, start)
+    notes += [remark, undetermined(base, layout)]
     if data.robot.payload is not None:
         notes.append("the mounted payload is part of the last link now")
     numbers = []
@@ -74,6 +66,60 @@ def whole_arm(data: Training, method: str) -> Outcome:
     robot = with_vector(data.robot, layout, x, tuple(frictions))
     contests = [c for f in fits if f is not None for c in f.contests]
     return Outcome(robot, numbers, contests, base, [*notes, *held(data)])
+
+
+def from_base(triangles: Triangles, start: Array) -> tuple[Array, str]:
+    """The physical model nearest to the base parameters, and what is said of it."""
+    return nearest_physical(triangles, start), (
+        "the robot file holds the physically consistent model nearest to the base parameters; "
+        "observers use that, [[identification.base_parameters]] lists the least-squares values"
+    )
+
+
+def from_consistent(triangles: Triangles, start: Array) -> tuple[Array, str]:
+    """The physical model with a cross-validated pull to the profile, and what is said of it."""
+    found = fit_consistent(triangles, start)
+    return found.x, (
+        f"pull to the profile {found.weight:g}, chosen by cross-validation among "
+        f"{', '.join(f'{w:g}' for w in sorted(found.errors))}"
+    )
+
+
+METHODS: dict[str, Callable[[Triangles, Array], tuple[Array, str]]] = {
+    "base": from_base,
+    "consistent": from_consistent,
+}
+"""Method → parameters of the whole arm from its stacked equations."""
+
+
+def undetermined(base: BaseParameters, layout: Layout) -> str:
+    """How many base parameters the logs leave open."""
+    count = len(base.values) - (layout.size - layout.inertial - layout.rotors)
+    doubtful = sum(not known for known in base.determined[:count])
+    return (
+        f"{count} base parameters, of which {doubtful} are not determined by these logs "
+        "(standard deviation above 30 % of the value)"
+    )
+
+
+def stacked(data: Training, layout: Layout, start: Array, weights: Sequence[Array]) -> Triangles:
+    """The stacked equations of all logs."""
+    logs = [Data(m, c, w) for m, c, w in zip(data.motions, data.columns, weights, strict=True)]
+    check_size(layout, logs)
+    return stack(layout, logs, start)
+
+
+def with_links(data: Training, layout: Layout, x: Array) -> Training:
+    """The training data with other links: their rigid-body torque, their gravity as load."""
+    robot = with_vector(data.robot, layout, x, data.robot.friction)
+    columns = (
+        FrictionColumns(m, np.abs(gravity_torque(robot, m.recording.q))) for m in data.motions
+    )
+    return replace(
+        data,
+        columns=tuple(columns),
+        rigid=tuple(rigid_torque(robot, m) for m in data.motions),
+    )
 
 
 def layout_of(data: Training, fits: Sequence[JointFit | None]) -> tuple[Layout, Array]:
