@@ -1,14 +1,14 @@
 """Logs in, a robot out: the whole way of `vftcli identify`, in the order the data flows."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import polars as pl
 
 from vftcli.arrays import Array
 from vftcli.errors import IdentificationError, ParameterError
+from vftcli.identification.account import Story, documented
 from vftcli.identification.base_parameters import BaseParameters
 from vftcli.identification.friction_fit import Contest
 from vftcli.identification.methods import METHODS
@@ -29,7 +29,6 @@ from vftcli.identification.scoring import diagnosis, mean_text, predicted_torque
 from vftcli.identification.training import training
 from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
-from vftcli.robots.writing import robot_document
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +97,18 @@ def identify(
     processing = task.processing.described(logs[0].step)
     table = pl.DataFrame([*rows, *more], schema=RESIDUALS, orient="row")
     sources = tuple(logs) if free is None else (*logs, free)
-    new = documented(new, robot, task.name, method, sources, processing, table, outcome, load)
+    story = Story(
+        profile=robot,
+        name=task.name,
+        method=method,
+        logs=sources,
+        trained=[r.name for r in train],
+        processing=processing,
+        residuals=table,
+        outcome=outcome,
+        load=load,
+    )
+    new = documented(new, story)
     return Identification(
         robot=new,
         profile=robot,
@@ -239,83 +249,3 @@ def base_table(base: BaseParameters | None) -> pl.DataFrame | None:
         return None
     rows = zip(base.names, base.values.tolist(), base.sd.tolist(), base.determined, strict=True)
     return pl.DataFrame(list(rows), schema=BASE, orient="row")
-
-
-def documented(
-    robot: Robot,
-    profile: Robot,
-    name: str,
-    method: str,
-    logs: Sequence[Recording],
-    processing: Mapping[str, Any],
-    residuals: pl.DataFrame,
-    outcome: Outcome,
-    load: LoadFit | None,
-) -> Robot:
-    """The robot under its own name, its document telling where every number comes from."""
-    named = replace(
-        robot,
-        name=name or f"{profile.name}-identified",
-        title=f"{profile.title or profile.name}, identified",
-        path=None,
-    )
-    document = robot_document(named)
-    words = f"identified ({method}) from " + ", ".join(log.name for log in logs)
-    changed = {(n.joint, n.parameter) for n in outcome.numbers if n.determined}
-    for j, table in enumerate(document["joints"], start=1):
-        links = method in {"base", "consistent"}
-        table["inertial_source"] = words if links else f"profile {profile.name}"
-        for key in ("rotor_inertia", "torque_constant"):
-            if key in table:
-                new = (j, key) in changed or (links and key == "rotor_inertia")
-                table[f"{key}_source"] = words if new else f"profile {profile.name}"
-    sources = [*document.get("sources", ()), *(source_table(k, r) for k, r in enumerate(logs, 1))]
-    account: dict[str, Any] = {
-        "method": method,
-        "profile": profile.name,
-        "logs": [log.name for log in logs],
-        "sha256": [log.source.sha256 or "unknown" for log in logs],
-        "processing": dict(processing),
-        "residuals": residual_tables(residuals),
-    }
-    if load is not None:
-        document["payload"]["source"] = load.notes[0]
-        account["payload"] = {
-            "loaded": load.loaded,
-            "mass_sd": load.mass_sd,
-            "com_sd": load.com_sd.tolist(),
-            "residual_Nm": load.residual.tolist(),
-        }
-    if outcome.base is not None:
-        account["base_parameters"] = base_tables(outcome.base)
-    return replace(named, document={**document, "sources": sources, "identification": account})
-
-
-def source_table(index: int, recording: Recording) -> dict[str, Any]:
-    """One log as a source."""
-    return {
-        "id": f"log-{index}",
-        "what": "what `identification` and the joints' confidence name",
-        "ref": f"{recording.name}, {recording.samples} samples, {recording.duration:.3f} s",
-        "sha256": recording.source.sha256 or "unknown",
-    }
-
-
-def residual_tables(residuals: pl.DataFrame) -> list[dict[str, Any]]:
-    """RMS per joint of each log under the identified robot."""
-    tables = []
-    for (log, role), rows in residuals.filter(pl.col("model") == "identified").group_by(
-        ["log", "role"], maintain_order=True
-    ):
-        values = [round(v, 4) for v in rows["rms_Nm"].to_list()]
-        tables.append({"log": log, "role": role, "rms_Nm": values})
-    return tables
-
-
-def base_tables(base: BaseParameters) -> list[dict[str, Any]]:
-    """Base parameters as tables of the robot file; an unknown spread is infinite."""
-    rows = zip(base.names, base.values, base.sd, base.determined, strict=True)
-    return [
-        {"parameter": name, "value": float(value), "sd": float(sd), "determined": ok}
-        for name, value, sd, ok in rows
-    ]

@@ -147,7 +147,8 @@ def pair_fit(loaded: Recording, free: Recording, robot: Robot) -> PairFit:
     left = extra - np.einsum("knp,p->kn", A, solution)
     sd = column_sd(A, left, usable)[:STATIC]
     note = (
-        f"load from the pair {loaded.name} − {free.name}: same motion, shifted by {-shift:.3f} s, "
+        f"load from the pair {loaded.name} − {free.name}: same motion, "
+        f"shifted by {round(-shift, 3) + 0.0:.3f} s, "
         f"positions {1e3 * distance:.2g} mrad rms apart; Coulomb friction that grows with the load "
         "fitted along; the load is taken as a point mass"
     )
