@@ -159,8 +159,22 @@ def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
     )
     request = Request(robot="ur5", observers=("kfo-auto",))
     analysis = analyse(twice, choose_robot(request, twice), request)
-    assert any("as loud as the rest" in note for note in analysis.notes)
+    assert any("is not much quieter than the rest" in note for note in analysis.notes)
     assert analysis.estimates[0].band is None
+
+
+def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: Request) -> None:
+    """Its quietest cycle is pushed too: hand-set gains, no bands, no bias removed, all said."""
+    always = replace(request_, interval="4.3:20", observers=("rts-auto", "kfo-rts"))
+    analysis = analyse_log(FIXTURE, always)
+    assert any("something touches the arm in all of them" in note for note in analysis.notes)
+    np.testing.assert_array_equal(analysis.estimates[0].tau, analysis.estimates[1].tau)
+    assert analysis.estimates[0].band is None
+    with pytest.raises(ParameterError, match="something touches the arm in all of them"):
+        analyse_log(FIXTURE, replace(always, remove_bias="free-cycle"))
+    # what the user states is not doubted
+    stated = analyse_log(FIXTURE, replace(always, free_cycles="1"))
+    assert stated.estimates[0].band is not None
 
 
 def test_a_gap_in_the_log_is_survived() -> None:

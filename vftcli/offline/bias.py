@@ -74,9 +74,11 @@ def remove_free_cycle(
         ParameterError: If there is no free motion to subtract.
     """
     if found.part is None or not found.part.pairings:
+        why = found.notes[-1] if found.part is None and found.notes else ""
         raise ParameterError(
             "--remove-bias free-cycle needs a motion that repeats with a free cycle, or a free run "
             "of the same motion (--free LOG); --remove-bias model needs neither, only a free part"
+            f"{f'. Here: {why}' if why else ''}"
         )
     removed = []
     for observer, estimate in zip(observers, estimates, strict=True):
