@@ -186,7 +186,8 @@ def look_over(
     if not request.looks_back:
         return None
     from vftcli.offline.bias import check_removal
-    from vftcli.offline.survey import Asked, survey
+    from vftcli.offline.free_part import Asked
+    from vftcli.offline.survey import survey, without_free_motion
 
     check_removal(request.remove_bias)
     asked = Asked(
@@ -195,7 +196,10 @@ def look_over(
         period=request.period if not request.free else None,
         free_cycles=request.free_cycles,
     )
-    return survey(recording, robot, terms, asked)
+    found = survey(recording, robot, terms, asked)
+    if request.remove_bias == "free-cycle":
+        return replace(found, spectra=without_free_motion(found))
+    return found
 
 
 def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":

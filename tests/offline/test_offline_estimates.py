@@ -80,7 +80,7 @@ def test_removing_the_bias_subtracts_the_free_cycle_at_the_same_phase(
 ) -> None:
     found = worked_up.workup
     assert found is not None
-    before, after = worked_up.estimates[-1], without_bias.estimates[-1]
+    before, after = worked_up.estimates[0], without_bias.estimates[0]
     inside, t = found.survey.part.inside, worked_up.t
     assert np.all(after.tau[inside] == 0.0)
     k = int(np.searchsorted(t, 9.0))
@@ -89,6 +89,17 @@ def test_removing_the_bias_subtracts_the_free_cycle_at_the_same_phase(
     # the period found on the positions differs from 4 s by microseconds
     np.testing.assert_allclose(before.tau[k] - after.tau[k], same, atol=1e-3)
     assert any("zero by construction" in note for note in without_bias.notes)
+
+
+def test_what_is_left_without_the_bias_is_tuned_on(
+    worked_up: Analysis, without_bias: Analysis
+) -> None:
+    """Joints that friction and model limit gain; where noise does (J1), there is twice as much."""
+    assert worked_up.workup is not None
+    assert without_bias.workup is not None
+    plain, left = (a.workup.curves["kfo-auto"] for a in (worked_up, without_bias))
+    limited = [1, 2, 3]
+    assert np.all(left.least[limited] < 0.7 * plain.least[limited])
 
 
 def test_a_bias_model_helps_where_nothing_repeats(request_: Request) -> None:

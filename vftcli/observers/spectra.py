@@ -83,6 +83,22 @@ class Spectra:
         excess = smoothed(self.loaded - self.free)
         return np.maximum(excess, 0.0)
 
+    @property
+    def floor(self) -> Array:
+        """Noise alone: S_n from its quietest octave up, below it that octave's level. (F, n)
+
+        Friction and model error make the rest of S_n at low frequencies.
+        """
+        low, levels, tops = self.width, [], []
+        while 2.0 * low <= self.frequency[-1]:
+            inside = (self.frequency >= low) & (self.frequency <= 2.0 * low)
+            levels.append(self.free[inside].mean(axis=0))
+            tops.append(2.0 * low)
+            low *= np.sqrt(2.0)
+        quietest = np.argmin(levels, axis=0)
+        above = self.frequency[:, None] > np.array(tops)[quietest]
+        return np.where(above, smoothed(self.free), np.min(levels, axis=0))
+
     def missed(self, response: NDArray[np.complex128]) -> Array:
         """∫|1 − H|² S_τ df, what an estimator's lag and bandwidth leave out. (n,) [(N·m)²]
 

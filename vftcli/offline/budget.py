@@ -6,7 +6,6 @@ import numpy as np
 
 from vftcli.arrays import Array
 from vftcli.observers.observer import Observer
-from vftcli.observers.spectra import Spectra
 from vftcli.offline.survey import Survey, free_estimates, free_rms, free_samples, stuck_joints
 from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
@@ -14,9 +13,6 @@ from vftcli.torque import ExternalTorque
 
 CAUSES = ("noise", "friction", "model", "bandwidth", "stiction at rest")
 """What an error is divided into."""
-
-OCTAVES = 2.0
-"""The noise floor is the quietest stretch of the free spectrum this many times as wide as low."""
 
 SLOW = 0.02
 """Velocity over which the sign of friction turns. [rad/s]"""
@@ -62,7 +58,7 @@ def budget(
     free = free_estimates(found, observer, estimate)
     read = free_rms(found, free) ** 2
     share: Array = np.abs(response) ** 2
-    noise = np.minimum(noise_floor(spectra) * np.sum(share, axis=0) * spectra.width, read)
+    noise = np.minimum(np.sum(spectra.floor * share, axis=0) * spectra.width, read)
     modelled = read - noise
     by_friction = modelled * friction_share(found, recording, free)
     squares = {
@@ -73,17 +69,6 @@ def budget(
         "stiction at rest": dry_friction(robot, n) ** 2 / 3.0 * found.rest.mean(axis=0),
     }
     return Budget(observer.name, {cause: np.sqrt(value) for cause, value in squares.items()})
-
-
-def noise_floor(spectra: Spectra) -> Array:
-    """The quietest octave of S_n, which no friction or model error reaches. (n,) [(N·m)²/Hz]"""
-    low = spectra.width
-    floors = []
-    while OCTAVES * low <= spectra.frequency[-1]:
-        inside = (spectra.frequency >= low) & (spectra.frequency <= OCTAVES * low)
-        floors.append(spectra.free[inside].mean(axis=0))
-        low *= np.sqrt(OCTAVES)
-    return np.asarray(np.min(floors, axis=0))
 
 
 def friction_share(found: Survey, recording: Recording, free: tuple[ExternalTorque, ...]) -> Array:

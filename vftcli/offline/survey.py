@@ -9,11 +9,12 @@ from vftcli.arrays import Array, frozen
 from vftcli.dynamics.terms import DynamicsTerms, dynamics_terms
 from vftcli.errors import ParameterError, ReferenceTorqueError
 from vftcli.observers.observer import Observer
-from vftcli.observers.spectra import Part, Spectra, spectra_of
-from vftcli.offline.free_part import Asked, Flags, FreePart, find_free_part
+from vftcli.observers.spectra import Part, Spectra, raw_disturbance, spectra_of
+from vftcli.offline.free_part import Asked, FreePart, find_free_part
 from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
 from vftcli.torque import ExternalTorque
+from vftcli.truth.pairing import mean_of
 from vftcli.truth.rest import at_rest, stops
 
 QUIETER = 0.85
@@ -76,6 +77,36 @@ def survey(recording: Recording, robot: Robot, terms: DynamicsTerms, asked: Aske
     return Survey(terms=terms, part=None, rest=rest, notes=(not_free(recording, part),))
 
 
+def without_free_motion(found: Survey) -> Spectra | None:
+    """Spectra as they are once the free motion at the same phase is subtracted.
+
+    What repeats is gone from both parts. Left in the free one is what does not repeat: the noise
+    in S_n, from the log and from the mean of the k free motions, 1 + 1/k of it.
+    """
+    part, spectra = found.part, found.spectra
+    if part is None or spectra is None or not part.pairings:
+        return spectra
+    terms, clocks = found.terms, {len(x.t): x for x in (*found.run_terms, found.terms)}
+    series = [padded(raw_disturbance(clocks[len(p.free.t)])) for p in part.pairings]
+    d = padded(raw_disturbance(terms)) - mean_of(part.pairings, series)
+    known = np.isfinite(d[:, 0]) & ~part.inside
+    step = np.diff(terms.t, prepend=terms.t[0])[:, None]
+    p = np.cumsum(step * np.nan_to_num(d), axis=0)
+    relieved = Part(DynamicsTerms(t=terms.t, p=p, mu=np.zeros_like(p)), known)
+    try:
+        loaded = spectra_of(relieved, free_samples(found))
+    except ParameterError:
+        return spectra
+    floor = (1.0 + 1.0 / len(part.pairings)) * spectra.floor
+    columns = [np.interp(loaded.frequency, spectra.frequency, column) for column in floor.T]
+    return replace(loaded, free=np.column_stack(columns))
+
+
+def padded(d: Array) -> Array:
+    """The raw disturbance with its first sample repeated, so that every sample has one. (T, n)"""
+    return np.concatenate([d[:1], d])
+
+
 def free_samples(found: Survey) -> list[Part]:
     """The free part's terms and samples, of the log itself or of the free runs."""
     if found.run_terms:
@@ -124,6 +155,3 @@ def free_rms(found: Survey, estimates: Sequence[ExternalTorque]) -> Array:
 def stuck_joints(found: Survey) -> tuple[str, ...]:
     """The names of the joints that rest, as J5."""
     return tuple(f"J{j + 1}" for j in np.flatnonzero(found.stuck))
-
-
-__all__ = ["Asked", "Flags", "Survey", "free_estimates", "free_rms", "stuck_joints", "survey"]
