@@ -3,46 +3,52 @@
 import gc
 import os
 import sys
-from typing import Annotated
+from collections.abc import Iterable
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
 
-from vftcli.cli import (
-    admit,
-    bench,
-    compare,
-    convert,
-    estimate,
-    formats,
-    identify,
-    inspect,
-    listings,
-    report,
-    simulate,
-    tune,
-)
 from vftcli.errors import VftError
 
-app = typer.Typer(
-    help="External forces from recorded robot logs: disturbance observers, ground truth, errors.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    add_completion=False,
-)
-app.command("estimate")(estimate.estimate)
-app.command("compare")(compare.compare)
-app.command("report")(report.report)
-app.command("inspect")(inspect.inspect_log)
-app.command("convert")(convert.convert_log)
-app.command("admit")(admit.admit)
-app.command("identify")(identify.identify_robot)
-app.command("tune")(tune.tune_gains)
-app.command("simulate")(simulate.simulate_log)
-app.command("bench")(bench.bench)
-app.command("robots")(listings.robots)
-app.command("observers")(listings.observers)
-app.command("formats")(formats.list_formats)
+COMMANDS = {
+    "estimate": "estimate:estimate",
+    "compare": "compare:compare",
+    "report": "report:report",
+    "inspect": "inspect:inspect_log",
+    "convert": "convert:convert_log",
+    "admit": "admit:admit",
+    "identify": "identify:identify_robot",
+    "tune": "tune:tune_gains",
+    "simulate": "simulate:simulate_log",
+    "bench": "bench:bench",
+    "robots": "listings:robots",
+    "observers": "listings:observers",
+    "formats": "formats:list_formats",
+}
+"""Command → the module of this package, and the function in it."""
+
+
+def make_app(names: Iterable[str] = tuple(COMMANDS)) -> typer.Typer:
+    """Make the command line with all commands, or with those that a call can need."""
+    app = typer.Typer(
+        help=vftcli.__doc__,
+        no_args_is_help=True,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        add_completion=False,
+    )
+    app.callback()(vftcli)
+    for name in names:
+        module, function = COMMANDS[name].split(":")
+        app.command(name)(getattr(import_module(f"vftcli.cli.{module}"), function))
+    return app
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module's attributes are of every kind
+    if name == "app":
+        return make_app()
+    raise AttributeError(f"module 'vftcli.cli' has no attribute {name!r}")
 
 
 def show_version(asked: bool) -> None:
@@ -54,7 +60,6 @@ def show_version(asked: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def vftcli(
     _version: Annotated[
         bool,
@@ -70,8 +75,9 @@ def main() -> None:
         # The matrices here are small: threads of a linear algebra library only wait for each other.
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     gc.set_threshold(200_000)  # a command is short: collecting while it imports is a tenth of it
+    asked = sys.argv[1] if len(sys.argv) > 1 else ""
     try:
-        app()
+        make_app([asked] if asked in COMMANDS else COMMANDS)()
     except VftError as error:
         stop(str(error))
     except MemoryError:

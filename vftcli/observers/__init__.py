@@ -1,20 +1,20 @@
 """Disturbance observers: one table, and the parameters each starts from."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
 from vftcli.arrays import Array
 from vftcli.errors import ParameterError
-from vftcli.observers.auto_tuning import AutoTuned, tuned
 from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
 from vftcli.observers.kalman import KalmanObserver
 from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer, Tuning, per_joint
 from vftcli.observers.settings import PARAMETERS, Settings, joint_values, merged, parse_settings
-from vftcli.observers.smoother import KalmanSmoother
-from vftcli.observers.spectra import Spectra
+
+if TYPE_CHECKING:
+    from vftcli.observers.spectra import Spectra
 
 FALLBACK_RATE = 10.0
 """First-order gain where a robot gives no gains at all. [1/s]"""
@@ -37,7 +37,7 @@ class Setup(NamedTuple):
     joints: int
     step: float
     as_printed: bool
-    spectra: Spectra | None = None
+    spectra: "Spectra | None" = None
 
 
 class Entry(NamedTuple):
@@ -136,6 +136,8 @@ def build_auto(
     """The builder of an observer whose gains come from the log, else from `by_hand`."""
 
     def build(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
+        from vftcli.observers.auto_tuning import AutoTuned, tuned
+
         if setup.spectra is not None:
             return tuned(name, setup.spectra), ()
         observer, notes = by_hand(setup)

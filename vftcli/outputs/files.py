@@ -1,7 +1,6 @@
 """Writing files whole or not at all, and never over something without being told to."""
 
 import os
-import secrets
 import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -31,7 +30,7 @@ def atomic(path: Path, force: bool = False) -> Iterator[Path]:
         return
     refuse_existing(path, force)
     target = path.resolve() if path.is_symlink() else path
-    temporary = target.with_name(f".{secrets.token_hex(4)}.{target.name}")
+    temporary = target.with_name(f".{os.urandom(4).hex()}.{target.name}")
     try:
         check_writable(target.parent)
         yield temporary
@@ -87,7 +86,7 @@ class OutputFolder:
         try:
             self.made = make_folders(self.path)
             check_writable(self.path)
-            self.temporary = self.path / f".{secrets.token_hex(4)}.partial"
+            self.temporary = self.path / f".{os.urandom(4).hex()}.partial"
             self.temporary.mkdir()
         except OSError as error:
             self._discard()
