@@ -126,6 +126,8 @@ def build_kfo(
 
 def build_rts(setup: Setup) -> tuple[Observer, tuple[str, ...]]:
     """The smoother on the zero-order-hold filter, whose process noise leaves no bias on a ramp."""
+    from vftcli.observers.smoother import KalmanSmoother
+
     kalman, notes = build_kfo("zoh", "kfo-rts")(setup)
     return KalmanSmoother(filter=cast("KalmanObserver", kalman)), notes
 
