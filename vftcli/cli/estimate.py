@@ -77,7 +77,7 @@ def estimate(
         free_cycles=free_cycles,
         gains_file=gains_file,
         free_part=free_part,
-        bands=bands,
+        bands=bands or any((free, free_cycles, period)),
         remove_bias=remove_bias,
         wrench=wrench_request(*of_wrench),
     )

@@ -252,7 +252,7 @@ def responses(analysis: Analysis) -> list[dict[str, Any]]:
 
 
 def tuning_curves(analysis: Analysis, shape: dict[str, Any]) -> list[dict[str, Any]]:
-    """What was minimised for every observer that the log tuned, if there is one."""
+    """What was minimised for every observer that the log tuned, and the spectra behind it."""
     from vftcli.outputs.html.workup_part import curves
 
     colours = colours_of(analysis.estimates)
@@ -262,6 +262,20 @@ def tuning_curves(analysis: Analysis, shape: dict[str, Any]) -> list[dict[str, A
     ]
     title = "Expected error against natural frequency ω_n/2π"
     chart = {"key": "curve", "title": title, "unit": "N·m", **shape, "series": series}
+    return [*([chart] if series else []), *spectra_charts(analysis, shape)]
+
+
+def spectra_charts(analysis: Analysis, shape: dict[str, Any]) -> list[dict[str, Any]]:
+    """The spectra of the raw disturbance over the free and the loaded part, if they are known."""
+    from vftcli.outputs.html.workup_part import spectra
+
+    series = [
+        {"name": name, "colour": colour, "dashed": False, "lines": lines_over(frequency, level)}
+        for name, colour, frequency, level in spectra(analysis)
+    ]
+    title = "Spectrum of d: free part (blue), loaded part (orange)"
+    unit = "dB, 1 (N·m)²/Hz"
+    chart = {"key": "spectra", "title": title, "unit": unit, **shape, "series": series}
     return [chart] if series else []
 
 

@@ -9,6 +9,9 @@ from vftcli.analysis import Analysis
 from vftcli.arrays import Array
 from vftcli.outputs.tables import significant
 
+FREE, LOADED = "#3b7ea1", "#c2410c"
+"""Colours of the two spectra."""
+
 
 def workup(analysis: Analysis) -> str:
     """The section, empty where nothing asked for it."""
@@ -69,6 +72,22 @@ def table(caption: str, words: tuple[str, str], joints: int, rows: list[str]) ->
         f'<details><summary>{escape(caption)}</summary><div class="scroll"><table>'
         f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div></details>"
     )
+
+
+def spectra(analysis: Analysis) -> Iterator[tuple[str, str, Array, Array]]:
+    """Name, colour, frequencies (F,) and level (F, n) of the raw disturbance's spectra.
+
+    In decibels to 1 (N·m)²/Hz; 0 Hz is left out.
+    """
+    found = analysis.workup.survey.spectra if analysis.workup is not None else None
+    if found is None:
+        return
+    for name, colour, power in (
+        ("free part, S_n", FREE, found.free),
+        ("loaded part, S_d", LOADED, found.loaded),
+    ):
+        level = 10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny))
+        yield name, colour, found.frequency[1:], level
 
 
 def curves(analysis: Analysis) -> Iterator[tuple[str, Array, Array]]:
