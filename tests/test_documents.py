@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from vftcli.cli import app
+from vftcli.cli import COMMANDS, app
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
@@ -68,6 +68,13 @@ def test_every_command_is_documented_and_has_an_example() -> None:
         words = command.callback.__doc__ or ""
         assert f"Example: vftcli {command.name}" in " ".join(words.split()), command.name
         assert f"vftcli {command.name}" in text, command.name
+
+
+def test_the_summaries_of_help_are_the_commands_own() -> None:
+    for command in app.registered_commands:
+        assert command.callback is not None
+        first = (command.callback.__doc__ or "").strip().splitlines()[0]
+        assert COMMANDS[str(command.name)].summary == first
 
 
 def test_every_observer_and_robot_is_documented() -> None:

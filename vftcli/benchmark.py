@@ -4,8 +4,10 @@ Every ratio is between things measured in one run, interleaved round by round, s
 whose speed drifts drifts for both sides. Medians over the rounds are reported.
 """
 
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -53,6 +55,20 @@ class Timings:
     def median(self, name: str) -> float:
         """Median over the rounds. [s]"""
         return float(np.median(self.seconds[name]))
+
+
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Keep this process on one core while it is measured, where the system lets it choose."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(before)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
 
 
 def circle(robot: Robot, samples: int, rate: float = 125.0) -> Recording:
@@ -196,7 +212,8 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
     )
     observers = {name: OBSERVERS[name].build(setup)[0] for name in DEFAULT}
     timings = Timings()
-    run_rounds(timings, robot, recording, observers, setup, rounds)
+    with one_core():
+        run_rounds(timings, robot, recording, observers, setup, rounds)
     core = timings.median("core")
     looking_back = [
         {
@@ -276,6 +293,7 @@ def run_rounds(
     complete()
     momentum_terms(robot.loaded_chain, q, dq)
     for _ in range(rounds):
+        core()  # unmeasured: the scripts before it have given the memory back
         timings.measure("core", core)
         timings.measure("complete", complete)
         timings.measure("spectra", lambda: spectra(terms))

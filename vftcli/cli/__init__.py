@@ -3,34 +3,86 @@
 import gc
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection
 from importlib import import_module
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
 from vftcli.errors import VftError
 
+
+class Command(NamedTuple):
+    """One command: where it is, and its first sentence, so that --help need not load it.
+
+    Attributes:
+        target: Module of this package, and the function in it.
+        summary: First line of the function's docstring.
+    """
+
+    target: str
+    summary: str
+
+
 COMMANDS = {
-    "estimate": "estimate:estimate",
-    "compare": "compare:compare",
-    "report": "report:report",
-    "inspect": "inspect:inspect_log",
-    "convert": "convert:convert_log",
-    "admit": "admit:admit",
-    "identify": "identify:identify_robot",
-    "tune": "tune:tune_gains",
-    "simulate": "simulate:simulate_log",
-    "bench": "bench:bench",
-    "robots": "listings:robots",
-    "observers": "listings:observers",
-    "formats": "formats:list_formats",
+    "estimate": Command(
+        "estimate:estimate",
+        "Estimate the external joint torques along a log.",
+    ),
+    "compare": Command(
+        "compare:compare",
+        "Print the RMSE of every observer against a reference, with the reference's own floor.",
+    ),
+    "report": Command(
+        "report:report",
+        "Write a report page, a Rerun recording, tables and estimates of a log into one folder.",
+    ),
+    "inspect": Command(
+        "inspect:inspect_log",
+        "Examine a log: format, signals, clock, and what looks wrong, with its remedy.",
+    ),
+    "convert": Command(
+        "convert:convert_log",
+        "Convert any readable log into a flat Parquet or CSV table, or a ros2-profile MCAP.",
+    ),
+    "admit": Command(
+        "admit:admit",
+        "Replay a log's external force through traditional and variable-parameter admittance.",
+    ),
+    "identify": Command(
+        "identify:identify_robot",
+        "Make a robot file from logs: friction, rotor inertia, link inertias, payload.",
+    ),
+    "tune": Command(
+        "tune:tune_gains",
+        "Find gains on a log for a stated goal, and write them to a file for --set-file.",
+    ),
+    "simulate": Command(
+        "simulate:simulate_log",
+        "Simulate an experiment: the log, PATH.truth.parquet and PATH.scenario.toml.",
+    ),
+    "bench": Command(
+        "bench:bench",
+        "Time the observers and print the ratios to a bare RNEA loop and to per-sample scripts.",
+    ),
+    "robots": Command(
+        "listings:robots",
+        "List the robot profiles, or show one with its numbers and their sources.",
+    ),
+    "observers": Command(
+        "listings:observers",
+        "List the observers, their equations and their parameters.",
+    ),
+    "formats": Command(
+        "formats:list_formats",
+        "List the log formats: how to record them, what is taken from them, what to look out for.",
+    ),
 }
-"""Command → the module of this package, and the function in it."""
+"""Name → the command."""
 
 
-def make_app(names: Iterable[str] = tuple(COMMANDS)) -> typer.Typer:
-    """Make the command line with all commands, or with those that a call can need."""
+def make_app(load: Collection[str] = tuple(COMMANDS)) -> typer.Typer:
+    """Make the command line; a command that is not to be loaded has its summary only."""
     app = typer.Typer(
         help=vftcli.__doc__,
         no_args_is_help=True,
@@ -39,10 +91,17 @@ def make_app(names: Iterable[str] = tuple(COMMANDS)) -> typer.Typer:
         add_completion=False,
     )
     app.callback()(vftcli)
-    for name in names:
-        module, function = COMMANDS[name].split(":")
-        app.command(name)(getattr(import_module(f"vftcli.cli.{module}"), function))
+    for name, command in COMMANDS.items():
+        if name in load:
+            module, function = command.target.split(":")
+            app.command(name)(getattr(import_module(f"vftcli.cli.{module}"), function))
+        else:
+            app.command(name, help=command.summary)(not_loaded)
     return app
+
+
+def not_loaded() -> None:
+    """Stand in for a command that this call does not need."""
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module's attributes are of every kind
@@ -77,7 +136,7 @@ def main() -> None:
     gc.set_threshold(200_000)  # a command is short: collecting while it imports is a tenth of it
     asked = sys.argv[1] if len(sys.argv) > 1 else ""
     try:
-        make_app([asked] if asked in COMMANDS else COMMANDS)()
+        make_app({asked})()
     except VftError as error:
         stop(str(error))
     except MemoryError:
