@@ -1,9 +1,11 @@
 """The command line: one file a command; parse, call, print. Nothing else prints or exits."""
 
+import atexit
 import gc
 import os
 import sys
 from collections.abc import Collection
+from contextlib import suppress
 from importlib import import_module
 from typing import Annotated, Any, NamedTuple
 
@@ -147,6 +149,24 @@ def main() -> None:
             raise SystemExit(1) from None
         where = f": {error.filename}" if error.filename else ""
         stop(f"{error.strerror or error}{where}")
+
+
+def launch() -> None:
+    """Run `main` as a program and leave at once: what `vftcli` at the shell calls.
+
+    Taking the interpreter and its libraries apart costs as much as reading a large log; everything
+    that has to be written is written, and whoever asked to be called at exit is called, before.
+    """
+    try:
+        main()
+        code: object = 0
+    except SystemExit as end:
+        code = end.code
+    atexit._run_exitfuncs()
+    with suppress(OSError, ValueError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(code if isinstance(code, int) else int(code is not None))
 
 
 def stop(message: str) -> None:
