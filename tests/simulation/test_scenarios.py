@@ -46,13 +46,14 @@ def test_free_excitation_moves_a_panda() -> None:
     assert run.recording.joints == 7
 
 
-@pytest.mark.parametrize(("start", "stop", "axis"), [(7.0, 8.4, "force"), (18.5, 20.0, "force")])
-def test_drags_exceed_the_threshold(start: float, stop: float, axis: str) -> None:
-    run = simulate(load_scenario("ur5-drag", ["duration=20.5"]))
-    inside = (run.truth.t > start) & (run.truth.t < stop)
-    assert axis == "force"
-    # Table III: 20 N
-    assert np.max(np.abs(run.truth.wrench[inside, :3])) > 20.0
+def test_both_drags_exceed_the_threshold_while_the_hand_holds() -> None:
+    scenario = load_scenario("ur5-drag", ["duration=20.5"])
+    run = simulate(scenario)
+    for start, stop in ((6.3, 8.6), (17.5, 20.2)):  # the hand's spans in the scenario
+        inside = (run.truth.t > start) & (run.truth.t < stop)
+        # Table III: 20 N, held long enough to drag and not only passed
+        above = np.max(np.abs(run.truth.wrench[inside, :3]), axis=1) > 20.0
+        assert np.count_nonzero(above) * 0.008 > 0.3
 
 
 def test_twists_exceed_the_threshold() -> None:
