@@ -4,63 +4,24 @@ from functools import cache
 
 from vftcli.errors import LogError
 from vftcli.readers.bags.container import Channel
+from vftcli.readers.bags.franka_interface import DEFINITIONS
 from vftcli.readers.bags.layout import Field, LayoutError, fields_of, short, types_of
 
-ERRORS_36 = "\n".join(f"bool error_{k}" for k in range(36))
+STATE = "franka_msgs/msg/FrankaRobotState"
+"""The one type outside ROS's own packages that is known without the bag's help."""
 
-STAMPED = "std_msgs/Header header\n"
 
-FRANKA_ROBOT_STATE = f"""{STAMPED}franka_msgs/CollisionIndicators collision_indicators
-sensor_msgs/JointState measured_joint_state
-sensor_msgs/JointState desired_joint_state
-sensor_msgs/JointState measured_joint_motor_state
-float64[7] ddq_d
-float64[7] dtau_j
-sensor_msgs/JointState tau_ext_hat_filtered
-franka_msgs/Elbow elbow
-geometry_msgs/WrenchStamped k_f_ext_hat_k
-geometry_msgs/WrenchStamped o_f_ext_hat_k
-geometry_msgs/InertiaStamped inertia_ee
-geometry_msgs/InertiaStamped inertia_load
-geometry_msgs/InertiaStamped inertia_total
-geometry_msgs/PoseStamped o_t_ee
-geometry_msgs/PoseStamped o_t_ee_d
-geometry_msgs/PoseStamped o_t_ee_c
-geometry_msgs/PoseStamped f_t_ee
-geometry_msgs/PoseStamped ee_t_k
-geometry_msgs/TwistStamped o_dp_ee_d
-geometry_msgs/TwistStamped o_dp_ee_c
-geometry_msgs/AccelStamped o_ddp_ee_c
-float64 time
-float64 control_command_success_rate
-uint8 robot_mode
-franka_msgs/Errors current_errors
-franka_msgs/Errors last_motion_errors
-{"=" * 80}
-MSG: franka_msgs/CollisionIndicators
-geometry_msgs/Vector3 is_cartesian_linear_collision
-geometry_msgs/Vector3 is_cartesian_angular_collision
-geometry_msgs/Vector3 is_cartesian_linear_contact
-geometry_msgs/Vector3 is_cartesian_angular_contact
-float64[7] is_joint_collision
-float64[7] is_joint_contact
-{"=" * 80}
-MSG: franka_msgs/Elbow
-float64[2] position
-float64[2] desired_position
-float64[2] commanded_position
-float64[2] commanded_velocity
-float64[2] commanded_acceleration
-{"=" * 80}
-MSG: franka_msgs/Errors
-{ERRORS_36}
-"""
-"""Fields of franka_msgs/FrankaRobotState in order, as franka_ros2 has sent them since 0.1.10.
+def with_parts(name: str) -> str:
+    """A definition followed by those of the types of its own package, as bags embed them."""
+    parts = [
+        f"{'=' * 80}\nMSG: {short(other)}\n{text.rstrip()}"
+        for other, text in DEFINITIONS.items()
+        if other != name
+    ]
+    return "\n".join([DEFINITIONS[name].rstrip(), *parts]) + "\n"
 
-Source: the interface published in frankarobotics/franka_ros2; only names, types and order matter.
-"""
 
-EMBEDDED = {"franka_msgs/FrankaRobotState": FRANKA_ROBOT_STATE}
+EMBEDDED = {short(STATE): with_parts(STATE)}
 """Message type outside ROS's own packages → its definition."""
 
 

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.arrays import Array
+from vftcli.readers.bags.franka_interface import DEFINITIONS
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.writers.flange import flange_signals, force_estimate
-from vftcli.simulation.writers.franka_messages import DEFINITIONS
 from vftcli.simulation.writers.stamping import Marks, fill
 
 RECEIVED_LATER_NS = 400_000

@@ -1,5 +1,7 @@
 """The interface of franka_msgs/FrankaRobotState, as franka_ros2 sends it since 0.1.10.
 
+Bags of ROS 2 Humble and older hold no definitions, and a bag that is written needs them.
+
 Names, types and order of the fields are those published in frankarobotics/franka_ros2.
 """
 
