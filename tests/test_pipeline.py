@@ -14,9 +14,9 @@ import polars as pl
 import pytest
 
 import vftcli as vft
-from vftcli.dynamics.kinematics import flange_jacobian
-from vftcli.errors import ParameterError, RobotError
-from vftcli.pipeline import Request, analyse_log, parse_interval
+from vftcli.pipeline import AnalysisChoice, analyse_log, parse_interval
+from vftcli.robots.kinematics import flange_jacobian
+from vftcli.signals.errors import ParameterError, RobotError
 
 FIXTURE = Path(__file__).parent.parent / "fixtures" / "ur5_circle.csv"
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
@@ -28,7 +28,7 @@ def rmse_of(analysis: vft.Analysis, observer: str = "gmo") -> np.ndarray:
 
 
 def test_a_fixture_goes_all_the_way_to_a_table() -> None:
-    request = Request(robot="ur5", reference=f"file:{FIXTURE}.truth.parquet")
+    request = AnalysisChoice(robot="ur5", reference=f"file:{FIXTURE}.truth.parquet")
     analysis = analyse_log(FIXTURE, request)
     assert analysis.errors is not None
     joint_rows = analysis.errors
@@ -43,11 +43,11 @@ def test_a_fixture_goes_all_the_way_to_a_table() -> None:
 
 def test_the_log_must_settle_its_robot_or_be_told() -> None:
     with pytest.raises(RobotError, match="choose one with --robot: ur5, ur5e, ur10e"):
-        analyse_log(FIXTURE, Request())
+        analyse_log(FIXTURE, AnalysisChoice())
 
 
 def test_an_interval_keeps_the_logs_own_time() -> None:
-    analysis = analyse_log(FIXTURE, Request(robot="ur5", interval="4:8"))
+    analysis = analyse_log(FIXTURE, AnalysisChoice(robot="ur5", interval="4:8"))
     assert analysis.t[0] >= 4.0
     assert analysis.t[-1] <= 8.0
 
@@ -64,7 +64,7 @@ def test_intervals_that_are_none(text: str) -> None:
 
 
 def test_as_printed_differs_and_says_so() -> None:
-    short = Request(robot="ur5", interval="4:6")
+    short = AnalysisChoice(robot="ur5", interval="4:6")
     printed = analyse_log(FIXTURE, replace(short, as_printed=True))
     corrected = analyse_log(FIXTURE, short)
     assert any("as printed" in note for note in printed.notes)
@@ -75,7 +75,7 @@ def test_as_printed_differs_and_says_so() -> None:
 def test_mujoco_ur5e_with_its_own_model(logs: Path) -> None:
     """An independent engine's log; its own truth is the vendor column. Prototype .426 … .058."""
     folder = logs / "mujoco_ur5e"
-    request = Request(
+    request = AnalysisChoice(
         robot=str(folder / "robot.toml"),
         settings=("gmo.gain=30",),
         reference="vendor",
@@ -90,7 +90,7 @@ def test_libfranka_simulation_against_its_truth(logs: Path, tmp_path: Path) -> N
     for name in ("pushes.csv", "pushes_truth.csv"):
         with gzip.open(folder / f"{name}.gz") as packed, (tmp_path / name).open("wb") as plain:
             shutil.copyfileobj(packed, plain)
-    request = Request(
+    request = AnalysisChoice(
         robot=str(folder / "robot.toml"),
         settings=("gmo.gain=30",),
         reference=f"file:{tmp_path / 'pushes_truth.csv'}",
@@ -120,7 +120,7 @@ def test_panda_in_free_motion_from_its_four_text_files(logs: Path) -> None:
 def test_ur10e_in_free_motion_needs_rotor_and_friction(logs: Path) -> None:
     """Real: the prototype's mean of six rms is 1.64 N·m; without rotor or friction it is worse."""
     path = logs / "ur10e" / "free_14harm.csv"
-    request = Request(robot="ur10e", columns=UR10E, reference="zero", observers=("gmo",))
+    request = AnalysisChoice(robot="ur10e", columns=UR10E, reference="zero", observers=("gmo",))
     full = rmse_of(analyse_log(path, request)).mean()
     without_friction = rmse_of(analyse_log(path, replace(request, friction="none"))).mean()
     recording, robot = vft.read(path, columns=UR10E), vft.load_robot("ur10e")
@@ -136,7 +136,7 @@ def test_ur10e_in_free_motion_needs_rotor_and_friction(logs: Path) -> None:
 def test_ur10e_payload_shows_in_the_two_cycle_difference(logs: Path) -> None:
     """A loaded run less a free one is the payload's own torque, 2.805 kg at the flange."""
     folder = logs / "ur10e"
-    request = Request(
+    request = AnalysisChoice(
         robot="ur10e",
         columns=UR10E,
         reference="two-cycle",
@@ -168,7 +168,7 @@ def low_passed(t: np.ndarray, x: np.ndarray, cutoff: float = 1.0) -> np.ndarray:
 
 def test_fr3_table_against_the_vendor(logs: Path) -> None:
     columns = "t[ns],q:7,dq:7,tau:7,-tau_ext:7,_:13"
-    request = Request(robot="fr3", columns=columns, reference="vendor")
+    request = AnalysisChoice(robot="fr3", columns=columns, reference="vendor")
     analysis = analyse_log(logs / "fr3" / "run_a.npy", request)
     assert analysis.errors is not None
     assert analysis.errors.height == 4 * 7

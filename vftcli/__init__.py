@@ -16,9 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
-    from vftcli.dynamics.kinematics import flange_jacobian, link_poses
-    from vftcli.dynamics.terms import DynamicsTerms, dynamics_terms
-    from vftcli.errors import VftError
     from vftcli.evaluation import evaluate, rmse
     from vftcli.observers import (
         FilteredDynamicsObserver,
@@ -26,40 +23,43 @@ if TYPE_CHECKING:
         MomentumObserver,
         Observer,
     )
-    from vftcli.pipeline import Request, analyse, analyse_log
+    from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
     from vftcli.readers import read
     from vftcli.readers.assembly import assemble
-    from vftcli.recording import Recording
+    from vftcli.repetition.two_cycle import two_cycle_difference
     from vftcli.robots import Payload, Robot, load_robot
-    from vftcli.torque import ExternalTorque
-    from vftcli.truth.two_cycle import two_cycle_difference
+    from vftcli.robots.kinematics import flange_jacobian, link_poses
+    from vftcli.robots.terms import DynamicsTerms, dynamics_terms
+    from vftcli.signals.errors import VftError
+    from vftcli.signals.external_torque import ExternalTorque
+    from vftcli.signals.recording import Recording
 
 __version__ = "0.1.0"
 
 HOMES = {
     "Analysis": "analysis",
-    "DynamicsTerms": "dynamics.terms",
-    "ExternalTorque": "torque",
+    "DynamicsTerms": "robots.terms",
+    "ExternalTorque": "signals.external_torque",
     "FilteredDynamicsObserver": "observers",
     "KalmanObserver": "observers",
     "MomentumObserver": "observers",
     "Observer": "observers",
     "Payload": "robots",
-    "Recording": "recording",
-    "Request": "pipeline",
+    "Recording": "signals.recording",
+    "AnalysisChoice": "pipeline",
     "Robot": "robots",
-    "VftError": "errors",
+    "VftError": "signals.errors",
     "analyse": "pipeline",
     "analyse_log": "pipeline",
     "assemble": "readers.assembly",
-    "dynamics_terms": "dynamics.terms",
+    "dynamics_terms": "robots.terms",
     "evaluate": "evaluation",
-    "flange_jacobian": "dynamics.kinematics",
-    "link_poses": "dynamics.kinematics",
+    "flange_jacobian": "robots.kinematics",
+    "link_poses": "robots.kinematics",
     "load_robot": "robots",
     "read": "readers",
     "rmse": "evaluation",
-    "two_cycle_difference": "truth.two_cycle",
+    "two_cycle_difference": "repetition.two_cycle",
 }
 """Public name → the module it lives in."""
 
@@ -76,6 +76,7 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "Analysis",
+    "AnalysisChoice",
     "DynamicsTerms",
     "ExternalTorque",
     "FilteredDynamicsObserver",
@@ -84,7 +85,6 @@ __all__ = [
     "Observer",
     "Payload",
     "Recording",
-    "Request",
     "Robot",
     "VftError",
     "analyse",

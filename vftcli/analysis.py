@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from vftcli.arrays import Array
-from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.observers.observer import Observer, Tuning
-from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
-from vftcli.torque import ExternalTorque
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.recording import Recording
 
 if TYPE_CHECKING:
-    from vftcli.offline.workup import Workup
-    from vftcli.published import Comparison
-    from vftcli.wrench.detection import Told
-    from vftcli.wrench.measurement import Measurement
-    from vftcli.wrench.wrench import Wrench
+    from vftcli.evaluation.print_table import Comparison
+    from vftcli.refinement.refine import Refinement
+    from vftcli.signals.wrench import Wrench
+    from vftcli.virtual_sensor.detection import ContactScore
+    from vftcli.virtual_sensor.sensor_reading import SensorReading
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,10 +51,10 @@ class Analysis:
     tunings: Mapping[str, Tuning]
     reference: ExternalTorque | None = None
     errors: pl.DataFrame | None = None
-    virtual_sensor: "Measurement | None" = None
-    contacts: "tuple[Told, ...]" = ()
+    virtual_sensor: "SensorReading | None" = None
+    contacts: "tuple[ContactScore, ...]" = ()
     published: "Comparison | None" = None
-    workup: "Workup | None" = None
+    workup: "Refinement | None" = None
     notes: tuple[str, ...] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
 

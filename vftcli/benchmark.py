@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.dynamics.kernels import momentum_terms
-from vftcli.dynamics.literal import literal_momentum_terms
-from vftcli.dynamics.terms import DynamicsTerms, dynamics_terms
 from vftcli.observers import DEFAULT, OBSERVERS, KalmanObserver, Observer, Setup
 from vftcli.observers.auto_tuning import KINDS, tuned
 from vftcli.observers.spectra import Part, Spectra, spectra_of
-from vftcli.recording import Recording
 from vftcli.robots import Robot, load_robot
+from vftcli.robots.kernels import momentum_terms
+from vftcli.robots.literal import literal_momentum_terms
+from vftcli.robots.terms import DynamicsTerms, dynamics_terms
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
 
 SAMPLES = 30_060
 """Samples of the paper's Table II."""

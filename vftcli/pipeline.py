@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vftcli.dynamics.terms import dynamics_terms
-from vftcli.errors import ParameterError, RobotError
 from vftcli.observers import (
     DEFAULT,
     OBSERVERS,
@@ -16,23 +14,25 @@ from vftcli.observers import (
     build_observers,
     observer_settings,
 )
-from vftcli.recording import Recording
 from vftcli.robots import PROFILES, Robot, load_robot
+from vftcli.robots.terms import dynamics_terms
+from vftcli.signals.errors import ParameterError, RobotError
+from vftcli.signals.recording import Recording
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
-    from vftcli.dynamics.terms import DynamicsTerms
-    from vftcli.offline.survey import Survey
-    from vftcli.torque import ExternalTorque
-    from vftcli.wrench.detection import Told
-    from vftcli.wrench.frames import Mounting
-    from vftcli.wrench.measurement import Measurement, Unloaded, WrenchRequest
+    from vftcli.refinement.baseline import Baseline
+    from vftcli.robots.terms import DynamicsTerms
+    from vftcli.signals.external_torque import ExternalTorque
+    from vftcli.virtual_sensor.detection import ContactScore
+    from vftcli.virtual_sensor.frames import Mounting
+    from vftcli.virtual_sensor.sensor_reading import FreeRunTorque, SensorReading, WrenchRequest
 
 FRICTION = ("profile", "none")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class AnalysisChoice:
     """What a user asks of one log: the options that estimate, compare and report share.
 
     Attributes:
@@ -92,14 +92,14 @@ class Request:
         return tuned or self.bands or self.remove_bias != "none" or self.free_part is not None
 
 
-def open_log(path: Path, request: Request) -> Recording:
+def open_log(path: Path, request: AnalysisChoice) -> Recording:
     """Read a log and cut it to the asked interval."""
     from vftcli.readers import read
 
     return cut(read(path, format=request.format, columns=request.columns), request)
 
 
-def cut(recording: Recording, request: Request) -> Recording:
+def cut(recording: Recording, request: AnalysisChoice) -> Recording:
     """The part of a log that the request's interval names, or all of it."""
     if request.interval is None:
         return recording
@@ -126,7 +126,7 @@ def parse_interval(text: str) -> tuple[float, float]:
     return start, stop
 
 
-def choose_robot(request: Request, recording: Recording) -> Robot:
+def choose_robot(request: AnalysisChoice, recording: Recording) -> Robot:
     """Load the robot that is asked for, or the one the log settles.
 
     Raises:
@@ -149,7 +149,7 @@ def choose_robot(request: Request, recording: Recording) -> Robot:
 
 
 def choose_observers(
-    request: Request, robot: Robot, recording: Recording, survey: "Survey | None" = None
+    request: AnalysisChoice, robot: Robot, recording: Recording, survey: "Baseline | None" = None
 ) -> tuple[tuple[Observer, ...], tuple[str, ...]]:
     """Build the observers that are asked for, with notes on gains that nobody gave."""
     setup = Setup(
@@ -169,7 +169,7 @@ def choose_observers(
     return observers, (*notes, *remarks)
 
 
-def chosen_gains(request: Request, robot: Robot) -> Mapping[str, Mapping[str, Any]]:
+def chosen_gains(request: AnalysisChoice, robot: Robot) -> Mapping[str, Mapping[str, Any]]:
     """The robot's gains, those of a gains file put over them."""
     if request.gains_file is None:
         return robot.gains
@@ -180,17 +180,17 @@ def chosen_gains(request: Request, robot: Robot) -> Mapping[str, Mapping[str, An
 
 
 def look_over(
-    recording: Recording, robot: Robot, terms: "DynamicsTerms", request: Request
-) -> "Survey | None":
+    recording: Recording, robot: Robot, terms: "DynamicsTerms", request: AnalysisChoice
+) -> "Baseline | None":
     """The log's free part and spectra, None where nothing asks for them."""
     if not request.looks_back:
         return None
-    from vftcli.offline.bias import check_removal
-    from vftcli.offline.free_part import Asked
-    from vftcli.offline.survey import survey, without_free_motion
+    from vftcli.refinement.baseline import survey, without_free_motion
+    from vftcli.refinement.bias import check_removal
+    from vftcli.repetition.free_part import FreeChoice
 
     check_removal(request.remove_bias)
-    asked = Asked(
+    asked = FreeChoice(
         span=parse_interval(request.free_part) if request.free_part is not None else None,
         runs=tuple(open_log(path, without_interval(request)) for path in request.free),
         period=request.period if not request.free else None,
@@ -202,7 +202,7 @@ def look_over(
     return found
 
 
-def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
+def analyse(recording: Recording, robot: Robot, request: AnalysisChoice) -> "Analysis":
     """Go from a recording to estimates and, if a reference is asked for, their errors."""
     from vftcli.analysis import Analysis
 
@@ -212,7 +212,7 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
     estimates = tuple(observer.estimate(terms) for observer in observers)
     workup = None
     if survey is not None:
-        from vftcli.offline.workup import work_up
+        from vftcli.refinement.refine import work_up
 
         removal = request.remove_bias
         estimates, workup = work_up(survey, recording, robot, observers, estimates, removal)
@@ -220,10 +220,10 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
     tunings = {o.name: o.tuning(recording.step, robot.joints) for o in observers}
     measured, mounting, sensed = sense(recording, robot, estimates, request, terms, observers)
     reference, errors = None, None
-    contacts: tuple[Told, ...] = ()
+    contacts: tuple[ContactScore, ...] = ()
     if request.reference is not None:
         from vftcli.evaluation import evaluate, with_wrenches
-        from vftcli.truth.reference import ReferenceRequest, make_reference
+        from vftcli.evaluation.reference import ReferenceRequest, make_reference
 
         wanted = request.free if request.reference == "two-cycle" or survey is None else ()
         free = tuple(open_log(path, without_interval(request)) for path in wanted)
@@ -240,15 +240,15 @@ def analyse(recording: Recording, robot: Robot, request: Request) -> "Analysis":
         reference = make_reference(sensed, robot, asked)
         errors = evaluate(recording.name, estimates, reference)
         if measured is not None:
-            from vftcli.truth.wrench_reference import reference_wrench
-            from vftcli.wrench.measurement import referred
+            from vftcli.evaluation.reference_wrench import reference_wrench
+            from vftcli.virtual_sensor.sensor_reading import referred
 
             theirs = reference_wrench(sensed, robot, reference, measured.sensor, asked)
             measured = referred(measured, theirs)
             errors = with_wrenches(errors, recording.name, measured)
         if request.contacts:
             from vftcli.evaluation import with_contacts
-            from vftcli.wrench.detection import judge_contacts
+            from vftcli.virtual_sensor.detection import judge_contacts
 
             contacts = judge_contacts(estimates, measured, reference)
             errors = with_contacts(errors, recording.name, reference.name, contacts)
@@ -272,16 +272,16 @@ def sense(
     recording: Recording,
     robot: Robot,
     estimates: tuple["ExternalTorque", ...],
-    request: Request,
+    request: AnalysisChoice,
     terms: "DynamicsTerms",
     observers: tuple[Observer, ...],
-) -> "tuple[Measurement | None, Mounting | None, Recording]":
+) -> "tuple[SensorReading | None, Mounting | None, Recording]":
     """What the virtual sensor measures, where things sit, and the log with its sensor relieved."""
     if request.wrench is None:
         return None, None, recording
-    from vftcli.wrench.measurement import measure
-    from vftcli.wrench.placing import placed, weighed
-    from vftcli.wrench.torque_error import Disturbance
+    from vftcli.virtual_sensor.mounting import placed, weighed
+    from vftcli.virtual_sensor.sensor_reading import measure
+    from vftcli.virtual_sensor.torque_error import Disturbance
 
     mounting, notes = placed(recording, robot, estimates, request.wrench)
     unloaded = unloaded_run(recording, robot, request, observers)
@@ -295,17 +295,17 @@ def sense(
 
 
 def unloaded_run(
-    recording: Recording, robot: Robot, request: Request, observers: tuple[Observer, ...]
-) -> "Unloaded | None":
+    recording: Recording, robot: Robot, request: AnalysisChoice, observers: tuple[Observer, ...]
+) -> "FreeRunTorque | None":
     """What the observers read in the free run of ``--zero LOG``, None if none is given.
 
     Where it is the same trajectory, their torque at the same place of it is taken; else its mean.
     """
     if request.wrench is None or request.wrench.zero_log is None:
         return None
-    from vftcli.errors import ReferenceTorqueError
-    from vftcli.truth.alignment import align
-    from vftcli.wrench.measurement import unloaded_from
+    from vftcli.repetition.alignment import align
+    from vftcli.signals.errors import ReferenceTorqueError
+    from vftcli.virtual_sensor.sensor_reading import unloaded_from
 
     free = open_log(request.wrench.zero_log, without_interval(request))
     terms = dynamics_terms(free, robot, literal=request.as_printed)
@@ -317,18 +317,18 @@ def unloaded_run(
     return replace(read, terms=terms)
 
 
-def analyse_log(path: Path, request: Request) -> "Analysis":
+def analyse_log(path: Path, request: AnalysisChoice) -> "Analysis":
     """Read a log, choose its robot, and analyse it."""
     recording = open_log(path, request)
     return analyse(recording, choose_robot(request, recording), request)
 
 
-def without_interval(request: Request) -> Request:
+def without_interval(request: AnalysisChoice) -> AnalysisChoice:
     """The same request for a free run, which is read whole."""
     return replace(request, interval=None)
 
 
-def printed_note(request: Request) -> tuple[str, ...]:
+def printed_note(request: AnalysisChoice) -> tuple[str, ...]:
     """A note on the printed formulas, if they are used."""
     if not request.as_printed:
         return ()

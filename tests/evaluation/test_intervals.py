@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from vftcli.arrays import Array
 from vftcli.evaluation import paired_significance
 from vftcli.evaluation.intervals import (
     LEAST_BLOCKS,
@@ -15,7 +14,8 @@ from vftcli.evaluation.intervals import (
     interval,
     resample,
 )
-from vftcli.torque import ExternalTorque
+from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import ExternalTorque
 
 STEP = 0.008
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.evaluation.selection import advice, facts, step_response
 from vftcli.observers import KalmanObserver, MomentumObserver
+from vftcli.robots.terms import DynamicsTerms
 
 STEP = 0.002
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from vftcli.dynamics.terms import DynamicsTerms
-from vftcli.errors import ParameterError
 from vftcli.observers import DEFAULT, Setup, build_observers
 from vftcli.observers.matching import matched
 from vftcli.observers.observer import Observer
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.errors import ParameterError
 
 GAINS = {
     "fdo": {"omega": 10.0},

@@ -8,12 +8,12 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation import evaluate
-from vftcli.outputs.run import run_record
-from vftcli.pipeline import Request, analyse
-from vftcli.recording import Recording, Source
+from vftcli.outputs.log.run_record import run_record
+from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.robots import load_robot
-from vftcli.torque import ExternalTorque
-from vftcli.wrench.measurement import WrenchRequest
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.recording import Recording, Source
+from vftcli.virtual_sensor.sensor_reading import WrenchRequest
 
 HOSTILE = '<script>alert("x")</script>&_%.csv'
 
@@ -47,7 +47,7 @@ def recording() -> Recording:
 @pytest.fixture(scope="session")
 def without_reference(recording: Recording) -> Analysis:
     """All default observers on the log, with nothing to be judged by."""
-    return analyse(recording, load_robot("ur5"), Request(robot="ur5"))
+    return analyse(recording, load_robot("ur5"), AnalysisChoice(robot="ur5"))
 
 
 @pytest.fixture(scope="session")
@@ -65,5 +65,5 @@ def analysis(without_reference: Analysis) -> Analysis:
 @pytest.fixture(scope="session")
 def with_wrench(recording: Recording) -> Analysis:
     """The log's estimates with their wrenches in base axes."""
-    request = Request(robot="ur5", wrench=WrenchRequest(frame="base"))
+    request = AnalysisChoice(robot="ur5", wrench=WrenchRequest(frame="base"))
     return analyse(recording, load_robot("ur5"), request)

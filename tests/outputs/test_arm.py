@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from vftcli.dynamics.kinematics import flange_jacobian, link_poses
 from vftcli.outputs.arm import arm_length, capsules, flange_force, motion, quat_xyzw
 from vftcli.robots import PROFILES, load_robot
+from vftcli.robots.kinematics import flange_jacobian, link_poses
 
 
 def test_quaternions_against_scipy() -> None:

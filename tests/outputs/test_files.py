@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.errors import OutputError
 from vftcli.outputs.files import OutputFolder, atomic, write_text
+from vftcli.signals.errors import OutputError
 
 
 def names(folder: Path) -> list[str]:

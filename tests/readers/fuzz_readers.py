@@ -21,9 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from seed_logs import SEEDS
 
-from vftcli.errors import VftError
 from vftcli.readers import read
-from vftcli.recording import Recording
+from vftcli.signals.errors import VftError
+from vftcli.signals.recording import Recording
 
 TIME_LIMIT = 10.0
 MEMORY_LIMIT_KB = 1024 * 1024

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from vftcli.dynamics.kernels import momentum_terms
-from vftcli.dynamics.kinematics import link_poses
-from vftcli.errors import RobotError
 from vftcli.robots import PROFILES, load_robot
 from vftcli.robots.chain import unphysical
+from vftcli.robots.kernels import momentum_terms
+from vftcli.robots.kinematics import link_poses
+from vftcli.signals.errors import RobotError
 
 # Origin: Pinocchio 4.1 on the manufacturers' URDFs (UniversalRobots ROS 2 description for the UR
 # arms, franka_description for the FR3, an arm-only URDF with the parameters of Gaz et al. 2019 for

@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from vftcli.dynamics.kernels import momentum_terms
-from vftcli.errors import RobotError
 from vftcli.robots import load_robot
+from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.urdf import chain_from_model
+from vftcli.signals.errors import RobotError
 
 TWO_LINKS = """schema = 1
 name = "planar"

@@ -5,12 +5,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vftcli.errors import ParameterError
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.contact import Place
 from vftcli.simulation.contacts import RandomWalkSpec
 from vftcli.simulation.hand import HandSpec
+from vftcli.simulation.hard_stop import StopSpec
 from vftcli.simulation.pushes import STYLES, LoadSpec, ProfileSpec, PushesSpec
-from vftcli.simulation.stop import StopSpec
 from vftcli.simulation.touch import draw_walk
 
 HERE = Place(np.eye(3), np.array([0.4, 0.1, 0.3]), np.zeros(3), np.zeros(3))

@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from vftcli.arrays import Array
-from vftcli.dynamics.terms import dynamics_terms
 from vftcli.observers.momentum import MomentumObserver
 from vftcli.robots import load_robot
+from vftcli.robots.terms import dynamics_terms
+from vftcli.signals.arrays import Array
 from vftcli.simulation import Arm, Simulation, load_scenario, observe, prepare, simulate
 from vftcli.simulation.mismatch import build_arm
 from vftcli.simulation.pairs import simulate_pair

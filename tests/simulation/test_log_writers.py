@@ -6,9 +6,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.errors import OutputError, ParameterError
 from vftcli.readers import read
 from vftcli.readers.references import read_reference
+from vftcli.signals.errors import OutputError, ParameterError
 from vftcli.simulation import Simulation, load_scenario, simulate
 from vftcli.simulation.saving import companions, save
 from vftcli.simulation.writers import WRITERS

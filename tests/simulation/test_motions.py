@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from vftcli.errors import ParameterError
 from vftcli.robots import load_robot
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario
 from vftcli.simulation.calibration_motions import ExcitationSpec, JointwiseSpec, PosesSpec
 from vftcli.simulation.excitation import inside, optimise, optimised
 from vftcli.simulation.kinematics import check_limits, flange_pose
-from vftcli.simulation.motion import Motion
+from vftcli.simulation.motion import Command
 from vftcli.simulation.regressor import base_columns, condition_number, full_regressor
 from vftcli.simulation.trajectories import CircleSpec, HoldSpec, JointMovesSpec, OffsetsSpec, plan
 
@@ -26,7 +26,7 @@ SPECS = [
 
 @pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.KIND)
 def test_derivatives_are_those_of_the_positions(spec: object) -> None:
-    motion: Motion = spec.motion(load_robot("ur5"))  # type: ignore[attr-defined]
+    motion: Command = spec.motion(load_robot("ur5"))  # type: ignore[attr-defined]
     t, h = np.linspace(0.05, min(motion.duration, 6.0) - 0.05, 400), 1e-5
     here, before, after = motion.at(t), motion.at(t - h), motion.at(t + h)
     # central differences: h² times the third derivative (about 1e2), and rounding 1e-16/h

@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.robots import Robot, load_robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.friction import TrueFriction, true_friction
 from vftcli.simulation.plant import Plant
 from vftcli.simulation.scenario import FrictionSpec

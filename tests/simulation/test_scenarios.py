@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.errors import ParameterError, VftError
+from vftcli.signals.errors import ParameterError, VftError
 from vftcli.simulation import load_scenario, scenario_names, simulate
 from vftcli.simulation.load import to_toml
 from vftcli.simulation.scenario import Scenario

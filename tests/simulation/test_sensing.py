@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.errors import ParameterError
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation import Simulation, load_scenario, simulate
 from vftcli.simulation.sensing import check_sensing
 

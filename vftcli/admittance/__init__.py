@@ -1,15 +1,15 @@
 """Admittance: the paper's variable-parameter law, on recorded forces and in closed loop."""
 
 from vftcli.admittance.law import Controller, controllers, traditional, variable
-from vftcli.admittance.motion import Motion, release, run
+from vftcli.admittance.motion import AxisMotion, release, run
 from vftcli.admittance.parameters import AXES, Admittance, from_document
 from vftcli.admittance.stability import UnstableError, check_stable
 
 __all__ = [
     "AXES",
     "Admittance",
+    "AxisMotion",
     "Controller",
-    "Motion",
     "UnstableError",
     "check_stable",
     "controllers",

@@ -15,12 +15,12 @@ from vftcli.admittance.law import Controller
 from vftcli.admittance.motion import Recursion
 from vftcli.admittance.online import OnlineKalman
 from vftcli.admittance.replay import deviation_of
-from vftcli.admittance.rotation import exp_matrix
 from vftcli.admittance.stability import check_stable
 from vftcli.admittance.thresholds import Flags
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.observers.kalman import KalmanObserver
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.pose import exp_matrix
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.experiment import Progress, Simulation, observe
 from vftcli.simulation.motion import Reference
@@ -220,7 +220,7 @@ def run_closed_loop(
         zero: Unloaded span whose mean wrench is removed; the controller holds still until it ends.
             None removes nothing. [s]
         force_unstable: Run unstable settings too.
-        progress: Told how far the run is.
+        progress: ContactScore how far the run is.
 
     Raises:
         UnstableError: If the controller is unstable.

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array, check_clock, check_shape, frozen
-from vftcli.dynamics.kinematics import link_poses
-from vftcli.errors import ParameterError
-from vftcli.recording import Recording
+from vftcli.robots.kinematics import link_poses
 from vftcli.robots.robot import Robot
-from vftcli.torque import ExternalTorque
-from vftcli.wrench.frames import FRAMES, Mounting, to_base
-from vftcli.wrench.virtual_sensor import VirtualSensor
+from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.recording import Recording
+from vftcli.virtual_sensor.frames import FRAMES, Mounting, to_base
+from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 BY_THE_ROBOT = "BY the robot"
 """How a recording says that its wrench is the robot's on the environment."""
@@ -94,7 +94,7 @@ def from_sensor(
     Args:
         recording: The log.
         robot: The arm, whose pose turns the wrench.
-        frame: Its frame, a key of `vftcli.wrench.frames.FRAMES`; None takes what the log states.
+        frame: Its frame, one of `FRAMES` in virtual_sensor.frames; None takes what the log states.
         mounting: Where tool and sensor sit, for the frames that need it.
 
     Raises:

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.admittance.rotation import exp_matrix
 from vftcli.admittance.thresholds import Flags
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.pose import exp_matrix
 
 ITERATIONS = 12
 REACHED = 1e-6

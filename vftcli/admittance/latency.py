@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vftcli.admittance.closed_loop import ClosedLoop
-from vftcli.arrays import Array
+from vftcli.signals.arrays import Array
 
 STARTED = 5e-3
 """Displacement of the flange at which it is said to have moved. [m]"""

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vftcli.admittance.parameters import Admittance
-from vftcli.arrays import Array, check_shape, frozen
-from vftcli.errors import ParameterError
+from vftcli.signals.arrays import Array, check_shape, frozen
+from vftcli.signals.errors import ParameterError
 
 KINDS = ("traditional", "variable")
 

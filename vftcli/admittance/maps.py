@@ -11,8 +11,8 @@ from vftcli.admittance.motion import release
 from vftcli.admittance.parameters import AXES, Admittance
 from vftcli.admittance.replay import settling
 from vftcli.admittance.stability import judge
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from vftcli.admittance.law import Controller
-from vftcli.admittance.motion import Motion
+from vftcli.admittance.motion import AxisMotion
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.thresholds import Phases
-from vftcli.arrays import Array
+from vftcli.signals.arrays import Array
 
 PAUSE = 1.0
 """Drags of one axis that follow each other within this time are one. [s]"""
@@ -67,7 +67,7 @@ def releases_of(x: Array, rows: int) -> tuple[Drag, ...]:
 
 
 def rows_of(
-    controllers: Sequence[Controller], motion: Motion, drags: Sequence[Drag], wrench: Array
+    controllers: Sequence[Controller], motion: AxisMotion, drags: Sequence[Drag], wrench: Array
 ) -> list[dict[str, Any]]:
     """The comparison as rows, one for each controller, axis and drag.
 
@@ -95,7 +95,7 @@ def rows_of(
 
 
 def row_of(
-    controller: Controller, motion: Motion, n: int, drag: Drag, wrench: Array
+    controller: Controller, motion: AxisMotion, n: int, drag: Drag, wrench: Array
 ) -> dict[str, Any]:
     """One controller's figures for one drag of one axis."""
     axis, t = drag.axis, motion.t

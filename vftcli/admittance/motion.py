@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from vftcli.admittance.law import Controller
-from vftcli.admittance.rotation import exp_quaternion, log_quaternion, product
 from vftcli.admittance.thresholds import Flags
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.pose import exp_quaternion, log_quaternion, product
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motion:
+class AxisMotion:
     """How the flange would move: one row a control period, one column a controller.
 
     Row k + 1 follows from row k and the force of row k. All components are in base axes; the
@@ -105,10 +105,10 @@ def run(
     dragged: Flags,
     x: Array | None = None,
     v: Array | None = None,
-) -> Motion:
+) -> AxisMotion:
     """Run controllers over one force record, each axis in the phase the record puts it in.
 
-    A law that escapes in finite time ends in infinities, which `Motion.escaped` tells.
+    A law that escapes in finite time ends in infinities, which `AxisMotion.escaped` tells.
 
     Args:
         controllers: The controllers, all with the same control period.
@@ -125,14 +125,14 @@ def run(
         for k in range(len(force)):
             state.step(force[k], dragged[k])
             xs[k + 1], vs[k + 1], clips[k + 1] = state.x, state.v, state.clipped
-    return Motion(
+    return AxisMotion(
         t=np.arange(len(force) + 1, dtype=np.float64) * state.period, x=xs, v=vs, clipped=clips
     )
 
 
 def release(
     controllers: Sequence[Controller], x: Array, duration: float, v: Array | None = None
-) -> Motion:
+) -> AxisMotion:
     """Let go at deviation `x`, at rest unless `v` is given, and watch for `duration` [s]."""
     steps = int(np.ceil(duration / controllers[0].parameters.period - 1e-9))
     return run(controllers, np.zeros((steps, 6)), np.zeros((steps, 6), dtype=bool), x, v)

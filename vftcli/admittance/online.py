@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.dynamics.friction import friction_torque
 from vftcli.observers.kalman import KalmanObserver
+from vftcli.robots.friction import friction_torque
 from vftcli.robots.robot import Robot
-from vftcli.wrench.solvers import LEAST_SIGMA, SCALE
+from vftcli.signals.arrays import Array
+from vftcli.virtual_sensor.solvers import LEAST_SIGMA, SCALE
 
 
 class OnlineKalman:

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array, check_shape, frozen
-from vftcli.errors import ParameterError
+from vftcli.signals.arrays import Array, check_shape, frozen
+from vftcli.signals.errors import ParameterError
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 """The six axes: translation of the flange point along the base axes, rotation about them."""

@@ -10,9 +10,9 @@ from vftcli.admittance.force import ForceRecord, on_control_clock
 from vftcli.admittance.joints import FlangeSolver, JointPath, follow
 from vftcli.admittance.law import Controller, energy, printed_energy
 from vftcli.admittance.metrics import drags_of, releases_of, rows_of
-from vftcli.admittance.motion import Motion, run
+from vftcli.admittance.motion import AxisMotion, run
 from vftcli.admittance.parameters import Admittance
-from vftcli.admittance.remarks import (
+from vftcli.admittance.replay_checks import (
     motion_notes,
     moved_note,
     quiet_note,
@@ -21,9 +21,9 @@ from vftcli.admittance.remarks import (
 )
 from vftcli.admittance.stability import Verdict, check_stable
 from vftcli.admittance.thresholds import Flags, Phases, phases
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 
 RISE = 1e-12
 """A step in which W rises by more than this share of its value at the phase's start is told."""
@@ -77,7 +77,7 @@ class Replay:
     start: Array
     wrench: Array
     phases: Phases
-    motion: Motion
+    motion: AxisMotion
     path: JointPath
     logged: Array | None
     lyapunov: Lyapunov
@@ -233,15 +233,15 @@ def settling(controllers: Sequence[Controller], x: Array) -> float:
     return float(min(max(6.0 / slowest, 1.0), LONGEST))
 
 
-def shifted(motion: Motion, begin: float) -> Motion:
+def shifted(motion: AxisMotion, begin: float) -> AxisMotion:
     """The same motion on a clock that starts at `begin`. [s]"""
-    return Motion(t=motion.t + begin, x=motion.x, v=motion.v, clipped=motion.clipped)
+    return AxisMotion(t=motion.t + begin, x=motion.x, v=motion.v, clipped=motion.clipped)
 
 
 def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
     """Where the log's own arm was, as a deviation from the start pose. (T, 6) [m, rad]"""
-    from vftcli.admittance.rotation import log_matrix
-    from vftcli.dynamics.kinematics import link_poses
+    from vftcli.robots.kinematics import link_poses
+    from vftcli.signals.pose import log_matrix
 
     poses = link_poses(solver.robot.chain, q)
     rotation, translation = solver.pose(start)
@@ -249,7 +249,9 @@ def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
     return np.concatenate([poses.translation[:, -1] - translation, turned], axis=1)
 
 
-def lyapunov_along(controllers: Sequence[Controller], motion: Motion, dragged: Flags) -> Lyapunov:
+def lyapunov_along(
+    controllers: Sequence[Controller], motion: AxisMotion, dragged: Flags
+) -> Lyapunov:
     """Energies along a run, and where the corrected one rises inside a recovery phase."""
     shape = motion.x.shape
     corrected, printed = np.empty(shape), np.empty(shape)

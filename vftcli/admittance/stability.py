@@ -13,8 +13,8 @@ import numpy as np
 
 from vftcli.admittance.law import Controller
 from vftcli.admittance.parameters import AXES
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 
 DISCRETE_BOUND = 4.0
 """Where 2TsB/M + Ts²K/M has to stay below: det(zI − A) = 0 then has both roots inside |z| = 1."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.admittance.parameters import Admittance
-from vftcli.arrays import Array
+from vftcli.signals.arrays import Array
 
 Flags = NDArray[np.bool_]
 

@@ -11,10 +11,10 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from vftcli.errors import VftError
+from vftcli.signals.errors import VftError
 
 
-class Command(NamedTuple):
+class ListedCommand(NamedTuple):
     """One command: where it is, and its first sentence, so that --help need not load it.
 
     Attributes:
@@ -27,55 +27,55 @@ class Command(NamedTuple):
 
 
 COMMANDS = {
-    "estimate": Command(
+    "estimate": ListedCommand(
         "estimate:estimate",
         "Estimate the external joint torques along a log.",
     ),
-    "compare": Command(
+    "compare": ListedCommand(
         "compare:compare",
         "Print the RMSE of every observer against a reference, with the reference's own floor.",
     ),
-    "report": Command(
+    "report": ListedCommand(
         "report:report",
         "Write a report page, a Rerun recording, tables and estimates of a log into one folder.",
     ),
-    "inspect": Command(
+    "inspect": ListedCommand(
         "inspect:inspect_log",
         "Examine a log: format, signals, clock, and what looks wrong, with its remedy.",
     ),
-    "convert": Command(
+    "convert": ListedCommand(
         "convert:convert_log",
         "Convert any readable log into a flat Parquet or CSV table, or a ros2-profile MCAP.",
     ),
-    "admit": Command(
+    "admit": ListedCommand(
         "admit:admit",
         "Replay a log's external force through traditional and variable-parameter admittance.",
     ),
-    "identify": Command(
+    "identify": ListedCommand(
         "identify:identify_robot",
         "Make a robot file from logs: friction, rotor inertia, link inertias, payload.",
     ),
-    "tune": Command(
+    "tune": ListedCommand(
         "tune:tune_gains",
         "Find gains on a log for a stated goal, and write them to a file for --set-file.",
     ),
-    "simulate": Command(
+    "simulate": ListedCommand(
         "simulate:simulate_log",
         "Simulate an experiment: the log, PATH.truth.parquet and PATH.scenario.toml.",
     ),
-    "bench": Command(
+    "bench": ListedCommand(
         "bench:bench",
         "Time the observers and print the ratios to a bare RNEA loop and to per-sample scripts.",
     ),
-    "robots": Command(
+    "robots": ListedCommand(
         "listings:robots",
         "List the robot profiles, or show one with its numbers and their sources.",
     ),
-    "observers": Command(
+    "observers": ListedCommand(
         "listings:observers",
         "List the observers, their equations and their parameters.",
     ),
-    "formats": Command(
+    "formats": ListedCommand(
         "formats:list_formats",
         "List the log formats: how to record them, what is taken from them, what to look out for.",
     ),

@@ -10,7 +10,7 @@ from vftcli.cli import options as opt
 if TYPE_CHECKING:
     from vftcli.admittance.closed_loop import ClosedLoop
     from vftcli.admittance.replay import Replay
-    from vftcli.recording import Recording
+    from vftcli.signals.recording import Recording
 
 LogOrNone = Annotated[
     Path | None,
@@ -136,8 +136,8 @@ def admit(
     """
     from vftcli.admittance.parameters import is_admittance_setting
     from vftcli.cli.admit_runs import Choice, looped, released, replayed
-    from vftcli.cli.asking import say
-    from vftcli.pipeline import Request
+    from vftcli.cli.console import say
+    from vftcli.pipeline import AnalysisChoice
 
     if sum((log is not None, bool(release), closed_loop is not None)) != 1:
         raise typer.BadParameter("give one of LOG, --release AXIS=VALUE, --closed-loop SCENARIO")
@@ -147,7 +147,7 @@ def admit(
         own.append(f"admittance.xi={xi}")
     if threshold_mode is not None:
         own.append(f"admittance.threshold_mode={threshold_mode}")
-    request = Request(
+    request = AnalysisChoice(
         format=format_,
         columns=columns,
         robot=robot,
@@ -187,8 +187,8 @@ def admit(
 
 def show(result: "Replay", run: "ClosedLoop | None", json: bool) -> None:
     """The comparison on stdout, remarks on stderr."""
-    from vftcli.cli.asking import say
-    from vftcli.outputs.admittance import (
+    from vftcli.cli.console import say
+    from vftcli.outputs.admittance.files import (
         comparison_json,
         comparison_text,
         latency_text,
@@ -215,7 +215,7 @@ def write(
     force: bool,
 ) -> None:
     """The folder of a replay."""
-    from vftcli.cli.asking import command_line
-    from vftcli.outputs.admittance import write_admittance
+    from vftcli.cli.console import command_line
+    from vftcli.outputs.admittance.files import write_admittance
 
     write_admittance(output, result, recording, run, command=command_line(), force=force)

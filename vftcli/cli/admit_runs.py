@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     from vftcli.admittance.force import ForceRecord
     from vftcli.admittance.parameters import Admittance
     from vftcli.admittance.replay import Replay
-    from vftcli.pipeline import Request
-    from vftcli.recording import Recording
+    from vftcli.pipeline import AnalysisChoice
     from vftcli.robots.robot import Robot
+    from vftcli.signals.recording import Recording
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +50,7 @@ class Choice:
 
 
 def released(
-    request: "Request", choice: Choice, own: list[str], parameters: Path | None
+    request: "AnalysisChoice", choice: Choice, own: list[str], parameters: Path | None
 ) -> "Replay":
     """A release from rest."""
     import numpy as np
@@ -58,9 +58,9 @@ def released(
     from vftcli.admittance.law import controllers
     from vftcli.admittance.parameters import release_deviation
     from vftcli.admittance.replay import replay_release
-    from vftcli.errors import ParameterError, RobotError
     from vftcli.observers import observer_settings
     from vftcli.robots import PROFILES, load_robot
+    from vftcli.signals.errors import ParameterError, RobotError
 
     observer_settings(request.settings)  # nothing uses them, but a slip of the pen is told
     if request.robot is None:
@@ -85,7 +85,7 @@ def released(
 
 
 def replayed(
-    log: Path, request: "Request", choice: Choice, own: list[str], parameters: Path | None
+    log: Path, request: "AnalysisChoice", choice: Choice, own: list[str], parameters: Path | None
 ) -> "tuple[Replay, Recording]":
     """A log's forces through every controller."""
     from dataclasses import replace
@@ -108,17 +108,17 @@ def replayed(
 
 
 def looped(
-    name: str, request: "Request", choice: Choice, own: list[str], parameters: Path | None
+    name: str, request: "AnalysisChoice", choice: Choice, own: list[str], parameters: Path | None
 ) -> "tuple[Replay, ClosedLoop]":
     """A scenario with a controller in the loop, and the force it acted on through all of them."""
     from vftcli.admittance.closed_loop import run_closed_loop
     from vftcli.admittance.law import controllers
     from vftcli.admittance.replay import replay
     from vftcli.cli.simulate import progress_bar
-    from vftcli.errors import ParameterError
     from vftcli.observers import KalmanObserver, Setup, build_observers, observer_settings
     from vftcli.pipeline import parse_interval
     from vftcli.robots import load_robot
+    from vftcli.signals.errors import ParameterError
     from vftcli.simulation import load_scenario
     from vftcli.simulation.sensing import log_rate
 
@@ -155,11 +155,16 @@ UNLOADED = (0.5, 3.0)
 
 
 def force_of(
-    recording: "Recording", robot: "Robot", request: "Request", choice: Choice, *, estimated: bool
+    recording: "Recording",
+    robot: "Robot",
+    request: "AnalysisChoice",
+    choice: Choice,
+    *,
+    estimated: bool,
 ) -> "ForceRecord":
     """The wrench that drives the replay: truth, sensor, or an observer's."""
     from vftcli.admittance.force import from_sensor, from_torque
-    from vftcli.torque import ExternalTorque
+    from vftcli.signals.external_torque import ExternalTorque
 
     if choice.sensor and choice.truth is not None:
         raise typer.BadParameter("choose one of --sensor and --truth")
@@ -181,8 +186,8 @@ def force_of(
 def truth_of(recording: "Recording", path: Path) -> "ForceRecord":
     """The wrench of a truth file, on the log's own clock, base axes."""
     from vftcli.admittance.force import from_truth
-    from vftcli.errors import ReferenceTorqueError
     from vftcli.readers.references import read_reference
+    from vftcli.signals.errors import ReferenceTorqueError
 
     table = read_reference(path)
     if table.wrench is None:

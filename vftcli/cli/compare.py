@@ -54,13 +54,13 @@ def compare(
     """
     import polars as pl
 
-    from vftcli.cli.asking import chosen, paths, say_notes, say_recording
+    from vftcli.cli.console import chosen, paths, say_notes, say_recording
     from vftcli.cli.wrench_options import wrench_request
-    from vftcli.evaluation.pooling import Run, pooled_rows
+    from vftcli.evaluation.pooling import ScoredLog, pooled_rows
     from vftcli.observers import DEFAULT
-    from vftcli.outputs import tables
-    from vftcli.outputs.significance import pairs_text
-    from vftcli.pipeline import Request, analyse, choose_robot, open_log
+    from vftcli.outputs.log import tables
+    from vftcli.outputs.log.significance import pairs_text
+    from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, open_log
 
     wanted = {"json": json, "csv": csv, "markdown": markdown, "latex": latex}
     show = {
@@ -70,7 +70,7 @@ def compare(
         "markdown": tables.to_markdown,
         "latex": tables.to_latex,
     }[chosen(wanted, default="terminal")]
-    request = Request(
+    request = AnalysisChoice(
         format=format_,
         columns=columns,
         robot=robot,
@@ -109,5 +109,5 @@ def compare(
         typer.echo(pairs_text(analyses, as_json=json))
         return
     errors = [a.errors for a in analyses if a.errors is not None]
-    runs = [Run(a.estimates, a.reference) for a in analyses if a.reference is not None]
+    runs = [ScoredLog(a.estimates, a.reference) for a in analyses if a.reference is not None]
     typer.echo(show(pl.concat([*errors, *pooled_rows(runs)], how="diagonal")))

@@ -24,10 +24,10 @@ def convert_log(
 
     Example: vftcli convert fixtures/ur5_circle.csv -o ur5_circle.mcap
     """
-    from vftcli.outputs.conversion import convert as write
-    from vftcli.pipeline import Request, open_log
+    from vftcli.outputs.log.conversion import convert as write
+    from vftcli.pipeline import AnalysisChoice, open_log
 
-    recording = open_log(log, Request(format=format_, columns=columns, interval=interval))
+    recording = open_log(log, AnalysisChoice(format=format_, columns=columns, interval=interval))
     write(recording, output, force=force)
     if json:
         import json as json_module

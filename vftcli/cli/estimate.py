@@ -47,21 +47,21 @@ def estimate(
 
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5 -o out
     """
-    from vftcli.cli.meanwhile import Meanwhile
+    from vftcli.cli.background import Background
     from vftcli.readers import read
 
     extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
     of_wrench = (wrench, frame, solver, tool, sensor_pose, zero, sensor_weight, torque_sd)
     signals = None if any(of_wrench) or extras else ("dq", "current", "torque")
-    reading = Meanwhile(lambda: read(log, format=format_, columns=columns, signals=signals))
+    reading = Background(lambda: read(log, format=format_, columns=columns, signals=signals))
 
-    from vftcli.cli.asking import command_line, say, say_notes, say_recording
+    from vftcli.cli.console import command_line, say, say_notes, say_recording
     from vftcli.cli.wrench_options import wrench_request
     from vftcli.observers import DEFAULT
-    from vftcli.outputs.estimates import write_estimate_folder
-    from vftcli.pipeline import Request, analyse, choose_robot, cut
+    from vftcli.outputs.log.estimates import write_estimate_folder
+    from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, cut
 
-    request = Request(
+    request = AnalysisChoice(
         format=format_,
         columns=columns,
         robot=robot,

@@ -17,8 +17,8 @@ def list_formats(
     """
     import json as json_module
 
-    from vftcli.errors import UnknownFormatError
     from vftcli.readers import READERS
+    from vftcli.signals.errors import UnknownFormatError
 
     if name is not None and name not in READERS:
         raise UnknownFormatError(f"no format {name!r}; there is {', '.join(READERS)}")

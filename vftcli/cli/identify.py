@@ -61,11 +61,11 @@ def identify_robot(
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
-    from vftcli.cli.asking import command_line, paths, say, say_recording
+    from vftcli.cli.console import command_line, paths, say, say_recording
     from vftcli.identification import Processing, Task, identify
     from vftcli.outputs.files import refuse_existing
-    from vftcli.outputs.identification import beside, write_identification
-    from vftcli.pipeline import Request, choose_robot, open_log
+    from vftcli.outputs.identification.files import beside, write_identification
+    from vftcli.pipeline import AnalysisChoice, choose_robot, open_log
 
     task = Task(
         method=method or (None if find_payload else "friction"),
@@ -76,10 +76,10 @@ def identify_robot(
     )
     for file in beside(output).values():
         refuse_existing(file, force)
-    request = Request(
+    request = AnalysisChoice(
         format=format_, columns=columns, robot=robot, interval=interval, payload=payload
     )
-    whole = Request(format=format_, columns=columns, interval=validate_interval)
+    whole = AnalysisChoice(format=format_, columns=columns, interval=validate_interval)
     train = [open_log(log, request) for log in logs]
     held_out = [open_log(log, whole) for log in paths(validate)]
     unloaded = open_log(free, request) if free is not None else None

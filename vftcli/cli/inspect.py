@@ -8,7 +8,7 @@ from vftcli.cli import options as opt
 
 if TYPE_CHECKING:
     from vftcli.doctor import Examination
-    from vftcli.recording import Recording
+    from vftcli.signals.recording import Recording
 
 
 def inspect_log(

@@ -51,16 +51,16 @@ def report(
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
     """
-    from vftcli.cli.asking import command_line, paths, say, say_notes, say_recording
+    from vftcli.cli.console import command_line, paths, say, say_notes, say_recording
     from vftcli.cli.wrench_options import wrench_request
+    from vftcli.evaluation.print_table import check_published, compare_with
     from vftcli.observers import DEFAULT
-    from vftcli.outputs.published import terminal_published
-    from vftcli.outputs.report import write_report, write_reports
-    from vftcli.outputs.tables import terminal
-    from vftcli.pipeline import Request, analyse, choose_robot, open_log
-    from vftcli.published import check_published, compare_with
+    from vftcli.outputs.log.published import terminal_published
+    from vftcli.outputs.log.report import write_report, write_reports
+    from vftcli.outputs.log.tables import terminal
+    from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, open_log
 
-    request = Request(
+    request = AnalysisChoice(
         format=format_,
         columns=columns,
         robot=robot,

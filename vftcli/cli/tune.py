@@ -8,7 +8,7 @@ import typer
 from vftcli.cli import options as opt
 
 if TYPE_CHECKING:
-    from vftcli.offline.tuning import Goal, Tuned
+    from vftcli.refinement.tuning import Tuned, TuningGoal
 
 
 def tune_gains(
@@ -50,18 +50,18 @@ def tune_gains(
     """
     import json as json_module
 
-    from vftcli.cli.asking import command_line, paths, say, say_recording
-    from vftcli.dynamics.terms import dynamics_terms
-    from vftcli.errors import ParameterError
-    from vftcli.offline.tuning import gains_document, parse_goal, tune_all
+    from vftcli.cli.console import command_line, paths, say, say_recording
     from vftcli.outputs.files import refuse_existing, write_text
-    from vftcli.outputs.run import plain
-    from vftcli.pipeline import Request, choose_robot, look_over, open_log
+    from vftcli.outputs.log.run_record import plain
+    from vftcli.pipeline import AnalysisChoice, choose_robot, look_over, open_log
+    from vftcli.refinement.tuning import gains_document, parse_goal, tune_all
+    from vftcli.robots.terms import dynamics_terms
     from vftcli.robots.writing import lines_of
+    from vftcli.signals.errors import ParameterError
 
     wanted = parse_goal(goal, threshold)
     refuse_existing(output, force)
-    request = Request(
+    request = AnalysisChoice(
         format=format_,
         columns=columns,
         robot=robot,
@@ -95,7 +95,7 @@ def tune_gains(
     say(f"wrote {output}: use it with --set-file {output}")
 
 
-def table(tuned: "tuple[Tuned, ...]", goal: "Goal") -> str:
+def table(tuned: "tuple[Tuned, ...]", goal: "TuningGoal") -> str:
     """What was chosen and what to expect of it, joint by joint."""
     joints = len(tuned[0].rate)
     head = "".join(f"{f'J{j + 1}':>9}" for j in range(joints))

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from vftcli.wrench.measurement import WrenchRequest
+    from vftcli.virtual_sensor.sensor_reading import WrenchRequest
 
 START = "start"
 """The word for the unloaded start of the log."""
@@ -29,11 +29,11 @@ def wrench_request(
     options = (frame, solver, tool, sensor_pose, zero or None, torque_sd, sensor_weight or None)
     if not asked and all(option is None for option in options):
         return None
-    from vftcli.errors import ParameterError
     from vftcli.pipeline import parse_interval
-    from vftcli.wrench.frames import check_frame
-    from vftcli.wrench.measurement import WrenchRequest
-    from vftcli.wrench.solvers import check_solver
+    from vftcli.signals.errors import ParameterError
+    from vftcli.virtual_sensor.frames import check_frame
+    from vftcli.virtual_sensor.sensor_reading import WrenchRequest
+    from vftcli.virtual_sensor.solvers import check_solver
 
     spans, logs = [], []
     for text in zero or ():

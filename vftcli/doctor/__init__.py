@@ -2,6 +2,6 @@
 
 from vftcli.doctor.examination import Examination, examine
 from vftcli.doctor.findings import Finding
-from vftcli.doctor.fit import Fit
+from vftcli.doctor.fit import RobotMatch
 
-__all__ = ["Examination", "Finding", "Fit", "examine"]
+__all__ = ["Examination", "Finding", "RobotMatch", "examine"]

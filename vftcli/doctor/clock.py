@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vftcli.doctor.findings import Finding
-from vftcli.recording import JOINT_SIGNALS, Recording
+from vftcli.signals.recording import JOINT_SIGNALS, Recording
 
 SLOW_RATE = 50.0
 """Below this rate a contact of a tenth of a second is a handful of samples. [Hz]"""

@@ -7,11 +7,11 @@ import numpy as np
 
 from vftcli.doctor.clock import clock_findings
 from vftcli.doctor.findings import Finding
-from vftcli.doctor.fit import CLOSE, Evidence, Fit, best_fit, measured, ranking
+from vftcli.doctor.fit import CLOSE, Evidence, RobotMatch, best_fit, measured, ranking
 from vftcli.doctor.load import load_findings
 from vftcli.doctor.signals import inverted_joints, signal_findings
-from vftcli.recording import Recording
 from vftcli.robots import PROFILES, Robot, load_robot
+from vftcli.signals.recording import Recording
 
 MISTAKEN = 0.08
 """Misfit up to which an effort counts as something else than it was taken for.
@@ -35,7 +35,7 @@ class Examination:
 
     recording: Recording
     findings: tuple[Finding, ...]
-    robots: tuple[Fit, ...]
+    robots: tuple[RobotMatch, ...]
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
@@ -65,7 +65,7 @@ def examine(recording: Recording, robots: Mapping[str, Robot] | None = None) -> 
 
 
 def robot_findings(
-    recording: Recording, fits: tuple[Fit, ...], robots: Mapping[str, Robot]
+    recording: Recording, fits: tuple[RobotMatch, ...], robots: Mapping[str, Robot]
 ) -> Iterator[Finding]:
     """Which profile fits, whether the log says another one, or that none does."""
     if not fits:
@@ -87,7 +87,7 @@ def robot_findings(
     yield from _load(recording, fits[0], robots[fits[0].robot])
 
 
-def _load(recording: Recording, fit: Fit, robot: Robot) -> Iterator[Finding]:
+def _load(recording: Recording, fit: RobotMatch, robot: Robot) -> Iterator[Finding]:
     """A load that the drives carry and the profile does not know."""
     drives = best_fit(recording, fit.robot, robot, measured(recording, robot))
     carried = max(fit.load, drives.load if drives is not None else 0.0)
@@ -104,7 +104,7 @@ def _load(recording: Recording, fit: Fit, robot: Robot) -> Iterator[Finding]:
         )
 
 
-def _contradicted(recording: Recording, fits: tuple[Fit, ...]) -> Iterator[Finding]:
+def _contradicted(recording: Recording, fits: tuple[RobotMatch, ...]) -> Iterator[Finding]:
     hint = recording.robot_hint
     hinted = next((fit for fit in fits if fit.robot == hint), None)
     if hinted is not None and hinted.misfit > CLOSE * fits[0].misfit:
@@ -150,7 +150,7 @@ def hypotheses(recording: Recording, robot: Robot) -> Iterator[Evidence]:
             yield Evidence("current in mA", current * constant / 1e3, MISTAKEN, friction=True)
 
 
-def _none_fits(recording: Recording, fits: tuple[Fit, ...]) -> Finding:
+def _none_fits(recording: Recording, fits: tuple[RobotMatch, ...]) -> Finding:
     ranked = "; ".join(str(fit) for fit in fits)
     still = float(np.max(np.ptp(recording.q, axis=0))) < 0.05
     inverted, judged = inverted_joints(recording)

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.dynamics.kernels import momentum_terms
-from vftcli.dynamics.kinematics import flange_jacobian, link_poses
-from vftcli.recording import Recording
 from vftcli.robots import Robot
+from vftcli.robots.kernels import momentum_terms
+from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
 
 WINDOW = 0.3
 WINDOWS = 400
@@ -50,7 +50,7 @@ class Evidence(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fit:
+class RobotMatch:
     """How well a profile explains a log.
 
     Attributes:
@@ -73,7 +73,7 @@ class Fit:
         return f"{self.robot} {100 * self.misfit:.3g} %{load} ({self.evidence})"
 
 
-def ranking(recording: Recording, robots: Mapping[str, Robot]) -> tuple[Fit, ...]:
+def ranking(recording: Recording, robots: Mapping[str, Robot]) -> tuple[RobotMatch, ...]:
     """Profiles with as many joints as the log, best first.
 
     Args:
@@ -96,14 +96,14 @@ def ranking(recording: Recording, robots: Mapping[str, Robot]) -> tuple[Fit, ...
 
 def best_fit(
     recording: Recording, name: str, robot: Robot, evidence: Iterable[Evidence]
-) -> Fit | None:
+) -> RobotMatch | None:
     """A profile's fit to the evidence that it explains best, or None without any torque."""
     windows = Windows(recording, robot)
     found = []
     for item in evidence:
         misfit, load = windows.misfit(item.torque, friction=item.friction)
         found.append(
-            Fit(
+            RobotMatch(
                 robot=name,
                 misfit=misfit,
                 fits=misfit < item.limit,

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vftcli.arrays import Array
 from vftcli.doctor.findings import Finding
-from vftcli.recording import Recording
 from vftcli.robots import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
 
 REST = 2e-3
 """Speed below which a joint counts as resting. [rad/s]"""

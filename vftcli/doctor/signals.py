@@ -4,9 +4,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from vftcli.arrays import Array
 from vftcli.doctor.findings import Finding
-from vftcli.recording import Recording
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
 
 MOVING = 1e-3
 """Speed from which a joint counts as moving. [rad/s]"""

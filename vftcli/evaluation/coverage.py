@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.torque import COVERS, ExternalTorque
+from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import COVERS, ExternalTorque
 
 LEAST = 10
 """Fewest samples that a share is told of."""

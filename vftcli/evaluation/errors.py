@@ -7,13 +7,13 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from vftcli.arrays import Array
-from vftcli.errors import ShapeError
 from vftcli.evaluation.coverage import coverage
 from vftcli.evaluation.intervals import Resampled, interval, resample
-from vftcli.evaluation.lag import lags
 from vftcli.evaluation.significance import p_value
-from vftcli.torque import ExternalTorque
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ShapeError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.lag import lags
 
 SCHEMA: dict[str, type[pl.DataType]] = {
     "recording": pl.String,

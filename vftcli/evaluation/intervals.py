@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.arrays import Array
+from vftcli.signals.arrays import Array
 
 REPETITIONS = 1000
 """Bootstrap repetitions; the ends of a 95 % interval rest on 25 of them."""

@@ -8,13 +8,13 @@ import polars as pl
 
 from vftcli.evaluation.errors import SCHEMA, Scored, scored, table
 from vftcli.evaluation.intervals import Resampled
-from vftcli.torque import ExternalTorque
+from vftcli.signals.external_torque import ExternalTorque
 
 POOLED = "pooled"
 """Name of the pooled rows in the column `recording`."""
 
 
-class Run(NamedTuple):
+class ScoredLog(NamedTuple):
     """One log's estimates and what they are judged by.
 
     Attributes:
@@ -26,7 +26,7 @@ class Run(NamedTuple):
     reference: ExternalTorque
 
 
-def evaluate_pooled(runs: Sequence[Run]) -> pl.DataFrame:
+def evaluate_pooled(runs: Sequence[ScoredLog]) -> pl.DataFrame:
     """Rows over all samples of several logs together, each log resampled on its own.
 
     Logs of arms with other joint numbers, or run with other observers, are not pooled: the table
@@ -42,7 +42,7 @@ def evaluate_pooled(runs: Sequence[Run]) -> pl.DataFrame:
     )
 
 
-def pooled_rows(runs: Sequence[Run]) -> list[pl.DataFrame]:
+def pooled_rows(runs: Sequence[ScoredLog]) -> list[pl.DataFrame]:
     """The pooled table as a list, empty where there is nothing to pool."""
     rows = evaluate_pooled(runs)
     return [rows] if len(rows) else []

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.arrays import Array
-from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.observers.observer import Observer, Tuning
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array
 
 STEP_TIME = 3.0
 """Length of the step that response times are read from. [s]"""

@@ -6,9 +6,9 @@ from itertools import combinations
 import numpy as np
 import polars as pl
 
-from vftcli.arrays import Array
 from vftcli.evaluation.intervals import LEVEL, known_rows, resample
-from vftcli.torque import ExternalTorque
+from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import ExternalTorque
 
 SCHEMA: dict[str, type[pl.DataType]] = {
     "recording": pl.String,

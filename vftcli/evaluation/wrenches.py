@@ -5,11 +5,11 @@ from collections.abc import Iterable
 import numpy as np
 import polars as pl
 
-from vftcli.arrays import Array
 from vftcli.evaluation.errors import SCHEMA, correlation, number, rmse
-from vftcli.wrench.detection import Told
-from vftcli.wrench.measurement import Measurement
-from vftcli.wrench.wrench import AXES, Mask, Wrench
+from vftcli.signals.arrays import Array
+from vftcli.signals.wrench import AXES, Mask, Wrench
+from vftcli.virtual_sensor.detection import ContactScore
+from vftcli.virtual_sensor.sensor_reading import SensorReading
 
 WRENCH_SCHEMA: dict[str, type[pl.DataType]] = {
     **SCHEMA,
@@ -67,7 +67,7 @@ def band_share(wrench: Wrench, k: int, error: Array, known: Mask) -> float | Non
     return float(np.mean(np.abs(error[known]) <= 1.96 * wrench.sd[known, k]))
 
 
-def with_wrenches(errors: pl.DataFrame, recording: str, sensed: Measurement) -> pl.DataFrame:
+def with_wrenches(errors: pl.DataFrame, recording: str, sensed: SensorReading) -> pl.DataFrame:
     """The joints' errors, and below them the wrenches' where a reference wrench is known."""
     if sensed.reference is None:
         return errors
@@ -91,7 +91,7 @@ CONTACT_SCHEMA: dict[str, type[pl.DataType]] = {
 
 
 def with_contacts(
-    errors: pl.DataFrame, recording: str, reference: str, contacts: Iterable[Told]
+    errors: pl.DataFrame, recording: str, reference: str, contacts: Iterable[ContactScore]
 ) -> pl.DataFrame:
     """The errors, and below them one row an observer on the contacts it tells."""
     rows = [

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.identification.regressor import torque_regressor
-from vftcli.identification.stacking import TRUNCATION, Layout, Triangles
+from vftcli.identification.stacking import TRUNCATION, ParameterColumns, Triangles
 from vftcli.robots.chain import Chain
+from vftcli.robots.regressor import torque_regressor
+from vftcli.signals.arrays import Array
 
 PROBES = 400
 """Random states at which the structure is found."""
@@ -78,7 +78,7 @@ def structure(chain: Chain, rotor: bool) -> Grouping:
     return Grouping(tuple(order[:rank][first].tolist()), tuple(order[rank:].tolist()), beta[first])
 
 
-def extended(grouping: Grouping, layout: Layout) -> Grouping:
+def extended(grouping: Grouping, layout: ParameterColumns) -> Grouping:
     """The grouping of all unknowns: friction coefficients stand for themselves."""
     own = tuple(range(layout.inertial + layout.rotors, layout.size))
     carried = np.vstack([grouping.carried, np.zeros((len(own), grouping.carried.shape[1]))])

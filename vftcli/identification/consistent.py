@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import IdentificationError
-from vftcli.identification.regressor import LINK, TENSOR
-from vftcli.identification.stacking import Layout, Triangles
+from vftcli.identification.stacking import ParameterColumns, Triangles
+from vftcli.robots.regressor import LINK, TENSOR
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import IdentificationError
 
 WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3)
 """Weights of the distance to the profile that cross-validation chooses from."""
@@ -103,7 +103,7 @@ class Problem(NamedTuple):
     R: Array
     z: Array
     start: Array
-    layout: Layout
+    layout: ParameterColumns
     weight: float
 
     def value(self, x: Array) -> float:
@@ -181,7 +181,7 @@ class ConsistentFit(NamedTuple):
     errors: dict[float, float]
 
 
-def starting_point(layout: Layout, x: Array) -> Array:
+def starting_point(layout: ParameterColumns, x: Array) -> Array:
     """Physical parameters near x to measure the distance from. (size,)"""
     start = x.copy()
     start[: layout.inertial] = thickened(x[: layout.inertial])

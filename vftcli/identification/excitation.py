@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import IdentificationError
 from vftcli.identification.least_squares import robust_sd
-from vftcli.identification.processing import Motion, Samples, runs
+from vftcli.identification.processing import PreparedLog, Samples, runs
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import IdentificationError
 
 SLOW = 0.02
 """A joint must move faster than this to identify anything. [rad/s]"""
@@ -45,7 +45,7 @@ class Excitation(NamedTuple):
     reverses: Samples
 
 
-def excitation(motions: Sequence[Motion]) -> Excitation:
+def excitation(motions: Sequence[PreparedLog]) -> Excitation:
     """Find which joints move, and which both ways.
 
     Raises:
@@ -69,7 +69,7 @@ def excitation(motions: Sequence[Motion]) -> Excitation:
     return Excitation(moves, np.min(times, axis=0) >= 0.1 * ENOUGH)
 
 
-class Contact(NamedTuple):
+class ContactSpan(NamedTuple):
     """A stretch in which something seems to touch the arm.
 
     Attributes:
@@ -85,7 +85,7 @@ class Contact(NamedTuple):
     size: float
 
 
-def contacts(motion: Motion, residual: Array, dry: Array) -> list[Contact]:
+def contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSpan]:
     """Find stretches whose residual is far outside what the rest of the log shows.
 
     Near a reversal a joint may stick, and the residual be as large as its dry friction: only what
@@ -106,7 +106,7 @@ def contacts(motion: Motion, residual: Array, dry: Array) -> list[Contact]:
         if motion.t[stop - 1] - motion.t[start] >= TOUCH_TIME:
             k, j = np.unravel_index(int(np.argmax(z[start:stop])), (stop - start, z.shape[1]))
             found.append(
-                Contact(
+                ContactSpan(
                     float(motion.t[start]),
                     float(motion.t[stop - 1]),
                     int(j) + 1,
@@ -116,7 +116,7 @@ def contacts(motion: Motion, residual: Array, dry: Array) -> list[Contact]:
     return merged(found)
 
 
-def sticking(motion: Motion) -> Samples:
+def sticking(motion: PreparedLog) -> Samples:
     """Whether a joint is slower than `STICKING` within a filter's length of a sample. (M, n)"""
     slow = np.abs(motion.dq) < STICKING
     if motion.samples < 2:
@@ -130,9 +130,9 @@ def sticking(motion: Motion) -> Samples:
     return spread
 
 
-def merged(found: Sequence[Contact]) -> list[Contact]:
+def merged(found: Sequence[ContactSpan]) -> list[ContactSpan]:
     """Join contacts that lie closer together than twice the margin."""
-    out: list[Contact] = []
+    out: list[ContactSpan] = []
     for contact in found:
         if out and contact.start - out[-1].stop < 2 * TOUCH_MARGIN:
             larger = max(out[-1], contact, key=lambda c: abs(c.size))
@@ -142,7 +142,7 @@ def merged(found: Sequence[Contact]) -> list[Contact]:
     return out
 
 
-def without(motion: Motion, found: Sequence[Contact]) -> Samples:
+def without(motion: PreparedLog, found: Sequence[ContactSpan]) -> Samples:
     """Samples outside all contacts and their margins. (M,)"""
     free = np.ones(motion.samples, dtype=bool)
     for contact in found:

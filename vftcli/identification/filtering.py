@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from vftcli.arrays import Array, is_uniform
-from vftcli.errors import ClockError
+from vftcli.signals.arrays import Array, is_uniform
+from vftcli.signals.errors import ClockError
 
 ORDER = 4
 """Order of the Butterworth low-pass, run forwards and backwards (so its roll-off counts twice)."""

@@ -5,14 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
 from vftcli.identification.friction_shapes import (
     SMOOTHINGS,
     STRIBECK_VELOCITIES,
     FrictionColumns,
     Shape,
 )
-from vftcli.identification.least_squares import Fit, cross_validated, fit_column
+from vftcli.identification.least_squares import ColumnFit, cross_validated, fit_column
+from vftcli.signals.arrays import Array
 
 PLAIN = ("coulomb", "viscous", "offset")
 RICHEST = (*PLAIN, "quadratic", "load_coulomb")
@@ -37,7 +37,7 @@ LIGHT = 1.0
 """Spread of the gravity torque below which growth with load cannot be told. [N·m]"""
 
 
-class Contest(NamedTuple):
+class ShapeChoice(NamedTuple):
     """One candidate's cross-validated error.
 
     Attributes:
@@ -79,7 +79,7 @@ class Given(NamedTuple):
         return np.hstack([friction, self.fixed])
 
 
-def choose_shape(j: int, given: Given) -> tuple[Shape, list[Contest]]:
+def choose_shape(j: int, given: Given) -> tuple[Shape, list[ShapeChoice]]:
     """Choose a joint's friction model by cross-validation, simplest of the nearly best.
 
     First the smoothing is chosen with the richest plain model, then the terms.
@@ -100,7 +100,7 @@ def choose_shape(j: int, given: Given) -> tuple[Shape, list[Contest]]:
         A = given.columns(j, shape)
         fit = fit_column(A, given.y, given.weights)
         if physical(shape, fit):
-            contests.append(Contest(j + 1, shape, cross_validated(A, given.y, start.weights)))
+            contests.append(ShapeChoice(j + 1, shape, cross_validated(A, given.y, start.weights)))
     if not contests:
         return Shape(allowed(PLAIN, given), smoothing), []
     limit = MARGIN * min(contest.error for contest in contests)
@@ -129,7 +129,7 @@ def allowed(terms: tuple[str, ...], given: Given) -> tuple[str, ...]:
     return out if given.reverses else tuple(t for t in out if t != "offset")
 
 
-def physical(shape: Shape, fit: Fit) -> bool:
+def physical(shape: Shape, fit: ColumnFit) -> bool:
     """Whether no dry-friction term came out negative."""
     return all(
         value >= 0.0

@@ -2,10 +2,9 @@
 
 from dataclasses import replace
 
-from vftcli.errors import IdentificationError
 from vftcli.identification.friction_shapes import rounded
-from vftcli.identification.outcome import (
-    Outcome,
+from vftcli.identification.method_result import (
+    MethodResult,
     confidence,
     friction_numbers,
     held,
@@ -14,9 +13,10 @@ from vftcli.identification.outcome import (
 )
 from vftcli.identification.result import Number
 from vftcli.identification.training import Training, fitted
+from vftcli.signals.errors import IdentificationError
 
 
-def friction_method(data: Training) -> Outcome:
+def friction_method(data: Training) -> MethodResult:
     """Friction, rotor inertia and, if asked, drive constants; links at the maker's table."""
     fits, _, notes = fitted(data, strict=True)
     robot = data.robot
@@ -52,7 +52,7 @@ def friction_method(data: Training) -> Outcome:
     chain = replace(robot.chain, rotor_inertia=rotor)
     new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
     contests = [c for f in fits if f is not None for c in f.contests]
-    return Outcome(new, numbers, contests, None, [*notes, *held(data)])
+    return MethodResult(new, numbers, contests, None, [*notes, *held(data)])
 
 
 def refuse_sign(data: Training, j: int, scale: float) -> None:

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.identification.processing import Motion
+from vftcli.identification.processing import PreparedLog
 from vftcli.robots.robot import JointFriction
+from vftcli.signals.arrays import Array
 
 SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)
 """Velocities over which the sign may be smoothed. [rad/s]"""
@@ -97,7 +97,7 @@ class FrictionColumns:
         load: Absolute gravity torques along the whole log. (T, n) [N·m]
     """
 
-    def __init__(self, motion: Motion, load: Array) -> None:
+    def __init__(self, motion: PreparedLog, load: Array) -> None:
         self.motion = motion
         self.load = load
         self.made: dict[tuple[str, int, float, float], Array] = {}

@@ -6,15 +6,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import polars as pl
 
-from vftcli.arrays import Array
-from vftcli.errors import IdentificationError, ParameterError
-from vftcli.identification.account import Story, documented
 from vftcli.identification.base_parameters import BaseParameters
-from vftcli.identification.friction_fit import Contest
+from vftcli.identification.friction_fit import ShapeChoice
+from vftcli.identification.method_result import MethodResult
 from vftcli.identification.methods import METHODS
-from vftcli.identification.outcome import Outcome
 from vftcli.identification.payload import LoadFit, payload_from_pair, payload_from_poses
-from vftcli.identification.processing import Motion, Processing, prepare
+from vftcli.identification.processing import PreparedLog, Processing, prepare
+from vftcli.identification.provenance import Provenance, documented
 from vftcli.identification.repeats import repeated_share, repeats
 from vftcli.identification.result import (
     BASE,
@@ -27,8 +25,10 @@ from vftcli.identification.result import (
 )
 from vftcli.identification.scoring import diagnosis, mean_text, predicted_torque, rms
 from vftcli.identification.training import training
-from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import IdentificationError, ParameterError
+from vftcli.signals.recording import Recording
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +81,7 @@ def identify(
     load = find_load(logs, robot, free) if task.find_payload else None
     train = free_logs(logs, free, load)
     if load is not None and (task.method is None or not train):
-        method, outcome = "payload", Outcome(robot, [], [], None, [])
+        method, outcome = "payload", MethodResult(robot, [], [], None, [])
     else:
         method = task.method or "payload"
         data = training(train, robot, task.processing, task.fit_constants)
@@ -97,7 +97,7 @@ def identify(
     processing = task.processing.described(logs[0].step)
     table = pl.DataFrame([*rows, *more], schema=RESIDUALS, orient="row")
     sources = tuple(logs) if free is None else (*logs, free)
-    story = Story(
+    story = Provenance(
         profile=robot,
         name=task.name,
         method=method,
@@ -165,7 +165,7 @@ def _names(logs: Sequence[Recording]) -> set[str]:
 
 
 def residual_rows(
-    motions: Sequence[Motion], role: str, profile: Robot, robot: Robot
+    motions: Sequence[PreparedLog], role: str, profile: Robot, robot: Robot
 ) -> tuple[list[tuple[str, str, str, int, float, int]], list[Trace]]:
     """Score logs under the profile and the identified robot."""
     rows, traces = [], []
@@ -185,12 +185,12 @@ def residual_rows(
     return rows, traces
 
 
-def constant_ratio(profile: Robot, robot: Robot, motion: Motion) -> Array | float:
+def constant_ratio(profile: Robot, robot: Robot, motion: PreparedLog) -> Array | float:
     """New over old drive constants, for torque that was made from currents with the old. (n,)"""
     old, new = profile.torque_constant, robot.torque_constant
     if old is None or new is None or motion.recording.current is None:
         return 1.0
-    from vftcli.dynamics.drive import uses_current
+    from vftcli.robots.drive import uses_current
 
     ratio: Array = new / old
     return ratio if uses_current(motion.recording, profile) else 1.0
@@ -198,8 +198,8 @@ def constant_ratio(profile: Robot, robot: Robot, motion: Motion) -> Array | floa
 
 def remarks(
     robot: Robot,
-    train: Sequence[Motion],
-    test: Sequence[Motion],
+    train: Sequence[PreparedLog],
+    test: Sequence[PreparedLog],
     trained: Sequence[Trace],
     tested: Sequence[Trace],
 ) -> list[str]:
@@ -237,7 +237,7 @@ def with_load(
     return robot.with_payload(load.payload), [*numbers, *found], [*notes, *load.notes]
 
 
-def contest_table(contests: Sequence[Contest]) -> pl.DataFrame:
+def contest_table(contests: Sequence[ShapeChoice]) -> pl.DataFrame:
     """The friction candidates as a table."""
     rows = [(c.joint, c.shape.words, c.error, c.chosen) for c in contests]
     return pl.DataFrame(rows, schema=CONTESTS, orient="row")

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import IdentificationError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import IdentificationError
 
 HUBER = 2.5
 """Residuals beyond this many robust standard deviations weigh less (Huber). On normal noise that
@@ -22,7 +22,7 @@ FOLDS = 5
 """Contiguous stretches of the log for cross-validation."""
 
 
-class Fit(NamedTuple):
+class ColumnFit(NamedTuple):
     """A fitted column.
 
     Attributes:
@@ -38,7 +38,7 @@ class Fit(NamedTuple):
     weights: Array
 
 
-def fit_column(A: Array, y: Array, weights: Array) -> Fit:
+def fit_column(A: Array, y: Array, weights: Array) -> ColumnFit:
     """Fit y ≈ A x, down-weighting outliers.
 
     Args:
@@ -60,7 +60,7 @@ def fit_column(A: Array, y: Array, weights: Array) -> Fit:
         residual = y - A @ x
         outliers = huber(residual / max(robust_sd(residual[weights > 0]), 1e-12))
     final = weights * outliers
-    return Fit(x, deviations(A, residual, final), residual, final)
+    return ColumnFit(x, deviations(A, residual, final), residual, final)
 
 
 class Normal(NamedTuple):

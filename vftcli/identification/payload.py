@@ -5,23 +5,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.dynamics.drive import drive_torque
-from vftcli.errors import IdentificationError
 from vftcli.identification.filtering import resampled, zero_phase
 from vftcli.identification.least_squares import fit_column, solve
 from vftcli.identification.processing import (
-    Motion,
+    PreparedLog,
     Processing,
     Samples,
     gravity_torque,
     prepare,
     runs,
 )
-from vftcli.identification.regressor import LINK, chain_parameters, torque_regressor
-from vftcli.recording import Recording
 from vftcli.robots.chain import Payload
+from vftcli.robots.drive import drive_torque
+from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import IdentificationError
+from vftcli.signals.recording import Recording
 
 STATIC = 4
 """Parameters that gravity tells: mass and three first moments."""
@@ -190,7 +190,7 @@ def column_sd(A: Array, left: Array, usable: Array) -> Array:
     return fit.sd
 
 
-def time_shift(motion: Motion, other: Recording) -> tuple[float, float]:
+def time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:
     """Shift [s] to add to the motion's clock for the other log's, and what is left. [rad rms]
 
     Raises:

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.dynamics.drive import drive_torque
-from vftcli.dynamics.kernels import CHUNK, momentum_terms
-from vftcli.errors import ParameterError
 from vftcli.identification.filtering import ORDER, derivative, zero_phase
-from vftcli.recording import Recording
+from vftcli.robots.drive import drive_torque
+from vftcli.robots.kernels import CHUNK, momentum_terms
 from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.recording import Recording
 
 Samples = np.ndarray
 
@@ -62,7 +62,7 @@ class Processing:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motion:
+class PreparedLog:
     """A log prepared for identification: M samples from the first to the last that moves.
 
     Attributes:
@@ -113,7 +113,7 @@ class Motion:
             yield slice(start, min(start + size, self.samples))
 
 
-def prepare(recording: Recording, robot: Robot, processing: Processing) -> Motion:
+def prepare(recording: Recording, robot: Robot, processing: Processing) -> PreparedLog:
     """Filter, differentiate and decimate a log, one column at a time.
 
     Raises:
@@ -133,7 +133,7 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Motio
         for name, signal in (("q", recording.q), ("tau", torque)):
             columns[name].append(zero_phase(t, signal[:, j : j + 1], processing.cutoff)[kept])
     usable = told(t, dq, processing)[kept]
-    return Motion(
+    return PreparedLog(
         recording=recording,
         processing=processing,
         kept=kept,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vftcli.identification.processing import Motion
+from vftcli.identification.processing import PreparedLog
 
 NEAR = 0.01
 """Largest joint distance at which two samples are the same place. [rad]"""
@@ -14,7 +14,7 @@ SHARE = 0.8
 """Share of the test log's samples that must lie on the training trajectory."""
 
 
-def repeated_share(train: Motion, test: Motion) -> float:
+def repeated_share(train: PreparedLog, test: PreparedLog) -> float:
     """Share of the test's moving samples that lie on the training log's path through (q, q̇)."""
     from scipy.spatial import cKDTree
 
@@ -26,7 +26,7 @@ def repeated_share(train: Motion, test: Motion) -> float:
     return float(np.mean(np.isfinite(distance)))
 
 
-def densified(motion: Motion, per_step: int = 4) -> np.ndarray:
+def densified(motion: PreparedLog, per_step: int = 4) -> np.ndarray:
     """The path through (q, q̇), interpolated so that neighbours are nearer than `NEAR`."""
     points = np.hstack([motion.q, SLOWNESS * motion.dq])
     index = np.arange(0, len(points) - 1 + 1e-9, 1.0 / per_step)
@@ -34,6 +34,6 @@ def densified(motion: Motion, per_step: int = 4) -> np.ndarray:
     return np.stack(columns, axis=1)
 
 
-def repeats(train: Motion, test: Motion) -> bool:
+def repeats(train: PreparedLog, test: PreparedLog) -> bool:
     """Whether the test log repeats the training log's trajectory."""
     return repeated_share(train, test) >= SHARE

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import polars as pl
 
-from vftcli.arrays import Array
-from vftcli.recording import Recording
 from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
 
 RESIDUALS = pl.Schema(
     {

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.dynamics.friction import friction_torque
 from vftcli.identification.excitation import SLOW
 from vftcli.identification.least_squares import fit_column
-from vftcli.identification.processing import Motion, Samples, gravity_torque
-from vftcli.identification.regressor import LINK, chain_parameters, torque_regressor
+from vftcli.identification.processing import PreparedLog, Samples, gravity_torque
+from vftcli.robots.friction import friction_torque
+from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Array
 
 EXPLAINS = 0.4
 """Share of a residual that a cause must explain to be named."""
@@ -25,7 +25,7 @@ WORSE = 1.5
 """A held-out joint whose residual is this many times the training's is remarked on."""
 
 
-def rigid_torque(robot: Robot, motion: Motion) -> Array:
+def rigid_torque(robot: Robot, motion: PreparedLog) -> Array:
     """Rigid-body torque of the loaded arm without its rotors. (M, n) [N·m]"""
     phi = chain_parameters(robot.loaded_chain)
     out = np.empty(motion.q.shape)
@@ -35,7 +35,7 @@ def rigid_torque(robot: Robot, motion: Motion) -> Array:
     return out
 
 
-def predicted_torque(robot: Robot, motion: Motion) -> Array:
+def predicted_torque(robot: Robot, motion: PreparedLog) -> Array:
     """Torque the drives need by the robot's model, friction filtered like the log. (M, n) [N·m]"""
     torque = rigid_torque(robot, motion) + robot.chain.rotor_inertia * motion.ddq
     if not robot.friction:
@@ -53,7 +53,7 @@ def rms(residual: Array) -> Array:
     return value
 
 
-def diagnosis(robot: Robot, motion: Motion, residual: Array, trained: Array) -> list[str]:
+def diagnosis(robot: Robot, motion: PreparedLog, residual: Array, trained: Array) -> list[str]:
     """What a held-out log's residual looks like where it is much larger than in training.
 
     Args:
@@ -81,13 +81,13 @@ def diagnosis(robot: Robot, motion: Motion, residual: Array, trained: Array) -> 
     return [f"{name}: {text}" for text in remarks]
 
 
-def in_motion(motion: Motion, j: int) -> Samples:
+def in_motion(motion: PreparedLog, j: int) -> Samples:
     """Where a joint moves fast enough to tell its friction. (M,)"""
     moving: Samples = motion.usable[:, j] & (np.abs(motion.dq[:, j]) > SLOW)
     return moving
 
 
-def apparent_load(robot: Robot, motion: Motion, residual: Array) -> tuple[float, float]:
+def apparent_load(robot: Robot, motion: PreparedLog, residual: Array) -> tuple[float, float]:
     """Mass that would explain the residual, and the share of it that it explains. [kg], [1]"""
     Y = [
         torque_regressor(robot.chain, motion.q[s], motion.dq[s], motion.ddq[s])[:, :, -LINK:]
@@ -99,7 +99,7 @@ def apparent_load(robot: Robot, motion: Motion, residual: Array) -> tuple[float,
     return float(x[0]), 1.0 - float(np.sum((y - A @ x) ** 2) / max(np.sum(y**2), 1e-12))
 
 
-def rubbing(motion: Motion, residual: Array, j: int, size: float, trained: float) -> str:
+def rubbing(motion: PreparedLog, residual: Array, j: int, size: float, trained: float) -> str:
     """How a moving joint's residual differs from the training's: by friction, or unexplained."""
     text = f"joint {j + 1} leaves {size:.2f} N·m, {size / trained:.1f} × the training's"
     dq = motion.recording.require("dq")[:, j]

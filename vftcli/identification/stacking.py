@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.least_squares import (
     FOLDS,
@@ -20,12 +19,13 @@ from vftcli.identification.least_squares import (
     huber,
     robust_sd,
 )
-from vftcli.identification.processing import Motion, Samples
-from vftcli.identification.regressor import INERTIAL_NAMES, LINK, torque_regressor
+from vftcli.identification.processing import PreparedLog, Samples
 from vftcli.robots.chain import Chain
+from vftcli.robots.regressor import INERTIAL_NAMES, LINK, torque_regressor
+from vftcli.signals.arrays import Array
 
 
-class Layout(NamedTuple):
+class ParameterColumns(NamedTuple):
     """Which unknown stands where.
 
     Attributes:
@@ -68,7 +68,7 @@ class Layout(NamedTuple):
         terms = [f"{t}{j}" for j, s in enumerate(self.shapes, start=1) for t in s.terms]
         return (*inertial, *rotors, *terms)
 
-    def rows(self, motion: Motion, columns: FrictionColumns, span: slice) -> Array:
+    def rows(self, motion: PreparedLog, columns: FrictionColumns, span: slice) -> Array:
         """The regressor of some samples. (N, n, size)"""
         n = self.chain.joints
         q, dq, ddq = motion.q[span], motion.dq[span], motion.ddq[span]
@@ -90,7 +90,7 @@ class Data(NamedTuple):
         weights: Weight of every sample and joint, 0 … 1. (M, n)
     """
 
-    motion: Motion
+    motion: PreparedLog
     columns: FrictionColumns
     weights: Array
 
@@ -106,7 +106,7 @@ class Triangles(NamedTuple):
         samples: Effective number of weighted equations.
     """
 
-    layout: Layout
+    layout: ParameterColumns
     parts: tuple[Array, ...]
     sigma: Array
     correlation: float
@@ -134,7 +134,7 @@ REWEIGHTINGS = 3
 """Passes of reweighting; each evaluates the regressor twice."""
 
 
-def residuals(layout: Layout, data: Data, x: Array) -> Array:
+def residuals(layout: ParameterColumns, data: Data, x: Array) -> Array:
     """Torque that x does not explain. (M, n) [N·m]"""
     motion = data.motion
     out = np.empty(motion.q.shape)
@@ -143,7 +143,7 @@ def residuals(layout: Layout, data: Data, x: Array) -> Array:
     return out
 
 
-def stack(layout: Layout, logs: Sequence[Data], start: Array) -> Triangles:
+def stack(layout: ParameterColumns, logs: Sequence[Data], start: Array) -> Triangles:
     """Weigh and stack all logs, down-weighting outliers by what the last solution leaves.
 
     Args:
@@ -170,7 +170,9 @@ def joint_sigma(logs: Sequence[Data], left: Sequence[Array]) -> Array:
     return sigma
 
 
-def reduced(layout: Layout, logs: Sequence[Data], left: Sequence[Array], sigma: Array) -> Triangles:
+def reduced(
+    layout: ParameterColumns, logs: Sequence[Data], left: Sequence[Array], sigma: Array
+) -> Triangles:
     """QR updates over all chunks of all logs, one triangle a cross-validation stretch."""
     parts = [np.zeros((0, layout.size + 1)) for _ in range(FOLDS)]
     total, correlation = 0.0, []
@@ -188,7 +190,7 @@ def reduced(layout: Layout, logs: Sequence[Data], left: Sequence[Array], sigma: 
 
 
 def weighted_rows(
-    layout: Layout, data: Data, scale: Array, fold: slice, size: int = 512
+    layout: ParameterColumns, data: Data, scale: Array, fold: slice, size: int = 512
 ) -> Iterator[Array]:
     """Rows [A y] times their weights, a chunk at a time; rows of no weight are dropped."""
     for start in range(fold.start, fold.stop, size):

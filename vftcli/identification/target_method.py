@@ -6,14 +6,19 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.identification.friction_shapes import rounded
-from vftcli.identification.outcome import Outcome, confidence, friction_numbers, profile_friction
+from vftcli.identification.method_result import (
+    MethodResult,
+    confidence,
+    friction_numbers,
+    profile_friction,
+)
 from vftcli.identification.result import Number
 from vftcli.identification.targets import SHAPES, ControllerModel, controller_models
 from vftcli.identification.training import Training
 from vftcli.robots.robot import Robot
 
 
-def targets_method(data: Training) -> Outcome:
+def targets_method(data: Training) -> MethodResult:
     """K, rotor inertia and friction as the controller itself uses them."""
     models = controller_models(data.recordings, data.robot)
     robot = data.robot
@@ -34,7 +39,7 @@ def targets_method(data: Training) -> Outcome:
     notes += gravity_note(models)
     chain = replace(robot.chain, rotor_inertia=rotor)
     new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
-    return Outcome(new, numbers, [], None, notes)
+    return MethodResult(new, numbers, [], None, notes)
 
 
 def target_numbers(j: int, model: ControllerModel, robot: Robot) -> list[Number]:

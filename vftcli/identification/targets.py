@@ -11,15 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import IdentificationError
 from vftcli.identification.filtering import derivative, zero_phase
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.least_squares import fit_column, solve
-from vftcli.identification.processing import Motion, Processing, gravity_torque, prepare, runs
-from vftcli.identification.regressor import chain_parameters, torque_regressor
-from vftcli.recording import Recording
+from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare, runs
+from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import IdentificationError
+from vftcli.signals.recording import Recording
 
 CUTOFF = 4.0
 """Cutoff for targets: above it the measured motion no longer follows the asked one. [Hz]"""
@@ -87,7 +87,7 @@ class Targets(NamedTuple):
     """
 
     recording: Recording
-    motion: Motion
+    motion: PreparedLog
     columns: FrictionColumns
     current: Array
     moment: Array

@@ -7,18 +7,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.dynamics.drive import drive_torque, uses_current
-from vftcli.errors import IdentificationError
 from vftcli.identification import excitation as exciting
 from vftcli.identification.excitation import Excitation
-from vftcli.identification.friction_fit import LIGHT, Contest, Given, choose_shape
+from vftcli.identification.friction_fit import LIGHT, Given, ShapeChoice, choose_shape
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
-from vftcli.identification.least_squares import Fit, fit_column
-from vftcli.identification.processing import Motion, Processing, gravity_torque, prepare
+from vftcli.identification.least_squares import ColumnFit, fit_column
+from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
 from vftcli.identification.scoring import apparent_load, predicted_torque, rigid_torque
-from vftcli.recording import Recording
+from vftcli.robots.drive import drive_torque, uses_current
 from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import IdentificationError
+from vftcli.signals.recording import Recording
 
 LOAD_EXPLAINS = 0.8
 """Share of what the profile misses that a load must explain to be suspected."""
@@ -50,7 +50,7 @@ class Training:
 
     robot: Robot
     recordings: tuple[Recording, ...]
-    motions: tuple[Motion, ...]
+    motions: tuple[PreparedLog, ...]
     columns: tuple[FrictionColumns, ...]
     rigid: tuple[Array, ...]
     excited: Excitation
@@ -107,8 +107,8 @@ class JointFit(NamedTuple):
     """
 
     shape: Shape
-    fit: Fit
-    contests: list[Contest]
+    fit: ColumnFit
+    contests: list[ShapeChoice]
     constant: bool
 
 
@@ -134,7 +134,7 @@ def fit_joint(data: Training, j: int, weights: Sequence[Array], constant: bool) 
     return JointFit(shape, fit, contests, constant)
 
 
-def constant_known(fit: Fit) -> bool:
+def constant_known(fit: ColumnFit) -> bool:
     """Whether a joint's load tells its drive constant: the last coefficient, 1 by the profile."""
     return bool(fit.sd[-1] < CONSTANT_KNOWN * abs(fit.values[-1]))
 
@@ -227,7 +227,7 @@ def doubts(data: Training, left: Sequence[Array], weights: Sequence[Array]) -> l
     return [remark for remark in remarks if remark]
 
 
-def unknown_load(data: Training, motion: Motion) -> str:
+def unknown_load(data: Training, motion: PreparedLog) -> str:
     """Say if a log's torque looks like a load on the flange that the robot has not, or ""."""
     before = motion.tau - predicted_torque(data.robot, motion)
     mass, explained = apparent_load(data.robot, motion, before)

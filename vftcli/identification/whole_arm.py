@@ -5,14 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import IdentificationError
 from vftcli.identification.base_parameters import BaseParameters, base_parameters
 from vftcli.identification.consistent import fit_consistent, nearest_physical
 from vftcli.identification.friction_fit import PLAIN
 from vftcli.identification.friction_shapes import FrictionColumns, Shape, rounded
-from vftcli.identification.outcome import (
-    Outcome,
+from vftcli.identification.method_result import (
+    MethodResult,
     confidence,
     friction_numbers,
     held,
@@ -20,24 +18,26 @@ from vftcli.identification.outcome import (
     profile_friction,
 )
 from vftcli.identification.processing import gravity_torque
-from vftcli.identification.regressor import chain_parameters, with_parameters
 from vftcli.identification.scoring import rigid_torque
-from vftcli.identification.stacking import Data, Layout, Triangles, stack
+from vftcli.identification.stacking import Data, ParameterColumns, Triangles, stack
 from vftcli.identification.training import JointFit, Training, fit_frictions, fitted
+from vftcli.robots.regressor import chain_parameters, with_parameters
 from vftcli.robots.robot import JointFriction, Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import IdentificationError
 
 
-def base_method(data: Training) -> Outcome:
+def base_method(data: Training) -> MethodResult:
     """Base parameters by weighted least squares; the file gets the nearest physical model."""
     return whole_arm(data, "base")
 
 
-def consistent_method(data: Training) -> Outcome:
+def consistent_method(data: Training) -> MethodResult:
     """A physical model near the profile, its pull chosen by cross-validation."""
     return whole_arm(data, "consistent")
 
 
-def whole_arm(data: Training, method: str) -> Outcome:
+def whole_arm(data: Training, method: str) -> MethodResult:
     """Identify all parameters of the arm together.
 
     Friction models are chosen twice: with the profile's links, and again with the links that come
@@ -65,7 +65,7 @@ def whole_arm(data: Training, method: str) -> Outcome:
             notes += odd_friction(j, frictions[j], data)
     robot = with_vector(data.robot, layout, x, tuple(frictions))
     contests = [c for f in fits if f is not None for c in f.contests]
-    return Outcome(robot, numbers, contests, base, [*notes, *held(data)])
+    return MethodResult(robot, numbers, contests, base, [*notes, *held(data)])
 
 
 def from_base(triangles: Triangles, start: Array) -> tuple[Array, str]:
@@ -92,7 +92,7 @@ METHODS: dict[str, Callable[[Triangles, Array], tuple[Array, str]]] = {
 """Method → parameters of the whole arm from its stacked equations."""
 
 
-def undetermined(base: BaseParameters, layout: Layout) -> str:
+def undetermined(base: BaseParameters, layout: ParameterColumns) -> str:
     """How many base parameters the logs leave open."""
     count = len(base.values) - (layout.size - layout.inertial - layout.rotors)
     doubtful = sum(not known for known in base.determined[:count])
@@ -102,14 +102,16 @@ def undetermined(base: BaseParameters, layout: Layout) -> str:
     )
 
 
-def stacked(data: Training, layout: Layout, start: Array, weights: Sequence[Array]) -> Triangles:
+def stacked(
+    data: Training, layout: ParameterColumns, start: Array, weights: Sequence[Array]
+) -> Triangles:
     """The stacked equations of all logs."""
     logs = [Data(m, c, w) for m, c, w in zip(data.motions, data.columns, weights, strict=True)]
     check_size(layout, logs)
     return stack(layout, logs, start)
 
 
-def with_links(data: Training, layout: Layout, x: Array) -> Training:
+def with_links(data: Training, layout: ParameterColumns, x: Array) -> Training:
     """The training data with other links: their rigid-body torque, their gravity as load."""
     robot = with_vector(data.robot, layout, x, data.robot.friction)
     columns = (
@@ -122,7 +124,7 @@ def with_links(data: Training, layout: Layout, x: Array) -> Training:
     )
 
 
-def layout_of(data: Training, fits: Sequence[JointFit | None]) -> tuple[Layout, Array]:
+def layout_of(data: Training, fits: Sequence[JointFit | None]) -> tuple[ParameterColumns, Array]:
     """The unknowns of the whole arm, and the profile with its fitted friction. (size,)"""
     shapes, values = [], []
     for j, fit in enumerate(fits):
@@ -139,11 +141,11 @@ def layout_of(data: Training, fits: Sequence[JointFit | None]) -> tuple[Layout, 
         if data.rotor and fit is not None and (J := fit.fit.values[len(fit.shape.terms)]) > 0:
             rotor[j] = float(J)
     start = np.concatenate([chain_parameters(chain), rotor, *values])
-    return Layout(data.robot.chain, data.rotor, tuple(shapes)), start
+    return ParameterColumns(data.robot.chain, data.rotor, tuple(shapes)), start
 
 
 def with_vector(
-    robot: Robot, layout: Layout, x: Array, friction: tuple[JointFriction, ...]
+    robot: Robot, layout: ParameterColumns, x: Array, friction: tuple[JointFriction, ...]
 ) -> Robot:
     """The robot with a whole vector of parameters; a mounted payload is in it already."""
     phi = np.array([rounded(v, 12) for v in x[: layout.inertial]])
@@ -153,7 +155,7 @@ def with_vector(
     return replace(robot, chain=chain, payload=None, friction=friction)
 
 
-def check_size(layout: Layout, logs: Sequence[Data]) -> None:
+def check_size(layout: ParameterColumns, logs: Sequence[Data]) -> None:
     """Raise unless there are clearly more equations than unknowns."""
     rows = sum(int(np.count_nonzero(data.weights)) for data in logs)
     if rows < 4 * layout.size:

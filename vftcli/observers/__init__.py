@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
 from vftcli.observers.kalman import KalmanObserver
 from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer, Tuning, per_joint
 from vftcli.observers.settings import PARAMETERS, Settings, joint_values, merged, parse_settings
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 
 if TYPE_CHECKING:
     from vftcli.observers.spectra import Spectra

@@ -15,13 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array, frozen
-from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.observers.kalman import KalmanObserver
 from vftcli.observers.observer import Complex, Observer, Tuning
 from vftcli.observers.smoother import KalmanSmoother
 from vftcli.observers.spectra import Spectra
-from vftcli.torque import ExternalTorque
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, frozen
+from vftcli.signals.external_torque import ExternalTorque
 
 SLOWEST = 1.0
 """Smallest natural frequency that is tried. [rad/s]"""

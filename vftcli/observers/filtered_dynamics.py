@@ -5,9 +5,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from vftcli.arrays import Array, handed_over
-from vftcli.dynamics.terms import DynamicsTerms
-from vftcli.errors import ParameterError
 from vftcli.observers.first_order import (
     Piece,
     first_order_response,
@@ -15,7 +12,10 @@ from vftcli.observers.first_order import (
     run_first_order,
 )
 from vftcli.observers.observer import Complex, Tuning
-from vftcli.torque import ExternalTorque
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, handed_over
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +57,7 @@ class FilteredDynamicsObserver:
         rate = np.full(terms.joints, self.omega)
         tau, notes = run_first_order(terms, rate, self._coefficients, self._start)
         tau += self.omega * terms.p
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), notes=notes)
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=notes)
 
     def _coefficients(self, piece: Piece) -> tuple[Array, Array]:
         """(29): Y₁ and Y₂ obey the same recursion, so it is their sum that is run."""

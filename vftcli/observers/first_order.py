@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.arrays import Array, empty_series
-from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.recursion import PIECE, Steps, recursion, steps_of
 from vftcli.observers.steady_filter import steady_filter
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, empty_series
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from vftcli.errors import ParameterError
 from vftcli.observers.settings import check_name
+from vftcli.signals.errors import ParameterError
 
 Gains = Mapping[str, Mapping[str, Any]]
 """Section → parameter → number, list or word."""

@@ -4,9 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array, empty_series, frozen, handed_over
-from vftcli.dynamics.terms import DynamicsTerms
-from vftcli.errors import ParameterError
 from vftcli.observers.kalman_gains import Covariance, Gains, Steady, gain_pieces, steady
 from vftcli.observers.kalman_model import (
     DISCRETISATIONS,
@@ -18,7 +15,10 @@ from vftcli.observers.kalman_model import (
 from vftcli.observers.observer import Complex, Tuning, per_joint
 from vftcli.observers.recursion import Steps, recursion, steps_of
 from vftcli.observers.steady_filter import steady_filter
-from vftcli.torque import ExternalTorque
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, empty_series, frozen, handed_over
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
 from vftcli.observers.kalman_model import Discrete
+from vftcli.signals.arrays import Array
 
 PIECE = 1 << 14
 """Samples handled at a time: the covariances of a piece are a dozen arrays of its size."""

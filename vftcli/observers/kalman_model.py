@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 
 SERIES = 1e-2
 """Below this a·Ts the integrals are summed as series: their closed forms cancel there."""
@@ -22,7 +22,7 @@ class Densities(NamedTuple):
     """The filter's parameters, one a joint.
 
     Attributes:
-        r: Measurement noise of the momentum, R. (n,)
+        r: SensorReading noise of the momentum, R. (n,)
         q_p: Process noise of the momentum, Q_p. (n,)
         q_tau: Process noise of the external torque, Q_τ. (n,)
         decay: a in A_τ = −a. (n,) [1/s]

@@ -6,19 +6,19 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.observers import Setup
 from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
 from vftcli.observers.kalman import KalmanObserver
 from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 
 HALVINGS = 70
 """Bisections of a gain's logarithm: its last digits are those of float64."""
 
 
-class Goal(NamedTuple):
+class MatchTarget(NamedTuple):
     """What every observer is to have on every joint.
 
     Attributes:
@@ -30,7 +30,7 @@ class Goal(NamedTuple):
     value: float
 
 
-def parse_goal(text: str) -> Goal:
+def parse_goal(text: str) -> MatchTarget:
     """Read ``delay=S`` or ``bandwidth=HZ``.
 
     Raises:
@@ -45,7 +45,7 @@ def parse_goal(text: str) -> Goal:
         raise ParameterError(
             f"--match {text!r} is not delay=S (seconds) or bandwidth=HZ, a positive number"
         )
-    return Goal(quantity.strip(), value)
+    return MatchTarget(quantity.strip(), value)
 
 
 def matched(
@@ -75,7 +75,7 @@ def matched(
     return tuned, (note(goal, tuned),)
 
 
-def tune(observer: Observer, goal: Goal, setup: Setup) -> Observer:
+def tune(observer: Observer, goal: MatchTarget, setup: Setup) -> Observer:
     """One observer with the gain that reaches the goal on every joint."""
     if type(observer) not in KNOBS:
         raise ParameterError(
@@ -96,7 +96,7 @@ def tune(observer: Observer, goal: Goal, setup: Setup) -> Observer:
     return turn(observer, np.exp(0.5 * (a + b)))
 
 
-def out_of_reach(observer: Observer, goal: Goal, setup: Setup) -> str:
+def out_of_reach(observer: Observer, goal: MatchTarget, setup: Setup) -> str:
     """One line on a goal that no gain reaches."""
     limit = (
         f"a delay of more than half a sample ({0.5 * setup.step:g} s)"
@@ -160,7 +160,7 @@ KNOBS: dict[type, Knob] = {
 """Observer → its knob: cutoff ω [rad/s], gain K [1/s], or Q_τ. A cutoff is one for all joints."""
 
 
-def note(goal: Goal, observers: Sequence[Observer]) -> str:
+def note(goal: MatchTarget, observers: Sequence[Observer]) -> str:
     """What was matched, and why filtered dynamics and momentum observer then agree."""
     unit = {"delay": "s", "bandwidth": "Hz"}[goal.quantity]
     text = (

@@ -5,9 +5,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from vftcli.arrays import Array, frozen, handed_over
-from vftcli.dynamics.terms import DynamicsTerms
-from vftcli.errors import ParameterError
 from vftcli.observers.first_order import (
     Piece,
     first_order_response,
@@ -16,7 +13,10 @@ from vftcli.observers.first_order import (
 )
 from vftcli.observers.observer import Complex, Tuning, per_joint
 from vftcli.observers.recursion import recursion, steps_of
-from vftcli.torque import ExternalTorque
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, frozen, handed_over
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +67,7 @@ class MomentumObserver:
             return (1.0 - a) / (1.0 + a), x
 
         tau, notes = run_first_order(terms, gain, coefficients, np.zeros_like)
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), notes=notes)
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=notes)
 
     def _as_printed(self, terms: DynamicsTerms, gain: Array) -> ExternalTorque:
         """rᵗ = rᵗ⁻¹ + K(pᵗ−pᵗ⁻¹) − a(μᵗ+μᵗ⁻¹+rᵗ⁻¹+rᵗ⁻²), r⁻¹ = r⁰ = 0: two states a joint."""
@@ -86,7 +86,7 @@ class MomentumObserver:
             joints = ", ".join(f"J{j + 1}" for j in unstable)
             notes = (f"K·Ts ≥ 2 on {joints}: (35) as printed is unstable there",)
         tau = np.where(np.isfinite(tau), tau, np.nan)
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), notes=notes)
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=notes)
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """What K means at a sample time. [s]"""

@@ -6,9 +6,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.arrays import Array, frozen
-from vftcli.dynamics.terms import DynamicsTerms
-from vftcli.torque import ExternalTorque
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, frozen
+from vftcli.signals.external_torque import ExternalTorque
 
 Complex = NDArray[np.complex128]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array, is_uniform, median
+from vftcli.signals.arrays import Array, is_uniform, median
 
 BLOCK = 32
 """Samples in a block: the Python loop has this length, once a level."""

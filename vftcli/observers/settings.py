@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 
 Value = float | str | list[float]
 Settings = dict[str, dict[str, Value]]

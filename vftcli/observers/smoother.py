@@ -20,15 +20,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array, empty_series, handed_over
-from vftcli.dynamics.terms import DynamicsTerms
 from vftcli.observers.kalman import KalmanObserver, error_filter, momentum_change
 from vftcli.observers.kalman_gains import Covariance, Gains, gain_pieces
 from vftcli.observers.kalman_model import Discrete
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.recursion import Steps, recursion, steps_of
 from vftcli.observers.steady_filter import steady_filter
-from vftcli.torque import ExternalTorque
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, empty_series, handed_over
+from vftcli.signals.external_torque import ExternalTorque
 
 SETTLED = 1e-16
 """Share of the smoother's settled information that may be missing where it counts as settled."""

@@ -22,9 +22,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.arrays import Array, frozen, handed_over, is_uniform, median
-from vftcli.dynamics.terms import DynamicsTerms
-from vftcli.errors import ParameterError
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, frozen, handed_over, is_uniform, median
+from vftcli.signals.errors import ParameterError
 
 Flags = NDArray[np.bool_]
 

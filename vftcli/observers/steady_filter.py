@@ -9,8 +9,8 @@ once a block. It is the plain loop's sum in another order, to rounding.
 
 import numpy as np
 
-from vftcli.arrays import Array, empty_series
 from vftcli.observers.recursion import recursion
+from vftcli.signals.arrays import Array, empty_series
 
 BLOCK = 32
 """Samples in a block: the work grows with it, the number of blocks shrinks."""

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.dynamics.kinematics import flange_jacobian, link_poses
 from vftcli.robots.chain import Chain
+from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.signals.arrays import Array
 
 THICKNESS = (0.048, 0.030)
 """Radius of the first and of the last link, as a share of the arm's length."""
@@ -37,7 +37,7 @@ class Capsule(NamedTuple):
     joint: bool
 
 
-class Motion(NamedTuple):
+class ArmPoses(NamedTuple):
     """Poses of the links over time.
 
     Attributes:
@@ -76,12 +76,12 @@ def capsules(chain: Chain) -> list[list[Capsule]]:
     return shapes
 
 
-def motion(chain: Chain, t: Array, q: Array, rate: float) -> Motion:
+def motion(chain: Chain, t: Array, q: Array, rate: float) -> ArmPoses:
     """Poses of all links at about `rate` samples a second. [Hz]"""
     every = max(1, int(len(t) / max(float(t[-1] - t[0]) * rate, 1.0)))
     t, q = t[::every], np.ascontiguousarray(q[::every])
     poses = link_poses(chain, q)
-    return Motion(t, poses.translation, quat_xyzw(poses.rotation), q)
+    return ArmPoses(t, poses.translation, quat_xyzw(poses.rotation), q)
 
 
 def quat_xyzw(rotation: Array) -> Array:

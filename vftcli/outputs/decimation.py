@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.arrays import Array
+from vftcli.signals.arrays import Array
 
 GAP_STEPS = 10.0
 """A step this many times the median is drawn as a break in the line."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from vftcli.errors import OutputError
+from vftcli.signals.errors import OutputError
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from vftcli.torque import ExternalTorque
+from vftcli.signals.external_torque import ExternalTorque
 
 COLOURS = {
     "fdo": "#2f86d0",

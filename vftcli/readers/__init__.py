@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.errors import LogError, UnknownFormatError
 from vftcli.readers import arrays_file, lerobot, libfranka, parquet, pickles, rtde, tables
 from vftcli.readers.bags import formats as bags
 from vftcli.readers.cleaning import RestartError, cleaned
 from vftcli.readers.opening import Digest
-from vftcli.readers.reader import LogFile, RawLog, Reader, Request, open_log
-from vftcli.recording import Recording
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
+from vftcli.signals.errors import LogError, UnknownFormatError
+from vftcli.signals.recording import Recording
 
 READERS: dict[str, Reader] = {
     reader.name: reader
@@ -63,7 +63,9 @@ def read(
     path = Path(path)
     file = open_log(path)
     reader = _reader(file, format, columns)
-    request = Request(columns=columns, signals=frozenset(signals) if signals is not None else None)
+    request = ReadChoice(
+        columns=columns, signals=frozenset(signals) if signals is not None else None
+    )
     digest = Digest(path)
     if "polars" not in sys.modules:
         digest.start()  # its import takes longer than the hash and leaves a core idle
@@ -134,8 +136,8 @@ __all__ = [
     "READERS",
     "LogFile",
     "RawLog",
+    "ReadChoice",
     "Reader",
-    "Request",
     "read",
     "read_first_recording",
     "recognise",

@@ -4,9 +4,9 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from vftcli.errors import LogError
 from vftcli.readers.joints import kinematic_order
 from vftcli.readers.table import Cell, Pick, Picks, Table, checked, listed
+from vftcli.signals.errors import LogError
 
 CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "seconds")
 """Names of the clock; a unit may follow, as in time_ms."""

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.errors import LogError
 from vftcli.readers.aliases import TURNED_NOTE
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
-from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Cell, Column, Pick, Picks, checked, picked
 from vftcli.readers.tables import ArrayTable, from_table, numpy_array
+from vftcli.signals.errors import LogError
 
 PANDA_PY = {
     "q": "q",
@@ -27,7 +27,7 @@ PANDA_PY = {
 WRENCH_FRAME = "base axes at the stiffness frame K, as force BY the robot ON the environment"
 
 
-def read_npz(file: LogFile, request: Request) -> RawLog:
+def read_npz(file: LogFile, request: ReadChoice) -> RawLog:
     """Read an .npz file: one array a signal, or whatever --columns names."""
     return read_arrays(file, npz_arrays(file), request)
 
@@ -74,7 +74,7 @@ def check_claim(file: LogFile, content: bytes) -> None:
     check_npy_header(LogFile(path=file.path, head=content), len(content))
 
 
-def read_arrays(file: LogFile, arrays: Mapping[str, Column], request: Request) -> RawLog:
+def read_arrays(file: LogFile, arrays: Mapping[str, Column], request: ReadChoice) -> RawLog:
     """Read named arrays as panda-py's log, by --columns, or by alias.
 
     Raises:
@@ -103,7 +103,7 @@ def _shaped(array: Column) -> Column:
     return array
 
 
-def _read_panda_py(table: ArrayTable, request: Request) -> RawLog:
+def _read_panda_py(table: ArrayTable, request: ReadChoice) -> RawLog:
     """Read panda-py's log: time in milliseconds, the vendor's residual turned."""
     names = list(table.columns)
     signals = []

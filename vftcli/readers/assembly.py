@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vftcli.errors import MissingSignalError
 from vftcli.readers.cleaning import cleaned
 from vftcli.readers.reader import RawLog
-from vftcli.recording import JOINT_SIGNALS, Recording
+from vftcli.signals.errors import MissingSignalError
+from vftcli.signals.recording import JOINT_SIGNALS, Recording
 
 
 def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Recording:

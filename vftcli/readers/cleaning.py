@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.arrays import Array, handed_over, median
-from vftcli.errors import ClockError, LogError
 from vftcli.readers.reader import RawLog
-from vftcli.recording import Recording, Source
+from vftcli.signals.arrays import Array, handed_over, median
+from vftcli.signals.errors import ClockError, LogError
+from vftcli.signals.recording import Recording, Source
 
 GARBAGE_ROWS = 100
 """Rows at the start of a log among which a misaligned packet may have left garbage."""

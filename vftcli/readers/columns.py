@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from vftcli.errors import LogError
+from vftcli.signals.errors import LogError
 
 SIGNALS: dict[str, str] = {
     "q": "q",

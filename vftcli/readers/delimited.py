@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.errors import LogError
 from vftcli.readers.reader import LogFile
 from vftcli.readers.table import Column
+from vftcli.signals.errors import LogError
 
 SEPARATORS = (",", ";", "\t", " ")
 TAIL_BYTES = 128 * 1024

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from vftcli.errors import LogError
+from vftcli.signals.errors import LogError
 
 PREFIX = "tau_ext/"
 

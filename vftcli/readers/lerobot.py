@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.errors import LogError
 from vftcli.readers.parquet import EPISODE, ParquetTable
-from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.tables import from_table
+from vftcli.signals.errors import LogError
 
 INFO_LIMIT = 16 * 1024 * 1024
 
 
-def read_lerobot(file: LogFile, request: Request) -> RawLog:
+def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
     """Read the first episode of a dataset; which one, of how many, is said.
 
     Raises:
@@ -35,7 +35,7 @@ def read_lerobot(file: LogFile, request: Request) -> RawLog:
     total = info.get("total_episodes", "an unknown number")
     fps = info.get("fps", "unknown")
     note = f"took episode {first} of {total!s:.20}; the dataset's rate is {fps!s:.20} Hz"
-    request = Request(
+    request = ReadChoice(
         columns=request.columns or default_columns(table, info), signals=request.signals
     )
     return from_table(table, request, warnings=(note,))

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.errors import LogError
 from vftcli.readers.aliases import TURNED_NOTE
 from vftcli.readers.delimited import TextTable
-from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Cell, Pick, Picks, checked, picked
 from vftcli.readers.tables import ArrayTable
+from vftcli.signals.errors import LogError
 
 JOINTS = 7
 CLOCK = "robot clock (milliseconds since start)"
@@ -45,7 +45,7 @@ def _pick(name: str, cells: tuple[Cell, ...]) -> Pick:
     )
 
 
-def _read(table: TextTable, groups: dict[str, int], request: Request) -> RawLog:
+def _read(table: TextTable, groups: dict[str, int], request: ReadChoice) -> RawLog:
     signals = tuple(
         _pick(name, tuple(Cell(start + j) for j in range(JOINTS))) for name, start in groups.items()
     )
@@ -54,7 +54,7 @@ def _read(table: TextTable, groups: dict[str, int], request: Request) -> RawLog:
     return picked(table, picks, request, clock_name=CLOCK)
 
 
-def read_old(file: LogFile, request: Request) -> RawLog:
+def read_old(file: LogFile, request: ReadChoice) -> RawLog:
     """Read a log of libfranka 0.2.0 to 0.9.0, by position."""
     table = TextTable(file)
     names = table.names or ()
@@ -68,7 +68,7 @@ def read_old(file: LogFile, request: Request) -> RawLog:
     return _read(table, {n: 2 + k * JOINTS for k, n in enumerate(OLD_GROUPS)}, request)
 
 
-def read_new(file: LogFile, request: Request) -> RawLog:
+def read_new(file: LogFile, request: ReadChoice) -> RawLog:
     """Read a log of libfranka 0.9.1 and later, by name."""
     table = TextTable(file)
     names = table.names or ()
@@ -89,7 +89,7 @@ MAX_LINE = 64 * 1024
 """A robot state takes 1.7 kB; a line longer than this is no robot state."""
 
 
-def read_states(file: LogFile, request: Request) -> RawLog:
+def read_states(file: LogFile, request: ReadChoice) -> RawLog:
     """Read robot states printed one a line.
 
     Raises:
@@ -128,7 +128,7 @@ def _state(line: bytes) -> dict[str, Any] | None:
 
 
 def _read_states(
-    file: LogFile, states: list[dict[str, Any]], notes: tuple[str, ...], request: Request
+    file: LogFile, states: list[dict[str, Any]], notes: tuple[str, ...], request: ReadChoice
 ) -> RawLog:
     columns = {name: _column(file, states, name, JOINTS) for name in FIELDS if name in states[0]}
     if "O_F_ext_hat_K" in states[0]:

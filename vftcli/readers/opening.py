@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
-from vftcli.errors import LogError
+from vftcli.signals.errors import LogError
 
 HEAD_BYTES = 64 * 1024
 """Bytes that recognition looks at."""

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.errors import LogError
-from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Column
 from vftcli.readers.tables import from_table
+from vftcli.signals.errors import LogError
 
 EPISODE = "episode_index"
 
@@ -163,7 +163,7 @@ class guarded:  # noqa: N801 - a context manager reads as a verb
             raise LogError(f"{self.path}: a damaged Parquet file ({reason})") from None
 
 
-def read_parquet(file: LogFile, request: Request) -> RawLog:
+def read_parquet(file: LogFile, request: ReadChoice) -> RawLog:
     """Read a Parquet file: ours, a user's, or one file of a LeRobot dataset."""
     source = file.path if file.wrapping is None else file.content
     table = ParquetTable(file.path, source)

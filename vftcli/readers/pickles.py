@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.errors import LogError
 from vftcli.readers.arrays_file import arrays_of_lists, read_arrays
-from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Column
+from vftcli.signals.errors import LogError
 
 PICKLE_LIMIT = 512 * 1024 * 1024
 """Larger pickles are refused: they have to be held in memory twice."""
@@ -140,7 +140,7 @@ def _check_opcodes(content: bytes) -> None:
             raise Refused("a memo larger than the file")
 
 
-def read_pickle(file: LogFile, request: Request) -> RawLog:
+def read_pickle(file: LogFile, request: ReadChoice) -> RawLog:
     """Read a pickled dictionary of arrays: panda-py's get_log() or frankapy's trajectory.
 
     Raises:
@@ -164,7 +164,7 @@ def read_pickle(file: LogFile, request: Request) -> RawLog:
     return read_arrays(file, arrays_of_lists(file, log), request)
 
 
-def _read_frankapy(file: LogFile, log: dict[Any, Any], request: Request) -> RawLog:
+def _read_frankapy(file: LogFile, log: dict[Any, Any], request: ReadChoice) -> RawLog:
     """Read frankapy's trajectory: times in seconds, positions, no torque."""
     arrays = arrays_of_lists(file, log)
     kept: dict[str, Column] = {
@@ -175,7 +175,7 @@ def _read_frankapy(file: LogFile, log: dict[Any, Any], request: Request) -> RawL
         for signal, name in (("t[s]", "time"), ("q[rad]", "q"), ("dq", "dq"), ("tau", "tau_J"))
         if name in kept
     )
-    return read_arrays(file, kept, Request(columns=columns, signals=request.signals))
+    return read_arrays(file, kept, ReadChoice(columns=columns, signals=request.signals))
 
 
 PICKLE = Reader(

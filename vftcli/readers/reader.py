@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from vftcli.arrays import Array
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
+from vftcli.signals.arrays import Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +111,7 @@ class RawLog:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Request:
+class ReadChoice:
     """What the caller asked of a reader.
 
     Attributes:
@@ -149,7 +149,7 @@ class Reader:
     takes: str
     pitfalls: str
     recognises: Callable[[LogFile], bool] = field(repr=False)
-    read: Callable[[LogFile, Request], RawLog] = field(repr=False)
+    read: Callable[[LogFile, ReadChoice], RawLog] = field(repr=False)
     general: bool = False
     columns: bool = False
 

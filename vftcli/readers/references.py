@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.arrays import Array, check_clock
-from vftcli.errors import LogError
 from vftcli.readers.aliases import _clock, _wrench, grouped
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.parquet import ParquetTable
-from vftcli.readers.reader import LogFile, Request, open_log
+from vftcli.readers.reader import LogFile, ReadChoice, open_log
 from vftcli.readers.table import Pick, Picks, Table, listed, picked, picks_of
+from vftcli.signals.arrays import Array, check_clock
+from vftcli.signals.errors import LogError
 
 TORQUE = "tau_ext"
 
@@ -49,7 +49,7 @@ def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
     file = open_log(path)
     table = opened(file)
     picks = picks_of(table, parse_columns(columns), as_given) if columns else found(table)
-    raw = picked(table, picks, Request(signals=frozenset({TORQUE, "wrench"})))
+    raw = picked(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
     t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
     check_clock(t, str(path))
     for name, values in raw.signals.items():

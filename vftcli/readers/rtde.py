@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.errors import LogError
 from vftcli.readers.aliases import vector_picks
 from vftcli.readers.delimited import TextTable
-from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Cell, Pick, Picks, Table, checked, picked
+from vftcli.signals.errors import LogError
 
 JOINT_COLUMNS = {
     "q": "actual_q",
@@ -44,7 +44,7 @@ BINARY_TYPES = {
 """Type words of the second line of the official client's binary file."""
 
 
-def read_rtde(table: Table, request: Request) -> RawLog:
+def read_rtde(table: Table, request: ReadChoice) -> RawLog:
     """Read a table of RTDE names: timestamp and positions are required, the rest is optional.
 
     Raises:
@@ -73,7 +73,7 @@ def read_rtde(table: Table, request: Request) -> RawLog:
     return replace(raw, payload_mass=raw.constants[0], payload_com=raw.constants[1:])
 
 
-def read_rtde_text(file: LogFile, request: Request) -> RawLog:
+def read_rtde_text(file: LogFile, request: ReadChoice) -> RawLog:
     """Read a text file of either client."""
     return read_rtde(TextTable(file), request)
 
@@ -125,7 +125,7 @@ def _binary_header(file: LogFile) -> tuple[tuple[str, ...], list[bytes], int]:
     return names, types, len(first) + len(second) + 2
 
 
-def read_rtde_binary(file: LogFile, request: Request) -> RawLog:
+def read_rtde_binary(file: LogFile, request: ReadChoice) -> RawLog:
     """Read the official client's binary file."""
     return read_rtde(BinaryTable(file), request)
 

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.arrays import Array
-from vftcli.errors import LogError
 from vftcli.readers.columns import ColumnSpec, Item
-from vftcli.readers.reader import RawLog, Request
+from vftcli.readers.reader import RawLog, ReadChoice
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import LogError
 
 Column = NDArray[Any]
 """One column as it is stored: (T,) numbers, or (T, k) for a column of lists."""
@@ -91,7 +91,7 @@ class Picks:
 def picked(
     table: Table,
     picks: Picks,
-    request: Request,
+    request: ReadChoice,
     *,
     clock_name: str = "",
     **more: Any,  # noqa: ANN401

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.errors import LogError
 from vftcli.readers.aliases import picks_by_alias
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable, as_number
 from vftcli.readers.joints import robot_of
-from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Column, Table, picked, picks_of
+from vftcli.signals.errors import LogError
 
 NOT_AN_ARRAY = (
     ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError, KeyError, OverflowError,
@@ -24,7 +24,7 @@ NOT_AN_ARRAY = (
 """What NumPy raises for a header or content that is no array."""
 
 
-def from_table(table: Table, request: Request, **more: Any) -> RawLog:  # noqa: ANN401
+def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
     """Read a table by its --columns text, else by the aliases of its column names.
 
     Raises:
@@ -128,12 +128,12 @@ def numpy_array(path: Path, content: Any) -> Column:  # noqa: ANN401 - any reada
     return np.asarray(array)
 
 
-def read_text(file: LogFile, request: Request) -> RawLog:
+def read_text(file: LogFile, request: ReadChoice) -> RawLog:
     """Read a text table, headed or described."""
     return from_table(TextTable(file), request)
 
 
-def read_npy(file: LogFile, request: Request) -> RawLog:
+def read_npy(file: LogFile, request: ReadChoice) -> RawLog:
     """Read an .npy file: a matrix with one row a sample, or a structured array."""
     check_npy_header(file, len(file.content))
     array = numpy_array(file.path, file.content)

@@ -3,9 +3,9 @@
 import difflib
 from pathlib import Path
 
-from vftcli.errors import RobotError
 from vftcli.robots.chain import Chain, Payload
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
+from vftcli.signals.errors import RobotError
 
 PROFILES: dict[str, Path] = {
     name: Path(__file__).parent / f"{name}.toml"

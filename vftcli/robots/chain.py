@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array, check_shape, frozen
-from vftcli.errors import RobotError
+from vftcli.signals.arrays import Array, check_shape, frozen
+from vftcli.signals.errors import RobotError
 
 
 @dataclass(frozen=True, kw_only=True)

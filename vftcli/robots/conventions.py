@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
+from vftcli.signals.arrays import Array
 
 
 class Pose(NamedTuple):

@@ -9,11 +9,11 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import RobotError
 from vftcli.robots.chain import Chain, Payload, symmetric, unphysical
 from vftcli.robots.conventions import CONVENTIONS, Convention, Kinematics, rpy
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import RobotError
 
 SCHEMA = 1
 UPRIGHT = (0.0, 0.0, -9.81)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array, check_shape, frozen
-from vftcli.errors import RobotError
 from vftcli.robots.chain import Chain, Payload
+from vftcli.signals.arrays import Array, check_shape, frozen
+from vftcli.signals.errors import RobotError
 
 TORQUE_SOURCES = ("current", "link_torque", "joint_torque")
 
@@ -20,7 +20,7 @@ class JointFriction:
     """Friction of one joint: a model's name and its parameters (the keys of the robot file).
 
     Attributes:
-        model: A name in `vftcli.dynamics.friction.MODELS`, or "none".
+        model: A name in `vftcli.robots.friction.MODELS`, or "none".
         parameters: The model's numbers by key, in SI units of torque and rad/s.
         confidence: Where the numbers come from, in words.
     """
@@ -86,7 +86,7 @@ class Robot:
         torque_constant: Joint torque per motor current, gear included. (n,) [N·m/A]
         friction: One model a joint.
         limits: Joint limits.
-        noise: Measurement noise.
+        noise: SensorReading noise.
         sample_rate_hz: The vendor's own rate, NaN if not given. [Hz]
         payload: The load mounted on the flange, or None.
         payloads: Further loads by name, for ``--payload NAME``.

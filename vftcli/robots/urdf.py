@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import RobotError
 from vftcli.robots.chain import Chain, unphysical
 from vftcli.robots.profile import UPRIGHT, RobotFile, assemble, column
 from vftcli.robots.robot import Limits, Robot, SensorNoise
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import RobotError
 
 FREE_JOINTS = (
     "JointModelRUBX",

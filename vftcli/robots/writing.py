@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import RobotError
 from vftcli.robots.chain import Chain, Payload
 from vftcli.robots.conventions import CONVENTIONS, Pose
 from vftcli.robots.profile import SCHEMA
 from vftcli.robots.robot import Limits, Robot, SensorNoise
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import RobotError
 
 Table = dict[str, Any]
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.robots import Robot, load_robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.mismatch import TrueArm, build_arm
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.plant import Plant

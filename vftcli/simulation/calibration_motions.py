@@ -6,11 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.robots import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.kinematics import check_start, flange_pose
-from vftcli.simulation.motion import Motion, Periodic, Stretches
+from vftcli.simulation.motion import Command, Periodic, Stretches
 
 TABLE = 0.15
 """Least height of the flange in poses that are drawn. [m]"""
@@ -37,7 +37,7 @@ class PosesSpec:
     spread: float = 0.7
     draw: int = 1
 
-    def motion(self, robot: Robot) -> Motion:
+    def motion(self, robot: Robot) -> Command:
         """Straight joint-space moves between the poses."""
         if self.move <= 0 or self.dwell < 0 or self.count < 2:
             raise ParameterError(
@@ -89,7 +89,7 @@ class JointwiseSpec:
     joints: tuple[int, ...] = ()
     rest: float = 0.3
 
-    def motion(self, robot: Robot) -> Motion:
+    def motion(self, robot: Robot) -> Command:
         """Each sweep as a pair of minimum-jerk moves out and back."""
         start = check_start(robot, self.start)
         joints = self.joints or tuple(range(1, robot.joints + 1))
@@ -130,7 +130,7 @@ class ExcitationSpec:
     cosine: tuple[tuple[float, ...], ...] = ()
     sine: tuple[tuple[float, ...], ...] = ()
 
-    def motion(self, robot: Robot) -> Motion:
+    def motion(self, robot: Robot) -> Command:
         """The stated series, or the one optimised for `robot`."""
         if not self.mean:
             from vftcli.simulation.excitation import optimised

@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple, Protocol
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.schema import unknown
 
 Vector = tuple[float, float, float]
@@ -28,7 +28,7 @@ class Place(NamedTuple):
     spin: Array
 
 
-class Contact(Protocol):
+class Touch(Protocol):
     """A contact during a run; it may remember where it took hold."""
 
     def active(self, t: float) -> bool:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from vftcli.simulation.hand import HandSpec
+from vftcli.simulation.hard_stop import StopSpec
 from vftcli.simulation.pushes import LoadSpec, ProfileSpec, PushesSpec
-from vftcli.simulation.stop import StopSpec
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.robots import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.motion import Periodic
 from vftcli.simulation.regressor import Base, base_columns, condition_number, full_regressor
 from vftcli.simulation.schema import unknown
@@ -29,7 +29,7 @@ CLEARANCE = 0.12
 """Least height of the joints beyond the second, and of the flange, above the base plane. [m]"""
 
 
-class Series(NamedTuple):
+class FourierSeries(NamedTuple):
     """Coefficients of one round: period [s], mean (n,), cosine and sine (H, n) [rad]."""
 
     period: float
@@ -44,7 +44,7 @@ class Series(NamedTuple):
         )
 
 
-def optimised(robot: str) -> Series:
+def optimised(robot: str) -> FourierSeries:
     """The trajectory optimised for a built-in robot.
 
     Raises:
@@ -58,10 +58,10 @@ def optimised(robot: str) -> Series:
             + " Give trajectory.period, mean, cosine and sine yourself."
         )
     table = tomllib.loads(path.read_text(encoding="utf-8"))
-    return Series(table["period"], *(np.array(table[k]) for k in ("mean", "cosine", "sine")))
+    return FourierSeries(table["period"], *(np.array(table[k]) for k in ("mean", "cosine", "sine")))
 
 
-def inside(robot: Robot, series: Series, box: Array) -> Series:
+def inside(robot: Robot, series: FourierSeries, box: Array) -> FourierSeries:
     """Shrink a series joint by joint until it respects position, speed and acceleration limits.
 
     Args:
@@ -80,7 +80,7 @@ def inside(robot: Robot, series: Series, box: Array) -> Series:
     return series._replace(cosine=series.cosine * factor, sine=series.sine * factor)
 
 
-def cost(robot: Robot, series: Series, base: Base) -> float:
+def cost(robot: Robot, series: FourierSeries, base: Base) -> float:
     """Condition number, with penalties for torque beyond the drives and for the table."""
     import pinocchio as pin
 
@@ -100,7 +100,7 @@ def cost(robot: Robot, series: Series, base: Base) -> float:
 
 def optimise(
     robot: Robot, box: Array, period: float, harmonics: int, seed: int, rounds: int
-) -> tuple[Series, float]:
+) -> tuple[FourierSeries, float]:
     """Search for the trajectory of least cost by an evolution strategy with a growing step.
 
     Args:
@@ -118,10 +118,10 @@ def optimise(
     base = base_columns(robot)
     span = 0.5 * (box[1] - box[0])
 
-    def decode(x: Array) -> Series:
+    def decode(x: Array) -> FourierSeries:
         mean = box.mean(axis=0) + 0.5 * span * np.tanh(x[:n])
         cosine, sine = x[n:].reshape(2, harmonics, n)
-        return inside(robot, Series(period, mean, cosine, sine), box)
+        return inside(robot, FourierSeries(period, mean, cosine, sine), box)
 
     best = rng.standard_normal(n * (2 * harmonics + 1))
     least, step = cost(robot, decode(best), base), 0.5

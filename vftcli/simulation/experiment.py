@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
-from vftcli.recording import Recording, Source
 from vftcli.robots import Robot, load_robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.recording import Recording, Source
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.force_sensor import read_force_sensor
 from vftcli.simulation.motion import Reference
@@ -125,7 +125,7 @@ def simulate(
     Args:
         scenario: The experiment.
         seed: Seed of everything drawn; the scenario's own if not given.
-        progress: Told how far the run is.
+        progress: ContactScore how far the run is.
         noise_seed: Seed of the sensors alone, for another log of the same arm and contacts.
 
     Raises:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from vftcli.arrays import Array
 from vftcli.robots.conventions import rpy
+from vftcli.signals.arrays import Array
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.scenario import ForceSensorSpec
 from vftcli.simulation.sensing import Samples

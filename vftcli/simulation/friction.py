@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vftcli.arrays import Array
 from vftcli.robots import JointFriction, Robot
+from vftcli.signals.arrays import Array
 from vftcli.simulation.scenario import FrictionSpec
 
 SHAPES = ("coulomb", "viscous", "quadratic", "offset", "amplitude", "slope", "shift")

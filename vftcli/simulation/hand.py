@@ -5,8 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.contact import ORIGIN, Place, Vector
 
 

@@ -4,9 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.robots import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 
 ITERATIONS = 100
 REACHED = 1e-10

@@ -6,7 +6,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
-from vftcli.errors import ParameterError
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.schema import build, unknown
 

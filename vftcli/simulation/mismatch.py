@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.robots import Payload, Robot
 from vftcli.robots.chain import Chain
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.friction import TrueFriction, true_friction
 from vftcli.simulation.scenario import MismatchSpec, PayloadSpec, Scenario
 

@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from vftcli.arrays import Array
+from vftcli.signals.arrays import Array
 
 
 class Reference(NamedTuple):
@@ -16,7 +16,7 @@ class Reference(NamedTuple):
     ddq: Array
 
 
-class Motion(Protocol):
+class Command(Protocol):
     """A commanded motion of known length."""
 
     @property

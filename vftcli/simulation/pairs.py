@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from vftcli.errors import ParameterError
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.experiment import Progress, Simulation, simulate
 from vftcli.simulation.scenario import Scenario
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.friction import TrueFriction
 from vftcli.simulation.stiction import slide_or_stick
 

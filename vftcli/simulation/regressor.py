@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
 from vftcli.robots import Robot
+from vftcli.signals.arrays import Array
 from vftcli.simulation.motion import Reference
 
 SIGN_WIDTH = 0.01

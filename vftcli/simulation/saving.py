@@ -6,7 +6,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from vftcli.errors import OutputError
+from vftcli.signals.errors import OutputError
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.load import to_toml
 

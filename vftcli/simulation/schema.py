@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from vftcli.errors import ParameterError
+from vftcli.signals.errors import ParameterError
 
 Section = TypeVar("Section")
 

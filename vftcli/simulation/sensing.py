@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.robots import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.arm import Arm, History
 from vftcli.simulation.scenario import SensingSpec
 

@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.dynamics.friction import friction_torque
-from vftcli.errors import ParameterError
 from vftcli.robots import Robot
+from vftcli.robots.friction import friction_torque
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import ServoSpec
 from vftcli.simulation.schema import unknown

@@ -8,7 +8,7 @@ dynamics", 1988.)
 
 import numpy as np
 
-from vftcli.arrays import Array
+from vftcli.signals.arrays import Array
 
 GUESSES = 12
 """Active-set guesses before the slower sweeps that always converge take over."""

@@ -4,10 +4,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.robots.chain import Chain
-from vftcli.simulation.contact import Contact, Place
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
+from vftcli.simulation.contact import Place, Touch
 from vftcli.simulation.contacts import ContactSpec, RandomWalkSpec, WrenchSpec
 
 
@@ -25,7 +25,7 @@ class Mounted(NamedTuple):
     """
 
     name: str
-    contact: Contact
+    contact: Touch
     joint: int
     turn: Array
     point: Array
@@ -50,7 +50,7 @@ def mount(spec: WrenchSpec, chain: Chain, rng: np.random.Generator, duration: fl
         raise ParameterError(
             f"contacts.{spec.name}.link is {spec.link}; it is 0 (flange) to {chain.joints}"
         )
-    contact: Contact = spec.start(rng, duration)
+    contact: Touch = spec.start(rng, duration)
     lever = np.array(spec.point)
     if spec.link == 0:
         point = chain.flange_rotation @ lever + chain.flange_translation

@@ -6,12 +6,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
 from vftcli.robots import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.calibration_motions import ExcitationSpec, JointwiseSpec, PosesSpec
 from vftcli.simulation.kinematics import FlangePose, check_limits, check_start, flange_pose, follow
-from vftcli.simulation.motion import Motion, Periodic, Reference, Stretches
+from vftcli.simulation.motion import Command, Periodic, Reference, Stretches
 
 HARMONICS = 48
 """Harmonics kept of a periodic path; those of a circle fall below rounding long before."""
@@ -36,7 +36,7 @@ class CircleSpec:
     cycles: float = 5.0
     towards: float = 0.0
 
-    def motion(self, robot: Robot) -> Motion:
+    def motion(self, robot: Robot) -> Command:
         """Solve the circle for the joints of `robot`."""
         if self.radius <= 0 or self.period <= 0 or self.cycles <= 0:
             raise ParameterError("trajectory radius, period and cycles must be positive")
@@ -75,7 +75,7 @@ class HoldSpec:
     start: tuple[float, ...] = ()
     length: float = 10.0
 
-    def motion(self, robot: Robot) -> Motion:
+    def motion(self, robot: Robot) -> Command:
         """The pose as a motion of no amplitude."""
         start = check_start(robot, self.start)
         return Stretches(
@@ -101,7 +101,7 @@ class OffsetsSpec:
     length: float
     start: tuple[float, ...] = ()
 
-    def motion(self, robot: Robot) -> Motion:
+    def motion(self, robot: Robot) -> Command:
         """Solve every line for the joints of `robot`."""
         from numpy.polynomial import chebyshev
 
@@ -138,7 +138,7 @@ class JointMovesSpec:
     length: float
     start: tuple[float, ...] = ()
 
-    def motion(self, robot: Robot) -> Motion:
+    def motion(self, robot: Robot) -> Command:
         """Minimum-jerk moves."""
         start = check_start(robot, self.start)
         if any(len(row) != 2 + robot.joints for row in self.moves):

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array
+from vftcli.signals.arrays import Array
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.sensing import Samples, at
 from vftcli.simulation.touch import Mounted, joint_jacobian

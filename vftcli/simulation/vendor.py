@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.dynamics.friction import friction_torque
 from vftcli.robots import Robot
+from vftcli.robots.friction import friction_torque
+from vftcli.signals.arrays import Array
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.sensing import Measured, Samples, log_rate

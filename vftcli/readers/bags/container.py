@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.errors import LogError
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.signals.errors import LogError
 
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]

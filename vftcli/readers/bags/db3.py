@@ -6,9 +6,9 @@ from contextlib import closing
 
 import numpy as np
 
-from vftcli.errors import LogError
 from vftcli.readers.bags.container import Batch, Channel, Ingest, printable, type_name
 from vftcli.readers.reader import LogFile
+from vftcli.signals.errors import LogError
 
 ROWS = 4096
 ZSTD = b"\x28\xb5\x2f\xfd"

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import LogError
 from vftcli.readers.bags.container import Batch, Channel, Ingest, Integers
 from vftcli.readers.bags.definitions import types_for
 from vftcli.readers.bags.kinds import KINDS, Kind, constant_in, paths_in
-from vftcli.readers.bags.layout import Layout, LayoutError, Types, Walker
+from vftcli.readers.bags.layout import LayoutError, MessageLayout, Types, Walker
 from vftcli.readers.joints import kinematic_order
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import LogError
 
 CHECKED_ROWS = 4
 """Random messages of some batches that are walked one by one to confirm their layout."""
@@ -69,7 +69,7 @@ class _Topic:
     """What is known of a channel while its batches come in."""
 
     types: Types
-    layouts: dict[int, list[Layout]] = field(default_factory=dict)
+    layouts: dict[int, list[MessageLayout]] = field(default_factory=dict)
     parts: dict[tuple[tuple[str, ...], str, tuple[str, ...]], list[_Part]] = field(
         default_factory=dict
     )
@@ -119,7 +119,9 @@ class Decoder:
             known.append(layout)
             rows = self._matching(batch, topic, layout, rows)
 
-    def _matching(self, batch: Batch, topic: _Topic, layout: Layout, rows: Integers) -> Integers:
+    def _matching(
+        self, batch: Batch, topic: _Topic, layout: MessageLayout, rows: Integers
+    ) -> Integers:
         """Decode the rows that have a layout and return the others."""
         if rows.size == 0:
             return rows
@@ -128,13 +130,13 @@ class Decoder:
             self._decode(batch, topic, layout, rows[fits])
         return rows[~fits]
 
-    def _walked(self, batch: Batch, topic: _Topic, row: int) -> Layout:
+    def _walked(self, batch: Batch, topic: _Topic, row: int) -> MessageLayout:
         start = int(batch.offsets[row])
         message = batch.buffer[start : start + int(batch.lengths[row])]
         cdr = batch.channel.encoding == "cdr"
         return Walker(topic.types, message, cdr=cdr).walk(batch.channel.type)
 
-    def _decode(self, batch: Batch, topic: _Topic, layout: Layout, rows: Integers) -> None:
+    def _decode(self, batch: Batch, topic: _Topic, layout: MessageLayout, rows: Integers) -> None:
         layout.uses += 1
         if layout.uses & (layout.uses - 1) == 0:  # the first, second, fourth, eighth … batch
             for row in self._chance.choice(rows, min(CHECKED_ROWS, len(rows)), replace=False):
@@ -188,7 +190,7 @@ def _picked(signal: str, value: Array, order: tuple[int, ...], width: int) -> Ar
     return value[:, list(order)]
 
 
-def _stamps(layout: Layout, batch: Batch, offsets: Integers) -> Integers | None:
+def _stamps(layout: MessageLayout, batch: Batch, offsets: Integers) -> Integers | None:
     """Header stamps in nanoseconds, or None if the type has no header. (k,)"""
     if "header.stamp.sec" not in layout.leaves or "header.stamp.nanosec" not in layout.leaves:
         return None

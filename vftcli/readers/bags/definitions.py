@@ -2,10 +2,10 @@
 
 from functools import cache
 
-from vftcli.errors import LogError
 from vftcli.readers.bags.container import Channel
 from vftcli.readers.bags.franka_interface import DEFINITIONS
 from vftcli.readers.bags.layout import Field, LayoutError, fields_of, short, types_of
+from vftcli.signals.errors import LogError
 
 STATE = "franka_msgs/msg/FrankaRobotState"
 """The one type outside ROS's own packages that is known without the bag's help."""

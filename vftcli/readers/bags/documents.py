@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.errors import LogError
 from vftcli.readers.bags.container import Batch, Channel, Ingest
 from vftcli.readers.joints import kinematic_order, robot_of
-from vftcli.readers.reader import LogFile, RawLog, Request
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, from_table
+from vftcli.signals.errors import LogError
 
 FOXGLOVE = "foxglove.JointStates"
 MAX_DEPTH = 8
@@ -150,7 +150,7 @@ def _flatten(value: Any, path: str, flat: dict[str, Any], depth: int) -> None:  
         flat[path] = value
 
 
-def read_documents(file: LogFile, documents: Documents, request: Request) -> RawLog:
+def read_documents(file: LogFile, documents: Documents, request: ReadChoice) -> RawLog:
     """Read the channel whose documents hold joint positions.
 
     Raises:
@@ -169,7 +169,11 @@ def read_documents(file: LogFile, documents: Documents, request: Request) -> Raw
 
 
 def _read(
-    file: LogFile, channel: Channel, rows: list[dict[str, Any]], times: list[int], request: Request
+    file: LogFile,
+    channel: Channel,
+    rows: list[dict[str, Any]],
+    times: list[int],
+    request: ReadChoice,
 ) -> RawLog:
     columns: dict[str, Column] = {}
     for key, first in rows[0].items():

@@ -2,10 +2,10 @@
 
 from vftcli.readers.bags.storage import MCAP as MCAP_MAGIC
 from vftcli.readers.bags.storage import ROSBAG1, SQLITE, storage_files
-from vftcli.readers.reader import LogFile, RawLog, Reader, Request
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 
 
-def read_bag(file: LogFile, request: Request) -> RawLog:
+def read_bag(file: LogFile, request: ReadChoice) -> RawLog:
     """Read any container of messages; the decoders are loaded only when there is one."""
     from vftcli.readers.bags import reading
 

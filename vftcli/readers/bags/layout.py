@@ -55,7 +55,7 @@ class Leaf(NamedTuple):
 
 
 @dataclass
-class Layout:
+class MessageLayout:
     """Where everything lies in messages of one shape.
 
     Attributes:
@@ -115,13 +115,13 @@ class Walker:
         self.types = types
         self.message = message
         self.cdr = cdr
-        self.layout = Layout()
+        self.layout = MessageLayout()
         self.order = "<"
         self.position = 0
         if self.cdr:
             self._encapsulation()
 
-    def walk(self, root: str) -> Layout:
+    def walk(self, root: str) -> MessageLayout:
         """Walk the whole message.
 
         Raises:

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.errors import LogError
 from vftcli.readers.bags.container import (
     Batch,
     Bytes,
@@ -25,6 +24,7 @@ from vftcli.readers.bags.container import (
     unpack_chunk,
 )
 from vftcli.readers.bags.storage import MCAP
+from vftcli.signals.errors import LogError
 
 SCHEMA, CHANNEL, MESSAGE, CHUNK, STATISTICS, FOOTER, DATA_END = 3, 4, 5, 6, 11, 2, 15
 HEADER = 9
@@ -38,7 +38,7 @@ ENCODINGS: dict[str, Encoding] = {
 }  # fmt: skip
 
 
-class Run(NamedTuple):
+class MessageRun(NamedTuple):
     """Messages of one channel at one stride."""
 
     start: int
@@ -56,7 +56,7 @@ class Catalogue:
         self.channels: dict[int, Channel] = {}
         self.messages = 0
         self.counted: int | None = None
-        self.loose: dict[int, list[Run]] = {}
+        self.loose: dict[int, list[MessageRun]] = {}
         self.ended = self.closed = False
 
     def schema(self, content: memoryview) -> None:
@@ -160,13 +160,15 @@ def _take(catalogue: Catalogue, opcode: int, content: memoryview) -> None:
         catalogue.channel(content)
 
 
-def _message(content: memoryview, position: int, end: int, found: dict[int, list[Run]]) -> None:
+def _message(
+    content: memoryview, position: int, end: int, found: dict[int, list[MessageRun]]
+) -> None:
     length = end - position - HEADER - MESSAGE_HEAD
     if length < 0:
         raise struct.error
     channel = int(struct.unpack_from("<H", content, position + HEADER)[0])
     start = position + HEADER + MESSAGE_HEAD
-    found.setdefault(channel, []).append(Run(start, end - position, 1, length))
+    found.setdefault(channel, []).append(MessageRun(start, end - position, 1, length))
 
 
 def _chunk(content: memoryview, catalogue: Catalogue) -> Iterator[Batch]:
@@ -184,9 +186,9 @@ def _chunk(content: memoryview, catalogue: Catalogue) -> Iterator[Batch]:
     yield from _yielded(_walk(chunk, buffer, catalogue), buffer, catalogue)
 
 
-def _walk(chunk: memoryview, buffer: Bytes, catalogue: Catalogue) -> dict[int, list[Run]]:
+def _walk(chunk: memoryview, buffer: Bytes, catalogue: Catalogue) -> dict[int, list[MessageRun]]:
     """Find the messages of a chunk. Channel → runs of its messages."""
-    found: dict[int, list[Run]] = {}
+    found: dict[int, list[MessageRun]] = {}
     position, alike, before = 0, 0, (-1, -1)
     while position < len(chunk):
         opcode, length = struct.unpack_from("<BQ", chunk, position)
@@ -206,13 +208,15 @@ def _walk(chunk: memoryview, buffer: Bytes, catalogue: Catalogue) -> dict[int, l
         before, count = (channel, stride), 1
         if alike >= RUN_AFTER:
             count = equal_rows(buffer, position, stride, ((0, HEADER + 2),))
-        run = Run(position + HEADER + MESSAGE_HEAD, stride, count, length - MESSAGE_HEAD)
+        run = MessageRun(position + HEADER + MESSAGE_HEAD, stride, count, length - MESSAGE_HEAD)
         found.setdefault(channel, []).append(run)
         position += stride * count
     return found
 
 
-def _yielded(found: dict[int, list[Run]], buffer: Bytes, catalogue: Catalogue) -> Iterator[Batch]:
+def _yielded(
+    found: dict[int, list[MessageRun]], buffer: Bytes, catalogue: Catalogue
+) -> Iterator[Batch]:
     for number, runs in found.items():
         if (channel := catalogue.channels.get(number)) is None:
             raise LogError(f"{catalogue.ingest.path}: messages of an unknown channel; damaged.")

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.errors import LogError
 from vftcli.readers.bags.container import (
     Batch,
     Bytes,
@@ -23,6 +22,7 @@ from vftcli.readers.bags.container import (
     unpack_chunk,
 )
 from vftcli.readers.bags.storage import ROSBAG1
+from vftcli.signals.errors import LogError
 
 OP_MESSAGE, OP_BAG, OP_INDEX, OP_CHUNK, OP_CHUNK_INFO, OP_CONNECTION = 2, 3, 4, 5, 6, 7
 MAX_HEADER = 64 * 1024
@@ -184,7 +184,7 @@ def _chunk(
         yield _batch(connections[connection], buffer, runs)
 
 
-class Run(NamedTuple):
+class ChunkRun(NamedTuple):
     """Messages of one connection at one stride."""
 
     start: int
@@ -194,7 +194,7 @@ class Run(NamedTuple):
     time: int
 
 
-def _batch(channel: Channel, buffer: Bytes, runs: list[Run]) -> Batch:
+def _batch(channel: Channel, buffer: Bytes, runs: list[ChunkRun]) -> Batch:
     """One batch of all runs of a connection: offsets, lengths and receive times."""
     offsets = np.concatenate([r.start + r.stride * np.arange(r.messages) for r in runs])
     lengths = np.repeat([r.length for r in runs], [r.messages for r in runs])
@@ -206,14 +206,14 @@ def _batch(channel: Channel, buffer: Bytes, runs: list[Run]) -> Batch:
 
 def _walk(
     chunk: memoryview, connections: dict[int, Channel], ingest: Ingest
-) -> dict[int, list[Run]]:
+) -> dict[int, list[ChunkRun]]:
     """Find the messages of a chunk. Connection → runs of its messages.
 
     Raises:
         LogError: If the chunk's records do not fill it.
     """
     buffer = np.frombuffer(chunk, dtype=np.uint8)
-    found: dict[int, list[Run]] = {}
+    found: dict[int, list[ChunkRun]] = {}
     templates: list[Template] = []
     position, alike, before = 0, 0, (-1, -1)
     while position < len(chunk):
@@ -246,7 +246,7 @@ def _walk(
             count = equal_rows(
                 buffer, position, stride, ((0, template.time), (after, 8 + template.length))
             )
-        run = Run(data, stride, count, length, data - position - template.time)
+        run = ChunkRun(data, stride, count, length, data - position - template.time)
         found.setdefault(template.connection, []).append(run)
         position += stride * count
     return found

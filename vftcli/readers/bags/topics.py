@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import LogError
 from vftcli.readers.aliases import TURNED_NOTE
 from vftcli.readers.bags.container import Integers
 from vftcli.readers.bags.decode import Stream
 from vftcli.readers.columns import SIGNALS, parse_columns
 from vftcli.readers.joints import UR_NAMES, robot_of
-from vftcli.readers.reader import RawLog, Request
+from vftcli.readers.reader import RawLog, ReadChoice
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import LogError
 
 TARGETS = re.compile(r"desired|command|target|goal|reference", re.IGNORECASE)
 VENDOR_WRENCH = re.compile(r"franka|F_ext$|external_wrench", re.IGNORECASE)
@@ -40,7 +40,7 @@ class Notes:
 
 
 def aligned(
-    streams: Sequence[Stream], path: Path, request: Request, others: dict[str, str]
+    streams: Sequence[Stream], path: Path, request: ReadChoice, others: dict[str, str]
 ) -> RawLog:
     """Put the topics of a bag on the clock of the one with the joints' positions.
 
@@ -83,7 +83,7 @@ def _take_wrench(
     lead: Stream,
     times: Integers,
     notes: Notes,
-    request: Request,
+    request: ReadChoice,
 ) -> str | None:
     """Put a sensor's wrench in place of the vendor's estimate; return its frame in words."""
     frame = lead.kind.wrench_frame
@@ -213,7 +213,7 @@ def host_times(stream: Stream) -> tuple[Integers, str]:
 
 
 def _joint_signals(
-    lead: Stream, notes: Notes, request: Request
+    lead: Stream, notes: Notes, request: ReadChoice
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
     """The leading topic's signals, the vendor's signs turned into ours."""
     if lead.mixed:
@@ -240,7 +240,7 @@ def _empty(signal: str, value: Array, notes: Notes) -> bool:
     return False
 
 
-def _chosen(request: Request) -> dict[str, tuple[str, float]]:
+def _chosen(request: ReadChoice) -> dict[str, tuple[str, float]]:
     """Signal → message field and factor, as --columns says: -tau=effort, current[mA]=effort."""
     if request.columns is None:
         return {}
@@ -256,7 +256,7 @@ FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}
 
 
 def _with_effort(
-    signals: dict[str, Array], lead: Stream, notes: Notes, request: Request
+    signals: dict[str, Array], lead: Stream, notes: Notes, request: ReadChoice
 ) -> dict[str, Array]:
     """Decide what effort is: what --columns says, else current for UR joints, torque for others."""
     found = dict(signals)

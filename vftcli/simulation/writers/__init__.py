@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from vftcli.errors import ParameterError
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.schema import unknown
 from vftcli.simulation.writers.libfranka import write_libfranka

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.arrays import Array
+from vftcli.signals.arrays import Array
 
 CUT = 0.05
 """Singular values of J (lengths in units of 0.3 m) below which a direction is left out."""

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.servo import rigid_torque

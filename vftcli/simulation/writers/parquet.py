@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.arrays import Array
+from vftcli.signals.arrays import Array
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.truth import AXES, Truth
 

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
 from vftcli.readers.bags.franka_interface import DEFINITIONS
+from vftcli.signals.arrays import Array
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.writers.flange import flange_signals, force_estimate
 from vftcli.simulation.writers.stamping import Marks, fill
@@ -16,7 +16,7 @@ RECEIVED_LATER_NS = 400_000
 MODE_MOVE = 2
 
 
-class Topic(NamedTuple):
+class WrittenTopic(NamedTuple):
     """Messages of one topic.
 
     Attributes:
@@ -124,7 +124,7 @@ def joint_states(
     simulation: Simulation,
     rows: Array,
     stamps: list[int],
-) -> Topic:
+) -> WrittenTopic:
     """`/joint_states`, effort in ampere for a current-driven arm, in N·m for the others."""
     marks, n, kind = Marks(), simulation.robot.joints, "sensor_msgs/msg/JointState"
     names = [f"{name.removesuffix('_joint')}_joint" for name in simulation.robot.chain.names]
@@ -134,10 +134,10 @@ def joint_states(
     effort = seen.torque if seen.current is None else seen.current
     values = {"position": seen.q, "velocity": seen.dq, "effort": effort}
     filled = fill(template, marks, {k: v[rows] for k, v in values.items()}, stamps)
-    return Topic("/joint_states", kind, filled)
+    return WrittenTopic("/joint_states", kind, filled)
 
 
-def wrenches(store: Any, readings: Array, stamps: list[int]) -> Topic:  # noqa: ANN401
+def wrenches(store: Any, readings: Array, stamps: list[int]) -> WrittenTopic:  # noqa: ANN401
     """`/force_torque_sensor_broadcaster/wrench` in the sensor's frame, force ON the robot."""
     marks, kind = Marks(), "geometry_msgs/msg/WrenchStamped"
     make = Messages(store)
@@ -145,7 +145,7 @@ def wrenches(store: Any, readings: Array, stamps: list[int]) -> Topic:  # noqa: 
     message = make.stamped("Wrench", "wrench", wrench, "ft_sensor")
     template = bytes(store.serialize_cdr(message, kind))
     filled = fill(template, marks, {"wrench": readings}, stamps)
-    return Topic("/force_torque_sensor_broadcaster/wrench", kind, filled)
+    return WrittenTopic("/force_torque_sensor_broadcaster/wrench", kind, filled)
 
 
 def robot_states(
@@ -153,7 +153,7 @@ def robot_states(
     simulation: Simulation,
     rows: Array,
     stamps: list[int],
-) -> Topic:
+) -> WrittenTopic:
     """`/franka_robot_state_broadcaster/robot_state`; external estimates have libfranka's sign."""
     kind = "franka_msgs/msg/FrankaRobotState"
     marks = Marks()
@@ -161,7 +161,7 @@ def robot_states(
     template = bytes(store.serialize_cdr(message, kind))
     values = {name: v[rows] for name, v in franka_values(simulation).items()}
     filled = fill(template, marks, values, stamps)
-    return Topic("/franka_robot_state_broadcaster/robot_state", kind, filled)
+    return WrittenTopic("/franka_robot_state_broadcaster/robot_state", kind, filled)
 
 
 def robot_state(store: Any, simulation: Simulation, marks: Marks) -> Any:  # noqa: ANN401

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import ParameterError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.writers.flange import flange_signals, force_estimate, rotation_vectors
 

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.arrays import Array
-from vftcli.errors import OutputError
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import OutputError
 
 MARK = 7.3e211
 """First of the numbers that mark a place; no message holds them otherwise."""

@@ -1,0 +1,257 @@
+"""Replay: forces from every source, joints, comparison figures, remarks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from vftcli.admittance.force import (
+    ForceRecord,
+    from_sensor,
+    from_torque,
+    from_truth,
+    on_control_clock,
+)
+from vftcli.admittance.joints import FlangeSolver, follow
+from vftcli.admittance.law import controllers, variable
+from vftcli.admittance.parameters import from_document, parse_settings
+from vftcli.admittance.replay import Replay, replay, replay_release
+from vftcli.admittance.stability import UnstableError
+from vftcli.robots import load_robot
+from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.signals.errors import MissingSignalError, ParameterError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.pose import exp_matrix
+from vftcli.signals.recording import Recording
+
+UR5 = load_robot("ur5")
+START = np.array([0.0, -1.35, 1.9, -2.1208, -1.5708, 0.0])
+
+
+def parameters(*assignments: str):
+    """The UR5's parameters with assignments."""
+    return from_document(UR5.document, "ur5", parse_settings(assignments))
+
+
+def push(force: float = 24.0, axis: int = 1, length: float = 14.0) -> ForceRecord:
+    """A constant force from 1 s to 3 s on an arm at rest."""
+    t = np.arange(round(length / 0.008)) * 0.008
+    wrench = np.zeros((len(t), 6))
+    wrench[(t >= 1.0) & (t < 3.0), axis] = force
+    return ForceRecord(t=t, wrench=wrench, q=np.tile(START, (len(t), 1)), source="a push")
+
+
+def run(record: ForceRecord, *assignments: str, alphas: tuple[float, ...] = ()) -> Replay:
+    """Replay on the UR5."""
+    p = parameters(*assignments)
+    return replay(record, UR5, p, controllers(p, alphas=alphas))
+
+
+def test_soft_travel_is_plausible_and_hard_is_said_not_to_be() -> None:
+    """24 N for 2 s: 4 N of excess move K = 8 N/m by ≈ 0.6 m at most; the whole 24 N by metres."""
+    soft = run(push(), "threshold_mode=soft", alphas=(1.0, 1.9))
+    hard = run(push(), alphas=(1.0, 1.9))
+    assert np.abs(soft.motion.x[:, :, 1]).max() < 0.65
+    assert np.all(soft.path.reached)
+    assert not any("implausible" in note for note in soft.notes)
+    assert 1.4 < np.abs(hard.motion.x[:, :, 1]).max() < 2.5  # the science: 1.6–2.2 m above 20 N
+    assert any("implausible" in note and "--threshold-mode soft" in note for note in hard.notes)
+
+
+def test_rows_say_what_happened() -> None:
+    found = run(push(), "threshold_mode=soft", alphas=(1.0, 1.9))
+    assert [(r["controller"], r["alpha"], r["axis"]) for r in found.rows] == [
+        ("traditional", None, "y"),
+        ("variable", 1.0, "y"),
+        ("variable", 1.9, "y"),
+    ]
+    for n, row in enumerate(found.rows):
+        x, t = found.motion.x[:, n, 1], found.motion.t
+        assert row["start_s"] == pytest.approx(1.0, abs=1e-9)
+        assert row["release_s"] == pytest.approx(3.0, abs=1e-9)
+        assert row["peak"] == pytest.approx(x.max())
+        assert row["time_to_peak_s"] == pytest.approx(t[np.argmax(x)] - 1.0)
+        after = t > 3.0 + row["return_2_s"] + 1e-6
+        at_release = x[np.searchsorted(t, 3.0 - 1e-9)]
+        assert np.all(np.abs(x[after]) <= 0.02 * at_release)
+        assert row["idle_s"] == pytest.approx(2.0 + row["return_2_s"])
+        assert row["overshoot"] == pytest.approx(-x[t > 3.0].min() / at_release)
+        assert row["work_J"] > 0.0
+    variables = [row["return_2_s"] for row in found.rows]
+    assert variables == sorted(variables, reverse=True)
+    assert found.rows[2]["peak_advance_s"] > 0.0  # the release's brake acts sooner
+
+
+def test_work_of_a_constant_force_is_force_times_way() -> None:
+    found = run(push(), "threshold_mode=soft")
+    x = found.motion.x[:, 0, 1]
+    way = x[round(3.0 / 0.008)] - x[round(1.0 / 0.008)]
+    assert found.rows[0]["work_J"] == pytest.approx(24.0 * way, rel=1e-9)  # a sum of equal terms
+
+
+def test_joints_follow_the_flange() -> None:
+    """The joint positions put the flange where the deviation says, rotation included."""
+    record = push(21.0)
+    wrench = record.wrench.copy()
+    wrench[:, 3:] = 0.30 * wrench[:, 1:2] * np.array([1.0, 0.0, -0.99])
+    found = run(replace(record, wrench=wrench), "threshold_mode=soft", alphas=(1.6,))
+    R, p = FlangeSolver(UR5).pose(START)
+    for n in range(2):
+        poses = link_poses(UR5.chain, found.path.q[:, n])
+        x = found.motion.x[:, n]
+        good = found.path.reached[:, n]
+        assert good.mean() > 0.99
+        # REACHED is 1e-6 m, rad
+        np.testing.assert_allclose(poses.translation[good, -1] - p, x[good, :3], atol=1e-6)
+        turned = exp_matrix(x[good, 3:]) @ R
+        np.testing.assert_allclose(poses.rotation[good, -1], turned, atol=2e-6)
+    assert np.abs(found.motion.x[:, :, 3:]).max() > 0.05
+    assert np.max(np.abs(np.diff(found.path.q, axis=0))) < 0.1  # no branch is changed
+
+
+def test_redundant_arm_stays_inside_its_limits() -> None:
+    panda = load_robot("panda")
+    solver = FlangeSolver(panda)
+    q = np.array(panda.document["admittance"]["start"])
+    x = np.zeros((400, 1, 6))
+    x[:, 0, 1] = np.linspace(0.0, 1.2, 400)  # leaves the workspace
+    path = follow(solver, q, x, 0.0025)
+    assert path.reached[0, 0]
+    assert not path.reached[-1, 0]
+    assert np.all((path.q >= solver.lower) & (path.q <= solver.upper))
+    lost = int(np.argmin(path.reached[:, 0]))
+    np.testing.assert_array_equal(path.q[lost:, 0], np.tile(path.q[lost - 1, 0], (400 - lost, 1)))
+
+
+def test_start_outside_the_limits_is_refused() -> None:
+    record = push()
+    q = record.q.copy()
+    q[:, 5] = 7.0
+    with pytest.raises(ParameterError, match=r"joint 6 is at 7 rad and may be -6\.283 to 6\.283"):
+        run(replace(record, q=q))
+    p = parameters()
+    with pytest.raises(ParameterError, match=r"the start pose has 5 joints; ur5 has 6"):
+        replay_release(np.array([0.3, 0, 0, 0, 0, 0]), UR5, p, controllers(p), start=np.zeros(5))
+
+
+def test_quiet_log_moves_nothing_and_says_so() -> None:
+    found = run(push(19.0))
+    assert found.rows == ()
+    np.testing.assert_array_equal(found.motion.x, 0.0)
+    assert any(
+        "no axis ever passes its threshold" in note and "95 %" in note for note in found.notes
+    )
+
+
+def test_force_at_rest_for_long_is_told() -> None:
+    record = push(length=10.0)
+    wrench = record.wrench.copy()
+    wrench[record.t > 4.0, 0] = 21.0
+    found = run(replace(record, wrench=wrench))
+    assert any("log's arm stands still" in note for note in found.notes)
+
+
+def test_w_never_rises_in_a_replay() -> None:
+    record = push(30.0)
+    wrench = record.wrench.copy()
+    wrench[:, 4] = 0.3 * wrench[:, 1]
+    found = run(replace(record, wrench=wrench), "threshold_mode=soft", alphas=(1.0, 1.9))
+    np.testing.assert_array_equal(found.lyapunov.rises, 0)
+    dragged = found.phases.dragged
+    assert np.all(np.isnan(found.lyapunov.corrected[1:][dragged[:, None].repeat(3, axis=1)]))
+
+
+def test_release_without_a_limit_inside_the_bound_is_let_pass() -> None:
+    p = parameters("position.speed_limit=none")
+    x = np.array([0.2, 0, 0, 0, 0, 0])
+    found = replay_release(x, UR5, p, controllers(p), start=START)
+    assert not np.any(found.motion.escaped)
+    with pytest.raises(UnstableError, match=r"beyond 0\.385 m"):
+        replay_release(2.0 * x, UR5, p, controllers(p), start=START)
+    studied = replay_release(3.0 * x, UR5, p, controllers(p), start=START, force_unstable=True)
+    assert studied.motion.escaped[1]
+    assert any("escaped in finite time" in note for note in studied.notes)
+
+
+def test_release_needs_a_deviation() -> None:
+    p = parameters()
+    with pytest.raises(ParameterError, match=r"--release x=0\.3"):
+        replay_release(np.zeros(6), UR5, p, controllers(p), start=START)
+
+
+def test_wrench_from_joint_torques() -> None:
+    rng = np.random.default_rng(4)
+    q = START + rng.normal(0.0, 0.2, (40, 6))
+    wrench = rng.normal(0.0, 10.0, (40, 6))
+    tau = np.einsum("tij,ti->tj", flange_jacobian(UR5.chain, q), wrench)
+    estimate = ExternalTorque(name="kfo-fe", t=np.arange(40) * 0.008, tau=tau)
+    found = from_torque(estimate, q, UR5)
+    np.testing.assert_allclose(found.wrench, wrench, atol=1e-8)  # κ(J) ≈ 50 times 1e-14·κ²
+    q[7, 4] = 0.0  # the wrist's singularity: not told, not zero
+    assert np.all(np.isnan(from_torque(estimate, q, UR5).wrench[7]))
+
+
+def sensed(frame: str | None, wrench: np.ndarray, q: np.ndarray) -> Recording:
+    """A log with a wrench."""
+    return Recording(t=np.arange(len(q)) * 0.008, q=q, wrench=wrench, wrench_frame=frame)
+
+
+def test_sensor_frames() -> None:
+    q = START + np.random.default_rng(6).normal(0.0, 0.3, (5, 6))
+    wrench = np.random.default_rng(8).normal(0.0, 10.0, (5, 6))
+    base = from_sensor(sensed("base", wrench, q), UR5)
+    np.testing.assert_array_equal(base.wrench, wrench)
+    turned = from_sensor(sensed("flange axes, force on the robot", wrench, q), UR5)
+    solver = FlangeSolver(UR5)
+    for k in range(5):
+        R = solver.pose(q[k])[0]
+        expected = pin.SE3(R, np.zeros(3)).act(pin.Force(wrench[k])).vector
+        np.testing.assert_allclose(turned.wrench[k], expected, atol=1e-12)  # ulp of 30 N
+    by = from_sensor(sensed("base axes, as force BY the robot ON the environment", wrench, q), UR5)
+    np.testing.assert_array_equal(by.wrench, -wrench)
+
+
+def test_a_wrench_in_no_named_frame_is_refused() -> None:
+    q, wrench = np.tile(START, (3, 1)), np.zeros((3, 6))
+    with pytest.raises(
+        ParameterError, match=r"the frame of the wrench is not named.*--frame flange"
+    ):
+        from_sensor(sensed(None, wrench, q), UR5)
+    with pytest.raises(ParameterError, match="there is flange"):
+        from_sensor(sensed(None, wrench, q), UR5, "world")
+    assert np.all(from_sensor(sensed(None, wrench, q), UR5, "base").wrench == 0.0)
+    with pytest.raises(MissingSignalError, match="no wrenches"):
+        from_sensor(Recording(t=np.arange(3.0), q=q), UR5)
+
+
+def test_truth_is_brought_to_the_log_s_clock() -> None:
+    recording = Recording(t=np.array([0.0, 0.01, 0.02]), q=np.tile(START, (3, 1)))
+    wrench = np.outer([0.0, 1.0, 2.0], np.ones(6))
+    found = from_truth(recording, np.array([0.0, 0.005, 0.01]), wrench, "truth")
+    np.testing.assert_allclose(found.wrench[:2, 0], [0.0, 2.0], atol=1e-12)
+    assert np.all(np.isnan(found.wrench[2]))
+
+
+def test_zero_is_removed_and_told() -> None:
+    record = push()
+    shifted = replace(record, wrench=record.wrench + 2.5)
+    clean = shifted.zeroed(0.0, 0.9)
+    np.testing.assert_allclose(clean.wrench, record.wrench, atol=1e-12)
+    assert "2.5, 2.5" in clean.notes[-1]
+    with pytest.raises(ParameterError, match="holds no known sample"):
+        record.zeroed(90.0, 99.0)
+
+
+def test_control_clock_takes_the_newest_sample() -> None:
+    t = np.arange(41) * 0.001
+    clock, (seen,) = on_control_clock(t, [np.arange(41.0)], 0.0025)
+    np.testing.assert_allclose(clock, np.arange(17) * 0.0025, atol=1e-15)
+    np.testing.assert_array_equal(seen, np.floor(np.arange(17) * 2.5 + 1e-9))
+    printed = np.round(100.0 + np.arange(500) * 0.008, 6)  # a log's stamps, in step with control
+    _, (kept,) = on_control_clock(printed - printed[0], [np.arange(500.0)], 0.008)
+    np.testing.assert_array_equal(kept, np.arange(500))
+
+
+def test_variable_controller_of_the_profile() -> None:
+    assert variable(parameters()).alpha[0] == 1.6

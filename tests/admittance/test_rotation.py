@@ -1,0 +1,89 @@
+"""Rotations: round trips, large turns without a jump, agreement with Pinocchio."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vftcli.admittance.law import variable
+from vftcli.admittance.motion import release, run
+from vftcli.admittance.parameters import Admittance
+from vftcli.signals.pose import (
+    exp_matrix,
+    exp_quaternion,
+    log_matrix,
+    log_quaternion,
+    product,
+)
+
+ANGLES = st.one_of(
+    st.floats(0.0, 3.14), st.sampled_from([0.0, 1e-300, 1e-12, 1e-7, 1e-6, 2e-6, 3.0, 3.1415])
+)
+COMPONENT = st.floats(-1.0, 1.0)
+
+
+@given(ANGLES, COMPONENT, COMPONENT, COMPONENT)
+def test_round_trips(angle: float, x: float, y: float, z: float) -> None:
+    axis = np.array([x, y, z])
+    length = float(np.linalg.norm(axis))
+    vector = angle * (axis / length if length > 1e-3 else np.array([0.0, 0.0, 1.0]))
+    # the issue's number: a few ulp of values up to π
+    np.testing.assert_allclose(log_quaternion(exp_quaternion(vector)), vector, atol=1e-12)
+    np.testing.assert_allclose(log_matrix(exp_matrix(vector)), vector, atol=1e-12)
+    np.testing.assert_allclose(exp_matrix(vector), pin.exp3(vector), atol=1e-14)  # ulp of 1
+
+
+def test_product_is_that_of_matrices() -> None:
+    a, b = np.random.default_rng(2).normal(0.0, 1.0, (2, 50, 3))
+    both = product(exp_quaternion(a), exp_quaternion(b))
+    vector = log_quaternion(both)
+    np.testing.assert_allclose(exp_matrix(vector), exp_matrix(a) @ exp_matrix(b), atol=1e-14)
+
+
+def admittance(**changes: object) -> Admittance:
+    """A soft rotation that a small moment can turn far."""
+    values: dict[str, object] = {
+        "mass": np.full(6, 0.1),
+        "damping": np.full(6, 0.3),
+        "stiffness": np.full(6, 0.5),
+        "alpha": np.full(6, 1.6),
+        "threshold": np.full(6, 0.1),
+        "speed_limit": 1.0,
+        "period": 0.008,
+    }
+    return Admittance(**(values | changes))
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (0.6, -0.5, 0.62), (-1.0, 0.2, 0.1)])
+def test_large_rotations_have_no_jump(axis: tuple[float, float, float]) -> None:
+    """Dragged through 3 rad and past π, and let go: no step exceeds what the speed limit allows."""
+    unit = np.array(axis) / np.linalg.norm(axis)
+    force = np.zeros((1500, 6))
+    force[:700, 3:] = 2.2 * unit  # settles at 4.4 rad, beyond π
+    dragged = np.zeros_like(force, dtype=bool)
+    dragged[:700, 3:] = True
+    motion = run([variable(admittance())], force, dragged)
+    angle = np.linalg.norm(motion.x[:, 0, 3:], axis=1)
+    assert angle.max() > 3.5
+    steps = np.linalg.norm(np.diff(motion.x[:, 0, 3:], axis=0), axis=1)
+    # |ω| ≤ √3 rad/s for the three limits together; a turned axis lengthens log by angle/2/tan(…)
+    assert steps.max() < 3.0 * np.sqrt(3.0) * 0.008
+    assert angle[-1] < 0.05
+
+
+def test_three_radians_return() -> None:
+    x = np.concatenate([np.zeros(3), 3.0 * np.array([0.48, -0.6, 0.64])])
+    motion = release([variable(admittance())], x, 12.0)
+    assert np.linalg.norm(motion.x[-1, 0, 3:]) < 1e-3
+    assert np.linalg.norm(np.diff(motion.x[:, 0, 3:], axis=0), axis=1).max() < 0.05
+
+
+def test_equal_axes_turn_about_the_start_s_own_axis() -> None:
+    """With equal parameters a release stays on its axis, so it is the scalar law along it."""
+    unit = np.array([0.48, -0.6, 0.64])
+    wide = admittance(speed_limit=np.inf, alpha=np.ones(6), speed_scale=1e9)
+    slanted = release([variable(wide)], np.concatenate([np.zeros(3), 0.3 * unit]), 4.0)
+    straight = release([variable(wide)], np.array([0, 0, 0, 0.3, 0, 0.0]), 4.0)
+    along = slanted.x[:, 0, 3:] @ unit
+    np.testing.assert_allclose(along, straight.x[:, 0, 3], atol=1e-12)  # 500 steps of ulp

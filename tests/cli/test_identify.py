@@ -1,0 +1,67 @@
+"""`vftcli identify` at the command line."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from vftcli.cli import app
+from vftcli.robots import load_robot
+from vftcli.signals.errors import IdentificationError
+
+RUNNER = CliRunner()
+
+
+@pytest.fixture(scope="module")
+def excitation(tmp_path_factory):
+    """A simulated log of free motion, and one at rest cut from another scenario's."""
+    path = tmp_path_factory.mktemp("logs") / "free.csv"
+    result = RUNNER.invoke(app, ["simulate", "free-excitation", "-o", str(path), "--seed", "1"])
+    assert result.exit_code == 0, result.output
+    return path
+
+
+def test_a_log_becomes_a_robot_that_estimate_uses(excitation, tmp_path):
+    robot = tmp_path / "my_robot.toml"
+    result = RUNNER.invoke(
+        app, ["identify", str(excitation), "--robot", "ur5", "--method", "base", "-o", str(robot)]
+    )
+    assert result.exit_code == 0, result.output
+    assert "identified" in result.stdout
+    for ending in (".toml", ".html", ".rrd", ".run.json"):
+        assert robot.with_suffix(ending).is_file()
+    assert load_robot(robot).document["identification"]["base_parameters"]
+    out = tmp_path / "out"
+    used = RUNNER.invoke(app, ["estimate", str(excitation), "--robot", str(robot), "-o", str(out)])
+    assert used.exit_code == 0, used.output
+    assert (out / "estimates.parquet").is_file()
+
+
+def test_json_is_all_there_is_on_stdout(excitation, tmp_path):
+    command = ["identify", str(excitation), "--robot", "ur5", "--json"]
+    command += ["--validate", str(excitation), "-o", str(tmp_path / "r.toml")]
+    result = RUNNER.invoke(app, command)
+    assert result.exit_code == 0, result.output
+    record = json.loads(result.stdout)
+    assert {row["role"] for row in record["residuals"]} == {"train", "held-out"}
+    assert {"joint", "parameter", "value", "sd", "unit"} <= set(record["parameters"][0])
+    assert any("repeats the trajectory" in note for note in record["notes"])
+
+
+def test_a_refusal_leaves_no_file(excitation, tmp_path):
+    robot = tmp_path / "r.toml"
+    command = ["identify", str(excitation), "--robot", "ur10e", "-o", str(robot)]
+    result = RUNNER.invoke(app, command)
+    assert isinstance(result.exception, IdentificationError)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_exists_stays_without_force(excitation, tmp_path):
+    page = tmp_path / "r.html"
+    page.write_text("mine")
+    command = ["identify", str(excitation), "--robot", "ur5", "-o", str(tmp_path / "r.toml")]
+    result = RUNNER.invoke(app, command)
+    assert result.exit_code == 1
+    assert "--force" in str(result.exception)
+    assert page.read_text() == "mine"
+    assert list(tmp_path.iterdir()) == [page]

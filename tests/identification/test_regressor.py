@@ -1,0 +1,59 @@
+"""The batched regressor against Pinocchio's, and what is built on it."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from vftcli.robots import load_robot
+from vftcli.robots.regressor import (
+    chain_parameters,
+    torque_regressor,
+    with_parameters,
+)
+
+
+def states(joints, seed, count=40):
+    return np.random.default_rng(seed).uniform(-2.5, 2.5, (3, count, joints))
+
+
+@pytest.mark.parametrize("name", ["ur5", "ur10e", "panda", "fr3"])
+def test_equals_pinocchios_regressor(name):
+    robot = load_robot(name)
+    q, dq, ddq = states(robot.joints, 1)
+    model, data = robot.model, robot.model.createData()
+    expected = [
+        pin.computeJointTorqueRegressor(model, data, *state).copy()
+        for state in zip(q, dq, ddq, strict=True)
+    ]
+    # both are sums of some hundred products of numbers of order 10: rounding at 1e-13
+    np.testing.assert_allclose(torque_regressor(robot.chain, q, dq, ddq), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_times_parameters_is_inverse_dynamics_without_rotors(name):
+    robot = load_robot(name)
+    q, dq, ddq = states(robot.joints, 2)
+    model, data = robot.model, robot.model.createData()
+    torque = [pin.rnea(model, data, *state).copy() for state in zip(q, dq, ddq, strict=True)]
+    rigid = torque_regressor(robot.chain, q, dq, ddq) @ chain_parameters(robot.chain)
+    # Pinocchio's rnea includes the rotors' armature
+    np.testing.assert_allclose(rigid + robot.chain.rotor_inertia * ddq, torque, atol=1e-11)
+
+
+def test_a_tilted_base_turns_gravity():
+    robot = load_robot("ur5")
+    tilted = robot.with_gravity(np.array([4.0, -3.0, -8.0]))
+    q, zero = states(6, 3)[0], np.zeros((40, 6))
+    model, data = tilted.model, tilted.model.createData()
+    expected = [pin.computeGeneralizedGravity(model, data, x).copy() for x in q]
+    gravity = torque_regressor(tilted.chain, q, zero, zero) @ chain_parameters(tilted.chain)
+    np.testing.assert_allclose(gravity, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["ur10e", "panda"])
+def test_parameters_make_the_chain_again(name):
+    chain = load_robot(name).chain
+    again = with_parameters(chain, chain_parameters(chain))
+    for key in ("mass", "com", "inertia", "rotor_inertia"):
+        # moving a tensor to the origin and back loses digits of m·c², here below 10 kg·m²
+        np.testing.assert_allclose(getattr(again, key), getattr(chain, key), atol=1e-14)

@@ -1,0 +1,95 @@
+"""On simulated logs with seeded mismatch: the numbers the issue requires."""
+
+import numpy as np
+import pytest
+
+from vftcli.identification import Processing, Task, identify
+from vftcli.identification.consistent import is_physical
+from vftcli.identification.processing import gravity_torque, prepare
+from vftcli.identification.scoring import predicted_torque, rms
+from vftcli.robots import JointFriction, load_robot
+from vftcli.robots.friction import friction_torque
+from vftcli.robots.regressor import chain_parameters
+from vftcli.robots.robot import Robot
+from vftcli.simulation import load_scenario, simulate
+from vftcli.simulation import prepare as build
+
+MISMATCH = [
+    "mismatch.mass=0.05",
+    "mismatch.com=0.01",
+    "mismatch.rotor_inertia=0.1",
+    "mismatch.friction=0.15",
+    "mismatch.torque_constant=0.02",
+    "friction.stribeck=0.15",
+    "friction.stribeck_velocity=0.03",
+]
+SEED = 1
+
+
+@pytest.fixture(scope="module")
+def train():
+    return simulate(load_scenario("free-excitation"), SEED).recording
+
+
+@pytest.fixture(scope="module")
+def other():
+    """Another trajectory of the same arm: the circle, untouched."""
+    scenario = load_scenario("ur5-circle", [*MISMATCH, "contacts=[]"])
+    return simulate(scenario, SEED).recording
+
+
+@pytest.fixture(scope="module")
+def truth() -> Robot:
+    """The simulated arm as a robot."""
+    from dataclasses import replace
+
+    arm, _ = build(load_scenario("free-excitation"), SEED)
+    profile, true = load_robot("ur5"), arm.true
+    names = ("coulomb", "viscous", "quadratic", "offset")
+    friction = tuple(
+        JointFriction(
+            model="coulomb-viscous-stribeck",
+            parameters={
+                **{name: float(getattr(true.friction, name)[j]) for name in names},
+                "stribeck": true.friction.stribeck * float(true.friction.coulomb[j]),
+                "stribeck_velocity": true.friction.stribeck_velocity,
+                "smoothing": 0.003,
+            },
+        )
+        for j in range(6)
+    )
+    constant = profile.torque_constant * true.gain
+    return replace(profile, chain=true.chain, friction=friction, torque_constant=constant)
+
+
+def rubbing(robot, speeds, load):
+    """Friction against motion, half the step between both ways. (m, n) [N·m]
+
+    The offset is left out: it also stands for errors of the links' gravity.
+    """
+    v = speeds[:, None] * np.ones(6)
+    there, back = (friction_torque(robot.friction, x, load + 0 * v) for x in (v, -v))
+    return 0.5 * (there - back)
+
+
+def test_friction_rotor_and_constants_come_back_within_five_per_cent(train, truth):
+    found = identify([train], load_robot("ur5"), Task(fit_constants=True)).robot
+    np.testing.assert_allclose(found.torque_constant, truth.torque_constant, rtol=0.05)
+    np.testing.assert_allclose(found.chain.rotor_inertia, truth.chain.rotor_inertia, rtol=0.05)
+    speeds = np.linspace(0.2, 1.0, 9)
+    load = np.mean(np.abs(gravity_torque(truth, train.q)), axis=0)
+    np.testing.assert_allclose(
+        rubbing(found, speeds, load), rubbing(truth, speeds, load), rtol=0.05
+    )
+
+
+@pytest.mark.parametrize("method", ["base", "consistent"])
+def test_another_trajectory_is_predicted_to_the_noise_floor(train, other, truth, method):
+    found = identify([train], load_robot("ur5"), Task(method=method), [other])
+    trace = next(t for t in found.traces if t.role == "held-out")
+    motion = prepare(other, truth, Processing())
+    floor = rms(motion.tau - predicted_torque(truth, motion))
+    # the floor is what the true arm itself leaves: current noise and stiction at reversals
+    assert rms(trace.residual).mean() <= 1.1 * floor.mean()
+    assert is_physical(chain_parameters(found.robot.chain))
+    assert np.all(found.robot.chain.rotor_inertia > 0)

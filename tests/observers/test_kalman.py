@@ -1,0 +1,265 @@
+"""Kalman observers against a dense textbook filter, SciPy's Riccati and matrix exponential."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm, solve_discrete_are
+
+from vftcli.observers import KalmanObserver
+from vftcli.observers.kalman_gains import Covariance, gain_sequence
+from vftcli.observers.kalman_model import NOISE_CONVENTIONS, Densities, zero_order_hold
+from vftcli.observers.recursion import steps_of
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.errors import ParameterError
+
+R = np.array([0.5, 0.5, 0.5, 1.3, 1.3, 1.3])  # the paper's UR5 values, Sec. IV-A
+Q_P = np.array([0.01, 0.01, 0.01, 0.02, 0.02, 0.02])
+Q_TAU = np.full(6, 5000.0)
+STEP = 0.008
+
+
+def paper(scheme: str, convention: str = "density", **more: object) -> KalmanObserver:
+    return KalmanObserver(
+        discretisation=scheme,
+        r_diag=R,
+        q_p_diag=Q_P,
+        q_tau_diag=Q_TAU,
+        noise_convention=convention,
+        **more,
+    )
+
+
+def terms(samples: int = 1500, jitter: float = 0.0, seed: int = 0) -> DynamicsTerms:
+    rng = np.random.default_rng(seed)
+    steps = STEP * (1 + jitter * rng.uniform(-1, 1, samples - 1))
+    t = np.concatenate([[0.0], np.cumsum(steps)])
+    p = 2.0 + np.cumsum(rng.normal(0, 0.1, (samples, 6)), axis=0)
+    return DynamicsTerms(t=t, p=p, mu=rng.normal(0, 5, (samples, 6)))
+
+
+def dense(observer: KalmanObserver, log: DynamicsTerms) -> tuple[np.ndarray, np.ndarray]:
+    """The 2n-state textbook filter with full matrices; returns τ̂ and its standard deviation."""
+    n, steps = log.joints, steps_of(log.t)
+    eye, zero = np.eye(n), np.zeros((n, n))
+    C, whole = np.hstack([eye, zero]), np.eye(2 * n)
+    prior = observer.steady(steps.median, n).prior
+    P = np.block(
+        [[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]]
+    )
+    x = np.concatenate([log.p[0], np.zeros(n)])
+    tau, sd = np.empty_like(log.p), np.empty_like(log.p)
+    for k in range(log.samples):
+        step = steps.median if steps.uniform else steps.dt[k]
+        m = observer.model(step, n)
+        if k:
+            A = np.block([[eye, np.diag(m.a12)], [zero, np.diag(m.a22)]])
+            B = np.vstack([step * eye, zero])
+            Q = np.block([[np.diag(m.q11), np.diag(m.q12)], [np.diag(m.q12), np.diag(m.q22)]])
+            u = log.mu[k] if observer.as_printed else 0.5 * (log.mu[k] + log.mu[k - 1])
+            x, P = A @ x + B @ u, A @ P @ A.T + Q
+        L = P @ C.T @ np.linalg.inv(C @ P @ C.T + np.diag(m.r))
+        x = x + L @ (log.p[k] - C @ x)
+        P = (whole - L @ C) @ P @ (whole - L @ C).T + L @ np.diag(m.r) @ L.T
+        tau[k], sd[k] = x[n:], np.sqrt(np.diag(P)[n:])
+    return tau, sd
+
+
+@pytest.mark.parametrize("convention", NOISE_CONVENTIONS)
+@pytest.mark.parametrize("scheme", ["fe", "zoh"])
+@pytest.mark.parametrize("jitter", [0.0, 0.2])
+def test_agrees_with_the_dense_textbook_filter(scheme: str, convention: str, jitter: float) -> None:
+    observer, log = paper(scheme, convention), terms(jitter=jitter)
+    tau, sd = dense(observer, log)
+    estimate = observer.estimate(log)
+    # the decoupled filter is the same filter; 1500 steps of rounding at values of 100 N·m
+    np.testing.assert_allclose(estimate.tau, tau, atol=1e-10, rtol=0)
+    np.testing.assert_allclose(estimate.sd, sd, rtol=1e-10)
+
+
+@pytest.mark.parametrize("scheme", ["fe", "zoh"])
+def test_decay_agrees_with_the_dense_textbook_filter(scheme: str) -> None:
+    observer, log = paper(scheme, decay=3.0), terms(samples=600)
+    tau, _ = dense(observer, log)
+    np.testing.assert_allclose(observer.estimate(log).tau, tau, atol=1e-9)
+
+
+def test_as_printed_agrees_with_the_dense_filter_on_mu_alone() -> None:
+    observer, log = paper("fe", as_printed=True), terms(samples=600)
+    tau, _ = dense(observer, log)
+    np.testing.assert_allclose(observer.estimate(log).tau, tau, atol=1e-10)
+
+
+def test_euler_and_hold_share_a_and_b_exactly() -> None:
+    fe, zoh = paper("fe").model(STEP, 6), paper("zoh").model(STEP, 6)
+    np.testing.assert_array_equal(fe.a12, zoh.a12)
+    np.testing.assert_array_equal(fe.a22, zoh.a22)
+    np.testing.assert_array_equal(fe.step, zoh.step)
+    assert np.any(fe.q12 != zoh.q12)
+
+
+@pytest.mark.parametrize("decay", [0.0, 1e-3, 0.5, 1.0, 10.0, 50.0])
+@pytest.mark.parametrize("step", [0.001, 0.008, 0.1])
+def test_hold_is_van_loans_matrix_exponential(decay: float, step: float) -> None:
+    """(43) and (44) with the lower-right block −A_cᵀ, by SciPy's expm."""
+    one = Densities(*(np.array([v]) for v in (0.5, 0.01, 5000.0, decay)))
+    model = zero_order_hold(np.array(step), one)
+    A_c, B_c = np.array([[0.0, 1.0], [0.0, -decay]]), np.array([[1.0], [0.0]])
+    Q_c = np.diag([0.01, 5000.0])
+    both = expm(np.block([[A_c, B_c], [np.zeros((1, 3))]]) * step)
+    M = expm(np.block([[A_c, Q_c], [np.zeros((2, 2)), -A_c.T]]) * step)
+    Q = M[:2, 2:] @ M[:2, :2].T
+    np.testing.assert_allclose([model.a12[0], model.a22[0]], both[:2, 1], rtol=1e-12)
+    np.testing.assert_allclose(both[0, 2], model.step[0], rtol=1e-14)
+    # expm itself is good to about 1e-13 of the largest entry
+    np.testing.assert_allclose(
+        [model.q11[0], model.q12[0], model.q22[0]],
+        [Q[0, 0], Q[0, 1], Q[1, 1]],
+        rtol=1e-9,
+        atol=1e-13 * 5000,
+    )
+
+
+@pytest.mark.parametrize("convention", NOISE_CONVENTIONS)
+@pytest.mark.parametrize("scheme", ["fe", "zoh"])
+@pytest.mark.parametrize("step", [0.001, 0.008])
+def test_closed_form_gains_are_scipys_riccati(scheme: str, convention: str, step: float) -> None:
+    observer = paper(scheme, convention)
+    settled, m = observer.steady(step, 6), observer.model(step, 6)
+    for j in (0, 3):
+        A = np.array([[1.0, m.a12[j]], [0.0, m.a22[j]]])
+        Q = np.array([[m.q11[j], m.q12[j]], [m.q12[j], m.q22[j]]])
+        P = solve_discrete_are(A.T, np.array([[1.0], [0.0]]), Q, np.array([[m.r[j]]]))
+        found = [getattr(settled.prior, name)[j] for name in ("p11", "p12", "p22")]
+        # SciPy's solver is good to about 1e-9 on these ill-scaled problems
+        np.testing.assert_allclose(found, [P[0, 0], P[0, 1], P[1, 1]], rtol=1e-8)
+        L = P[:, 0] / (P[0, 0] + m.r[j])
+        np.testing.assert_allclose([settled.gains.l1[j], settled.gains.l2[j]], L, rtol=1e-8)
+
+
+def test_started_from_the_stationary_prior_there_is_no_transient() -> None:
+    """The step-by-step covariance stays where the closed form says."""
+    observer = paper("fe")
+    settled = observer.steady(STEP, 6)
+    model = observer.model(np.full((300, 1), STEP), 6)
+    gains = gain_sequence(model, settled.prior, settled.gains.posterior)
+    np.testing.assert_allclose(gains.l1, np.tile(settled.gains.l1, (300, 1)), rtol=1e-11)
+    np.testing.assert_allclose(gains.posterior.p22[-1], settled.gains.posterior.p22, rtol=1e-11)
+
+
+@pytest.mark.parametrize("scheme", ["fe", "zoh"])
+def test_a_users_initial_covariance_is_followed_exactly(scheme: str) -> None:
+    """Blocks run side by side give the plain loop's covariances, transient and all."""
+    start = np.array([[50.0] * 6, [3.0] * 6, [4e4] * 6])
+    observer, log = paper(scheme, initial_covariance=start), terms(samples=800, jitter=0.3)
+    steps = steps_of(log.t)
+    P = start.copy()
+    expected = []
+    for k in range(log.samples):
+        m = observer.model(steps.dt[k], 6)
+        p11, p12, p22 = P
+        if k:
+            p11, p12, p22 = (
+                p11 + 2 * m.a12 * p12 + m.a12**2 * p22 + m.q11,
+                m.a22 * (p12 + m.a12 * p22) + m.q12,
+                m.a22**2 * p22 + m.q22,
+            )
+        s = p11 + m.r
+        P = np.array([p11 - p11**2 / s, p12 - p11 * p12 / s, p22 - p12**2 / s])
+        expected.append(np.sqrt(P[2]))
+    # P₂₂ − P₁₂²/s cancels four digits at the start, where P₂₂ is 4e4
+    np.testing.assert_allclose(observer.estimate(log).sd, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("convention", "omega", "delay"),
+    [  # science of the observers: ω_n [rad/s] and delay [ms] of kfo-fe at 125 Hz, J1 and J4
+        ("density", (10.00, 7.88), (137.5, 175.7)),
+        ("discrete", (33.44, 26.33), (38.7, 50.0)),
+        ("literal", (2.99, 2.36), (468.9, 596.5)),
+    ],
+)
+def test_what_the_papers_parameters_mean(
+    convention: str, omega: tuple[float, float], delay: tuple[float, float]
+) -> None:
+    tuning = paper("fe", convention).tuning(STEP, 6)
+    # the table's last printed digit
+    np.testing.assert_allclose(tuning.omega_n[[0, 3]], omega, atol=0.005)
+    np.testing.assert_allclose(1e3 * tuning.delay[[0, 3]], delay, atol=0.051)
+
+
+@pytest.mark.parametrize("scheme", ["fe", "zoh"])
+def test_delay_to_a_ramp_is_exact(scheme: str) -> None:
+    t = np.arange(4000) * STEP
+    p = 0.5 * t[:, None] ** 2 * np.ones(6)
+    log = DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))
+    observer = paper(scheme)
+    lag = t[-1] - observer.estimate(log).tau[-1]
+    np.testing.assert_allclose(lag, observer.tuning(STEP, 6).delay, rtol=1e-6)  # 32 s of ramp
+
+
+@pytest.mark.parametrize(("decay", "gain"), [(1.0, 0.872), (10.0, 0.278)])
+def test_a_decaying_model_loses_gain_at_rest(decay: float, gain: float) -> None:
+    """DC gain of kfo-zoh with A_τ = −a, UR5 J1, as worked out and as the filter really answers."""
+    observer = paper("zoh", decay=decay)
+    t = np.arange(6000) * STEP
+    p = t[:, None] * np.ones(6)
+    answer = observer.estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))).tau[-1]
+    tuning = observer.tuning(STEP, 6)
+    np.testing.assert_allclose(answer, tuning.dc_gain, rtol=1e-6)
+    assert tuning.dc_gain[0] == pytest.approx(gain, abs=1e-3)  # printed digits
+
+
+def test_the_density_convention_does_not_change_with_the_rate() -> None:
+    slow, fast = paper("zoh").tuning(0.008, 6), paper("zoh").tuning(0.001, 6)
+    np.testing.assert_allclose(slow.omega_n, fast.omega_n, rtol=1e-12)
+    # what is left is the half sample by which a coarser clock sees the momentum earlier
+    np.testing.assert_allclose(slow.delay, fast.delay, atol=(0.008 - 0.001) / 2)
+
+
+def test_frequency_response_is_that_of_the_filter() -> None:
+    observer, f = paper("fe", "discrete"), 2.0
+    t = np.arange(5000) * STEP
+    w = 2 * np.pi * f
+    p = -np.cos(w * t)[:, None] / w * np.ones(6)
+    answer = observer.estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))).tau[2500:]
+    basis = np.column_stack([np.sin(w * t[2500:]), np.cos(w * t[2500:])])
+    sine, cosine = np.linalg.lstsq(basis, answer, rcond=None)[0]
+    response = observer.frequency_response(np.array([f]), STEP, 6)[0]
+    np.testing.assert_allclose(sine + 1j * cosine, response, atol=1e-9)  # transient long gone
+
+
+def test_forward_euler_refuses_a_decay_it_cannot_hold() -> None:
+    with pytest.raises(ParameterError, match=r"unstable: decay·Ts = 2\.4"):
+        paper("fe", decay=300.0).estimate(terms(samples=50))
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("r_diag", 0.0), ("q_tau_diag", -1.0), ("q_p_diag", -0.1), ("decay", np.nan)],
+)
+def test_impossible_variances_are_refused(field: str, value: float) -> None:
+    with pytest.raises(ParameterError, match=f"kfo.{field}"):
+        KalmanObserver(**{field: value})
+
+
+def test_gains_are_found_for_a_covariance_that_forgets_slowly() -> None:
+    """A nearly constant disturbance: the blocks need many passes and still end at the loop's P."""
+    observer = KalmanObserver(q_tau_diag=1e-6, q_p_diag=1e-8, r_diag=0.5)
+    samples = 900
+    model = observer.model(np.full((samples, 1), STEP), 1)
+    start = Covariance(np.array([10.0]), np.array([0.0]), np.array([1e3]))
+    guess = observer.steady(STEP, 1).gains.posterior
+    found = gain_sequence(model, start, guess).posterior.p22[-1, 0]
+    P, m = np.array([10.0, 0.0, 1e3]), observer.model(STEP, 1)
+    for k in range(samples):
+        p11, p12, p22 = P
+        if k:
+            p11, p12, p22 = (
+                p11 + 2 * STEP * p12 + STEP**2 * p22 + m.q11[0],
+                p12 + STEP * p22,
+                p22 + m.q22[0],
+            )
+        L = np.array([p11, p12]) / (p11 + m.r[0])
+        I_LC = np.array([[1 - L[0], 0], [-L[1], 1]])
+        full = I_LC @ np.array([[p11, p12], [p12, p22]]) @ I_LC.T + np.outer(L, L) * m.r[0]
+        P = np.array([full[0, 0], full[0, 1], full[1, 1]])
+    np.testing.assert_allclose(found, P[2], rtol=1e-9)

@@ -1,0 +1,85 @@
+"""Where observer parameters come from: the command line, the robot file, and what is left over."""
+
+import numpy as np
+import pytest
+
+from vftcli.observers import (
+    DEFAULT,
+    FilteredDynamicsObserver,
+    KalmanObserver,
+    MomentumObserver,
+    Setup,
+    build_observers,
+    observer_settings,
+)
+from vftcli.robots import load_robot
+from vftcli.signals.errors import ParameterError
+
+
+def setup(robot: str, *assignments: str, joints: int = 6, step: float = 0.008) -> Setup:
+    gains = load_robot(robot).gains if robot else {}
+    settings = observer_settings(assignments)
+    return Setup(gains=gains, settings=settings, joints=joints, step=step, as_printed=False)
+
+
+def test_the_profile_gives_the_papers_gains() -> None:
+    (fdo, gmo, fe, _), notes = build_observers(DEFAULT, setup("ur5"))
+    assert isinstance(fdo, FilteredDynamicsObserver)
+    assert fdo.omega == 10.0
+    assert isinstance(gmo, MomentumObserver)
+    np.testing.assert_array_equal(gmo.gain, [5, 3, 4, 10, 10, 10])
+    assert isinstance(fe, KalmanObserver)
+    np.testing.assert_array_equal(fe.r_diag, [0.5, 0.5, 0.5, 1.3, 1.3, 1.3])
+    assert notes == ()
+
+
+def test_the_command_line_wins_over_the_profile() -> None:
+    (gmo, zoh), _ = build_observers(
+        ["gmo", "kfo-zoh"], setup("ur5", "gmo.gain=30", "kfo.r_diag=1,2,3,4,5,6", "kfo-zoh.decay=2")
+    )
+    np.testing.assert_array_equal(gmo.gain, [30.0] * 6)
+    np.testing.assert_array_equal(zoh.r_diag, [1, 2, 3, 4, 5, 6])
+    np.testing.assert_array_equal(zoh.decay, [2.0] * 6)
+
+
+def test_gains_nobody_gave_take_the_kalman_filters_delay_and_say_so() -> None:
+    (fdo, gmo, fe), notes = build_observers(
+        ["fdo", "gmo", "kfo-fe"], setup("panda", joints=7, step=0.001)
+    )
+    delay = fe.tuning(0.001, 7).delay
+    np.testing.assert_allclose(gmo.tuning(0.001, 7).delay, delay, rtol=1e-12)
+    np.testing.assert_allclose(1.0 / fdo.omega, np.mean(delay), rtol=1e-12)
+    assert any("gmo.gain was not given" in note for note in notes)
+
+
+def test_a_bare_robot_gets_ten_per_second_and_is_told() -> None:
+    (gmo,), notes = build_observers(["gmo"], setup(""))
+    np.testing.assert_array_equal(gmo.gain, [10.0] * 6)
+    assert "no gains" in notes[0]
+
+
+@pytest.mark.parametrize(
+    ("assignment", "words"),
+    [
+        ("gmo.gain", "is not OBSERVER.PARAMETER=VALUE"),
+        ("gmo.gian=3", "Did you mean gain"),
+        ("gm.gain=3", "Did you mean gmo"),
+        ("gmo.gain=fast", "is not a number"),
+        ("gmo.gain=1,nan,3,4,5,6", "must be finite"),
+    ],
+)
+def test_a_malformed_assignment_says_what_is_wrong(assignment: str, words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        observer_settings([assignment])
+
+
+def test_another_number_of_gains_is_refused() -> None:
+    with pytest.raises(
+        ParameterError, match=r"gmo\.gain has 3 values; give one, or one for each of 6"
+    ):
+        build_observers(["gmo"], setup("ur5", "gmo.gain=1,2,3"))
+
+
+def test_an_unknown_observer_lists_what_there_is() -> None:
+    with pytest.raises(ParameterError, match="there is fdo, gmo, kfo-fe, kfo-zoh"):
+        build_observers(["kalman"], setup("ur5"))

@@ -1,0 +1,153 @@
+"""The smoother against a dense Rauch–Tung–Striebel textbook implementation, and its symmetries."""
+
+import numpy as np
+import pytest
+
+from vftcli.observers import KalmanObserver
+from vftcli.observers.recursion import steps_of
+from vftcli.observers.smoother import KalmanSmoother
+from vftcli.robots.terms import DynamicsTerms
+
+R, Q_P, Q_TAU = np.array([0.5, 1.3]), np.array([0.01, 0.02]), np.array([5000.0, 5000.0])
+STEP = 0.008
+
+
+def smoother(scheme: str = "fe", convention: str = "density", **more: object) -> KalmanSmoother:
+    return KalmanSmoother(
+        filter=KalmanObserver(
+            discretisation=scheme,
+            r_diag=R,
+            q_p_diag=Q_P,
+            q_tau_diag=Q_TAU,
+            noise_convention=convention,
+            **more,
+        )
+    )
+
+
+def wandering(samples: int, jitter: float, seed: int = 0) -> DynamicsTerms:
+    rng = np.random.default_rng(seed)
+    steps = STEP * (1 + jitter * rng.uniform(-1, 1, samples - 1))
+    t = np.concatenate([[0.0], np.cumsum(steps)])
+    p = 2.0 + np.cumsum(rng.normal(0, 0.1, (samples, 2)), axis=0)
+    return DynamicsTerms(t=t, p=p, mu=rng.normal(0, 5, (samples, 2)))
+
+
+def dense_rts(smooth: KalmanSmoother, log: DynamicsTerms) -> tuple[np.ndarray, np.ndarray]:
+    """Forward filter and backward smoother with full 2n-state matrices, as in any textbook."""
+    f, n, steps = smooth.filter, log.joints, steps_of(log.t)
+    eye, zero = np.eye(n), np.zeros((n, n))
+    C, whole = np.hstack([eye, zero]), np.eye(2 * n)
+    prior = f.steady(steps.median, n).prior
+    P = np.block(
+        [[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]]
+    )
+    x = np.concatenate([log.p[0], np.zeros(n)])
+    filtered, predicted = [], []
+    for k in range(log.samples):
+        step = steps.median if steps.uniform else steps.dt[k]
+        m = f.model(step, n)
+        A = np.block([[eye, np.diag(m.a12)], [zero, np.diag(m.a22)]])
+        if k:
+            B = np.vstack([step * eye, zero])
+            Q = np.block([[np.diag(m.q11), np.diag(m.q12)], [np.diag(m.q12), np.diag(m.q22)]])
+            x, P = A @ x + B @ (0.5 * (log.mu[k] + log.mu[k - 1])), A @ P @ A.T + Q
+        predicted.append((x, P, A))
+        L = P @ C.T @ np.linalg.inv(C @ P @ C.T + np.diag(m.r))
+        x = x + L @ (log.p[k] - C @ x)
+        P = (whole - L @ C) @ P @ (whole - L @ C).T + L @ np.diag(m.r) @ L.T
+        filtered.append((x, P))
+    xs, Ps = filtered[-1]
+    tau, sd = [xs[n:]], [np.sqrt(np.diag(Ps)[n:])]
+    for k in range(log.samples - 2, -1, -1):
+        x, P = filtered[k]
+        x_next, P_next, A = predicted[k + 1]
+        G = P @ A.T @ np.linalg.inv(P_next)
+        xs, Ps = x + G @ (xs - x_next), P + G @ (Ps - P_next) @ G.T
+        tau.append(xs[n:])
+        sd.append(np.sqrt(np.diag(Ps)[n:]))
+    return np.array(tau[::-1]), np.array(sd[::-1])
+
+
+@pytest.mark.parametrize("convention", ["density", "discrete", "literal"])
+@pytest.mark.parametrize("scheme", ["fe", "zoh"])
+@pytest.mark.parametrize("jitter", [0.0, 0.3])
+def test_agrees_with_a_dense_textbook_smoother(scheme: str, convention: str, jitter: float) -> None:
+    smooth, log = smoother(scheme, convention), wandering(700, jitter)
+    tau, sd = dense_rts(smooth, log)
+    estimate = smooth.estimate(log)
+    # the same answer through another recursion: rounding at values of some 100 N·m
+    np.testing.assert_allclose(estimate.tau, tau, atol=1e-10, rtol=0)
+    np.testing.assert_allclose(estimate.sd, sd, rtol=1e-9)
+
+
+def test_agrees_with_the_dense_smoother_from_a_users_covariance() -> None:
+    start = np.array([[4.0, 4.0], [1.0, 1.0], [900.0, 900.0]])
+    smooth, log = smoother(initial_covariance=start), wandering(300, 0.0)
+    plain = smoother()
+    far = slice(150, None)
+    # after 1.2 s, twelve time constants, the start no longer matters: e⁻¹²·700 N·m
+    np.testing.assert_allclose(
+        smooth.estimate(log).tau[far], plain.estimate(log).tau[far], atol=5e-3
+    )
+    assert np.max(np.abs(smooth.estimate(log).tau[:5] - plain.estimate(log).tau[:5])) > 1e-3
+
+
+def test_a_constant_torque_and_a_ramp_are_recovered_without_bias() -> None:
+    t = np.arange(4000) * STEP
+    for p, truth in ((t * 3.0, np.full_like(t, 3.0)), (0.5 * t**2, t)):
+        log = DynamicsTerms(t=t, p=np.column_stack([p, p]), mu=np.zeros((4000, 2)))
+        estimate = smoother("zoh").estimate(log).tau
+        middle = slice(1500, 2500)
+        # Forward Euler would lead a ramp by half a sample, for want of the hold's Q₁₂. Either end
+        # is 12 s away, more than a hundred time constants of 0.1 s.
+        np.testing.assert_allclose(
+            estimate[middle], np.repeat(truth[middle, None], 2, 1), rtol=1e-9
+        )
+
+
+def test_in_the_middle_of_a_log_it_is_symmetric_in_time() -> None:
+    """A torque turned round in time gives the estimate turned round: no delay, no lead."""
+    samples = 4001
+    t = np.arange(samples) * STEP
+    tau = np.exp(-0.5 * ((t - t[2000]) / 0.15) ** 2) * (1.0 + 0.5 * np.tanh((t - t[2000]) / 0.05))
+    answers = []
+    for series in (tau, tau[::-1]):
+        p = np.concatenate([[0.0], np.cumsum(0.5 * STEP * (series[1:] + series[:-1]))])
+        log = DynamicsTerms(t=t, p=np.column_stack([p, p]), mu=np.zeros((samples, 2)))
+        answers.append(smoother("zoh").estimate(log).tau)
+    middle = slice(1000, 3000)
+    # both ends are 8 s away, 80 time constants
+    np.testing.assert_allclose(answers[0][middle], answers[1][::-1][middle], atol=1e-9)
+
+
+def test_frequency_response_is_that_of_the_two_sided_filter() -> None:
+    samples, f = 8000, 1.5
+    t = np.arange(samples) * 0.001
+    w = 2 * np.pi * f
+    p = -np.cos(w * t)[:, None] / w * np.ones(2)
+    smooth = smoother("zoh")
+    answer = smooth.estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))).tau[2000:6000]
+    basis = np.column_stack([np.sin(w * t[2000:6000]), np.cos(w * t[2000:6000])])
+    sine, cosine = np.linalg.lstsq(basis, answer, rcond=None)[0]
+    response = smooth.frequency_response(np.array([f]), 0.001, 2)[0]
+    # the formula is that of the continuous filter: (ω_n Ts)² = 1e-4 at 1 kHz
+    np.testing.assert_allclose(sine, response.real, atol=1e-4)
+    np.testing.assert_allclose(cosine, 0.0, atol=1e-4)
+
+
+def test_the_bandwidth_is_that_of_the_formula() -> None:
+    tuning = smoother().tuning(STEP, 2)
+    # −3 dB of |H_KFO|² at .802 ω_n for ζ = .707
+    np.testing.assert_allclose(2 * np.pi * tuning.bandwidth / tuning.omega_n, 0.802, atol=1e-3)
+    assert not np.any(tuning.delay)
+
+
+def test_it_knows_more_than_the_filter() -> None:
+    log = wandering(500, 0.1)
+    smooth = smoother()
+    before, after = smooth.filter.estimate(log).sd, smooth.estimate(log).sd
+    assert before is not None
+    assert after is not None
+    assert np.all(after[:-1] < before[:-1])
+    np.testing.assert_allclose(after[-1], before[-1], rtol=1e-12)

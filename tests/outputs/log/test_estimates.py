@@ -1,0 +1,44 @@
+import csv
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from vftcli.analysis import Analysis
+from vftcli.outputs.log.parquet import estimates_table, write_csv, write_estimates
+
+
+def test_parquet_holds_flat_float_columns(analysis: Analysis, tmp_path: Path) -> None:
+    write_estimates(tmp_path / "e.parquet", analysis)
+    table = pl.read_parquet(tmp_path / "e.parquet")
+    assert set(table.dtypes) == {pl.Float64}
+    assert table.columns[:2] == ["t", "q/1"]
+    assert {"dq/6", "tau_ext/fdo/1", "tau_ext/kfo-zoh/6", "sd/kfo-fe/1"} <= set(table.columns)
+    for estimate in analysis.estimates:
+        for j in range(6):
+            column = table[f"tau_ext/{estimate.name}/{j + 1}"].to_numpy()
+            np.testing.assert_array_equal(column, estimate.tau[:, j])
+    np.testing.assert_array_equal(table["t"].to_numpy(), analysis.t)
+
+
+def test_unknown_is_null(analysis: Analysis) -> None:
+    """The reference of the fixture is unknown in its first 20 samples."""
+    column = estimates_table(analysis)["tau_ext/reference/3"]
+    assert column.null_count() == 20
+    assert not column.is_nan().any()
+
+
+def test_without_a_reference_there_is_no_column(without_reference: Analysis) -> None:
+    assert not [c for c in estimates_table(without_reference).columns if "reference" in c]
+
+
+def test_csv_has_the_same_columns(analysis: Analysis, tmp_path: Path) -> None:
+    write_csv(tmp_path / "e.csv", analysis)
+    with (tmp_path / "e.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == estimates_table(analysis).columns
+    assert rows[0]["tau_ext/reference/1"] == ""
+    # nine printed digits
+    np.testing.assert_allclose(
+        [float(r["q/2"]) for r in rows], analysis.recording.q[:, 1], atol=1e-9
+    )

@@ -1,0 +1,77 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+
+from vftcli.analysis import Analysis
+from vftcli.outputs.log import mcap_output
+from vftcli.outputs.log.description import urdf_text
+from vftcli.outputs.log.mcap_output import write_mcap
+from vftcli.robots import PROFILES, load_robot
+from vftcli.robots.drive import drive_torque
+
+
+@pytest.fixture(scope="module")
+def messages(analysis: Analysis, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list]:
+    """Topic → (stamp in the file, message), read by rosbags; three blocks of samples."""
+    path = tmp_path_factory.mktemp("mcap") / "estimates.mcap"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mcap_output, "BLOCK", 256)
+        write_mcap(path, analysis)
+    found: dict[str, list] = {}
+    with AnyReader([path]) as reader:
+        for connection, stamp, raw in reader.messages():
+            message = reader.deserialize(raw, connection.msgtype)
+            found.setdefault(connection.topic, []).append((stamp, message))
+    return found
+
+
+def test_every_topic_has_every_sample(messages: dict[str, list]) -> None:
+    observers = ("fdo", "gmo", "kfo_fe", "kfo_zoh", "reference")
+    topics = ["/joint_states", *(f"/vftcli/external/{name}" for name in observers)]
+    assert {topic: len(messages[topic]) for topic in topics} == dict.fromkeys(topics, 600)
+    assert len(messages["/robot_description"]) == 1
+    assert set(messages) == {*topics, "/robot_description"}
+
+
+def test_joint_states_are_the_log(messages: dict[str, list], analysis: Analysis) -> None:
+    states = [message for _, message in messages["/joint_states"]]
+    recording = analysis.recording
+    torque = drive_torque(recording, analysis.robot)
+    np.testing.assert_array_equal([m.position for m in states], recording.q)
+    np.testing.assert_array_equal([m.velocity for m in states], recording.dq)
+    np.testing.assert_array_equal([m.effort for m in states], torque)
+    assert {tuple(m.name) for m in states} == {analysis.robot.chain.names}
+
+
+def test_estimates_are_efforts(messages: dict[str, list], analysis: Analysis) -> None:
+    found = [message.effort for _, message in messages["/vftcli/external/kfo_fe"]]
+    np.testing.assert_array_equal(found, analysis.estimates[2].tau)
+    assert len(messages["/vftcli/external/kfo_fe"][0][1].position) == 0
+
+
+def test_stamps_are_the_logs_own(messages: dict[str, list], analysis: Analysis) -> None:
+    """The log's first stamp is 100.25 s."""
+    expected = np.round(analysis.t * 1e9).astype(int) + 100_250_000_000
+    for stamp, message in messages["/joint_states"][:1] + messages["/joint_states"][-1:]:
+        inside = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        assert stamp == inside
+    assert [stamp for stamp, _ in messages["/joint_states"]] == expected.tolist()
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_the_urdf_is_the_arm(name: str, tmp_path: Path) -> None:
+    """Read back through Pinocchio, the flange is where it was; 12 printed digits."""
+    from vftcli.robots.kinematics import link_poses
+
+    robot = load_robot(name)
+    path = tmp_path / "arm.urdf"
+    path.write_text(urdf_text(robot, robot.chain.names), encoding="utf-8")
+    back = load_robot(path)
+    q = np.random.default_rng(7).uniform(-2.0, 2.0, (20, robot.joints))
+    found, expected = link_poses(back.chain, q), link_poses(robot.chain, q)
+    np.testing.assert_allclose(found.translation, expected.translation, atol=1e-10)
+    np.testing.assert_allclose(found.rotation[:, -1], expected.rotation[:, -1], atol=1e-10)
+    np.testing.assert_allclose(back.chain.mass, robot.chain.mass, rtol=1e-10)
+    np.testing.assert_allclose(back.chain.inertia, robot.chain.inertia, atol=1e-10)

@@ -1,0 +1,72 @@
+import json
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from vftcli.analysis import Analysis
+from vftcli.outputs.log import report
+from vftcli.outputs.log.estimates import write_estimate_folder
+from vftcli.outputs.log.report import FILES, write_report, write_reports
+from vftcli.signals.errors import OutputError
+
+
+def test_a_report_holds_its_files(analysis: Analysis, tmp_path: Path) -> None:
+    text = write_report(tmp_path / "out", analysis, command="vftcli report x")
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted(FILES)
+    assert (tmp_path / "out/run.json").read_text(encoding="utf-8") == text
+    assert json.loads(text)["command"] == "vftcli report x"
+    assert "vftcli report x" in (tmp_path / "out/index.html").read_text(encoding="utf-8")
+
+
+def test_without_a_reference_there_are_no_error_tables(
+    without_reference: Analysis, tmp_path: Path
+) -> None:
+    write_report(tmp_path, without_reference, command="")
+    found = {p.name for p in tmp_path.iterdir()}
+    assert found == {"index.html", "recording.rrd", "estimates.parquet", "run.json"}
+
+
+def test_several_logs_get_a_folder_each_and_an_index(analysis: Analysis, tmp_path: Path) -> None:
+    text = write_reports(tmp_path / "out", [analysis, analysis], command="vftcli report a b")
+    folders = sorted(p.name for p in (tmp_path / "out").iterdir() if p.is_dir())
+    assert len(folders) == 2
+    for folder in folders:
+        assert sorted(p.name for p in (tmp_path / "out" / folder).iterdir()) == sorted(FILES)
+    assert len(json.loads(text)) == 2
+    errors = pl.read_csv(tmp_path / "out/errors.csv")
+    assert sorted(errors["recording"].unique()) == folders
+    assert len(errors) == 2 * len(pl.read_csv(tmp_path / "out" / folders[0] / "errors.csv"))
+
+
+def test_a_failing_writer_leaves_nothing(
+    analysis: Analysis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_path: Path, _analysis: Analysis) -> None:
+        raise OutputError("no")
+
+    monkeypatch.setattr(report, "write_estimates", fail)
+    with pytest.raises(OutputError, match="no"):
+        write_report(tmp_path / "out", analysis, command="")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_existing_report_needs_force(without_reference: Analysis, tmp_path: Path) -> None:
+    write_report(tmp_path, without_reference, command="first")
+    with pytest.raises(OutputError, match="--force"):
+        write_report(tmp_path, without_reference, command="second")
+    assert json.loads((tmp_path / "run.json").read_text())["command"] == "first"
+    write_report(tmp_path, without_reference, command="second", force=True)
+    assert json.loads((tmp_path / "run.json").read_text())["command"] == "second"
+
+
+def test_estimate_writes_its_extras(analysis: Analysis, tmp_path: Path) -> None:
+    write_estimate_folder(tmp_path / "out", analysis, "vftcli estimate x", ["csv", "mcap", "rrd"])
+    names = {p.name for p in (tmp_path / "out").iterdir()}
+    assert names == {
+        "estimates.parquet",
+        "run.json",
+        "estimates.csv",
+        "estimates.mcap",
+        "recording.rrd",
+    }

@@ -1,0 +1,49 @@
+import json
+
+import numpy as np
+
+import vftcli
+from vftcli.analysis import Analysis
+from vftcli.outputs.log.run_record import plain, to_json
+
+
+def test_run_json_says_how_to_make_it_again(analysis: Analysis) -> None:
+    record = json.loads(to_json(analysis.run))
+    assert record["command"].startswith("vftcli report '<script>")
+    assert record["versions"]["vftcli"] == vftcli.__version__
+    assert record["versions"]["numpy"] == np.__version__
+    assert record["input"]["sha256"] == "ab" * 32
+    assert record["input"]["samples"] == 600
+    assert len(record["robot"]["sha256"]) == 64
+    assert "ON the robot" in record["conventions"]["sign"]
+    assert record["repairs"] == ["turned <b>one</b> column"]
+    assert record["warnings"] == ["looks & feels odd"]
+    assert record["reference"]["name"] == "vendor"
+
+
+def test_run_json_has_every_observers_parameters(analysis: Analysis) -> None:
+    record = json.loads(to_json(analysis.run))
+    found = {o["name"]: o for o in record["observers"]}
+    assert list(found) == ["fdo", "gmo", "kfo-fe", "kfo-zoh"]
+    assert found["gmo"]["parameters"]["gain"] == [5.0, 3.0, 4.0, 10.0, 10.0, 10.0]
+    assert found["fdo"]["zeta"] == [None] * 6
+    for observer in found.values():
+        for key in ("omega_n_rad_s", "delay_s", "bandwidth_hz"):
+            assert len(observer[key]) == 6
+
+
+def test_a_built_in_robot_has_no_path(analysis: Analysis) -> None:
+    assert analysis.run["robot"]["name"] == "ur5"
+    assert analysis.run["robot"]["file"] is None
+
+
+def test_what_is_not_finite_becomes_null() -> None:
+    value = {"a": np.array([1.0, np.nan]), "b": float("inf"), "c": (np.float64(2.0), True, "x")}
+    assert plain(value) == {"a": [1.0, None], "b": None, "c": [2.0, True, "x"]}
+
+
+def test_lists_of_numbers_stand_on_one_line() -> None:
+    record = {"gain": [1.0, None, 3.0], "words": ["a [", "] b"]}
+    text = to_json(record)
+    assert '"gain": [ 1.0, null, 3.0 ]' in text
+    assert json.loads(text) == record

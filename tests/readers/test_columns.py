@@ -1,0 +1,160 @@
+"""The --columns grammar, and the tables it describes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from seed_logs import ROWS, headerless_csv, matrix_npy, motion, parquet, table_csv
+
+from vftcli.readers import read
+from vftcli.readers.columns import parse_columns
+from vftcli.signals.errors import ClockError, LogError
+
+DEGREE = np.pi / 180
+
+
+def write(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def test_counted_columns_are_taken_in_file_order(tmp_path: Path) -> None:
+    log = motion()
+    recording = read(headerless_csv(tmp_path / "x"), columns="t,q:6,dq:6,current:6")
+    # the file has six decimals
+    np.testing.assert_allclose(recording.current, log["current"], atol=6e-7)
+    np.testing.assert_allclose(recording.t, log["t"], atol=1e-9)
+    assert recording.torque is None
+    assert recording.source.format == "headerless"
+
+
+def test_minus_turns_the_sign_and_is_said(tmp_path: Path) -> None:
+    path = matrix_npy(tmp_path / "x")
+    plain = read(path, columns="t,q:6,dq:6,current:6")
+    turned = read(path, columns="t,q:6,_:6,-current:6")
+    np.testing.assert_array_equal(turned.current, -plain.current)
+    assert turned.dq is None
+    assert "turned the sign of current (--columns)" in turned.source.repairs
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)])
+def test_time_units(tmp_path: Path, unit: str, factor: float) -> None:
+    rows = "\n".join(f"{k},{0.1 * k}" for k in range(5))
+    recording = read(write(tmp_path / "x", rows + "\n"), columns=f"t[{unit}],q")
+    np.testing.assert_allclose(recording.t, factor * np.arange(5), rtol=1e-12)
+
+
+def test_degrees_become_radians(tmp_path: Path) -> None:
+    rows = "\n".join(f"{k / 100},{90 + k},{2 * k}" for k in range(10))
+    recording = read(write(tmp_path / "x", rows + "\n"), columns="t,q[deg],dq[deg/s]")
+    np.testing.assert_allclose(recording.q[:, 0], (90 + np.arange(10)) * DEGREE, rtol=1e-12)
+    assert recording.dq is not None
+    np.testing.assert_allclose(recording.dq[:, 0], 2 * np.arange(10) * DEGREE, rtol=1e-12)
+
+
+def test_degrees_without_a_unit_are_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "x", "".join(f"{k / 100},{90 + k}\n" for k in range(10)))
+    with pytest.raises(LogError, match=r"q\[deg\]"):
+        read(path, columns="t,q")
+    assert read(path, columns="t,q[rad]").joints == 1
+
+
+def test_named_columns_start_at_the_smallest_index(tmp_path: Path) -> None:
+    head = "clock,eff_3,eff_4,pos_3,pos_4\n"
+    rows = "".join(f"{k / 10},{k},{2 * k},{0.1 * k},{0.2 * k}\n" for k in range(4))
+    recording = read(write(tmp_path / "x", head + rows), columns="t=clock,q=pos_{i},tau=eff_{i}")
+    np.testing.assert_allclose(recording.q, np.outer(np.arange(4), [0.1, 0.2]), rtol=1e-12)
+    assert recording.torque is not None
+    np.testing.assert_array_equal(recording.torque[:, 1], 2 * np.arange(4))
+
+
+def test_wrench_by_names_carries_its_frame(tmp_path: Path) -> None:
+    head = "t,q1,Fx,Fy,Fz,Mx,My,Mz\n"
+    rows = "".join(f"{k},0,1,2,3,4,5,{k}\n" for k in range(4))
+    recording = read(
+        write(tmp_path / "x", head + rows), columns="t=t,q=q{i},wrench[base]=Fx|Fy|Fz|Mx|My|Mz"
+    )
+    assert recording.wrench_frame == "base"
+    assert recording.wrench is not None
+    np.testing.assert_array_equal(recording.wrench[3], [1, 2, 3, 4, 5, 3])
+
+
+def test_slices_of_list_columns(tmp_path: Path) -> None:
+    path = parquet(tmp_path / "x")
+    recording = read(path, columns="t=timestamp,q=observation.state[0:3],dq=dq[1:4]")
+    log = motion(7)
+    np.testing.assert_array_equal(recording.q, log["q"][:, :3])
+    np.testing.assert_array_equal(recording.dq, log["dq"][:, 1:4])
+
+
+def test_a_table_without_clock_takes_a_rate(tmp_path: Path) -> None:
+    path = write(tmp_path / "x", "".join(f"{0.1 * k},{k}\n" for k in range(5)))
+    recording = read(path, columns="t@125Hz,q,current")
+    np.testing.assert_allclose(recording.t, np.arange(5) / 125, rtol=1e-15)
+    assert "125 Hz as stated" in recording.source.clock
+
+
+def test_one_of_several_recordings(tmp_path: Path) -> None:
+    rows = "".join(f"{k / 100},{j + 0.001 * k}\n" for j in range(3) for k in range(30))
+    path = write(tmp_path / "x", "t,q1\n" + rows)
+    with pytest.raises(ClockError, match="segment=1"):
+        read(path)
+    second = read(path, columns="segment=2")
+    assert second.samples == 30
+    assert second.q[0, 0] == 1.0
+    assert "took recording 2 of 3, rows 31 to 60 (segment)" in second.source.repairs
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "empty"),
+        ("t,q:6,speed:6", "no signal 'speed'"),
+        ("t,q:6,q:6", "twice"),
+        ("t,dq:6", "no q"),
+        ("t,q[furlong]:6", "no unit 'furlong'"),
+        ("t,q:0", "at least one"),
+        ("t:2,q:6", "at least one"),
+        ("t,q=pos_{i}", "t has no column name"),
+        ("t,q:6;dq:6", "cannot understand"),
+        ("t@0Hz,q:6", "t@125Hz"),
+        ("segment=x,q:6", "whole number"),
+    ],
+)
+def test_what_cannot_be_understood_is_said(text: str, told: str) -> None:
+    with pytest.raises(LogError, match=told):
+        parse_columns(text)
+
+
+@pytest.mark.parametrize(
+    ("columns", "told"),
+    [
+        ("t,q:6", "skip the rest with _:12"),
+        ("t,q:6,dq:6,current:6,tau:6", "describes 25 columns, the table has 19"),
+        ("t,q:6,dq:5,current:7", "dq has 5 columns, q has 6"),
+        ("q=x_{i}", "no header"),
+    ],
+)
+def test_a_headerless_table_that_is_described_wrongly(
+    tmp_path: Path, columns: str, told: str
+) -> None:
+    with pytest.raises(LogError, match=told):
+        read(headerless_csv(tmp_path / "x"), columns=columns)
+
+
+@pytest.mark.parametrize(
+    ("columns", "told"),
+    [
+        ("t=time,q=q_{i}", "no column 'time'.*q_0"),
+        ("t=t,q=pos_{i}", r"no column 'pos_\{i\}'"),
+        ("t=t,q=q_0|q_1,dq=dq_0", "dq has 1 columns, q has 2"),
+        ("t=t,q=q_0[0:2]", "not of lists"),
+    ],
+)
+def test_a_headed_table_that_is_described_wrongly(tmp_path: Path, columns: str, told: str) -> None:
+    with pytest.raises(LogError, match=told):
+        read(table_csv(tmp_path / "x"), columns=columns)
+
+
+def test_every_row_is_kept(tmp_path: Path) -> None:
+    assert read(table_csv(tmp_path / "x")).samples == ROWS

@@ -1,0 +1,89 @@
+"""Properties that hold for any numbers: a written table reads back as it was written."""
+
+from pathlib import Path
+
+import numpy as np
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from vftcli.readers import read
+from vftcli.readers.columns import parse_columns
+from vftcli.signals.errors import VftError
+
+NUMBERS = st.floats(-6, 6, allow_subnormal=False)
+TABLES = st.integers(2, 40).flatmap(
+    lambda rows: st.integers(1, 7).flatmap(
+        lambda joints: arrays(np.float64, (rows, 2 * joints), elements=NUMBERS)
+    )
+)
+QUICK = settings(
+    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
+def check_message(error: VftError) -> None:
+    """A message is one line that says something."""
+    assert str(error).isprintable()
+    assert len(str(error)) > 20
+
+
+@QUICK
+@given(
+    values=TABLES,
+    step=st.floats(1e-3, 0.5),
+    start=st.floats(0, 1e6),
+    separator=st.sampled_from([",", ";", "\t", " "]),
+    end=st.sampled_from(["\n", "\r\n", "\r\r\n", "\r"]),
+    headed=st.booleans(),
+    closed=st.booleans(),
+)
+def test_a_text_table_reads_back(
+    tmp_path: Path,
+    values: np.ndarray,
+    step: float,
+    start: float,
+    separator: str,
+    end: str,
+    headed: bool,
+    closed: bool,
+) -> None:
+    """All rows and all digits, whatever separates them; an open last row may be dropped, said."""
+    rows, joints = len(values), values.shape[1] // 2
+    t = start + step * np.arange(rows)
+    matrix = np.column_stack([t, values])
+    lines = [separator.join(repr(float(v)) for v in row) for row in matrix]
+    if headed:
+        names = ["t", *(f"q_{j}" for j in range(joints)), *(f"dq_{j}" for j in range(joints))]
+        lines.insert(0, separator.join(names))
+    path = tmp_path / "x"
+    path.write_bytes((end.join(lines) + (end if closed else "")).encode())
+    recording = read(path, columns=None if headed else f"t[s],q[rad]:{joints},dq:{joints}")
+    kept = recording.samples
+    assert kept == rows or (not closed and kept == rows - 1 and recording.source.repairs)
+    np.testing.assert_array_equal(recording.q, values[:kept, :joints])
+    np.testing.assert_array_equal(recording.dq, values[:kept, joints:])
+
+
+@QUICK
+@given(text=st.text(alphabet="tqdcurentaw_:=-[]{}i@,|0123456789Hz ", max_size=40))
+def test_any_columns_text_is_parsed_or_refused_on_one_line(text: str) -> None:
+    try:
+        spec = parse_columns(text)
+    except VftError as error:
+        check_message(error)
+    else:
+        assert spec.items or spec.segment is not None
+
+
+@QUICK
+@given(content=st.binary(min_size=1, max_size=600))
+def test_any_bytes_are_read_or_refused_on_one_line(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "x"
+    path.write_bytes(content)
+    try:
+        recording = read(path)
+    except VftError as error:
+        check_message(error)
+    else:
+        assert recording.samples > 0

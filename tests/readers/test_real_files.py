@@ -1,0 +1,179 @@
+"""Every sample and every real log is read as what it is, or refused with the right reason."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.readers import read
+from vftcli.signals.errors import VftError
+
+TABLE_31 = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+FR3 = "t[ns],q:7,dq:7,tau:7,-tau_ext:7,_:13"
+
+SAMPLES = {
+    # by name: its format, joints, samples and rate in Hz
+    "ur_official.csv": ("ur-csv", 6, 299, 125),
+    "ur_official_win.csv": ("ur-csv", 6, 299, 125),
+    "ur_official.bin": ("ur-binary", 6, 299, 125),
+    "ur_rtde_sel.csv": ("ur-rtde", 6, 1494, 500),
+    "ur_rtde_cb3.csv": ("ur-rtde", 6, 372, 125),
+    "libfranka_0.8.csv": ("libfranka-csv-old", 7, 50, 1000),
+    "libfranka_0.15.csv": ("libfranka-csv", 7, 50, 1000),
+    "libfranka_0.8_state.jsonl": ("libfranka-json", 7, 50, 1000),
+    "libfranka_0.15_state.jsonl": ("libfranka-json", 7, 50, 1000),
+    "franka_ros1.bag": ("rosbag1", 7, 200, 1000),
+    "x.bag.active": ("rosbag1", 7, 200, 1000),
+    "ros2_mcap": ("rosbag2", 7, 200, 1000),
+    "ros2_mcap_zfile": ("rosbag2", 7, 200, 1000),
+    "ros2_mcap_zstor": ("rosbag2", 7, 200, 1000),
+    "ros2_db3": ("rosbag2", 7, 200, 1000),
+    "ros2_db3_zmsg": ("rosbag2", 7, 200, 1000),
+    "humble_db3": ("rosbag2", 7, 200, 1000),
+    "multi.mcap": ("mcap", 7, 200, 1000),
+    "multi_trunc.mcap": ("mcap", 7, 137, 1000),
+    "ros1prof.mcap": ("mcap", 7, 200, 1000),
+    "json.mcap": ("mcap", 6, 100, 500),
+    "panda_py.npz": ("npz", 7, 100, 1000),
+    "panda_py.pkl": ("pickle", 7, 100, 1000),
+    "frankapy.pkl": ("pickle", 7, 100, 100),
+}
+
+REFUSED_SAMPLES = {
+    "fox.mcap": "no joint positions",
+    "trunc.mcap": "no messages in any whole chunk",
+    "trunc.bag": "no messages in any whole chunk",
+}
+
+LOGS = {
+    "ur10e/free_12harm.csv": (TABLE_31, "headerless", 6, 5457, 100),
+    "ur10e/free_14harm.csv": (TABLE_31, "headerless", 6, 5375, 100),
+    "ur10e/free_repeat_a.csv": (TABLE_31, "headerless", 6, 759, 100),
+    "ur10e/free_repeat_b.csv": (TABLE_31, "headerless", 6, 912, 100),
+    "ur10e/free_repeat_c.csv": (TABLE_31, "headerless", 6, 660, 100),
+    "ur10e/jointwise_2.csv": (TABLE_31, "headerless", 6, 6030, 100),
+    "ur10e/jointwise_4.csv": (TABLE_31, "headerless", 6, 6288, 100),
+    "ur10e/load_14harm.csv": (TABLE_31, "headerless", 6, 5307, 100),
+    "ur10e/push_pose.csv": (TABLE_31, "headerless", 6, 1727, 100),
+    "fr3/run_a.npy": (FR3, "npy", 7, 10384, 974),
+    "fr3/run_b.npy": (FR3, "npy", 7, 10048, 983),
+    "franka_bags/calib_0108.bag": (None, "rosbag1", 7, 32, 29.4),
+    "franka_bags/calib_0308.bag": (None, "rosbag1", 7, 23, 29.4),
+    "libfranka_sim/pushes.csv.gz": (None, "table", 7, 28001, 1000),
+    "mujoco_ur5e/circle.csv": (None, "table", 6, 2500, 125),
+    "other_robot_yu_cobot.parquet": ("segment=1", "parquet", 6, 100, 99.4),
+    "rtde/blank_lines.csv": (None, "ur-csv", 6, 10, 125),
+    "rtde/static_cb3.csv": (None, "ur-csv", 6, 2590, 125),
+    "rtde/ur3e_25hz_cr_line_ends.csv": (None, "ur-rtde", 6, 65, 25),
+    "ur3/identification.bag": (None, "rosbag1", 6, 5941, 125),
+    "ur3/repeat_a.bag": (None, "rosbag1", 6, 1872, 125),
+    "ur3/repeat_b.bag": (None, "rosbag1", 6, 3156, 125),
+}
+
+REFUSED_LOGS = {
+    "fr3/run_a.npy": "42 columns without a header",
+    "ur10e/free_14harm.csv": "31 columns without a header",
+    "other_robot_yu_cobot.parquet": "4 recordings one after another",
+    "panda_ati/press_1.csv": "no joint positions",
+    "panda_ati/traj_raw.csv": "no joint positions",
+    "libfranka_sim/pushes_truth.csv.gz": "no joint positions",
+    "panda_exciting/exciting_traj_positions.txt": "single column",
+    "panda_exciting/exciting_traj_time.txt": "single column",
+    "panda_exciting/exciting_traj_torques.txt": "single column",
+    "panda_exciting/exciting_traj_velocity.txt": "single column",
+}
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_samples(samples: Path, name: str) -> None:
+    recording = read(samples / name)
+    found = (recording.source.format, recording.joints, recording.samples)
+    assert found == SAMPLES[name][:3]
+    assert 1 / recording.step == pytest.approx(SAMPLES[name][3], rel=1e-3)
+
+
+@pytest.mark.parametrize("name", REFUSED_SAMPLES)
+def test_samples_that_hold_no_log(samples: Path, name: str) -> None:
+    with pytest.raises(VftError, match=REFUSED_SAMPLES[name]):
+        read(samples / name)
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_real_logs(logs: Path, name: str) -> None:
+    columns, *expected, rate = LOGS[name]
+    recording = read(logs / name, columns=columns)
+    assert [recording.source.format, recording.joints, recording.samples] == expected
+    assert 1 / recording.step == pytest.approx(rate, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", REFUSED_LOGS)
+def test_real_logs_that_need_a_word(logs: Path, name: str) -> None:
+    with pytest.raises(VftError, match=REFUSED_LOGS[name]):
+        read(logs / name)
+
+
+def test_no_file_is_forgotten(logs: Path, samples: Path) -> None:
+    there = {str(p.relative_to(logs)) for p in logs.rglob("*") if p.is_file()}
+    known = set(LOGS) | set(REFUSED_LOGS)
+    assert {p for p in there if not p.endswith((".toml", ".md"))} == known
+    assert {p.name for p in samples.iterdir()} == set(SAMPLES) | set(REFUSED_SAMPLES)
+
+
+def test_text_and_binary_of_one_recording_agree(samples: Path) -> None:
+    text, binary = read(samples / "ur_official.csv"), read(samples / "ur_official.bin")
+    for name in text.signals:
+        np.testing.assert_array_equal(getattr(text, name), getattr(binary, name))
+
+
+@pytest.mark.parametrize("name", ["ros2_mcap", "ros2_db3", "franka_ros1.bag"])
+def test_bulk_and_typed_decoding_agree_on_samples(samples: Path, name: str) -> None:
+    from rosbags.highlevel import AnyReader
+
+    recording = read(samples / name)
+    with AnyReader([samples / name]) as reader:
+        states = [
+            reader.deserialize(raw, c.msgtype)
+            for c, _, raw in reader.messages()
+            if c.msgtype.startswith("franka_msgs")
+        ]
+    measured = [getattr(s, "measured_joint_state", s) for s in states]
+    q = [getattr(m, "position", getattr(m, "q", None)) for m in measured]
+    np.testing.assert_array_equal(recording.q, q)
+    residual = [getattr(s.tau_ext_hat_filtered, "effort", s.tau_ext_hat_filtered) for s in states]
+    np.testing.assert_array_equal(recording.tau_ext, 0.0 - np.array(residual))
+
+
+def test_bulk_and_typed_decoding_agree_on_a_real_bag(logs: Path) -> None:
+    from rosbags.highlevel import AnyReader
+
+    path = logs / "ur3" / "identification.bag"
+    recording = read(path)
+    with AnyReader([path]) as reader:
+        typed = [reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages()]
+    np.testing.assert_array_equal(recording.q, [m.position for m in typed])
+    np.testing.assert_array_equal(recording.torque, [m.effort for m in typed])
+    assert recording.source.t0_ns == typed[0].header.stamp.sec * 10**9 + (
+        typed[0].header.stamp.nanosec
+    )
+
+
+def test_ur3_repeats_differ_by_noise_once_the_sign_is_turned(logs: Path) -> None:
+    """repeat_a and repeat_b follow one free motion for 9.8 s: their difference is the noise."""
+    from vftcli.repetition.alignment import align
+
+    a = read(logs / "ur3" / "repeat_a.bag", columns="-tau=effort").between(0, 9.8)
+    b = read(logs / "ur3" / "repeat_b.bag", columns="-tau=effort")
+    lying = align(b, a)
+    t = (a.t - lying.shift) / lying.rate
+    inside = (t >= b.t[0]) & (t <= b.t[-1])
+    assert a.torque is not None
+    assert b.torque is not None
+    assert a.dq is not None
+    partner = np.column_stack([np.interp(t, b.t, torque) for torque in b.torque.T])
+    bends = [x.torque[2:] - 2 * x.torque[1:-1] + x.torque[:-2] for x in (a, b)]
+    floor = np.sqrt(sum(np.mean(bend**2, axis=0) / 6 for bend in bends))
+    for j in range(6):
+        moving = inside & (np.abs(a.dq[:, j]) > 1e-3)  # at rest stiction remains
+        difference = (partner - a.torque)[moving, j]
+        # white noise alone gives 1; wrist 3's is not quite white
+        assert np.sqrt(np.mean(difference**2)) < 1.5 * floor[j]

@@ -1,0 +1,221 @@
+"""The vendors' own files: UR's RTDE clients, libfranka, panda-py, LeRobot."""
+
+import json
+import os
+import pickle
+import zipfile
+from collections import OrderedDict
+from pathlib import Path
+
+import numpy as np
+import pytest
+from seed_logs import (
+    HEADERLESS_COLUMNS,
+    ROWS,
+    libfranka_csv,
+    libfranka_json,
+    matrix_npy,
+    motion,
+    panda_py_log,
+    panda_py_npz,
+    panda_py_pickle,
+    parquet,
+    ur_binary,
+    ur_csv,
+)
+
+from vftcli.readers import read
+from vftcli.signals.errors import LogError
+
+SIX_DIGITS = 1e-5
+"""libfranka prints six significant digits; the largest value of the motion is below ten."""
+
+
+def test_official_text_keeps_every_digit(tmp_path: Path) -> None:
+    recording = read(ur_csv(tmp_path / "x"))
+    log = motion()
+    assert recording.source.format == "ur-csv"
+    np.testing.assert_array_equal(recording.q, log["q"])
+    np.testing.assert_array_equal(recording.current, log["current"])
+    assert recording.torque is None
+    assert recording.robot_hint is None
+    assert recording.source.t0 == 1000
+
+
+@pytest.mark.parametrize("end", ["\r\r\n", "\r", "\n"])
+def test_official_text_of_every_line_end(tmp_path: Path, end: str) -> None:
+    recording = read(ur_csv(tmp_path / "x", end=end))
+    np.testing.assert_array_equal(recording.q, motion()["q"])
+
+
+def test_ur_rtde_is_told_by_its_commas(tmp_path: Path) -> None:
+    assert read(ur_csv(tmp_path / "x", separator=",", end="\n")).source.format == "ur-rtde"
+
+
+def test_payload_that_the_controller_was_told_of(tmp_path: Path) -> None:
+    path = ur_csv(tmp_path / "x", separator=",", end="\n")
+    lines = path.read_text().splitlines()
+    lines[0] += ",payload,payload_cog_0,payload_cog_1,payload_cog_2"
+    lines[1:] = [f"{line},1.5,0,0.01,0.05" for line in lines[1:]]
+    path.write_text("\n".join(lines) + "\n")
+    recording = read(path)
+    assert recording.payload_mass == 1.5
+    assert recording.payload_com == (0, 0.01, 0.05)
+
+
+def test_missing_positions_or_clock_say_what_to_record(tmp_path: Path) -> None:
+    path = ur_csv(tmp_path / "x")
+    text = path.read_text()
+    path.write_text(text.replace("timestamp", "time_stamp"))
+    with pytest.raises(LogError, match="t@125Hz"):
+        read(path)
+    path.write_text(text.replace("actual_q_5", "target_q_0"))
+    with pytest.raises(LogError, match="Add actual_q to the recipe"):
+        read(path)
+
+
+def test_binary_records(tmp_path: Path) -> None:
+    path = ur_binary(tmp_path / "x.csv")
+    np.testing.assert_array_equal(read(path).q, motion()["q"])
+    path.write_bytes(path.read_bytes()[:-10])
+    recording = read(path)
+    assert recording.samples == ROWS - 1
+    assert "cut last record" in recording.source.repairs[0]
+
+
+def test_binary_records_with_a_leading_identifier(tmp_path: Path) -> None:
+    path = ur_binary(tmp_path / "x")
+    names, types, body = path.read_bytes().split(b"\n", 2)
+    records = np.frombuffer(body, dtype="V60")
+    # 119 records, because 120 of 61 bytes would also be 122 of 60
+    joined = b"".join(b"\1" + record.tobytes() for record in records[:119])
+    path.write_bytes(b"\n".join([names, types, joined]))
+    recording = read(path)
+    np.testing.assert_array_equal(recording.q, motion()["q"][:119])
+    assert "recipe id" in recording.source.repairs[0]
+
+
+@pytest.mark.parametrize("old", [False, True])
+def test_libfranka_csv_turns_the_residual(tmp_path: Path, old: bool) -> None:
+    recording = read(libfranka_csv(tmp_path / "x", old=old))
+    log = motion(7)
+    assert recording.source.format == ("libfranka-csv-old" if old else "libfranka-csv")
+    np.testing.assert_allclose(recording.tau_ext, -log["tau_ext"], atol=SIX_DIGITS)
+    np.testing.assert_allclose(recording.torque, log["tau"], atol=10 * SIX_DIGITS)
+    np.testing.assert_allclose(recording.t, 1e-3 * np.arange(ROWS), rtol=1e-12)
+    assert any("turned the sign" in repair for repair in recording.source.repairs)
+
+
+def test_states_as_json_lines(tmp_path: Path) -> None:
+    path = libfranka_json(tmp_path / "x")
+    recording = read(path)
+    np.testing.assert_array_equal(recording.q, motion(7)["q"])
+    assert recording.wrench_frame is not None
+    assert "BY the robot" in recording.wrench_frame
+    lines = path.read_text().splitlines()
+    lines[50] = lines[50].replace('"q": [', '"q": [nan, ', 1)
+    path.write_text("\n".join(lines))
+    with pytest.raises(LogError, match="q is not 7 numbers in every state"):
+        read(path)
+
+
+def test_json_that_is_nested_or_endless_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "x"
+    for line in ('{"O_T_EE": ' + "[" * 50_000, '{"O_T_EE": "' + "x" * 100_000 + '"}'):
+        path.write_text(f"{line}\n{line}\n")
+        with pytest.raises(LogError, match="line 1 is not a robot state"):
+            read(path)
+
+
+def test_panda_py_bundle_and_pickle_read_the_same(tmp_path: Path) -> None:
+    log = panda_py_log()
+    for recording in (read(panda_py_npz(tmp_path / "x")), read(panda_py_pickle(tmp_path / "y"))):
+        np.testing.assert_array_equal(recording.torque, log["tau_J"])
+        np.testing.assert_array_equal(recording.tau_ext, -log["tau_ext_hat_filtered"])
+        np.testing.assert_allclose(recording.t, 1e-3 * np.arange(ROWS), rtol=1e-12)
+
+
+def test_array_files(tmp_path: Path) -> None:
+    path = matrix_npy(tmp_path / "x")
+    np.testing.assert_array_equal(read(path, columns=HEADERLESS_COLUMNS).q, motion()["q"])
+    with pytest.raises(LogError, match="without a header"):
+        read(path)
+    path.write_bytes(path.read_bytes()[:-8])
+    with pytest.raises(LogError, match="it is cut"):
+        read(path, columns=HEADERLESS_COLUMNS)
+
+
+def test_arrays_of_objects_are_refused(tmp_path: Path) -> None:
+    np.save(tmp_path / "x.npy", np.array([[1, "a"]], dtype=object), allow_pickle=True)
+    with pytest.raises(LogError, match=r"not a readable|cut, damaged"):
+        read(tmp_path / "x.npy", columns="t,q")
+
+
+def test_a_bundle_that_unpacks_beyond_reason_is_refused(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "x.npz", "w", zipfile.ZIP_DEFLATED) as bundle:
+        bundle.writestr("q.npy", bytes(300 << 20))
+    with pytest.raises(LogError, match="unpacks to 300 MiB"):
+        read(tmp_path / "x.npz")
+
+
+class Evil:
+    """A pickle that would make a folder if it were executed."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        return (os.mkdir, (str(self.folder),))
+
+
+@pytest.mark.parametrize(
+    "held", ["evil", {"q": OrderedDict}, {"q": np.ndarray}, {"q": Path("x")}, [1, 2], {}]
+)
+def test_pickles_of_anything_but_arrays_are_refused(tmp_path: Path, held: object) -> None:
+    trap = tmp_path / "trap"
+    (tmp_path / "x").write_bytes(pickle.dumps({"q": Evil(trap)} if held == "evil" else held))
+    with pytest.raises(LogError, match=r"np\.savez|no arrays|not a dictionary"):
+        read(tmp_path / "x")
+    assert not trap.exists()
+
+
+def test_a_pickle_cannot_fill_memory_through_ndarray(tmp_path: Path) -> None:
+    # cnumpy\nndarray\n (I1000000000\n t R . : numpy.ndarray((10**9,)) without any data
+    (tmp_path / "x").write_bytes(
+        b"\x80\x02cnumpy\nndarray\n((I10000000000\ntt R.".replace(b" ", b"")
+    )
+    with pytest.raises(LogError, match="Pickles are opened only"):
+        read(tmp_path / "x")
+
+
+def test_parquet_with_lists_by_alias(tmp_path: Path) -> None:
+    recording = read(parquet(tmp_path / "x"))
+    np.testing.assert_array_equal(recording.q, motion(7)["q"])
+    assert recording.source.format == "parquet"
+
+
+def test_lerobot_reads_the_first_episode(tmp_path: Path) -> None:
+    import polars as pl
+
+    log = motion(7, rows=60)
+    state = np.hstack([log["q"], np.zeros((60, 1))]).astype(np.float32)
+    data = tmp_path / "data" / "chunk-000"
+    data.mkdir(parents=True)
+    pl.DataFrame(
+        {
+            "timestamp": np.tile(np.arange(30) / 30, 2).astype(np.float32),
+            "observation.state": state.tolist(),
+            "episode_index": np.repeat([0, 1], 30),
+        }
+    ).write_parquet(data / "file-000.parquet")
+    (tmp_path / "meta").mkdir()
+    names = [*(f"joint_{j}" for j in range(7)), "gripper"]
+    info = {"fps": 30, "total_episodes": 2, "features": {"observation.state": {"names": names}}}
+    (tmp_path / "meta" / "info.json").write_text(json.dumps(info))
+    recording = read(tmp_path)
+    assert recording.source.format == "lerobot"
+    assert (recording.samples, recording.joints) == (30, 7)
+    np.testing.assert_allclose(recording.q, log["q"][:30], atol=1e-7)  # float32
+    assert "took episode 0 of 2" in recording.source.warnings[0]
+    with pytest.raises(LogError, match="holds 2 episodes"):
+        read(data / "file-000.parquet")

@@ -1,0 +1,246 @@
+"""What a complete log allows, on the reference fixture: tuned gains, bands, bias, limits."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from vftcli.analysis import Analysis
+from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, choose_robot, open_log
+from vftcli.signals.errors import ParameterError, VftError
+
+FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
+MOVING = np.array([1, 2, 3, 4, 6])
+"""Joint 5 of the circle rests."""
+
+
+def mean_rmse(analysis: Analysis, observer: str) -> float:
+    assert analysis.errors is not None
+    rows = analysis.errors.filter(pl.col("observer") == observer)
+    rows = rows.filter(pl.col("joint").is_in(MOVING.tolist()))
+    return float(rows["rmse_Nm"].mean())
+
+
+def test_the_free_cycle_is_found_and_the_resting_joint_named(worked_up: Analysis) -> None:
+    found = worked_up.workup
+    assert found is not None
+    assert "free part: cycle 1 of 5" in found.notes[0]
+    inside = worked_up.t[found.survey.part.inside]
+    assert inside[0] == pytest.approx(0.0, abs=0.05)
+    assert inside[-1] == pytest.approx(4.0, abs=0.05)
+    assert any("J5 rests" in note for note in found.notes)
+
+
+def test_ratios_to_the_hand_set_filter(
+    worked_up: Analysis, without_bias: Analysis, request_: AnalysisChoice
+) -> None:
+    """Bounds of the reference simulation for this one run, seed 1 of mixed pushes."""
+    discrete = replace(request_, settings=("kfo.noise_convention=discrete",))
+    by_hand = mean_rmse(worked_up, "kfo-zoh")
+    quick = analyse_log(FIXTURE, replace(discrete, observers=("kfo-zoh", "kfo-rts")))
+    faster = mean_rmse(quick, "kfo-zoh")
+    for error, bounds in (
+        (mean_rmse(quick, "kfo-rts"), (0.60, 0.85)),
+        (mean_rmse(worked_up, "rts-auto"), (0.45, 0.70)),
+        (mean_rmse(without_bias, "rts-auto"), (0.36, 0.55)),
+    ):
+        assert error <= bounds[0] * by_hand
+        assert error <= bounds[1] * faster
+    assert mean_rmse(worked_up, "kfo-auto") <= 1.05 * min(by_hand, faster)
+
+
+def test_the_band_covers_the_truth_on_moving_joints(worked_up: Analysis) -> None:
+    assert worked_up.errors is not None
+    rows = worked_up.errors.filter(pl.col("joint").is_in(MOVING.tolist()))
+    for observer in ("kfo-auto", "rts-auto"):
+        share = rows.filter(pl.col("observer") == observer)["coverage_95"].mean()
+        assert 0.93 <= share <= 0.99
+    # the joint that rests has no coverage to be told
+    rest = worked_up.errors.filter((pl.col("joint") == 5) & (pl.col("observer") == "rts-auto"))
+    assert rest["coverage_95"].to_list() == [None]
+
+
+def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
+    found = worked_up.workup
+    assert found is not None
+    spectra = found.survey.spectra
+    assert spectra is not None
+    for observer, estimate in zip(worked_up.observers, worked_up.estimates, strict=True):
+        response = observer.frequency_response(spectra.frequency, spectra.step, 6)
+        lag = np.sum(np.abs(1 - response) ** 2 * spectra.external, axis=0) * spectra.width
+        free = np.mean(estimate.tau[found.survey.part.inside] ** 2, axis=0)
+        np.testing.assert_allclose(estimate.band[7], np.sqrt(free + lag), rtol=1e-12)
+        assert estimate.sd is None or not np.allclose(estimate.sd[7], estimate.band[7])
+
+
+def test_removing_the_bias_subtracts_the_free_cycle_at_the_same_phase(
+    worked_up: Analysis, without_bias: Analysis
+) -> None:
+    found = worked_up.workup
+    assert found is not None
+    before, after = worked_up.estimates[0], without_bias.estimates[0]
+    inside, t = found.survey.part.inside, worked_up.t
+    assert np.all(after.tau[inside] == 0.0)
+    k = int(np.searchsorted(t, 9.0))
+    phase = t[k] - 2 * 4.0
+    same = [np.interp(phase, t[inside], x) for x in before.tau[inside].T]
+    # the period found on the positions differs from 4 s by microseconds
+    np.testing.assert_allclose(before.tau[k] - after.tau[k], same, atol=1e-3)
+    assert any("zero by construction" in note for note in without_bias.notes)
+
+
+def test_what_is_left_without_the_bias_is_tuned_on(
+    worked_up: Analysis, without_bias: Analysis
+) -> None:
+    """Joints that friction and model limit gain; where noise does (J1), there is twice as much."""
+    assert worked_up.workup is not None
+    assert without_bias.workup is not None
+    plain, left = (a.workup.curves["kfo-auto"] for a in (worked_up, without_bias))
+    limited = [1, 2, 3]
+    assert np.all(left.least[limited] < 0.7 * plain.least[limited])
+
+
+def test_a_bias_model_helps_where_nothing_repeats(request_: AnalysisChoice) -> None:
+    asked = replace(
+        request_, remove_bias="model", free_part="0:4", interval="0:7", observers=("rts-auto",)
+    )
+    modelled = analyse_log(FIXTURE, asked)
+    plain = analyse_log(FIXTURE, replace(asked, remove_bias="none"))
+    assert mean_rmse(modelled, "rts-auto") < 0.8 * mean_rmse(plain, "rts-auto")
+    assert any("cross-validated" in note for note in modelled.notes)
+
+
+def test_what_limits_the_log_is_said_joint_by_joint(worked_up: Analysis) -> None:
+    found = worked_up.workup
+    assert found is not None
+    budget = found.budgets[-1]
+    sentence = found.notes[-1]
+    assert sentence.startswith("what limits rts-auto on this log: J1 ")
+    assert "J5 stiction at rest" in sentence
+    assert all(np.all(part >= 0.0) for part in budget.parts.values())
+    # its parts but bandwidth are the free rms, cause by cause
+    read = np.mean(worked_up.estimates[-1].tau[found.survey.part.inside] ** 2, axis=0)
+    parts = sum(budget.parts[cause] ** 2 for cause in ("noise", "friction", "model"))
+    np.testing.assert_allclose(parts, read, rtol=1e-9)
+
+
+def test_innovations_of_the_tuned_filter_have_their_expected_size(worked_up: Analysis) -> None:
+    found = worked_up.workup
+    assert found is not None
+    by_name = {one.name: one for one in found.consistency}
+    assert set(by_name) == {"kfo-zoh", "kfo-auto"}
+    # R is scaled to the loaded part; the free fifth of the log pulls the mean down
+    assert np.all((by_name["kfo-auto"].nis > 0.6) & (by_name["kfo-auto"].nis < 1.5))
+    assert np.all(by_name["kfo-zoh"].nis < 0.1)
+
+
+def test_a_log_that_repeats_nothing_falls_back_and_says_so() -> None:
+    request = AnalysisChoice(robot="ur5", interval="4.5:6", observers=("rts-auto", "kfo-rts"))
+    analysis = analyse_log(FIXTURE, request)
+    assert any("rts-auto: no free part to tune on" in note for note in analysis.notes)
+    assert any("State one with --free-part A:B or --free LOG" in note for note in analysis.notes)
+    auto, by_hand = analysis.estimates
+    np.testing.assert_array_equal(auto.tau, by_hand.tau)
+    assert auto.band is None
+
+
+def test_a_free_part_that_is_too_short_falls_back_and_says_so() -> None:
+    request = AnalysisChoice(robot="ur5", free_part="0:0.1", observers=("rts-auto",))
+    analysis = analyse_log(FIXTURE, request)
+    assert any("no spectra: a spectrum needs 32 samples" in note for note in analysis.notes)
+    assert analysis.estimates[0].band is None
+
+
+def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
+    """Two free cycles of one log: the part is no quieter than the rest."""
+    recording = open_log(FIXTURE, AnalysisChoice(robot="ur5", interval="0:4"))
+    twice = replace(
+        recording,
+        t=np.concatenate([recording.t, recording.t + 4.0 + recording.step]),
+        **{
+            name: np.concatenate([value, value])
+            for name in ("q", "dq", "current")
+            if (value := getattr(recording, name)) is not None
+        },
+        **dict.fromkeys(
+            ("target_q", "target_dq", "target_current", "target_torque", "temperature", "wrench")
+        ),
+    )
+    request = AnalysisChoice(robot="ur5", observers=("kfo-auto",))
+    analysis = analyse(twice, choose_robot(request, twice), request)
+    assert any("is not much quieter than the rest" in note for note in analysis.notes)
+    assert analysis.estimates[0].band is None
+
+
+def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: AnalysisChoice) -> None:
+    """Its quietest cycle is pushed too: hand-set gains, no bands, no bias removed, all said."""
+    always = replace(request_, interval="4.3:20", observers=("rts-auto", "kfo-rts"))
+    analysis = analyse_log(FIXTURE, always)
+    assert any("something touches the arm in all of them" in note for note in analysis.notes)
+    np.testing.assert_array_equal(analysis.estimates[0].tau, analysis.estimates[1].tau)
+    assert analysis.estimates[0].band is None
+    with pytest.raises(ParameterError, match="something touches the arm in all of them"):
+        analyse_log(FIXTURE, replace(always, remove_bias="free-cycle"))
+    # what the user states is not doubted
+    stated = analyse_log(FIXTURE, replace(always, free_cycles="1"))
+    assert stated.estimates[0].band is not None
+
+
+def test_a_gap_in_the_log_is_survived() -> None:
+    """Half a second is missing amid a push: everything stays finite."""
+    request = AnalysisChoice(
+        robot="ur5", observers=("kfo-auto", "rts-auto"), remove_bias="free-cycle"
+    )
+    whole = open_log(FIXTURE, request)
+    keep = (whole.t < 9.0) | (whole.t > 9.5)
+    names = ("t", "q", "dq", "current")
+    cut = replace(
+        whole,
+        **{name: getattr(whole, name)[keep] for name in names},
+        **dict.fromkeys(
+            ("target_q", "target_dq", "target_current", "target_torque", "temperature", "wrench")
+        ),
+    )
+    analysis = analyse(cut, choose_robot(request, cut), request)
+    for estimate in analysis.estimates:
+        assert np.all(np.isfinite(estimate.tau))
+        assert estimate.band is not None
+        assert np.all(np.isfinite(estimate.band))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"remove_bias": "all"}, "there is none, free-cycle, model"),
+        ({"free_part": "40:50"}, "it must be a part of the log"),
+        ({"free_part": "4"}, "is not A:B"),
+        ({"remove_bias": "free-cycle", "interval": "4.5:6"}, "needs a motion that repeats"),
+        ({"remove_bias": "model", "interval": "4.5:6"}, "needs a free part"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line(changes: dict[str, str], message: str) -> None:
+    request = replace(AnalysisChoice(robot="ur5", observers=("kfo-zoh",)), **changes)
+    with pytest.raises(VftError, match=message) as caught:
+        analyse_log(FIXTURE, request)
+    assert "\n" not in str(caught.value)
+
+
+def test_bias_removal_needs_no_tuned_observer() -> None:
+    request = AnalysisChoice(robot="ur5", observers=("gmo",), remove_bias="free-cycle")
+    estimate = analyse_log(FIXTURE, request).estimates[0]
+    plain = analyse_log(FIXTURE, AnalysisChoice(robot="ur5", observers=("gmo",))).estimates[0]
+    assert estimate.band is not None
+    assert plain.band is None
+    assert np.max(np.abs(estimate.tau - plain.tau)) > 0.5
+
+
+def test_an_unknown_gains_file_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "gains.toml"
+    file.write_text("[observers.gmo]\ngian = 3.0\n", encoding="utf-8")
+    with pytest.raises(ParameterError, match="Did you mean gain"):
+        analyse_log(FIXTURE, AnalysisChoice(robot="ur5", gains_file=file))
+    file.write_text("gain = 3.0\n", encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"no \[observers"):
+        analyse_log(FIXTURE, AnalysisChoice(robot="ur5", gains_file=file))

@@ -1,0 +1,91 @@
+"""Bands, curves and limits reach the Parquet, the page, the recording and `run.json`."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from vftcli.analysis import Analysis
+from vftcli.outputs.log.parquet import estimates_table
+from vftcli.outputs.log.rerun_recording import line_groups
+from vftcli.outputs.log.run_record import run_record, to_json
+from vftcli.outputs.page.page import render
+from vftcli.outputs.page.payload import payload
+
+
+def test_the_parquet_holds_the_band_beside_the_covariance(worked_up: Analysis) -> None:
+    table = estimates_table(worked_up)
+    assert isinstance(table, pl.DataFrame)
+    for j in (1, 6):
+        band = worked_up.estimates[-1].band
+        assert band is not None
+        np.testing.assert_array_equal(table[f"band/rts-auto/{j}"].to_numpy(), band[:, j - 1])
+        assert f"sd/rts-auto/{j}" in table.columns
+
+
+def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -> None:
+    data = json.loads(payload(worked_up))
+    tau, error = data["charts"][:2]
+    halves = {s["name"]: s["half"] for s in tau["series"]}
+    band = worked_up.estimates[-1].band
+    assert band is not None
+    np.testing.assert_allclose(halves["rts-auto"], 1.96 * band[0])
+    assert all(s["half"] is None for s in error["series"])
+    charts = {chart["key"]: chart for chart in data["responses"]}
+    assert [s["name"] for s in charts["curve"]["series"]] == ["kfo-auto", "rts-auto"]
+    assert len(charts["spectra"]["series"]) == 2
+    page = render(worked_up)
+    assert "What the complete log tells" in page
+    assert "Error budget in N·m rms" in page
+    assert re.search(r"mean NIS \(1\)", page)
+
+
+def test_the_recording_shows_both_edges_of_the_last_band(worked_up: Analysis) -> None:
+    lines = line_groups(worked_up)["External torque"][0]
+    upper = lines.values[:, lines.names.index("rts-auto 95 % upper")]
+    lower = lines.values[:, lines.names.index("rts-auto 95 % lower")]
+    estimate = worked_up.estimates[-1]
+    assert estimate.band is not None
+    np.testing.assert_allclose(0.5 * (upper + lower), estimate.tau[:, 0], atol=1e-9)
+    np.testing.assert_allclose(upper - lower, 2 * 1.96 * estimate.band[:, 0], rtol=1e-9)
+    assert not any("kfo-auto 95 %" in name for name in lines.names)
+
+
+def test_run_json_records_what_was_chosen(worked_up: Analysis) -> None:
+    record = json.loads(to_json(run_record(worked_up, "vftcli report")))
+    told = record["complete_log"]
+    assert told["bias_removed"] == "none"
+    assert len(told["tuned"]["rts-auto"]["omega_n_rad_s"]) == 6
+    assert set(told["error_budget_Nm"]) == {e.name for e in worked_up.estimates}
+    assert "filter" in next(o["parameters"] for o in record["observers"] if o["name"] == "rts-auto")
+
+
+def test_a_run_that_asks_for_nothing_shows_nothing() -> None:
+    from vftcli.pipeline import AnalysisChoice, analyse_log
+
+    fixture = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
+    plain = analyse_log(fixture, AnalysisChoice(robot="ur5", interval="0:5", observers=("gmo",)))
+    assert plain.workup is None
+    assert "What the complete log tells" not in render(plain)
+    assert json.loads(to_json(run_record(plain, "")))["complete_log"] is None
+
+
+@pytest.mark.parametrize("frame", ["base", "flange"])
+def test_the_wrench_takes_its_band_from_the_joint_torques(frame: str) -> None:
+    from vftcli.pipeline import AnalysisChoice, analyse_log
+    from vftcli.virtual_sensor.sensor_reading import WrenchRequest
+
+    fixture = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
+    request = AnalysisChoice(
+        robot="ur5", observers=("rts-auto",), wrench=WrenchRequest(frame=frame), interval="0:12"
+    )
+    analysis = analyse_log(fixture, request)
+    assert analysis.virtual_sensor is not None
+    assert any("measured on the log's free part" in n for n in analysis.virtual_sensor.notes)
+    # the covariance of the filter alone would say another thing
+    wrench = analysis.virtual_sensor.wrenches[0]
+    assert wrench.sd is not None
+    assert np.all(np.isfinite(wrench.sd))

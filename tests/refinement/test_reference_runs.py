@@ -1,0 +1,139 @@
+"""The figures a complete log was asked for: reference simulation, other engines, real logs."""
+
+import gzip
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from vftcli.analysis import Analysis
+from vftcli.pipeline import AnalysisChoice, analyse_log, choose_observers, look_over
+from vftcli.refinement.refine import work_up
+from vftcli.robots.terms import dynamics_terms
+from vftcli.simulation import load_scenario, simulate
+
+UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+
+
+def mean_rmse(analysis: Analysis, observer: str) -> float:
+    assert analysis.errors is not None
+    return float(analysis.errors.filter(pl.col("observer") == observer)["rmse_Nm"].mean())
+
+
+def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
+    """Ratios to the hand-set filters, and coverages, of one reference run."""
+    run = simulate(load_scenario("ur5-circle", [f"contacts.hand.style={style}"]), seed)
+    log, robot, truth = run.recording, run.robot, run.truth.tau_ext
+    asked = AnalysisChoice(observers=("kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto"), bands=True)
+    terms = dynamics_terms(log, robot)
+    found = look_over(log, robot, terms, asked)
+    assert found is not None
+    observers, _ = choose_observers(asked, robot, log, found)
+    estimates = [observer.estimate(terms) for observer in observers]
+    discrete = replace(asked, settings=("kfo.noise_convention=discrete",))
+    quick = [o.estimate(terms) for o in choose_observers(discrete, robot, log, found)[0][:2]]
+    banded, _ = work_up(found, log, robot, observers, estimates)
+    rid = replace(asked, remove_bias="free-cycle")
+    relieved = look_over(log, robot, terms, rid)
+    assert relieved is not None
+    tuned, _ = choose_observers(rid, robot, log, relieved)
+    raw = [observer.estimate(terms) for observer in tuned]
+    unbiased, _ = work_up(relieved, log, robot, tuned, raw, "free-cycle")
+    moving = found.stuck == 0
+
+    def error(tau: np.ndarray) -> float:
+        return float(np.sqrt(np.mean((tau - truth) ** 2, axis=0))[moving].mean())
+
+    density, faster = error(estimates[0].tau), error(quick[0].tau)
+    shown = [error(x) for x in (quick[1].tau, estimates[3].tau, unbiased[3].tau)]
+    ratios = [e / d for e in shown for d in (density, faster)]
+    covered = [
+        float(np.mean((np.abs(e.tau - truth) <= 1.96 * e.band)[:, moving]))
+        for e in (banded[2], banded[3])
+        if e.band is not None
+    ]
+    return [*ratios, error(estimates[2].tau) / min(density, faster)], covered
+
+
+@pytest.mark.statistical
+def test_reference_runs_reach_their_ratios_and_coverage() -> None:
+    """Five seeds each of taps, mixed and slow pushes.
+
+    Measured means: smoother .287/.549 of KFO density/discrete, tuned .259/.500, without bias
+    .089/.170; the tuned filter at worst .956 of the better hand setting; bands cover 95.3 % and
+    96.4 %.
+    """
+    runs = [one_run(style, seed) for style in ("taps", "mixed", "slow") for seed in range(1, 6)]
+    ratios, covered = (np.array(x) for x in zip(*runs, strict=True))
+    assert np.all(ratios[:, :6].mean(axis=0) <= [0.60, 0.85, 0.45, 0.70, 0.36, 0.55])
+    assert np.all(ratios[:, 6] <= 1.05)
+    assert np.all((covered.mean(axis=0) >= 0.93) & (covered.mean(axis=0) <= 0.99))
+
+
+def test_mujoco_ur5e(logs: Path) -> None:
+    """An independent engine: the tuned smoother at most 0.6 of GMO(30). Measured .53."""
+    folder = logs / "mujoco_ur5e"
+    request = AnalysisChoice(
+        robot=str(folder / "robot.toml"),
+        settings=("gmo.gain=30",),
+        reference="vendor",
+        observers=("gmo", "rts-auto"),
+    )
+    analysis = analyse_log(folder / "circle.csv", request)
+    assert mean_rmse(analysis, "rts-auto") <= 0.6 * mean_rmse(analysis, "gmo")
+
+
+def test_libfranka_simulation(logs: Path, tmp_path: Path) -> None:
+    """Behind Franka's own protocol; the log repeats nothing, so its free part is stated.
+
+    Measured .39 of GMO(30).
+    """
+    folder = logs / "libfranka_sim"
+    for name in ("pushes.csv", "pushes_truth.csv"):
+        with gzip.open(folder / f"{name}.gz") as packed, (tmp_path / name).open("wb") as plain:
+            shutil.copyfileobj(packed, plain)
+    request = AnalysisChoice(
+        robot=str(folder / "robot.toml"),
+        settings=("gmo.gain=30",),
+        reference=f"file:{tmp_path / 'pushes_truth.csv'}",
+        interval="1.5:27.5",
+        free_part="1.5:6",
+        observers=("gmo", "rts-auto"),
+    )
+    analysis = analyse_log(tmp_path / "pushes.csv", request)
+    assert mean_rmse(analysis, "rts-auto") <= 0.6 * mean_rmse(analysis, "gmo")
+
+
+def test_ur10e_payload_by_the_free_run(logs: Path) -> None:
+    """Real: bias removed by the free run, at most 0.7 of the best causal observer as it stands.
+
+    Measured .35; without bias removal .92, as the drive's friction is in every estimate alike.
+    """
+    folder = logs / "ur10e"
+    request = AnalysisChoice(
+        robot="ur10e",
+        columns=UR10E,
+        reference="two-cycle",
+        free=(folder / "free_14harm.csv",),
+        observers=("fdo", "gmo", "kfo-fe", "kfo-zoh", "rts-auto"),
+        bands=True,
+    )
+    path = folder / "load_14harm.csv"
+    plain = analyse_log(path, request)
+    unbiased = analyse_log(path, replace(request, remove_bias="free-cycle"))
+    causal = min(mean_rmse(plain, name) for name in request.observers[:4])
+    assert mean_rmse(plain, "rts-auto") <= causal
+    assert mean_rmse(unbiased, "rts-auto") <= 0.7 * causal
+
+
+def test_ur10e_pushes_between_which_stiction_is_named(logs: Path) -> None:
+    """Real: a held pose; what is left between pushes is stiction, and is said to be."""
+    request = AnalysisChoice(robot="ur10e", columns=UR10E, free_part="0:2", observers=("rts-auto",))
+    analysis = analyse_log(logs / "ur10e" / "push_pose.csv", request)
+    assert any(
+        "J1, J2, J3, J4, J5, J6 rest in most of the log: stiction" in note
+        for note in analysis.notes
+    )

@@ -1,0 +1,68 @@
+"""Repeated motions without dynamics, and the simulated circle with its truth."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from vftcli.readers import read
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Circle:
+    """The simulated UR5 circle of the fixtures and what really happened.
+
+    Attributes:
+        recording: The log.
+        truth: True external torque at its samples. (T, n) [N·m]
+    """
+
+    recording: Recording
+    truth: Array
+
+
+@pytest.fixture(scope="session")
+def circle() -> Circle:
+    recording = read(FIXTURES / "ur5_circle.csv")
+    table = pl.read_parquet(FIXTURES / "ur5_circle.csv.truth.parquet")
+    t = table["t"].to_numpy() - recording.source.t0
+    columns = [table[f"tau_ext/{j}"].to_numpy() for j in range(1, 7)]
+    truth = np.column_stack([np.interp(recording.t, t, column) for column in columns])
+    return Circle(recording=recording, truth=truth)
+
+
+@pytest.fixture
+def repeated() -> Callable[..., Recording]:
+    """A log of a periodic joint motion, as six harmonics would draw it."""
+
+    def make(
+        period: float = 3.7,
+        cycles: float = 4.0,
+        rate: float = 100.0,
+        approach: float = 0.0,
+        hold: float = 0.0,
+        start: float = 0.0,
+        push: float = 0.0,
+        seed: int = 0,
+    ) -> Recording:
+        rng = np.random.default_rng(seed)
+        t = np.arange(0.0, hold + approach + cycles * period + hold, 1.0 / rate)
+        s = np.clip(t - hold - approach, 0.0, cycles * period) + start
+        phase = 2.0 * np.pi * s[:, None] / period
+        order, turn = np.array([1, 1, 2, 1, 2, 3]), np.arange(6.0)
+        q = 0.3 * np.sin(order * phase + turn)
+        way = np.clip((t - hold) / approach, 0.0, 1.0)[:, None] if approach else 1.0
+        q = q + 0.8 * (np.cos(np.pi * way) + 1.0) * np.ones(6)
+        q = q + push * np.sin(0.9 * t)[:, None] ** 8 * np.linspace(1.0, 0.2, 6)
+        q = q + 5e-5 * rng.standard_normal(q.shape)
+        dq = np.gradient(q, t, axis=0)
+        return Recording(t=t, q=q, dq=np.where(np.abs(dq) < 0.008, 0.0, dq))
+
+    return make

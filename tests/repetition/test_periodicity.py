@@ -1,0 +1,109 @@
+"""The period, the cycles, and one clear line for each log that has none."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.readers import read
+from vftcli.repetition.cycles import parse_cycles, segment
+from vftcli.repetition.periodicity import find_period
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.recording import Recording
+
+Make = Callable[..., Recording]
+
+WITHIN = 2e-4
+"""Required: the period to 0.02 %."""
+
+
+@pytest.mark.parametrize("period", [1.234, 3.7, 4.012])
+@pytest.mark.parametrize("rate", [30.0, 125.0, 1000.0])
+def test_period_below_the_sample_time(repeated: Make, period: float, rate: float) -> None:
+    found = find_period(repeated(period=period, rate=rate))
+    assert found.seconds == pytest.approx(period, rel=WITHIN)
+
+
+@pytest.mark.parametrize("push", [0.02, 0.05])
+def test_pushes_do_not_pull_the_period(repeated: Make, push: float) -> None:
+    """Pushes of 20 and 50 mrad, as a soft servo gives way, three times those of the paper's arm."""
+    found = find_period(repeated(push=push, cycles=5.0, rate=125.0))
+    assert found.seconds == pytest.approx(3.7, rel=WITHIN)
+
+
+def test_way_in_rests_and_start_amid_a_cycle(repeated: Make) -> None:
+    log = repeated(approach=2.0, hold=1.0, start=1.3, cycles=3.4)
+    period = find_period(log)
+    cycles = segment(log, period)
+    assert period.seconds == pytest.approx(3.7, rel=WITHIN)
+    assert cycles.whole == 3
+    # From the end of the way in, 3 s, less the last moments of it, which are within 0.1 rad.
+    assert 2.5 <= cycles.begin <= 3.0
+    assert cycles.end == pytest.approx(3.0 + 3.4 * 3.7, abs=0.1)
+
+
+def test_missing_samples(repeated: Make) -> None:
+    """A tenth of the samples lost at random, and half a second in one piece."""
+    log = repeated(rate=125.0)
+    keep = np.random.default_rng(1).random(log.samples) > 0.1
+    keep[600:660] = False
+    kept = replace(log, t=log.t[keep], q=log.q[keep], dq=log.dq[keep])
+    assert find_period(kept).seconds == pytest.approx(3.7, rel=WITHIN)
+
+
+def test_one_and_a_third_cycles_are_enough(repeated: Make) -> None:
+    log = repeated(cycles=1.33)
+    cycles = segment(log, find_period(log))
+    assert cycles.whole == 1
+    assert cycles.period == pytest.approx(3.7, rel=1e-3)  # one overlap of 1.2 s, 50 µrad noise
+
+
+def test_the_stated_period_decides_between_multiples(repeated: Make) -> None:
+    assert find_period(repeated(), 7.4).seconds == pytest.approx(7.4, rel=WITHIN)
+    assert find_period(repeated(), 3.75).seconds == pytest.approx(3.7, rel=WITHIN)
+
+
+@pytest.mark.parametrize(
+    ("stated", "message"),
+    [
+        (100.0, "does not fit into the 14.79 s"),
+        (14.0, "more than one cycle"),
+        (0.0, "must be positive"),
+        (0.01, "in seconds"),
+        (3.0, "no repetition found near 3 s"),
+    ],
+)
+def test_impossible_periods(repeated: Make, stated: float, message: str) -> None:
+    with pytest.raises(ReferenceTorqueError, match=message):
+        find_period(repeated(), stated)
+
+
+def test_no_repetition(repeated: Make) -> None:
+    log = repeated()
+    wandering = replace(log, q=log.q + 0.1 * log.t[:, None])
+    with pytest.raises(ReferenceTorqueError, match=r"no repetition found.*--free"):
+        find_period(wandering)
+
+
+def test_an_arm_at_rest(repeated: Make) -> None:
+    log = repeated()
+    still = replace(log, q=np.tile(log.q[:1], (log.samples, 1)), dq=np.zeros(log.q.shape))
+    with pytest.raises(ReferenceTorqueError, match="does not move"):
+        find_period(still)
+
+
+def test_sweeps_of_a_real_arm_are_no_repetition(logs: Path) -> None:
+    """Single-joint sweeps come back nearly, at another speed each time."""
+    columns = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+    log = read(logs / "ur10e" / "jointwise_2.csv", columns=columns)
+    with pytest.raises(ReferenceTorqueError, match="no repetition"):
+        find_period(log)
+
+
+def test_lists_of_cycles() -> None:
+    assert parse_cycles("1") == (1,)
+    assert parse_cycles("1, 3-5,3") == (1, 3, 4, 5)
+    with pytest.raises(ReferenceTorqueError, match="1 or 1,2 or 1-3"):
+        parse_cycles("first")

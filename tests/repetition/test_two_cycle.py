@@ -1,0 +1,197 @@
+"""The two-cycle difference against the simulated truth, and on real pairs of logs."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import pytest
+
+from vftcli.readers import read
+from vftcli.repetition.ladder import RUNGS
+from vftcli.repetition.two_cycle import TwoCycleOptions, two_cycle_difference
+from vftcli.robots import Robot, load_robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.recording import Recording
+
+
+class Circle(Protocol):
+    """The fixture `circle`: a log and its truth."""
+
+    recording: Recording
+    truth: Array
+
+
+MOVING = [0, 1, 2, 3, 5]
+"""J5 of the circle rests; it is not judged."""
+
+HONEST = (0.7, 1.4)
+"""Required: true over reported error."""
+
+UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+
+
+@pytest.fixture(scope="module")
+def ur5() -> Robot:
+    return load_robot("ur5")
+
+
+@pytest.fixture(scope="module")
+def repeats(logs: Path) -> dict[str, Recording]:
+    folder = logs / "ur10e"
+    return {k: read(folder / f"free_repeat_{k}.csv", columns=UR10E) for k in "abc"}
+
+
+def error_of(reference: ExternalTorque, truth: Array) -> Array:
+    """True root-mean-square error of a reference. (n,) [N·m]"""
+    return np.asarray(np.sqrt(np.nanmean((reference.tau - truth) ** 2, axis=0)))
+
+
+def test_default_beats_the_commanded_period(circle: Circle, ur5: Robot) -> None:
+    """Required: at most 0.6 times its error, mean over J1–J4 and J6."""
+    best = two_cycle_difference(circle.recording, (), ur5)
+    plain = TwoCycleOptions(period=4.0, alignment="commanded", low_pass="none")
+    commanded = two_cycle_difference(circle.recording, (), ur5, plain)
+    errors = [error_of(r, circle.truth)[MOVING].mean() for r in (best, commanded)]
+    assert errors[0] <= 0.6 * errors[1]
+
+
+@pytest.mark.parametrize("low_pass", ["none", "12", "6"])
+@pytest.mark.parametrize("rung", RUNGS)
+def test_every_rung_knows_its_error(circle: Circle, ur5: Robot, rung: str, low_pass: str) -> None:
+    options = TwoCycleOptions(period=4.0, alignment=rung, low_pass=low_pass)
+    reference = two_cycle_difference(circle.recording, (), ur5, options)
+    assert reference.floor is not None
+    ratio = (error_of(reference, circle.truth) / reference.floor)[MOVING]
+    # Required of the default rung; the others take J4's short stops for worse than they are.
+    least = HONEST[0] if (rung, low_pass) == ("model", "12") else 0.6
+    assert np.all((ratio >= least) & (ratio <= HONEST[1])), ratio
+
+
+def test_free_cycle_and_joint_at_rest_are_told(circle: Circle, ur5: Robot) -> None:
+    reference = two_cycle_difference(circle.recording, (), ur5)
+    t = circle.recording.t
+    assert np.isnan(reference.tau[t < 3.99]).all()  # the free cycle has no reference of its own
+    assert np.isfinite(reference.tau[(t > 4.01) & (t < 19.9)]).all()
+    assert reference.mostly_rests == (False, False, False, False, True, False)
+    text = " ".join(reference.remarks)
+    assert "free: cycle 1 of 5, found by the smallest residual" in text
+    assert "J5 rests in 100 % of the samples" in text
+    assert "alignment used:" in text
+
+
+def test_sign(circle: Circle, ur5: Robot) -> None:
+    """Positive is torque on the robot: the truth and the difference go together."""
+    reference = two_cycle_difference(circle.recording, (), ur5)
+    known = np.isfinite(reference.tau[:, 0])
+    both = np.corrcoef(reference.tau[known, 0], circle.truth[known, 0])
+    assert both[0, 1] > 0.99
+
+
+def test_two_free_cycles_measure_the_floor(circle: Circle, ur5: Robot) -> None:
+    """Given cycles 2 and 3, both pushed, the measured floor must say how wrong that is."""
+    options = TwoCycleOptions(free_cycles="2,3")
+    pushed = two_cycle_difference(circle.recording, (), ur5, options)
+    free = two_cycle_difference(circle.recording, (), ur5)
+    assert pushed.floor is not None
+    assert free.floor is not None
+    assert np.all(pushed.floor[MOVING] > 1.5 * free.floor[MOVING])
+    assert any("floor measured between the free runs" in note for note in pushed.remarks)
+
+
+def test_missing_samples(circle: Circle, ur5: Robot) -> None:
+    """Five per cent lost at random and a gap of 0.2 s: still honest, and the gap is left out."""
+    log = circle.recording
+    keep = np.random.default_rng(2).random(log.samples) > 0.05
+    keep[100:125] = False
+    names = ("t", "q", "dq", "current")
+    cut = Recording(**{n: getattr(log, n)[keep] for n in names}, robot_hint=log.robot_hint)
+    reference = two_cycle_difference(cut, (), ur5)
+    assert reference.floor is not None
+    ratio = (error_of(reference, circle.truth[keep]) / reference.floor)[MOVING]
+    assert np.all((ratio >= HONEST[0]) & (ratio <= HONEST[1])), ratio
+    hole = (cut.t > 4.0 + 0.85) & (cut.t < 4.0 + 0.95)  # samples 100 to 124 one cycle later
+    assert np.isnan(reference.tau[hole]).all()
+
+
+def test_rungs_and_filters_that_do_not_exist(circle: Circle, ur5: Robot) -> None:
+    def make(**options: object) -> None:
+        asked = TwoCycleOptions(**options)  # type: ignore[arg-type]
+        two_cycle_difference(circle.recording, (), ur5, asked)
+
+    with pytest.raises(ReferenceTorqueError, match="commanded, period, phase, model"):
+        make(alignment="best")
+    with pytest.raises(ReferenceTorqueError, match="add --period S"):
+        make(alignment="commanded")
+    with pytest.raises(ReferenceTorqueError, match=r"between 0 and 62\.5 Hz"):
+        make(low_pass="80")
+    with pytest.raises(ReferenceTorqueError, match="no cycle 7; the log holds 5"):
+        make(free_cycles="7")
+
+
+def test_a_log_is_not_its_own_free_run(circle: Circle, ur5: Robot) -> None:
+    with pytest.raises(ReferenceTorqueError, match="is the log itself"):
+        two_cycle_difference(circle.recording, circle.recording, ur5)
+
+
+def test_options_of_one_log_do_not_go_with_two(circle: Circle, ur5: Robot) -> None:
+    source = replace(circle.recording.source, path=Path("other.csv"))
+    other = replace(circle.recording, source=source)
+    with pytest.raises(ReferenceTorqueError, match="leave them away with --free"):
+        two_cycle_difference(circle.recording, other, ur5, TwoCycleOptions(period=4.0))
+
+
+@pytest.mark.parametrize("pair", ["ab", "ac", "ba", "bc", "ca", "cb"])
+@pytest.mark.parametrize("low_pass", ["none", "auto"])
+def test_floor_covers_real_free_pairs(
+    repeats: dict[str, Recording], pair: str, low_pass: str
+) -> None:
+    """The same free motion twice: what the difference shows on moving samples is its error."""
+    robot = load_robot("ur10e")
+    options = TwoCycleOptions(low_pass=low_pass)
+    reference = two_cycle_difference(repeats[pair[0]], repeats[pair[1]], robot, options)
+    assert reference.floor is not None
+    assert reference.trusted is not None
+    moving = reference.trusted > 0
+    shown = np.sqrt(np.nanmean(np.where(moving, reference.tau, np.nan) ** 2, axis=0))
+    ratio = shown / reference.floor
+    assert np.all((ratio >= HONEST[0]) & (ratio <= HONEST[1])), ratio
+
+
+def test_three_free_runs_measure_the_floor(repeats: dict[str, Recording]) -> None:
+    free = [repeats["b"], repeats["c"]]
+    reference = two_cycle_difference(repeats["a"], free, load_robot("ur10e"))
+    assert reference.floor is not None
+    assert reference.trusted is not None
+    shown = np.where(reference.trusted > 0, reference.tau, np.nan)
+    ratio = np.sqrt(np.nanmean(shown**2, axis=0)) / reference.floor
+    assert np.all((ratio >= HONEST[0]) & (ratio <= HONEST[1])), ratio
+
+
+def test_a_payload_is_seen(logs: Path) -> None:
+    """Documented: the difference correlates 0.986 (J2) and 0.977 (J3) with the load's gravity."""
+    import pinocchio as pin
+
+    robot = load_robot("ur10e")
+    loaded, free = (
+        read(logs / "ur10e" / f"{k}_14harm.csv", columns=UR10E) for k in ("load", "free")
+    )
+    reference = two_cycle_difference(loaded, free, robot)
+    model, data = robot.model, robot.model.createData()
+    frame = model.getFrameId("flange")
+    weight = []
+    for q in loaded.q[::10]:
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        jacobian = pin.getFrameJacobian(model, data, frame, axes)
+        weight.append(-9.81 * jacobian[2])
+    gravity, shown = np.array(weight), reference.tau[::10]
+    known = np.isfinite(shown[:, 1]) & (np.abs(loaded.dq[::10]).max(axis=1) > 0.01)
+    for joint, least in ((1, 0.97), (2, 0.95)):
+        assert np.corrcoef(gravity[known, joint], shown[known, joint])[0, 1] > least
+    mass = np.sum(gravity[known, 1] * shown[known, 1]) / np.sum(gravity[known, 1] ** 2)
+    # 2.805 kg with its centre of mass anywhere near the flange: a lever of 1 m, give or take 0.1 m.
+    assert mass == pytest.approx(2.805, rel=0.1)

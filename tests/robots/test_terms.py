@@ -1,0 +1,92 @@
+"""DynamicsTerms: μ as (33) defines it, and what is said when a signal is missing."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from vftcli.robots import load_robot
+from vftcli.robots.drive import drive_torque
+from vftcli.robots.terms import dynamics_terms
+from vftcli.signals.errors import MissingSignalError, RobotError
+from vftcli.signals.recording import Recording
+
+
+def motion(joints: int, samples: int = 400, rate: float = 500.0) -> tuple[np.ndarray, ...]:
+    t = np.arange(samples) / rate
+    phase = np.linspace(0.0, 2.0, joints)
+    angle = 2.0 * np.pi * 0.5 * t[:, None] + phase
+    w = np.pi
+    return t, 0.5 * np.sin(angle), 0.5 * w * np.cos(angle), -0.5 * w**2 * np.sin(angle)
+
+
+def test_mu_integrates_to_the_momentum_of_free_motion() -> None:
+    """On torque made by Pinocchio's inverse dynamics, ṗ = μ: nothing is left to explain."""
+    robot = load_robot("ur5").without_friction()
+    t, q, dq, ddq = motion(6)
+    data = robot.model.createData()
+    tau = np.array([pin.rnea(robot.model, data, *x) for x in zip(q, dq, ddq, strict=True)])
+    terms = dynamics_terms(Recording(t=t, q=q, dq=dq, torque=tau), robot)
+    step = t[1] - t[0]
+    change = np.diff(terms.p, axis=0) - 0.5 * step * (terms.mu[1:] + terms.mu[:-1])
+    # trapezoidal rule: Ts³/12 of p''' per step, p''' below 2e3 N·m/s² on this motion
+    np.testing.assert_allclose(change, 0.0, atol=step**3 / 12 * 2e3)
+
+
+def test_current_becomes_torque_through_the_drive_constant() -> None:
+    robot = load_robot("ur5")
+    t, q, dq, _ = motion(6)
+    current = np.ones_like(q)
+    torque = drive_torque(Recording(t=t, q=q, dq=dq, current=current), robot)
+    np.testing.assert_array_equal(torque[0], [12.625, 12.625, 12.625, 9.3122, 9.3122, 9.3122])
+
+
+def test_a_link_torque_robot_prefers_torque_and_a_current_robot_current() -> None:
+    t, q, dq, _ = motion(6)
+    both = Recording(t=t, q=q, dq=dq, current=np.ones_like(q), torque=np.full_like(q, 7.0))
+    assert drive_torque(both, load_robot("ur5"))[0, 0] == 12.625
+    t, q, dq, _ = motion(7)
+    both = Recording(t=t, q=q, dq=dq, current=np.ones_like(q), torque=np.full_like(q, 7.0))
+    assert drive_torque(both, load_robot("panda"))[0, 0] == 7.0
+
+
+def test_friction_is_taken_off_and_literal_dynamics_agree() -> None:
+    robot = load_robot("panda")
+    t, q, dq, _ = motion(7)
+    recording = Recording(t=t, q=q, dq=dq, torque=np.zeros_like(q))
+    rough, smooth = (
+        dynamics_terms(recording, robot),
+        dynamics_terms(recording, robot.without_friction()),
+    )
+    from vftcli.robots.friction import friction_torque
+
+    np.testing.assert_allclose(
+        smooth.mu - rough.mu, friction_torque(robot.friction, dq), atol=1e-12
+    )
+    literal = dynamics_terms(recording, robot, literal=True)
+    np.testing.assert_allclose(literal.mu, rough.mu, atol=5e-6)  # the literal method's own step
+
+
+@pytest.mark.parametrize(
+    ("missing", "words"),
+    [("dq", "no joint velocities"), ("current", "no motor currents")],
+)
+def test_a_missing_signal_is_named(missing: str, words: str) -> None:
+    t, q, dq, _ = motion(6)
+    signals = {"dq": dq, "current": np.ones_like(q)}
+    del signals[missing]
+    with pytest.raises(MissingSignalError, match=words):
+        dynamics_terms(Recording(t=t, q=q, **signals), load_robot("ur5"))
+
+
+def test_another_number_of_joints_is_refused() -> None:
+    t, q, dq, _ = motion(7)
+    recording = Recording(t=t, q=q, dq=dq, torque=q)
+    with pytest.raises(RobotError, match="7 joints but robot 'ur5' has 6"):
+        dynamics_terms(recording, load_robot("ur5"))
+
+
+def test_current_for_a_robot_without_drive_constants_is_refused() -> None:
+    t, q, dq, _ = motion(7)
+    recording = Recording(t=t, q=q, dq=dq, current=q)
+    with pytest.raises(MissingSignalError, match="no torque_constant"):
+        dynamics_terms(recording, load_robot("panda"))

@@ -1,0 +1,71 @@
+"""The bearing of Sec. IV-D, simulated: what hangs on the flange is what is read."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vftcli.pipeline import AnalysisChoice, analyse, choose_robot
+from vftcli.simulation import load_scenario, simulate
+from vftcli.virtual_sensor.sensor_reading import WrenchRequest
+
+WEIGHT = 9.2
+"""Weight of the bearing, Sec. IV-D. [N]"""
+
+
+def recorded(scenario):
+    """The first 9 s: moved unloaded from 0.5 to 3.5 s, the bearing hung on at 4 s."""
+    return simulate(replace(scenario, duration=9.0)).recording
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """The arm is what its profile says, but for the stiction that no profile has."""
+    scenario = load_scenario("panda-bearing")
+    return recorded(replace(scenario, mismatch=type(scenario.mismatch)()))
+
+
+@pytest.fixture(scope="module")
+def erring():
+    """The arm differs from its profile, as the scenario says."""
+    return recorded(load_scenario("panda-bearing"))
+
+
+def sensed(recording, **how):
+    request = AnalysisChoice(robot="panda", wrench=WrenchRequest(frame="base", **how))
+    return analyse(recording, choose_robot(request, recording), request)
+
+
+@pytest.mark.parametrize(("log", "share"), [("exact", 0.02), ("erring", 0.025)])
+def test_after_zeroing_the_bearing_weighs_what_it_weighs(log, share, request) -> None:
+    """Within 2 % of 9.2 N by every observer; the paper reads 9.66 N.
+
+    With errors in the profile the state in which stiction holds the loaded arm adds to it: 0.2 N
+    (measured 9.00, 9.16 and 9.15 N with seeds 1 to 3).
+    """
+    recording = request.getfixturevalue(log)
+    analysis = sensed(recording, zero=((2.0, 3.9),))
+    hung = (recording.t > 6.0) & (recording.t < 8.7)
+    for wrench in analysis.wrenches:
+        assert wrench.force[hung, 2].mean() == pytest.approx(-WEIGHT, rel=share), wrench.name
+    assert not analysis.virtual_sensor.warnings
+    assert all(drift.removed for drift in analysis.virtual_sensor.drifts)
+
+
+def test_a_zero_under_the_bearing_is_suspected(exact) -> None:
+    warnings = sensed(exact, zero=((6.0, 8.0),)).virtual_sensor.warnings
+    assert "looks like a contact" in warnings[0]
+
+
+def test_the_unloaded_start_ends_before_the_bearing(exact) -> None:
+    (start, stop) = sensed(exact, zero_start=True).virtual_sensor.drifts[0].span
+    assert start == pytest.approx(1.0)
+    assert 3.5 < stop < 4.0
+
+
+def test_with_the_exact_profile_the_moving_arm_reads_nothing(exact) -> None:
+    """F_z ≤ 0.6 N rms while moving unloaded: what is left is stiction the profile has not."""
+    moving = (exact.t > 0.5) & (exact.t < 3.5)
+    for wrench in sensed(exact).wrenches:
+        rms = np.sqrt(np.mean(wrench.force[moving, 2] ** 2))
+        assert rms <= 0.6, f"{wrench.name}: {rms:.3f} N"

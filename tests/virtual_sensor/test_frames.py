@@ -1,0 +1,185 @@
+"""Frames: the adjoint against Pinocchio, and what rotating a frame does to the answer."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vftcli.robots import load_robot
+from vftcli.robots.conventions import Pose, rpy
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.virtual_sensor.frames import (
+    FRAMES,
+    Mounting,
+    adjoint,
+    angles_of,
+    check_frame,
+    checked_pose,
+    from_base,
+    inverse,
+    pose_of_numbers,
+    read_pose,
+    to_base,
+)
+from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+
+angle = st.floats(-3.0, 3.0)
+length = st.floats(-1.0, 1.0)
+poses = st.builds(
+    lambda a, p: Pose(rpy(a), np.array(p)),
+    st.tuples(angle, angle, angle),
+    st.tuples(length, length, length),
+)
+wrenches = st.lists(st.floats(-50.0, 50.0), min_size=6, max_size=6).map(np.array)
+
+EXACT = 1e-12  # products of a few rotations and lengths of order one: rounding only
+
+
+def motion(samples: int = 40, joints: int = 6, seed: int = 3) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-1.5, 1.5, (samples, joints))
+
+
+@settings(max_examples=50, deadline=None)
+@given(poses, wrenches)
+def test_adjoint_is_pinocchios_action_on_forces(pose: Pose, wrench: np.ndarray) -> None:
+    """(56) in its right form is SE3(R, p).act(Force)."""
+    moved = pin.SE3(pose.rotation, pose.translation).act(pin.Force(wrench[:3], wrench[3:]))
+    np.testing.assert_allclose(adjoint(pose) @ wrench, moved.vector, atol=1e-11)
+
+
+@settings(max_examples=50, deadline=None)
+@given(poses, poses)
+def test_adjoints_compose_and_invert(first: Pose, second: Pose) -> None:
+    np.testing.assert_allclose(
+        adjoint(first @ second), adjoint(first) @ adjoint(second), atol=EXACT
+    )
+    np.testing.assert_allclose(adjoint(inverse(first)) @ adjoint(first), np.eye(6), atol=EXACT)
+
+
+@settings(max_examples=50, deadline=None)
+@given(poses, wrenches, wrenches)
+def test_power_does_not_depend_on_the_frame(
+    pose: Pose, wrench: np.ndarray, twist: np.ndarray
+) -> None:
+    """wᵀv is the same in both frames: the adjoint of forces is the dual of that of motions."""
+    moved = pin.SE3(pose.rotation, pose.translation).act(pin.Motion(twist[:3], twist[3:]))
+    power = float((adjoint(pose) @ wrench) @ moved.vector)
+    # products of 50 N and 50 m/s: relative rounding of 1e-13 on sums of up to 1e4
+    assert power == pytest.approx(float(wrench @ twist), abs=1e-8)
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_to_base_undoes_from_base(frame: str) -> None:
+    mounting = Mounting(
+        Pose(rpy((0.3, -0.2, 1.0)), np.array([0.1, 0.0, 0.2])), Pose(rpy((0, 0.4, 0)), np.zeros(3))
+    )
+    flange = np.array([rpy(a) for a in np.random.default_rng(1).uniform(-2, 2, (20, 3))])
+    both = to_base(frame, flange, mounting) @ from_base(frame, flange, mounting)
+    np.testing.assert_allclose(both, np.broadcast_to(np.eye(6), both.shape), atol=EXACT)
+
+
+def sensed(frame: str, mounting: Mounting, robot: str = "ur5", turn: np.ndarray | None = None):
+    """The wrench of one random torque, optionally with the base turned."""
+    from dataclasses import replace
+
+    chain = load_robot(robot).chain
+    if turn is not None:
+        first = chain.rotation.copy(), chain.translation.copy()
+        first[0][0], first[1][0] = turn @ first[0][0], turn @ first[1][0]
+        chain = replace(chain, rotation=first[0], translation=first[1])
+    q = motion(joints=chain.joints)
+    tau = np.random.default_rng(5).normal(size=q.shape)
+    torque = ExternalTorque(name="x", t=np.arange(len(q)) * 0.01, tau=tau)
+    return VirtualSensor(frame=frame, mounting=mounting).wrench(torque, q, chain)
+
+
+TOOL = Pose(rpy((0.2, 0.5, -0.4)), np.array([0.05, -0.1, 0.15]))
+TURN = rpy((0.7, -0.3, 1.9))
+
+
+def test_turning_the_base_turns_the_answer_in_base_axes_only() -> None:
+    plain, turned = sensed("base", Mounting()), sensed("base", Mounting(), turn=TURN)
+    expected = np.concatenate([plain.force @ TURN.T, plain.moment @ TURN.T], axis=1)
+    np.testing.assert_allclose(turned.known, expected, rtol=1e-9, atol=1e-9)
+    for frame in ("flange", "tool"):
+        same = sensed(frame, Mounting(tool=TOOL)), sensed(frame, Mounting(tool=TOOL), turn=TURN)
+        np.testing.assert_allclose(same[1].known, same[0].known, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("frame", ["tool", "sensor"])
+def test_turning_what_is_mounted_turns_the_answer(frame: str) -> None:
+    """A tool turned about its own point reads the same force in turned axes."""
+    other = Pose(TOOL.rotation @ TURN, TOOL.translation)
+    plain = sensed(frame, Mounting(tool=TOOL, sensor=TOOL))
+    turned = sensed(frame, Mounting(tool=other, sensor=other))
+    expected = np.concatenate([plain.force @ TURN, plain.moment @ TURN], axis=1)
+    np.testing.assert_allclose(turned.known, expected, rtol=1e-9, atol=1e-9)
+    assert turned.sd is not None
+    assert plain.sd is not None
+    # the variance summed over the axes of force is a trace, which no rotation changes
+    for part in (slice(0, 3), slice(3, 6)):
+        trace = np.sum(plain.sd[:, part] ** 2, axis=1)
+        np.testing.assert_allclose(np.sum(turned.sd[:, part] ** 2, axis=1), trace, rtol=1e-9)
+
+
+def test_moving_the_tool_moves_the_moment_by_the_lever() -> None:
+    lever = np.array([0.1, -0.2, 0.3])
+    flange = sensed("flange", Mounting())
+    tool = sensed("tool", Mounting(tool=Pose(np.eye(3), lever)))
+    np.testing.assert_allclose(tool.force, flange.force, atol=1e-9)
+    np.testing.assert_allclose(
+        tool.moment, flange.moment - np.cross(lever, flange.force), atol=1e-9
+    )
+
+
+def test_angles_are_rpy_turned_round() -> None:
+    angles = (0.3, -0.9, 2.2)
+    np.testing.assert_allclose(angles_of(rpy(angles)), angles, atol=1e-12)
+
+
+def test_an_unknown_frame_lists_those_there_are() -> None:
+    with pytest.raises(ParameterError, match=r"no frame 'wrist'.*flange.*base.*tool.*sensor"):
+        check_frame("wrist")
+
+
+def test_a_frame_without_its_pose_says_how_to_give_it() -> None:
+    with pytest.raises(ParameterError, match=r"no tool, so there is no Jacobian.*--tool"):
+        VirtualSensor(frame="tool")
+    with pytest.raises(ParameterError, match="--sensor-pose"):
+        VirtualSensor(frame="sensor")
+
+
+@pytest.mark.parametrize(
+    ("matrix", "words"),
+    [
+        (np.eye(3) * 1.01, "RᵀR differs"),
+        (np.diag([1.0, 1.0, -1.0]), "determinant is −1"),
+        (np.full((3, 3), np.nan), "finite"),
+    ],
+)
+def test_a_pose_that_is_no_rotation_is_refused(matrix: np.ndarray, words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        checked_pose(matrix, np.zeros(3), "--sensor-pose")
+
+
+def test_poses_are_read_as_three_six_or_twelve_numbers_or_a_name(tmp_path) -> None:
+    robot = load_robot("ur5")
+    short = read_pose("0.1,0,0.2", robot, "tool", "--tool")
+    long = read_pose("0.1,0,0.2,0.1,0.2,0.3", robot, "tool", "--tool")
+    np.testing.assert_array_equal(short.translation, [0.1, 0.0, 0.2])
+    np.testing.assert_allclose(long.rotation, rpy((0.1, 0.2, 0.3)))
+    whole = pose_of_numbers([0, 0, 1, *long.rotation.ravel()], "--tool")
+    np.testing.assert_allclose(whole.rotation, long.rotation)
+    with pytest.raises(ParameterError, match="5 numbers"):
+        read_pose("1,2,3,4,5", robot, "tool", "--tool")
+    with pytest.raises(ParameterError, match=r"no \[tool.gripper\]"):
+        read_pose("gripper", robot, "tool", "--tool")
+    assert robot.path is not None
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        robot.path.read_text(encoding="utf-8") + "\n[tool.gripper]\nxyz = [0, 0, 0.15]\n"
+    )
+    named = read_pose("gripper", load_robot(path), "tool", "--tool")
+    np.testing.assert_array_equal(named.translation, [0.0, 0.0, 0.15])

@@ -1,0 +1,170 @@
+"""A real sensor: its pose, weight and lag found again; conventions of vendors told apart."""
+
+import numpy as np
+import pytest
+
+from vftcli.evaluation.reference_sensor import sensor_reference
+from vftcli.robots import load_robot
+from vftcli.robots.conventions import Pose, rpy
+from vftcli.signals.errors import MissingSignalError, ParameterError
+from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import Wrench
+from vftcli.virtual_sensor.frames import Mounting, adjoint, inverse
+from vftcli.virtual_sensor.log_wrench import in_sensor_axes, logged_wrench, stated
+from vftcli.virtual_sensor.sensor import fit_pose, time_offset, weigh_tool
+from vftcli.virtual_sensor.vendor import axes_words, check_vendor, fit_axes
+
+POSE = Pose(rpy((0.1, -0.2, 0.8)), np.array([0.01, -0.02, 0.04]))
+GRAVITY = np.array([0.0, 0.0, -9.81])
+
+
+def pushes(samples: int = 400, seed: int = 1) -> np.ndarray:
+    """Smooth wrenches in all directions, flange axes. (T, 6)"""
+    t = np.linspace(0, 10, samples)[:, None]
+    rng = np.random.default_rng(seed)
+    phase, speed = rng.uniform(0, 6, 6), rng.uniform(0.5, 3, 6)
+    return np.sin(speed * t + phase) * np.array([20, 15, 25, 2, 2, 1.5])
+
+
+def test_a_sensors_pose_is_found_again_whatever_its_zero() -> None:
+    flange = pushes()
+    reading = flange @ adjoint(inverse(POSE)).T + np.array([1.0, -2.0, 3.0, 0.1, 0.0, -0.2])
+    fit = fit_pose(flange, reading)
+    np.testing.assert_allclose(fit.pose.rotation, POSE.rotation, atol=1e-9)
+    np.testing.assert_allclose(fit.pose.translation, POSE.translation, atol=1e-9)
+
+
+def test_under_noise_the_pose_is_found_within_its_own_deviation() -> None:
+    flange = pushes()
+    rng = np.random.default_rng(2)
+    reading = flange @ adjoint(inverse(POSE)).T
+    noisy = flange + rng.standard_normal(flange.shape) * np.repeat([0.5, 0.05], 3)
+    fit = fit_pose(noisy, reading)
+    error = np.abs(fit.pose.translation - POSE.translation)
+    assert np.all(error < 5 * fit.position_sd)
+    assert np.all(fit.position_sd < 1e-3)  # m: 0.05 N·m over √400 samples of 20 N
+
+
+def test_pushes_along_one_line_tell_no_pose() -> None:
+    line = np.outer(np.sin(np.linspace(0, 6, 50)), [10.0, 0, 0, 0, 1, 0])
+    with pytest.raises(ParameterError, match=r"forces lie on one line.*--sensor-pose"):
+        fit_pose(line, line)
+
+
+def test_a_tool_is_weighed_from_poses() -> None:
+    rng = np.random.default_rng(3)
+    rotation = np.array([rpy(a) for a in rng.uniform(-2, 2, (30, 3))])
+    com, zero = np.array([0.01, 0.0, 0.05]), np.array([0.5, -1.0, 2.0, 0.02, 0.03, -0.01])
+    weight = 0.35 * np.einsum("tji,j->ti", rotation, GRAVITY)
+    reading = np.concatenate([weight, np.cross(com, weight)], axis=1) + zero
+    tool = weigh_tool(reading, rotation, GRAVITY)
+    assert tool.mass == pytest.approx(0.35, rel=1e-9)
+    np.testing.assert_allclose(tool.com, com, atol=1e-9)
+    np.testing.assert_allclose(tool.zero, zero, atol=1e-9)
+    np.testing.assert_allclose(tool.reading(rotation, GRAVITY), reading, atol=1e-9)
+
+
+def test_one_orientation_weighs_nothing() -> None:
+    rotation = np.tile(np.eye(3), (20, 1, 1))
+    with pytest.raises(ParameterError, match="all in one orientation"):
+        weigh_tool(np.zeros((20, 6)), rotation, GRAVITY)
+
+
+@pytest.mark.parametrize("lag", [-0.123, 0.0, 0.05, 0.2])
+def test_a_time_offset_is_found_below_the_sample_time(lag: float) -> None:
+    t = np.arange(0, 12, 0.008)
+    shape = lambda x: np.column_stack([np.sin(2 * x), np.sin(3.3 * x + 1)])  # noqa: E731
+    found = time_offset(t, shape(t - lag), shape(t))
+    # a parabola through a band-limited peak: a small part of the 8 ms step; ends do not overlap
+    assert found.lag == pytest.approx(lag, abs=2e-3)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_any_order_and_sign_of_axes_is_recognised(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    P = np.eye(3)[rng.permutation(3)] * rng.choice([-1.0, 1.0], 3)[:, None]
+    ours = pushes(seed=seed)[:, :3]
+    theirs = 1.7 * ours @ P.T + 3.0 + 0.2 * rng.standard_normal(ours.shape)
+    fit = fit_axes(ours, theirs)
+    np.testing.assert_array_equal(fit.matrix, P)
+    assert fit.gain == pytest.approx(1.7, rel=0.01)  # 0.2 N of noise over 400 samples of 20 N
+    assert fit.words == axes_words(P)
+    assert not fit_axes(ours, ours + rng.standard_normal(ours.shape)).derived
+    assert fit_axes(ours, 2.0 * ours @ P.T).derived
+
+
+def log(wrench: np.ndarray, frame: str | None, samples: int = 400) -> Recording:
+    t = np.linspace(0, 10, samples)
+    rng = np.random.default_rng(5)
+    q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.3 * np.sin(
+        np.outer(t, rng.uniform(0.3, 1, 6))
+    )
+    return Recording(t=t, q=q, wrench=wrench, wrench_frame=frame)
+
+
+def ours_in_base(recording: Recording, flange: np.ndarray) -> Wrench:
+    from vftcli.robots.kinematics import link_poses
+    from vftcli.virtual_sensor.frames import to_base
+
+    R = link_poses(load_robot("ur5").chain, recording.q).rotation[:, -1]
+    values = np.einsum("tij,tj->ti", to_base("flange", R, Mounting()), flange)
+    return Wrench(name="x", t=recording.t, values=values, frame="base")
+
+
+@pytest.mark.parametrize(
+    ("axes", "sign", "words"),
+    [
+        ("base", 1.0, "fits base axes, force on the robot"),
+        ("base", -1.0, "fits base axes, force BY the robot"),
+        ("flange", -1.0, "fits flange axes, force BY the robot"),
+    ],
+)
+def test_a_vendors_frame_and_sign_are_told(axes: str, sign: float, words: str) -> None:
+    flange = pushes()
+    ours = ours_in_base(log(flange, None), flange)
+    rng = np.random.default_rng(0)
+    theirs = sign * (flange if axes == "flange" else ours.values)
+    theirs = theirs + 0.5 * rng.standard_normal(theirs.shape)
+    check = check_vendor(log(theirs, "as the vendor says"), ours, load_robot("ur5").chain)
+    assert check is not None
+    assert words in check.sentences()[-1]
+
+
+def test_a_vendors_zeros_are_called_that() -> None:
+    flange = pushes()
+    ours = ours_in_base(log(flange, None), flange)
+    check = check_vendor(log(np.zeros_like(flange), None), ours, load_robot("ur5").chain)
+    assert check is not None
+    assert "exactly zero in every sample" in check.sentences()[0]
+
+
+def test_a_logged_wrench_goes_through_its_frame_to_the_joints() -> None:
+    """The same contact, logged by a sensor on the flange, in base and in flange axes."""
+    chain, mounting = load_robot("ur5").chain, Mounting(sensor=POSE)
+    flange = pushes()
+    base = ours_in_base(log(flange, None), flange)
+    reading = in_sensor_axes(base, chain, log(flange, None).q, mounting)
+    logs = {
+        "sensor": reading,
+        "flange": flange,
+        "base": base.values,
+        "base axes, force BY the robot ON the environment": -base.values,
+    }
+    torques = [
+        sensor_reference(log(values, words), load_robot("ur5"), mounting).tau
+        for words, values in logs.items()
+    ]
+    for tau in torques[1:]:
+        np.testing.assert_allclose(tau, torques[0], atol=1e-9)
+
+
+def test_what_is_not_said_is_assumed_aloud() -> None:
+    assert "does not say the frame" in stated(None, Mounting()).notes[0]
+    assert "tool's pose is not known" in stated("base axes at the TCP", Mounting()).notes[0]
+    with pytest.raises(ParameterError, match=r"'world'.*no frame.*flange, base, tool, sensor"):
+        stated("world", Mounting())
+
+
+def test_a_wrench_of_zeros_is_no_reference() -> None:
+    with pytest.raises(MissingSignalError, match="zero in every sample"):
+        logged_wrench(log(np.zeros((400, 6)), "base"), load_robot("ur5").chain, Mounting())

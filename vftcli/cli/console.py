@@ -1,0 +1,76 @@
+"""From a command's options to an AnalysisChoice, and the words every command prints alike."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from vftcli.analysis import Analysis
+    from vftcli.signals.recording import Recording
+    from vftcli.virtual_sensor.sensor_reading import SensorReading
+
+
+def command_line() -> str:
+    """The command as the user typed it, for `run.json` and the report."""
+    return shlex.join(["vftcli", *sys.argv[1:]])
+
+
+def say(text: str) -> None:
+    """Print words to stderr; tables go to stdout."""
+    typer.echo(text, err=True)
+
+
+def say_recording(recording: "Recording") -> None:
+    """One line on what was read, then what was repaired or looks odd."""
+    source = recording.source
+    rate = f", {1.0 / recording.step:.4g} Hz" if recording.samples > 1 else ""
+    say(
+        f"{recording.name}: {source.format}, {recording.joints} joints, "
+        f"{recording.samples} samples, {recording.duration:.1f} s{rate}"
+    )
+    for remark in (*source.repairs, *source.warnings):
+        say(f"  note: {remark}")
+
+
+def say_notes(analysis: "Analysis") -> None:
+    """What the reader of the numbers should know."""
+    reference = analysis.reference.remarks if analysis.reference is not None else ()
+    own = [f"{e.name}: {note}" for e in analysis.estimates for note in e.remarks]
+    for note in (*analysis.robot.notes, *analysis.notes, *own, *reference):
+        say(f"note: {note}")
+    if analysis.virtual_sensor is not None:
+        say_wrenches(analysis.virtual_sensor)
+
+
+def say_wrenches(sensed: "SensorReading") -> None:
+    """Frame, zero drift and remarks of the virtual sensor."""
+    from vftcli.virtual_sensor.frames import FRAMES
+    from vftcli.virtual_sensor.zero import drift_table
+
+    say(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.sensor.solver}")
+    if sensed.drifts:
+        say(drift_table(sensed.drifts).rstrip())
+    for note in sensed.notes:
+        say(f"note: {note}")
+    for warning in sensed.warnings:
+        say(f"warning: {warning}")
+
+
+def paths(values: list[Path] | None) -> tuple[Path, ...]:
+    """A repeatable option's values."""
+    return tuple(values or ())
+
+
+def chosen(wanted: dict[str, bool], default: str) -> str:
+    """The one format whose flag is set, or the default.
+
+    Raises:
+        typer.BadParameter: If several are set.
+    """
+    names = [name for name, asked in wanted.items() if asked]
+    if len(names) > 1:
+        raise typer.BadParameter(f"choose one of {', '.join(f'--{name}' for name in names)}")
+    return names[0] if names else default

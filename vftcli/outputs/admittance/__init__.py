@@ -1,0 +1,1 @@
+"""What an admittance replay is shown as."""

@@ -1,0 +1,1 @@
+"""What an identification is shown as."""

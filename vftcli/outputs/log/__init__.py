@@ -1,0 +1,1 @@
+"""What one log's analysis is shown as: tables, files, recordings."""

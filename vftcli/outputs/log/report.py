@@ -1,0 +1,124 @@
+"""What `vftcli report` writes: page, recording, estimates, errors and run.json in one folder."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vftcli.analysis import Analysis
+from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.log import tables
+from vftcli.outputs.log.parquet import write_estimates
+from vftcli.outputs.log.rerun_recording import write_rrd
+from vftcli.outputs.log.run_record import run_record, to_json
+from vftcli.outputs.page import render, render_index
+
+if TYPE_CHECKING:
+    import polars as pl
+
+ERROR_TABLES: dict[str, Callable[["pl.DataFrame"], str]] = {
+    "errors.csv": tables.to_csv,
+    "errors.json": tables.to_json,
+    "errors.md": tables.to_markdown,
+    "errors.tex": tables.to_latex,
+}
+"""File name → how its text is made from the errors table."""
+
+FILES = ("index.html", "recording.rrd", "estimates.parquet", "run.json", *ERROR_TABLES)
+"""What a report of one log may hold; the error tables only where there is a reference."""
+
+
+def write_report(path: Path, analysis: Analysis, *, command: str, force: bool = False) -> str:
+    """Write the report of one log, all files or none.
+
+    Returns:
+        The text of `run.json`.
+
+    Raises:
+        OutputError: If the folder cannot be written, or a file exists and `force` is not set.
+    """
+    with OutputFolder(path, force, FILES) as folder:
+        return to_json(fill(folder, "", analysis, command))
+
+
+def write_reports(
+    path: Path, analyses: Sequence[Analysis], *, command: str, force: bool = False
+) -> str:
+    """Write one sub-folder a log, and above them an index, all errors in one, and run.json.
+
+    Returns:
+        The text of the upper `run.json`: a list with the record of every log.
+
+    Raises:
+        OutputError: If the folder cannot be written, or a file exists and `force` is not set.
+    """
+    places = sub_folders(analyses)
+    below = [f"{place}/{name}" for place in places for name in FILES]
+    with OutputFolder(path, force, ["index.html", "run.json", *ERROR_TABLES, *below]) as folder:
+        records = [
+            fill(folder, f"{place}/", analysis, command)
+            for place, analysis in zip(places, analyses, strict=True)
+        ]
+        index = render_index(list(zip(places, analyses, strict=True)))
+        put(folder / "index.html", index)
+        put_errors(folder, "", combined(places, analyses))
+        text = listed([to_json(record) for record in records])
+        put(folder / "run.json", text)
+        return text
+
+
+def fill(folder: OutputFolder, place: str, analysis: Analysis, command: str) -> dict[str, Any]:
+    """Write one log's files; return its record."""
+    record = run_record(analysis, command)
+    analysis = replace(analysis, run=record)
+    put(folder / f"{place}index.html", render(analysis))
+    write_rrd(folder / f"{place}recording.rrd", analysis)
+    write_estimates(folder / f"{place}estimates.parquet", analysis)
+    put_errors(folder, place, analysis.errors)
+    put(folder / f"{place}run.json", to_json(record))
+    return record
+
+
+def put(path: Path, text: str) -> None:
+    """Write text as it is, on every system."""
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def put_errors(folder: OutputFolder, place: str, errors: "pl.DataFrame | None") -> None:
+    """Write the error tables, if there are errors."""
+    if errors is None:
+        return
+    for name, write in ERROR_TABLES.items():
+        put(folder / f"{place}{name}", write(errors))
+
+
+def sub_folders(analyses: Sequence[Analysis]) -> list[str]:
+    """One folder name a log: its file's name without the ending, numbered where two are alike."""
+    found: list[str] = []
+    for analysis in analyses:
+        stem = Path(analysis.recording.name).stem or "log"
+        name, number = stem, 2
+        while name in found:
+            name, number = f"{stem}-{number}", number + 1
+        found.append(name)
+    return found
+
+
+def combined(places: Sequence[str], analyses: Sequence[Analysis]) -> "pl.DataFrame | None":
+    """All errors in one table; logs of one name are told apart by their folders."""
+    import polars as pl
+
+    names = [analysis.recording.name for analysis in analyses]
+    alike = len(set(names)) < len(names)
+    found = [
+        errors.with_columns(recording=pl.lit(place)) if alike else errors
+        for place, analysis in zip(places, analyses, strict=True)
+        if (errors := analysis.errors) is not None
+    ]
+    return pl.concat(found, how="diagonal") if found else None
+
+
+def listed(texts: Sequence[str]) -> str:
+    """JSON texts as one JSON array."""
+    together = ",\n".join(text.rstrip("\n") for text in texts)
+    return f"[\n{together}\n]\n"

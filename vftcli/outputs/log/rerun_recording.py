@@ -1,0 +1,368 @@
+"""recording.rrd: torques, residuals, motion and the arm, arranged for the Rerun viewer.
+
+Every plot is one entity holding one scalar a line: `/tau_ext/J1` … (every observer, then the
+reference), `/residual/J1` … (every estimate minus the reference), `/drive_torque`, `/q` and `/dq`
+(one line a joint). All of it stands on the timeline `t`, in seconds from the log's first sample.
+"""
+
+import itertools
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.analysis import Analysis
+from vftcli.outputs.arm import ArmPoses, capsules, flange_force, motion
+from vftcli.outputs.files import one_line
+from vftcli.outputs.log.rerun_blueprint import Plot, Scene, Tab, arrangement
+from vftcli.outputs.log.rerun_text import drawable
+from vftcli.outputs.log.run_record import CONVENTIONS, all_notes
+from vftcli.outputs.log.tables import escape_markdown, to_markdown
+from vftcli.outputs.palette import REFERENCE, SPARE, colours_of, rgb
+from vftcli.robots.drive import drive_torque
+from vftcli.robots.kinematics import link_poses
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import OutputError
+from vftcli.signals.external_torque import COVERS, ExternalTorque
+from vftcli.signals.wrench import AXES
+
+ARM_RATE = 50.0
+"""Poses a second of the arm. [Hz]"""
+
+NEWTON_PER_METRE = 200.0
+"""Length of the force arrow: 200 N are 1 m."""
+
+LINK, JOINT, FORCE = (176, 184, 192), (78, 92, 106), (221, 100, 21)
+"""Colours of links, joints and the force arrow."""
+
+FOOTER, TRAILER = b"RRF2FOOT", 64
+"""A whole recording has this mark in its last bytes."""
+
+Stream = Any
+
+
+class Lines(NamedTuple):
+    """The lines of one plot.
+
+    Attributes:
+        path: The entity.
+        title: What the plot shows, with its unit.
+        names: One a line.
+        colours: ``#rrggbb``, one a line.
+        widths: One a line. [px]
+        values: One column a line. (T, k)
+    """
+
+    path: str
+    title: str
+    names: list[str]
+    colours: list[str]
+    widths: list[float]
+    values: Array
+
+
+def write_rrd(path: Path, analysis: Analysis) -> None:
+    """Write the recording with its blueprint, so that it opens arranged.
+
+    Args:
+        path: Where to; an existing file is replaced.
+        analysis: What to show.
+    """
+    import rerun as rr
+
+    groups = line_groups(analysis)
+    plots = tuple(Tab(name, tuple(map(plot_of, lines))) for name, lines in groups.items())
+    poses = motion(analysis.robot.chain, analysis.t, analysis.recording.q, ARM_RATE)
+    stream = rr.RecordingStream("vftcli")
+    stream.save(str(path), default_blueprint=arrangement(plots, scene_of(poses)))
+    stream.send_recording_name(drawable(analysis.recording.name))
+    for lines in itertools.chain.from_iterable(groups.values()):
+        send_lines(stream, analysis.t, lines)
+    send_words(stream, analysis)
+    send_arm(stream, analysis, poses)
+    finish(stream, path)
+
+
+def finish(stream: Stream, path: Path) -> None:
+    """Write what is still in memory, and the footer.
+
+    Raises:
+        OutputError: If the file is not whole: Rerun writes in a thread of its own.
+    """
+    try:
+        stream.flush()
+        stream.disconnect()
+    except RuntimeError as error:
+        raise OutputError(f"{path.name} cannot be written: {one_line(error)}") from None
+    with path.open("rb") as file:
+        file.seek(-min(TRAILER, path.stat().st_size), os.SEEK_END)
+        if FOOTER not in file.read():
+            raise OutputError(f"{path.name} cannot be written whole: is the disk full?")
+
+
+def line_groups(analysis: Analysis) -> dict[str, list[Lines]]:
+    """All plots, tab by tab: external torques and residuals joint by joint, then the motion."""
+    reference, joints = analysis.reference, range(analysis.recording.joints)
+    groups = {"External torque": [joint_lines("tau_ext", analysis, j, reference) for j in joints]}
+    if reference is not None:
+        groups["Residual"] = [
+            joint_lines("residual", analysis, j, None, reference.tau[:, j]) for j in joints
+        ]
+    if analysis.wrenches:
+        axes = [wrench_lines(analysis, k) for k in range(len(AXES))]
+        groups["Wrench"] = [*axes, *condition_lines(analysis)]
+    return {**groups, "ArmPoses": motion_lines(analysis)}
+
+
+def plot_of(lines: Lines) -> Plot:
+    """A plot that shows all of its lines."""
+    known = lines.values[np.isfinite(lines.values)]
+    low, high = (known.min(), known.max()) if known.size else (-1.0, 1.0)
+    room = max(0.05 * (high - low), 1e-3)
+    return Plot(lines.path, lines.title, float(low - room), float(high + room))
+
+
+def scene_of(poses: ArmPoses) -> Scene:
+    """An eye that sees the base and all places where the links have been."""
+    corners = poses.translation.reshape(-1, 3)
+    low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
+    centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
+    return Scene(tuple(eye.tolist()), tuple(centre.tolist()))
+
+
+TITLES = {"tau_ext": "external torque [N·m]", "residual": "estimate − reference [N·m]"}
+"""Group of entities → what its plots show."""
+
+
+def joint_lines(
+    group: str,
+    analysis: Analysis,
+    j: int,
+    reference: ExternalTorque | None,
+    minus: Array | float = 0.0,
+) -> Lines:
+    """All estimates of one joint less something, and the reference first if it is wanted."""
+    colours = colours_of(analysis.estimates)
+    names = [e.name for e in analysis.estimates]
+    columns = [e.tau[:, j] - minus for e in analysis.estimates]
+    shades, widths = [colours[name] for name in names], [1.5] * len(names)
+    if group == "tau_ext":
+        for name, column, shade in band_lines(analysis, j):
+            names, columns = [*names, name], [*columns, column]
+            shades, widths = [*shades, shade], [*widths, 0.6]
+    if reference is not None:
+        names, columns = [f"reference ({reference.name})", *names], [reference.tau[:, j], *columns]
+        shades, widths = [REFERENCE, *shades], [2.5, *widths]
+    rests = analysis.reference is not None and analysis.reference.mostly_rests[j]
+    doubt = " (the joint rests: do not trust the reference)" if rests else ""
+    path, title = f"/{group}/J{j + 1}", f"J{j + 1} {TITLES[group]}{doubt}"
+    return Lines(path, title, names, shades, widths, np.column_stack(columns))
+
+
+def band_lines(analysis: Analysis, j: int) -> Iterator[tuple[str, Array, str]]:
+    """Both edges of the last observer's 95 % band of one joint, thin in its colour.
+
+    Every observer's would hide them all; the tables and the page hold the others.
+    """
+    colours = colours_of(analysis.estimates)
+    for estimate in reversed(analysis.estimates):
+        if estimate.band is not None:
+            for sign, edge in ((1.0, "upper"), (-1.0, "lower")):
+                column = estimate.tau[:, j] + sign * COVERS * estimate.band[:, j]
+                yield f"{estimate.name} 95 % {edge}", column, colours[estimate.name]
+            return
+
+
+def wrench_lines(analysis: Analysis, k: int) -> Lines:
+    """One axis of every wrench, the reference first."""
+    colours = colours_of(analysis.estimates)
+    found = sorted(analysis.wrenches, key=lambda wrench: wrench.name != "reference")
+    title = f"{AXES[k]} in {found[0].frame} axes [{'N' if k < 3 else 'N·m'}]"
+    return Lines(
+        f"/wrench/{AXES[k]}",
+        title,
+        [wrench.name for wrench in found],
+        [colours.get(wrench.name, REFERENCE) for wrench in found],
+        [1.5 if wrench.name in colours else 2.5 for wrench in found],
+        np.column_stack([wrench.known[:, k] for wrench in found]),
+    )
+
+
+def condition_lines(analysis: Analysis) -> list[Lines]:
+    """What the pose can tell, and the torque that no wrench at the flange explains."""
+    colours = colours_of(analysis.estimates)
+    wrenches = [wrench for wrench in analysis.wrenches if wrench.name in colours]
+    found = []
+    sigma = next((w.sigma_min for w in wrenches if w.sigma_min is not None), None)
+    if sigma is not None and analysis.virtual_sensor is not None:
+        least = np.full_like(sigma, analysis.virtual_sensor.sensor.least_sigma)
+        names, shades = ["σ_min", "masked below"], [REFERENCE, SPARE[0]]
+        values = np.column_stack([sigma, least])
+        title = "σ_min of J, angular rows × 0.3 m [m]"
+        found.append(Lines("/wrench/sigma_min", title, names, shades, [1.5, 1.0], values))
+    left = {w.name: w.null_space for w in wrenches if w.null_space is not None}
+    if left:
+        shades, widths = [colours[name] for name in left], [1.5] * len(left)
+        title = "torque that no wrench at the flange explains [N·m]"
+        values = np.column_stack(list(left.values()))
+        found.append(Lines("/wrench/null_space", title, list(left), shades, widths, values))
+    return found
+
+
+def motion_lines(analysis: Analysis) -> list[Lines]:
+    """Positions, velocities and drive torques, one line a joint."""
+    recording, n = analysis.recording, analysis.recording.joints
+    signals = [("/q", "position [rad]", recording.q)]
+    if recording.dq is not None:
+        signals.append(("/dq", "velocity [rad/s]", recording.dq))
+    torque = drive_torque(recording, analysis.robot)
+    signals.append(("/drive_torque", "drive torque [N·m]", torque))
+    names, widths = [f"J{j}" for j in range(1, n + 1)], [1.5] * n
+    colours = [SPARE[j % len(SPARE)] for j in range(n)]
+    return [Lines(path, title, names, colours, widths, x) for path, title, x in signals]
+
+
+def send_lines(stream: Stream, t: Array, lines: Lines) -> None:
+    """Send one plot: names and colours once, then all samples in one batch."""
+    import rerun as rr
+
+    style = rr.SeriesLines(
+        names=[drawable(name) for name in lines.names],
+        colors=[rgb(c) for c in lines.colours],
+        widths=lines.widths,
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,  # an average hides spikes
+    )
+    stream.log(lines.path, style, static=True)
+    samples, count = lines.values.shape
+    scalars = rr.Scalars.columns(scalars=lines.values.ravel()).partition(np.full(samples, count))
+    stream.send_columns(lines.path, [rr.TimeColumn("t", duration=t)], scalars)
+
+
+def send_words(stream: Stream, analysis: Analysis) -> None:
+    """Send the summary and the error tables as Markdown."""
+    import rerun as rr
+
+    def document(path: str, text: str) -> None:
+        stream.log(path, rr.TextDocument(drawable(text), media_type="text/markdown"), static=True)
+
+    document("/summary", summary(analysis))
+    table = to_markdown(analysis.errors) if analysis.errors is not None else ""
+    document("/errors", table or "No reference was given, so no errors can be told.")
+
+
+def summary(analysis: Analysis) -> str:
+    """Which log, which robot, what the numbers and the arrow mean."""
+    recording, robot = analysis.recording, analysis.robot
+    force = force_source(analysis.estimates)
+    source = recording.source
+    lines = [
+        f"# {escape_markdown(recording.name)}",
+        f"{escape_markdown(robot.title or robot.name)}, {recording.samples} samples in "
+        f"{recording.duration:.3f} s at {1.0 / recording.step:.4g} Hz; format {source.format}.",
+        "",
+        *(f"- **{name}**: {escape_markdown(text)}" for name, text in CONVENTIONS.items()),
+    ]
+    if force is not None:
+        lines.append(
+            f"- **orange arrow**: force on the robot at the flange from {force.name} by the "
+            f"pseudo-inverse of Jᵀ; 1 m is {NEWTON_PER_METRE:g} N; none where the pose cannot tell"
+        )
+    remarks = [*source.repairs, *source.warnings, *all_notes(analysis)]
+    lines += ["", "## Notes", *(f"- {escape_markdown(note)}" for note in remarks)]
+    lines += ["", f"Log sha256 {source.sha256 or 'unknown'}"]
+    return "\n".join(lines) + "\n"
+
+
+def force_source(estimates: Sequence[ExternalTorque]) -> ExternalTorque | None:
+    """The estimate the force arrow is made from: the first Kalman filter's, else the first."""
+    kalman = [estimate for estimate in estimates if estimate.name.startswith("kfo")]
+    return next(iter([*kalman, *estimates]), None)
+
+
+def send_arm(stream: Stream, analysis: Analysis, poses: ArmPoses) -> None:
+    """Send the arm's shape once and its poses over time."""
+    import rerun as rr
+
+    chain = analysis.robot.chain
+    stream.log("/robot", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    time = rr.TimeColumn("t", duration=poses.t)
+    for j, shapes in enumerate(capsules(chain)):
+        path = f"/robot/link_{j}" if j else "/robot/base"
+        if shapes:
+            stream.log(path, capsule_batch(shapes), static=True)
+        if j:
+            columns = rr.Transform3D.columns(
+                translation=poses.translation[:, j - 1], quaternion=poses.quat_xyzw[:, j - 1]
+            )
+            stream.send_columns(path, [time], columns)
+    force = force_source(analysis.estimates)
+    if force is not None and chain.joints >= 6:
+        sampled = np.searchsorted(analysis.t, poses.t)
+        send_force(
+            stream,
+            poses.t,
+            poses.translation[:, -1],
+            arrow_force(analysis, force, poses, sampled),
+        )
+
+
+def arrow_force(
+    analysis: Analysis, source: ExternalTorque, poses: ArmPoses, sampled: NDArray[np.intp]
+) -> Array:
+    """Force on the robot in base axes at the drawn poses: the wrench that was asked for. (N, 3) [N]
+
+    Where none was asked for, or in other axes than the base's or the flange's, it is the
+    pseudo-inverse of the torque as it stands.
+    """
+    asked = [w for w in analysis.wrenches if w.name == source.name]
+    if not asked or asked[0].frame not in {"base", "flange"}:
+        return flange_force(analysis.robot.chain, poses.q, source.tau[sampled])
+    force: Array = asked[0].known[sampled, :3]
+    if asked[0].frame == "base":
+        return force
+    rotation = link_poses(analysis.robot.chain, poses.q).rotation[:, -1]
+    turned: Array = np.einsum("tij,tj->ti", rotation, force)
+    return turned
+
+
+def capsule_batch(shapes: Sequence[Any]) -> Any:  # noqa: ANN401 - Rerun is untyped
+    """Capsules in the axes of the link they move with; Rerun's own lie along z from one end."""
+    import rerun as rr
+
+    directions = np.array([shape.direction for shape in shapes])
+    lengths = np.linalg.norm(directions, axis=1)
+    return rr.Capsules3D(
+        lengths=lengths,
+        radii=[shape.radius for shape in shapes],
+        translations=np.array([shape.start for shape in shapes]),
+        quaternions=[turn_from_z(d / s) for d, s in zip(directions, lengths, strict=True)],
+        colors=[JOINT if shape.joint else LINK for shape in shapes],
+        fill_mode="solid",
+    )
+
+
+def turn_from_z(unit: Array) -> Array:
+    """Quaternion (x, y, z, w) that turns z to a unit vector the short way. (4,)"""
+    if unit[2] < -1.0 + 1e-9:
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    turn = np.array([-unit[1], unit[0], 0.0, 1.0 + unit[2]])
+    turned: Array = turn / np.linalg.norm(turn)
+    return turned
+
+
+def send_force(stream: Stream, t: Array, origin: Array, force: Array) -> None:
+    """Send the arrow; where the force is not known there is none."""
+    import rerun as rr
+
+    told = np.all(np.isfinite(force), axis=1)
+    columns = rr.Arrows3D.columns(
+        origins=origin[told],
+        vectors=force[told] / NEWTON_PER_METRE,
+        radii=np.full(int(told.sum()), 0.012),
+        colors=np.tile(np.array([*FORCE, 255], dtype=np.uint8), (int(told.sum()), 1)),
+    ).partition(told.astype(int))
+    stream.send_columns("/robot/flange_force", [rr.TimeColumn("t", duration=t)], columns)

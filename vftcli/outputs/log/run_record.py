@@ -1,0 +1,254 @@
+"""run.json: what was run on what, so that every number can be made again."""
+
+import hashlib
+import json
+import platform
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import vftcli
+from vftcli.analysis import Analysis
+from vftcli.observers.auto_tuning import AutoTuned
+from vftcli.observers.observer import Observer, Tuning
+from vftcli.robots.robot import Robot
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.recording import Recording
+
+CONVENTIONS = {
+    "sign": "tau_ext is the torque the environment exerts ON the robot: "
+    "M ddq + C dq + g + friction = tau + tau_ext",
+    "frame": "joint torques, positive along each joint axis; joints count from 1 at the base",
+    "units": "s, rad, rad/s, A, N, N·m, kg",
+    "time": "seconds from the log's first sample",
+}
+"""What every number in an output means."""
+
+NUMBERS = re.compile(r"\[\n[^\[\]{}\"]*\n\s*\]")
+"""A list without words, which is better read on one line."""
+
+PACKAGES = {
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "polars": "polars",
+    "pin": "pinocchio",
+    "rerun-sdk": "rerun",
+    "rosbags": "rosbags",
+    "mcap": "mcap",
+}
+"""Package → its module, whose version is recorded if it is loaded; none is imported for it."""
+
+
+def run_record(
+    analysis: Analysis, command: str | Sequence[str], options: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Everything `run.json` holds.
+
+    Args:
+        analysis: What was run.
+        command: The command line, as the user typed it.
+        options: Further settings to record, by name.
+    """
+    return {
+        "command": command if isinstance(command, str) else shell_line(command),
+        "versions": versions(),
+        "input": input_record(analysis.recording),
+        "robot": robot_record(analysis.robot),
+        "observers": [
+            observer_record(observer, analysis.tunings.get(observer.name))
+            for observer in analysis.observers
+        ],
+        "reference": reference_record(analysis.reference),
+        "wrench": wrench_record(analysis),
+        "complete_log": workup_record(analysis),
+        "conventions": CONVENTIONS,
+        "repairs": list(analysis.recording.source.repairs),
+        "warnings": list(analysis.recording.source.warnings),
+        "notes": all_notes(analysis),
+        "options": dict(options or {}),
+    }
+
+
+def to_json(record: Mapping[str, Any]) -> str:
+    """A record as JSON text; what is not a finite number becomes null."""
+    text = json.dumps(plain(record), indent=2, ensure_ascii=False, allow_nan=False)
+    return NUMBERS.sub(lambda found: " ".join(found.group().split()), text) + "\n"
+
+
+def plain(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
+    """A value in JSON's own types: arrays as lists, NaN as None, dataclasses as objects."""
+    match value:
+        case None | bool() | int() | str():
+            return value
+        case float() | np.floating():
+            return float(value) if np.isfinite(value) else None
+        case np.ndarray() | np.generic():
+            return plain(value.tolist())
+        case Mapping():
+            return {str(key): plain(item) for key, item in value.items()}
+        case list() | tuple() | set() | frozenset():
+            return [plain(item) for item in value]
+        case _ if is_dataclass(value) and not isinstance(value, type):
+            return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    return str(value)
+
+
+def shell_line(words: Sequence[str]) -> str:
+    """A command line as one would type it again."""
+    import shlex
+
+    return shlex.join(words)
+
+
+def versions() -> dict[str, str]:
+    """Versions of the program and of the packages that took part in this run, by name.
+
+    A package that was not imported had no part in the numbers, and looking its version up would
+    cost more than they did.
+    """
+    found = {"vftcli": vftcli.__version__, "python": platform.python_version()}
+    for package, module in PACKAGES.items():
+        if (loaded := sys.modules.get(module)) is not None:
+            found[package] = str(getattr(loaded, "__version__", "unknown"))
+    return found
+
+
+def input_record(recording: Recording) -> dict[str, Any]:
+    """Which log it was and what is in it."""
+    source = recording.source
+    return {
+        "path": str(source.path) if source.path is not None else None,
+        "format": source.format,
+        "sha256": source.sha256 or None,
+        "clock": source.clock,
+        "t0_s": source.t0,
+        "rows": source.rows,
+        "duplicates": source.duplicates,
+        "samples": recording.samples,
+        "joints": recording.joints,
+        "start_s": float(recording.t[0]),
+        "end_s": float(recording.t[-1]),
+        "rate_hz": 1.0 / recording.step if recording.samples > 1 else None,
+        "signals": list(recording.signals),
+    }
+
+
+def robot_record(robot: Robot) -> dict[str, Any]:
+    """Which robot it was taken to be. A built-in profile is told by its name, not its path."""
+    built_in = robot.path is not None and Path(vftcli.__file__).parent in robot.path.parents
+    return {
+        "name": robot.name,
+        "title": robot.title,
+        "file": None if built_in or robot.path is None else str(robot.path),
+        "sha256": file_sha256(robot.path),
+        "torque_source": robot.torque_source,
+        "friction": [joint.model for joint in robot.friction] or "none",
+        "payload_kg": robot.payload.mass if robot.payload is not None else None,
+        "gravity_m_s2": robot.chain.gravity.tolist(),
+        "notes": list(robot.notes),
+    }
+
+
+def file_sha256(path: Path | None) -> str | None:
+    """Hex digest of a file's bytes, None where there is no file."""
+    if path is None or not path.is_file():
+        return None
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def observer_record(observer: Observer, tuning: Tuning | None) -> dict[str, Any]:
+    """An observer's parameters, and what they mean at the log's sample time."""
+    meaning = (
+        {
+            "omega_n_rad_s": tuning.omega_n,
+            "zeta": tuning.zeta,
+            "delay_s": tuning.delay,
+            "bandwidth_hz": tuning.bandwidth,
+            "dc_gain": tuning.dc_gain,
+            "numbers_to_tune": tuning.numbers,
+        }
+        if tuning is not None
+        else {}
+    )
+    return {"name": observer.name, "parameters": parameters(observer), **plain(meaning)}
+
+
+def parameters(observer: Observer) -> dict[str, Any]:
+    """An observer's parameters by name, as JSON can hold them."""
+    if isinstance(observer, AutoTuned):
+        return parameters(observer.observer)
+    if not is_dataclass(observer):
+        return {}
+    return {
+        field.name: plain(getattr(observer, field.name)) for field in fields(observer) if field.init
+    }
+
+
+def reference_record(reference: ExternalTorque | None) -> dict[str, Any] | None:
+    """What the estimates were judged by."""
+    if reference is None:
+        return None
+    floor = plain(reference.floor)
+    return {"name": reference.name, "floor_Nm": floor, "notes": list(reference.remarks)}
+
+
+def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
+    """How the wrenches were made and what is known of them, None where none was asked for."""
+    sensed = analysis.virtual_sensor
+    if sensed is None:
+        return None
+    from vftcli.virtual_sensor.frames import FRAMES
+
+    return {
+        "frame": sensed.sensor.frame,
+        "meaning": f"force and moment ON the robot; {FRAMES[sensed.sensor.frame]}",
+        "solver": sensed.sensor.solver,
+        "least_sigma_m": sensed.sensor.least_sigma,
+        "masked_share": sensed.masked_share,
+        "tool": plain(sensed.sensor.mounting.tool),
+        "sensor": plain(sensed.sensor.mounting.sensor),
+        "zero_drift": [plain(drift) for drift in sensed.drifts],
+        "warnings": list(sensed.warnings),
+    }
+
+
+def workup_record(analysis: Analysis) -> dict[str, Any] | None:
+    """What the complete log told: free part, chosen gains, error budget, consistency."""
+    found = analysis.workup
+    if found is None:
+        return None
+    return {
+        "bias_removed": found.removed,
+        "segments_free_loaded": found.survey.spectra.segments if found.survey.spectra else None,
+        "tuned": {
+            name: {"omega_n_rad_s": curve.best, "expected_rmse_Nm": curve.least}
+            for name, curve in found.curves.items()
+        },
+        "error_budget_Nm": {budget.name: budget.parts for budget in found.budgets},
+        "consistency": {one.name: one._asdict() for one in found.consistency},
+        "band_sd_Nm": {
+            e.name: np.sqrt(np.mean(e.band**2, axis=0))
+            for e in analysis.estimates
+            if e.band is not None
+        },
+        "notes": list(found.notes),
+    }
+
+
+def all_notes(analysis: Analysis) -> list[str]:
+    """Notes of the run, of every estimate and of the reference, each once."""
+    notes = [*analysis.notes]
+    for torque in analysis.torques:
+        notes += [
+            note if torque.name in note else f"{torque.name}: {note}"
+            for note in map(str, torque.remarks)
+            if note not in analysis.notes
+        ]
+    if analysis.virtual_sensor is not None:
+        notes += [*analysis.virtual_sensor.warnings, *analysis.virtual_sensor.notes]
+    return list(dict.fromkeys(notes))

@@ -1,0 +1,242 @@
+"""When two logs of one trajectory are at the same place: a time shift found on joint positions."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.repetition.standstill import Flags, runs
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.filters import resampled
+from vftcli.signals.recording import Recording
+
+LEAST_OVERLAP = 0.3
+"""Share of the shorter log that must overlap at an admissible shift."""
+
+SAME_TRAJECTORY = 0.05
+"""Positions that differ by more than this after alignment are another trajectory. [rad]"""
+
+SAME_RATE = 0.01
+"""Clocks whose rates differ by more than this share are refused, by less corrected."""
+
+COARSE = 300
+"""Instants at which a recording is compared while the shared part is looked for."""
+
+RATES = np.concatenate([np.linspace(0.5, 2.0, 61), [1e-3, 1e3]])
+"""Clock rates tried to explain why two logs do not fit."""
+
+
+class Alignment(NamedTuple):
+    """How one log lies on another.
+
+    Attributes:
+        shift: The other log's clock reads rate·t + shift at the same place. [s]
+        rate: Rate of the other log's clock against this one's, 1 for equal clocks.
+        deviation: Root mean square of the remaining position difference over all joints. [rad]
+        overlap: Samples of the log whose partner lies within the other. (T,)
+    """
+
+    shift: float
+    rate: float
+    deviation: float
+    overlap: Flags
+
+
+def align(recording: Recording, free: Recording) -> Alignment:
+    """Find the shift at which `free` passes through the recording's joint positions.
+
+    A coarse shift minimises the mean squared position difference over all overlaps of at least
+    `LEAST_OVERLAP`, by FFT on a common uniform clock; it and the ratio of the clocks' rates are
+    then refined on the logs' own clocks by Gauss–Newton steps, robust against contacts.
+
+    Raises:
+        ReferenceTorqueError: If the two logs are of other arms, not of the same trajectory, or
+            their clocks run at rates that differ by more than `SAME_RATE`.
+    """
+    check_same_arm(recording, free)
+    step = max(recording.step, free.step)
+    shift, rate = refined(recording, free, coarse_shift(recording, free, step), 1.0)
+    deviation, overlap = deviation_at(recording, free, shift, rate)
+    if not deviation <= SAME_TRAJECTORY:
+        shared = shared_part(recording, free)
+        if shared is None:
+            raise ReferenceTorqueError(misfit(recording, free, shift, deviation))
+        shift, rate, deviation, overlap = shared
+    if abs(rate - 1.0) > SAME_RATE:
+        raise ReferenceTorqueError(other_rate(recording, free, rate))
+    return Alignment(shift, rate, deviation, overlap)
+
+
+def check_same_arm(recording: Recording, free: Recording) -> None:
+    """Raise a ReferenceTorqueError if two logs cannot be of the same arm."""
+    if free.joints != recording.joints:
+        raise ReferenceTorqueError(
+            f"{free.name} has {free.joints} joints, {recording.name} has {recording.joints}: "
+            "a free run must be of the same arm; give another log with --free"
+        )
+    hints = (free.robot_hint, recording.robot_hint)
+    if None not in hints and hints[0] != hints[1]:
+        raise ReferenceTorqueError(
+            f"{free.name} is a log of {hints[0]}, {recording.name} of {hints[1]}: a free run must "
+            "be of the same arm; give another log with --free"
+        )
+
+
+def shared_part(recording: Recording, free: Recording) -> Alignment | None:
+    """Where two logs share only a part of their motion: that part, None if it is too short.
+
+    The shift is the one at which most of the recording's motion is within `SAME_TRAJECTORY`; it
+    must be at least `LEAST_OVERLAP` of it. The partners are the unbroken stretches of a second or
+    more.
+    """
+    t = np.linspace(recording.t[0], recording.t[-1], COARSE)
+    q = resampled(t, recording.t, recording.q)
+    path = np.append(np.max(np.abs(np.diff(q, axis=0)), axis=1), 0.0)
+    span = recording.duration + free.duration
+    step = max(0.02, span / 5000.0)
+    shifts = free.t[0] - recording.t[-1] + np.arange(0.0, span, step)
+    found = [float(np.sum(path * near(q, t + shift, free))) for shift in shifts]
+    best = float(shifts[int(np.argmax(found))])
+    if max(found) < LEAST_OVERLAP * float(np.sum(path)):
+        return None
+    shift, rate = refined(recording, free, best, 1.0)
+    matched = near(recording.q, rate * recording.t + shift, free)
+    overlap = np.zeros(recording.samples, dtype=bool)
+    for first, last in runs(matched):
+        overlap[first : last + 1] = recording.t[last] - recording.t[first] >= 1.0
+    there = resampled(rate * recording.t[overlap] + shift, free.t, free.q)
+    if not len(there):
+        return None
+    deviation = float(np.sqrt(np.mean((there - recording.q[overlap]) ** 2)))
+    return Alignment(shift, rate, deviation, overlap)
+
+
+def near(q: Array, t: Array, free: Recording) -> Flags:
+    """Whether positions lie within `SAME_TRAJECTORY` of the free run at instants of its clock."""
+    distance = np.max(np.abs(resampled(t, free.t, free.q) - q), axis=1)
+    return np.asarray((t >= free.t[0]) & (t <= free.t[-1]) & (distance <= SAME_TRAJECTORY))
+
+
+def misfit(recording: Recording, free: Recording, shift: float, deviation: float) -> str:
+    """One line on why two logs do not fit: other clocks if that explains it, else other motions."""
+    rate = explaining_rate(recording, free)
+    if rate is not None:
+        return other_rate(recording, free, rate)
+    return (
+        f"{free.name} is not a free run of the trajectory in {recording.name}: at the best "
+        f"shift ({shift:.3f} s) the joint positions still differ by {deviation:.3g} rad rms "
+        f"(at most {SAME_TRAJECTORY:g}); give a log of the same motion with --free"
+    )
+
+
+def other_rate(recording: Recording, free: Recording, rate: float) -> str:
+    """One line on clocks that run at different rates."""
+    return (
+        f"the clocks of {recording.name} and {free.name} run at different rates: the same motion "
+        f"takes {rate:.4g} times as long in {free.name}; correct its time stamps, or name their "
+        "unit with --columns (t[ms], t[ns])"
+    )
+
+
+def explaining_rate(recording: Recording, free: Recording) -> float | None:
+    """A ratio of clock rates at which the two logs are the same trajectory, None without one."""
+    for rate in RATES[np.abs(RATES - 1.0) > SAME_RATE]:
+        span = min(recording.duration * rate, free.duration) / max(
+            recording.duration * rate, free.duration
+        )
+        if span < LEAST_OVERLAP:
+            continue
+        step = max(recording.step * rate, free.step, free.duration / 4000.0)
+        lag = lag_of(uniform(recording, step / rate), uniform(free, step)) * step
+        shift = lag + float(free.t[0] - rate * recording.t[0])
+        shift, found = refined(recording, free, shift, float(rate))
+        if deviation_at(recording, free, shift, found)[0] <= 0.5 * SAME_TRAJECTORY:
+            return found
+    return None
+
+
+def uniform(recording: Recording, step: float) -> Array:
+    """Joint positions on a uniform clock. (N, n) [rad]"""
+    t = np.arange(0.0, recording.duration + 0.5 * step, step)
+    start = recording.t[0]
+    return np.column_stack([np.interp(t + start, recording.t, q) for q in recording.q.T])
+
+
+def coarse_shift(recording: Recording, free: Recording, step: float) -> float:
+    """The shift with the smallest mean squared position difference, to one `step`. [s]"""
+    lag = lag_of(uniform(recording, step), uniform(free, step))
+    return lag * step + float(free.t[0] - recording.t[0])
+
+
+def lag_of(a: Array, b: Array) -> float:
+    """The lag of b's samples against a's with the smallest mean squared difference. [samples]"""
+    middle = b.mean(axis=0)
+    a, b = a - middle, b - middle
+    size = 1 << int(np.ceil(np.log2(len(a) + len(b))))
+    spectra = np.conj(np.fft.rfft(a, size, axis=0)) * np.fft.rfft(b, size, axis=0)
+    cross = np.fft.irfft(np.sum(spectra, axis=1), size)
+    lags = np.arange(-(len(a) - 1), len(b))
+    first = np.maximum(0, -lags)
+    last = np.minimum(len(a), len(b) - lags)
+    energy_a = np.concatenate([[0.0], np.cumsum(np.sum(a**2, axis=1))])
+    energy_b = np.concatenate([[0.0], np.cumsum(np.sum(b**2, axis=1))])
+    overlap = last - first
+    here = energy_a[last] - energy_a[first]
+    there = energy_b[last + lags] - energy_b[first + lags]
+    squares = here + there - 2.0 * cross[lags % size]
+    least = max(2, int(LEAST_OVERLAP * min(len(a), len(b))))
+    mean = np.where(overlap >= least, squares / np.maximum(overlap, 1), np.inf)
+    return float(lags[int(np.argmin(mean))])
+
+
+def refined(
+    recording: Recording, free: Recording, shift: float, rate: float
+) -> tuple[float, float]:
+    """Refine shift [s] and clock rate on the logs' own clocks.
+
+    Gauss–Newton on q_free(rate·t + shift) = q(t), each joint weighted by its own spread, samples
+    by Cauchy's weight, so that contacts do not pull.
+    """
+    slope = np.gradient(free.q, free.t, axis=0)
+    for _ in range(15):
+        t = rate * recording.t + shift
+        inside = (t >= free.t[0]) & (t <= free.t[-1])
+        if np.count_nonzero(inside) < 8:
+            break
+        move = gauss_newton_step(recording, free, t, inside, slope)
+        shift, rate = shift - move[0], rate - move[1]
+        if abs(move[0]) < 1e-9 and abs(move[1]) < 1e-12:
+            break
+    return shift, rate
+
+
+def gauss_newton_step(
+    recording: Recording, free: Recording, t: Array, inside: Array, slope: Array
+) -> tuple[float, float]:
+    """How far shift [s] and rate are off, to first order; zeros where nothing moves."""
+    own = recording.t[inside]
+    middle = float(own.mean())
+    distance = resampled(t[inside], free.t, free.q) - recording.q[inside]
+    speed = resampled(t[inside], free.t, slope)
+    scale = 1.4826 * np.median(np.abs(distance), axis=0) + 1e-7
+    share = speed / (scale**2 + distance**2)
+    arm = (own - middle)[:, None]
+    a, b, c = (float(np.sum(share * speed * arm**k)) for k in range(3))
+    e, f = float(np.sum(share * distance)), float(np.sum(share * distance * arm))
+    determinant = a * c - b * b
+    if not determinant > 1e-12 * max(a * c, 1e-300):
+        return (0.0, 0.0)
+    rate = (a * f - b * e) / determinant
+    return (c * e - b * f) / determinant - rate * middle, rate
+
+
+def deviation_at(
+    recording: Recording, free: Recording, shift: float, rate: float = 1.0
+) -> tuple[float, Flags]:
+    """Rms position difference at a shift [rad], and the samples that overlap. (T,)"""
+    t = rate * recording.t + shift
+    overlap = (t >= free.t[0]) & (t <= free.t[-1])
+    if np.count_nonzero(overlap) < 2:
+        return float("inf"), overlap
+    there = resampled(t[overlap], free.t, free.q)
+    return float(np.sqrt(np.mean((there - recording.q[overlap]) ** 2))), overlap

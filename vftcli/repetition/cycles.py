@@ -1,0 +1,118 @@
+"""The cycles of a repeated motion in one log, without the way in and the way out."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.repetition.periodicity import Period, moving_part
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.filters import resampled
+from vftcli.signals.recording import Recording
+
+ON_PATH = 0.1
+"""A sample is on the repeated path if it is there again one period away, within this. [rad]"""
+
+COMPLETE = 0.97
+"""Share of a cycle that must be in the log for it to count as whole."""
+
+
+class Cycles(NamedTuple):
+    """The repeated part of a log.
+
+    Attributes:
+        period: Length of a cycle. [s]
+        begin: First instant on the repeated path. [s]
+        end: Last instant on it. [s]
+    """
+
+    period: float
+    begin: float
+    end: float
+
+    @property
+    def whole(self) -> int:
+        """Whole cycles; the last may lack a few samples."""
+        return max(int((self.end - self.begin) / self.period + 1.0 - COMPLETE), 0)
+
+    def number(self, t: Array) -> NDArray[np.int64]:
+        """Cycle of each instant, from 0; −1 before the first and after the last. (T,)"""
+        cycle = np.floor((t - self.begin) / self.period).astype(np.int64)
+        return np.where((t < self.begin) | (t > self.end), -1, cycle)
+
+    def span(self, cycle: int) -> tuple[float, float]:
+        """First and last instant of a cycle, counted from 0. [s]"""
+        first = self.begin + cycle * self.period
+        return first, min(first + self.period, self.end)
+
+
+def segment(recording: Recording, period: Period) -> Cycles:
+    """Find where the repeated path begins and ends; the log may start amid a cycle.
+
+    A sample is on the path if one period later or earlier the arm is at the same place, or if the
+    log is so short that neither is in it. Contacts push it off for a moment only, so the path
+    begins with the first sample after which at least three quarters of a cycle are on it, and ends
+    likewise.
+
+    Raises:
+        ReferenceTorqueError: If less than a whole cycle and a part of the next are there.
+    """
+    t, q = moving_part(recording)
+    seconds = period.seconds
+    alone = (t + seconds > t[-1]) & (t - seconds < t[0])
+    on_path = alone | comes_back(t, q, seconds) | comes_back(t, q, -seconds)
+    begin = settled(t, on_path, seconds)
+    end = -settled(-t[::-1], on_path[::-1], seconds)
+    cycles = Cycles(seconds, begin, end)
+    if not end - begin > seconds:
+        raise ReferenceTorqueError(
+            f"{recording.name}: only {max(end - begin, 0.0):.4g} s of the motion repeat, less than "
+            f"the period of {seconds:.4g} s; give a free run of the same motion with --free"
+        )
+    return cycles
+
+
+def comes_back(t: Array, q: Array, shift: float) -> NDArray[np.bool_]:
+    """Whether the arm is at the same place `shift` seconds away. (T,)"""
+    there = t + shift
+    distance = np.abs(resampled(there, t, q) - q).max(axis=1)
+    return np.asarray((there >= t[0]) & (there <= t[-1]) & (distance <= ON_PATH))
+
+
+def settled(t: Array, on_path: NDArray[np.bool_], seconds: float) -> float:
+    """The first instant from which three quarters of the next cycle are on the path. [s]"""
+    count = np.concatenate([[0], np.cumsum(on_path)])
+    stop = np.searchsorted(t, t + seconds)
+    here = np.arange(len(t))
+    share = (count[stop] - count[here]) / np.maximum(stop - here, 1)
+    good = np.flatnonzero(on_path & (share >= 0.75))
+    return float(t[good[0]]) if len(good) else float(t[-1])
+
+
+def parse_cycles(text: str) -> tuple[int, ...]:
+    """Read ``1`` or ``1,2`` or ``1-3`` into cycle numbers, counted from 1.
+
+    Raises:
+        ReferenceTorqueError: If it is something else.
+    """
+    found: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not first.isdecimal() or (dash and not last.isdecimal()):
+            raise ReferenceTorqueError(
+                f"--free-cycles {text!r} is not a list of cycle numbers such as 1 or 1,2 or 1-3"
+            )
+        found += range(int(first), int(last or first) + 1)
+    return tuple(dict.fromkeys(found))
+
+
+def check_cycles(recording: Recording, cycles: Cycles, asked: Sequence[int]) -> None:
+    """Raise unless the asked cycles are in the log, and something else to compare with them."""
+    beyond = [c for c in asked if not 1 <= c <= cycles.whole]
+    if beyond:
+        raise ReferenceTorqueError(
+            f"{recording.name}: there is no cycle {beyond[0]}; the log holds {cycles.whole} whole "
+            f"cycles of {cycles.period:.4g} s from {cycles.begin:.4g} s on"
+        )

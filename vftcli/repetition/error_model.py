@@ -1,0 +1,204 @@
+"""What a two-cycle difference cannot know: its own error, sample by sample and joint by joint."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.repetition.drive_run import DriveRun
+from vftcli.repetition.pairing import Pairing, mean_of
+from vftcli.repetition.standstill import Flags
+from vftcli.signals.arrays import Array
+from vftcli.signals.filters import band_pass, low_pass, passed
+
+STUCK = 0.3
+"""A stop of this length leaves the whole of the dry friction open, a shorter one its share. [s]"""
+
+LEAST_BAND = 12.0
+"""Noise is not measured in a band about less than this: contacts live there. [Hz]"""
+
+LEAST_SHARE = 0.05
+"""Share of the correction that is wrong even where the model is as good as it gets."""
+
+REPEATED = 0.5
+"""Share of the stiction that cancels between two stops of the same length at the same place."""
+
+TRUSTED_SHARE = 0.5
+"""A joint is trusted if it moves in at least this share of the samples."""
+
+
+class ErrorModel(NamedTuple):
+    """Expected error of a difference, from what the logs themselves show.
+
+    Attributes:
+        sd: Standard deviation of each sample, NaN where there is no reference. (T, n) [N·m]
+        rest: 1 where the joint rests in the log or in the free run. (T, n)
+    """
+
+    sd: Array
+    rest: Array
+
+    @property
+    def at_rest(self) -> Array:
+        """Share of the paired samples in which the joint rests. (n,)"""
+        return np.asarray(np.mean(self.rest[self.known], axis=0))
+
+    @property
+    def known(self) -> Flags:
+        """Samples with a reference. (T,)"""
+        return np.asarray(np.isfinite(self.sd).all(axis=1))
+
+    @property
+    def trusted_joints(self) -> Flags:
+        """Joints that move enough for friction to cancel; all if none does. (n,)"""
+        trusted = np.asarray(self.at_rest <= 1.0 - TRUSTED_SHARE)
+        return trusted if np.any(trusted) else np.ones_like(trusted)
+
+    @property
+    def floor(self) -> Array:
+        """Root mean square of `sd` while the joint moves; over all samples if it mostly rests."""
+        known = self.known
+        moving = self.rest[known] == 0.0
+        share = np.where(self.at_rest <= 1.0 - TRUSTED_SHARE, moving, True)
+        square = np.sum(np.where(share, self.sd[known] ** 2, 0.0), axis=0)
+        return np.asarray(np.sqrt(square / np.maximum(np.sum(share, axis=0), 1)))
+
+    @property
+    def floor_at_rest(self) -> Array:
+        """Root mean square of `sd` while the joint rests, NaN where it never does. (n,) [N·m]"""
+        known = self.known
+        resting = self.rest[known] > 0.0
+        square = np.sum(np.where(resting, self.sd[known] ** 2, 0.0), axis=0)
+        count = np.sum(resting, axis=0)
+        return np.where(count > 0, np.sqrt(square / np.maximum(count, 1)), np.nan)
+
+
+def error_model(
+    motion: DriveRun,
+    pairings: Sequence[Pairing],
+    raw: Array,
+    change: Array,
+    *,
+    corrected: bool,
+    cutoff: float | None,
+) -> ErrorModel:
+    """Estimate the error of a difference.
+
+    Its square is the sum of
+    - noise: √2·K·σ_i where nothing repeats, measured on the difference itself, so that ripple
+      which does repeat does not count and what the correction adds does;
+    - motion: the model's torque of the motion difference, Coulomb friction that turns over at
+      another instant included; all of it without the correction, with it the share by which the
+      model misses the free run's own torque;
+    - stiction where a joint stops: two torques anywhere within ±F_c differ by √(2/3)·F_c, after a
+      stop shorter than `STUCK` by its share.
+
+    Args:
+        motion: The log.
+        pairings: Its free runs.
+        raw: Torque difference, not corrected, not filtered; NaN without partner. (T, n) [N·m]
+        change: The model's torque of the motion difference. (T, n) [N·m]
+        corrected: Whether the difference is corrected by `change`.
+        cutoff: Cutoff of its low-pass, None without. [Hz]
+    """
+    known = np.isfinite(raw).all(axis=1)
+    t = motion.t[known]
+    rest = resting(motion, pairings)
+    momentum = motion.momentum - mean_of(pairings, [p.free.momentum for p in pairings])
+    moving = rest[known] == 0.0
+    step = float(np.median(np.diff(motion.t)))
+    said = change[known]
+    signal = raw[known] + said if corrected else raw[known]
+    noise = noise_of(t, signal, moving, step, cutoff)
+    motion_error = local_rms(low_pass(t, said, band(step, cutoff)[0]), step)
+    if corrected:
+        motion_error = motion_error * np.maximum(LEAST_SHARE, misfit(pairings))
+    else:
+        own = slope_noise(t, momentum[known], moving, step, band(step, cutoff)[0])
+        motion_error = np.sqrt(np.maximum(motion_error**2 - own**2, 0.0))
+    stuck = np.sqrt(2.0 / 3.0) * motion.coulomb * stopped(motion, pairings)[known]
+    square = noise**2 + motion_error**2 + stuck**2
+    sd = np.full(raw.shape, np.nan)
+    sd[known] = np.sqrt(square)
+    return ErrorModel(sd, rest)
+
+
+def resting(motion: DriveRun, pairings: Sequence[Pairing]) -> Array:
+    """1 where a joint rests in the log or in any free run. (T, n)"""
+    there = [np.nan_to_num(p.there(p.free.rest)) for p in pairings]
+    rest: Array = (np.max(np.stack([motion.rest, *there]), axis=0) > 0.0).astype(np.float64)
+    return rest
+
+
+def band(step: float, cutoff: float | None) -> tuple[float, float]:
+    """The band above the signal in which noise is measured. [Hz]"""
+    low = min(12.0 if cutoff is None else cutoff, 0.22 / step)
+    return low, min(2.0 * low, 0.45 / step)
+
+
+def noise_of(t: Array, x: Array, moving: Flags, step: float, cutoff: float | None) -> Array:
+    """Noise of a difference. (n,) [N·m]
+
+    Without a low-pass from second differences: for white noise of deviation σ on a smooth signal
+    x_{k−1} − 2x_k + x_{k+1} has √6·σ. With one, from the band about its cutoff, or about
+    `LEAST_BAND` if that is higher, because contacts fill what is below; taken to be as dense
+    throughout.
+    """
+    if cutoff is None:
+        return white(x, moving)
+    middle = max(cutoff, min(LEAST_BAND, 0.2 / step))
+    limits = (0.7 * middle, min(1.3 * middle, 0.45 / step))
+    dense = rms(band_pass(t, x, *limits), moving) / np.sqrt(passed(step, limits, "bandpass"))
+    return np.asarray(dense * np.sqrt(passed(step, cutoff, "lowpass")))
+
+
+def slope_noise(t: Array, momentum: Array, moving: Flags, step: float, cutoff: float) -> Array:
+    """Noise that differentiated momenta put into the model's low-passed torque. (n,) [N·m]"""
+    limits = band(step, cutoff)
+    dense = rms(band_pass(t, momentum, *limits), moving) / np.sqrt(passed(step, limits, "bandpass"))
+    return np.asarray(dense * np.sqrt(passed(step, cutoff, "lowpass", slope=1)))
+
+
+def white(x: Array, moving: Flags) -> Array:
+    """Standard deviation of the white part of a signal, from second differences. (n,)"""
+    curvature = x[:-2] - 2.0 * x[1:-1] + x[2:]
+    return np.asarray(rms(curvature, moving[1:-1]) / np.sqrt(6.0))
+
+
+def rms(x: Array, where: Flags) -> Array:
+    """Root mean square of each column over the chosen samples, over all if none is. (n,)"""
+    where = np.where(np.any(where, axis=0), where, True)
+    result: Array = np.sqrt(np.sum(np.where(where, x**2, 0.0), axis=0) / np.sum(where, axis=0))
+    return result
+
+
+def local_rms(x: Array, step: float) -> Array:
+    """Root mean square over a tenth of a second around each sample. (T, n)"""
+    width = max(1, round(0.05 / step))
+    total = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(x**2, axis=0)])
+    here = np.arange(len(x))
+    first, last = np.maximum(here - width, 0), np.minimum(here + width + 1, len(x))
+    result: Array = np.sqrt((total[last] - total[first]) / (last - first)[:, None])
+    return result
+
+
+def stopped(motion: DriveRun, pairings: Sequence[Pairing]) -> Array:
+    """Share of the dry friction a stop leaves open, in the log or in a free run, 0 to 1. (T, n)"""
+    there = [np.nan_to_num(p.there(p.free.stop)) for p in pairings]
+    longest = np.max(np.stack([motion.stop, *there]), axis=0)
+    alike = np.min(np.stack([motion.stop, *there]), axis=0) / np.maximum(longest, 1e-9)
+    share = np.minimum(longest / STUCK, 1.0) * (1.0 - REPEATED * alike)
+    return np.asarray(np.maximum(share, resting(motion, pairings)))
+
+
+def misfit(pairings: Sequence[Pairing]) -> Array:
+    """How much of its own torque's variation the model misses in the free run, at most 1. (n,)"""
+    missed = said = np.zeros(pairings[0].free.torque.shape[1])
+    for p in pairings:
+        used = np.unique(np.searchsorted(p.free.t, p.times[p.known]).clip(0, len(p.free.t) - 1))
+        step = float(np.median(np.diff(p.free.t)))
+        gap = low_pass(p.free.t, p.free.torque - p.free.model, band(step, None)[0])[used]
+        model = low_pass(p.free.t, p.free.model, band(step, None)[0])[used]
+        missed = missed + np.var(gap, axis=0)
+        said = said + np.var(model, axis=0)
+    return np.asarray(np.sqrt(np.minimum(missed / np.maximum(said, 1e-12), 1.0)))

@@ -1,0 +1,88 @@
+"""Which cycles of a repeated motion were free of contact: given, or found by what they show."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.repetition.cycles import Cycles
+from vftcli.repetition.drive_run import DriveRun
+from vftcli.repetition.error_model import band
+from vftcli.repetition.ladder import difference
+from vftcli.repetition.pairing import pair_with_cycle
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.filters import low_pass
+
+ALIKE = 1.5
+"""A cycle is free too if its difference from the freest is within this many expected errors."""
+
+
+class FreeCycles(NamedTuple):
+    """Cycles taken to be free.
+
+    Attributes:
+        numbers: Counted from 0.
+        note: How they were found, with the residuals they were chosen by.
+    """
+
+    numbers: tuple[int, ...]
+    note: str
+
+
+def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
+    """The cycle whose residual is smallest, and those that differ from it by noise alone.
+
+    The residual of a cycle is the root mean square of torque minus the model's, low-passed, of
+    each joint relative to that joint's smallest, averaged over the joints.
+
+    Raises:
+        ReferenceTorqueError: If the log holds no whole cycle beside another part of one.
+    """
+    if cycles.whole < 1:
+        raise ReferenceTorqueError(
+            f"{motion.name}: no whole cycle of {cycles.period:.4g} s is in the log; give a free "
+            "run with --free"
+        )
+    residual = residuals(motion, cycles)
+    freest = int(np.argmin(residual))
+    also = [
+        c for c in range(cycles.whole) if c == freest or differs_by_noise(motion, cycles, freest, c)
+    ]
+    if len(also) == cycles.whole:
+        also = also[:-1] if len(also) > 1 else also
+    listed = ", ".join(f"{value:.2f}" for value in residual)
+    note = (
+        f"free: {named(also)} of {cycles.whole}, found by the smallest residual "
+        f"(relative: {listed})"
+    )
+    return FreeCycles(tuple(also), note)
+
+
+def residuals(motion: DriveRun, cycles: Cycles) -> Array:
+    """Mean over joints of each cycle's residual relative to the smallest. (cycles,)"""
+    step = float(np.median(np.diff(motion.t)))
+    cutoff = min(5.0, band(step, None)[0])
+    gap = low_pass(motion.t, motion.torque - motion.model, cutoff)
+    number = cycles.number(motion.t)
+    square = np.array([np.mean(gap[number == c] ** 2, axis=0) for c in range(cycles.whole)])
+    relative = np.sqrt(square / np.maximum(square.min(axis=0), 1e-12))
+    mean: Array = relative.mean(axis=1)
+    return mean
+
+
+def differs_by_noise(motion: DriveRun, cycles: Cycles, freest: int, other: int) -> bool:
+    """Whether two cycles differ by no more than their difference's own error on any joint."""
+    pairing = pair_with_cycle(motion, cycles, freest, cycles.period)
+    only = cycles.number(motion.t) == other
+    pairing = pairing._replace(times=np.where(only, pairing.times, np.nan))
+    step = float(np.median(np.diff(motion.t)))
+    found = difference(motion, [pairing], "model", band(step, None)[0])
+    shown = np.sqrt(np.nanmean(found.tau**2, axis=0))
+    return bool(np.all(shown <= ALIKE * found.floor))
+
+
+def named(cycles: Sequence[int]) -> str:
+    """Cycles in words, counted from 1."""
+    listed = ", ".join(str(c + 1) for c in cycles)
+    return f"cycle{'s' if len(cycles) > 1 else ''} {listed}"

@@ -1,0 +1,128 @@
+"""The free part of a log: stated, other logs of the motion, or the free cycles it holds itself."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.repetition.alignment import align
+from vftcli.repetition.cycles import segment
+from vftcli.repetition.drive_run import DriveRun, drive_run_of
+from vftcli.repetition.pairing import Pairing, pair_with_cycle, pair_with_run
+from vftcli.repetition.periodicity import find_period
+from vftcli.repetition.two_cycle import TwoCycleOptions, partners_in_log
+from vftcli.robots.robot import Robot
+from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.recording import Recording
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeChoice:
+    """What the user says of the free part; nothing at all lets free cycles be found.
+
+    Attributes:
+        span: Free span of the log itself, from and to. [s]
+        runs: Free runs in other logs.
+        period: The commanded period of a repeated motion, or None. [s]
+        free_cycles: Its free cycles, as ``1`` or ``1,2`` or ``1-3``, or None.
+    """
+
+    span: tuple[float, float] | None = None
+    runs: tuple[Recording, ...] = ()
+    period: float | None = None
+    free_cycles: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreePart:
+    """What is known to be free of contact.
+
+    Attributes:
+        inside: Samples of the log itself that are free. (T,)
+        runs: Free runs in other logs.
+        pairings: Where in a free motion each sample belongs, one a free cycle or run that repeats
+            the log's motion; none where nothing repeats.
+        note: What it is and how it was found.
+    """
+
+    inside: Flags
+    runs: tuple[Recording, ...] = ()
+    pairings: tuple[Pairing, ...] = ()
+    note: str = ""
+
+
+def find_free_part(recording: Recording, robot: Robot, asked: FreeChoice) -> FreePart:
+    """The free part as stated, else in other logs, else the free cycles of a repeated motion.
+
+    Raises:
+        ReferenceTorqueError: If nothing is stated and the log repeats nothing.
+        ParameterError: If the stated span holds no samples.
+    """
+    if asked.span is not None:
+        return stated_span(recording, robot, asked.span)
+    if asked.runs:
+        return other_runs(recording, robot, asked.runs)
+    motion = drive_run_of(recording, robot)
+    options = TwoCycleOptions(period=asked.period, free_cycles=asked.free_cycles)
+    found = partners_in_log(recording, motion, options)
+    return FreePart(
+        inside=found.free,
+        pairings=tuple(found.clocks["found"]),
+        note=f"free part: {found.notes[-1].removeprefix('free: ').split(';')[0]}",
+    )
+
+
+def stated_span(recording: Recording, robot: Robot, span: tuple[float, float]) -> FreePart:
+    """A stated span of the log, with the free cycles it holds if the motion repeats."""
+    first, last = span
+    inside = (recording.t >= first) & (recording.t <= last)
+    if np.count_nonzero(inside) < 2 or inside.all():
+        raise ParameterError(
+            f"{recording.name}: --free-part {first:g}:{last:g} holds "
+            f"{np.count_nonzero(inside)} of its {recording.samples} samples; it must be a part of "
+            f"the log, which runs from {recording.t[0]:g} to {recording.t[-1]:g} s"
+        )
+    pairings: tuple[Pairing, ...] = ()
+    with suppress(ReferenceTorqueError):
+        pairings = cycles_within(recording, drive_run_of(recording, robot), span)
+    note = (
+        f"free part: {max(first, recording.t[0]):g} to {min(last, recording.t[-1]):g} s, as given"
+    )
+    return FreePart(inside=inside, pairings=pairings, note=note)
+
+
+def cycles_within(
+    recording: Recording, motion: DriveRun, span: tuple[float, float]
+) -> tuple[Pairing, ...]:
+    """The whole cycles inside a span, each laid under the log."""
+    cycles = segment(recording, find_period(recording))
+    slack = 0.03 * cycles.period
+    found = []
+    for number in range(cycles.whole):
+        first, last = cycles.span(number)
+        if first >= span[0] - slack and last <= span[1] + slack:
+            found.append(pair_with_cycle(motion, cycles, number, cycles.period))
+    return tuple(found)
+
+
+def other_runs(recording: Recording, robot: Robot, runs: tuple[Recording, ...]) -> FreePart:
+    """Free runs in other logs; those of the same motion are laid under the log."""
+    motion = drive_run_of(recording, robot)
+    pairings, words = [], []
+    for run in runs:
+        try:
+            found = align(recording, run)
+        except ReferenceTorqueError:
+            words.append(f"{run.name} (another motion)")
+            continue
+        pairings.append(pair_with_run(motion, drive_run_of(run, robot), found.shift, found.rate))
+        words.append(f"{run.name} (the same motion, shift {found.shift:+.3f} s)")
+    return FreePart(
+        inside=np.zeros(recording.samples, dtype=bool),
+        runs=runs,
+        pairings=tuple(pairings),
+        note=f"free part: {', '.join(words)}",
+    )

@@ -1,0 +1,114 @@
+"""Which instant of a free run belongs to each sample of a log: by clock, or by joint positions."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.repetition.cycles import Cycles
+from vftcli.repetition.drive_run import DriveRun
+from vftcli.repetition.standstill import Flags
+from vftcli.signals.arrays import Array
+from vftcli.signals.filters import low_pass, resampled
+
+GAP = 5.5
+"""A gap of more than this many median steps is not interpolated across."""
+
+FARTHEST = 0.1
+"""How far phase may lie from the clock's word, as the low-passed shift. [s]"""
+
+PHASE_CUTOFF = 8.0
+"""Cutoff of the joint-space phase shift: a servo's compliance is slower. [Hz]"""
+
+
+class Pairing(NamedTuple):
+    """A free run, and where in it each sample of the log belongs.
+
+    Attributes:
+        free: The free run; the log itself where cycles of one log are compared.
+        times: Instant on the free run's clock, NaN where there is none. (T,) [s]
+    """
+
+    free: DriveRun
+    times: Array
+
+    @property
+    def known(self) -> Flags:
+        """Whether a sample has a partner. (T,)"""
+        return np.isfinite(self.times)
+
+    def there(self, x: Array) -> Array:
+        """Columns of a signal of the free run at the paired instants, NaN where there is none."""
+        known = self.known
+        result = np.full((len(self.times), x.shape[1]), np.nan)
+        result[known] = resampled(self.times[known], self.free.t, x)
+        return result
+
+
+def pair_with_cycle(motion: DriveRun, cycles: Cycles, free: int, period: float) -> Pairing:
+    """Pair a log with one of its own cycles; that cycle itself has no partner.
+
+    Args:
+        motion: The log.
+        cycles: Its cycles.
+        free: The free cycle, from 0.
+        period: Period to go by, the commanded or the found one. [s]
+    """
+    t, number = motion.t, cycles.number(motion.t)
+    first, last = cycles.span(free)
+    middle = 0.5 * (first + last)
+    away = np.rint((t - middle) / period)
+    times = t - away * period
+    usable = (number >= 0) & (number != free) & (times >= first) & (times <= last)
+    times = np.where(usable & ~in_gap(motion.t, times), times, np.nan)
+    return Pairing(motion, times)
+
+
+def pair_with_run(motion: DriveRun, free: DriveRun, shift: float, rate: float = 1.0) -> Pairing:
+    """Pair a log with a free run in another log, at rate·t + shift on the free run's clock."""
+    times = rate * motion.t + shift
+    inside = (times >= free.t[0]) & (times <= free.t[-1]) & ~in_gap(free.t, times)
+    return Pairing(free, np.where(inside, times, np.nan))
+
+
+def in_gap(clock: Array, times: Array) -> Flags:
+    """Whether an instant lies in a gap of a clock. (T,)"""
+    steps = np.diff(clock)
+    at = np.clip(np.searchsorted(clock, times) - 1, 0, len(steps) - 1)
+    return np.asarray(steps[at] > GAP * np.median(steps))
+
+
+def by_phase(motion: DriveRun, pairing: Pairing) -> Pairing:
+    """Move each sample's partner to the nearest place on the free run's path.
+
+    The shift along the path minimises the distance of the joint positions, by Gauss–Newton; where
+    the path stands still there is nothing to go by and the clock's word stays. The shift is
+    smoothed along time.
+    """
+    known = pairing.known
+    if np.count_nonzero(known) < 8:
+        return pairing
+    times, q = pairing.times[known], motion.q[known]
+    free = pairing.free
+    speed = low_pass(free.t, free.dq, min(12.0, 0.2 / float(np.median(np.diff(free.t)))))
+    shift = np.zeros(len(times))
+    damping = 0.01 * float(np.mean(np.sum(speed**2, axis=1))) + 1e-6
+    for _ in range(4):
+        at = np.clip(times + shift, times.min(), times.max())
+        path = resampled(at, free.t, speed)
+        distance = resampled(at, free.t, free.q) - q
+        shift -= np.sum(distance * path, axis=1) / (np.sum(path**2, axis=1) + damping)
+        shift = np.clip(shift, -FARTHEST, FARTHEST)
+    step = float(np.median(np.diff(motion.t)))
+    smooth = low_pass(motion.t[known], shift[:, None], min(PHASE_CUTOFF, 0.2 / step))[:, 0]
+    moved = pairing.times.copy()
+    moved[known] = np.clip(times + smooth, times.min(), times.max())
+    return Pairing(free, moved)
+
+
+def mean_of(pairings: Sequence[Pairing], signals: Sequence[Array]) -> Array:
+    """Mean over free runs of a signal at the paired instants, over those that are known. (T, n)"""
+    values = np.stack([p.there(x) for p, x in zip(pairings, signals, strict=True)])
+    count = np.sum(np.isfinite(values), axis=0)
+    total = np.nansum(values, axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

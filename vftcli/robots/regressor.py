@@ -1,0 +1,141 @@
+"""The torque regressor: rigid-body torque as a matrix times the inertial parameters, batched.
+
+τ = Y(q, q̇, q̈) φ with ten numbers a link, in the chain's own frames and Pinocchio's order:
+m, m·c (3), then xx, xy, yy, xz, yz, zz of the tensor about the frame's origin. Reflected rotor
+inertia is not part of it (Pinocchio's regressor leaves it out too): it is a column q̈_j of its own.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vftcli.robots.chain import Chain
+from vftcli.signals.arrays import Array
+
+LINK = 10
+"""Inertial parameters a link."""
+
+INERTIAL_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+"""Their names, in order."""
+
+TENSOR = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+"""Row and column of the six tensor entries, in order."""
+
+
+def cross(a: Array, b: Array) -> Array:
+    """A × b of vectors that stand in the last axis but one. (..., 3, N)"""
+    x, y, z = a[..., 0, :], a[..., 1, :], a[..., 2, :]
+    u, v, w = b[..., 0, :], b[..., 1, :], b[..., 2, :]
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-2)
+
+
+def rotate_z(vectors: Array, cosine: Array, sine: Array) -> Array:
+    """Coordinates of vectors (..., 3, N) in a frame turned about z by the angle."""
+    x, y, z = vectors[..., 0, :], vectors[..., 1, :], vectors[..., 2, :]
+    return np.stack([cosine * x + sine * y, cosine * y - sine * x, z], axis=-2)
+
+
+def link_columns(
+    axis: Array, lever: Array, omega: Array, alpha: Array, acceleration: Array, out: Array
+) -> None:
+    """Fill the ten columns of one link for the joints before it. `out` is (j+1, 10, N).
+
+    The link's force is f = m a + (α̂ + ω̂²) h, its moment about the frame's origin
+    n = I α + ω × I ω + h × a; a joint feels axis·n + lever·f, all in the link's axes.
+
+    Args:
+        axis: Joint axes. (j+1, 3, N)
+        lever: axis × (origin of the link − origin of the joint). (j+1, 3, N) [m]
+        omega: Angular velocity ω. (3, N) [rad/s]
+        alpha: Angular acceleration α. (3, N) [rad/s²]
+        acceleration: Acceleration a of the origin, less gravity. (3, N) [m/s²]
+        out: The columns. (j+1, 10, N)
+    """
+    out[:, 0] = np.sum(lever * acceleration, axis=1)
+    out[:, 1:4] = cross(lever, alpha) + cross(omega, cross(omega, lever))
+    out[:, 1:4] += cross(acceleration, axis)
+    turned = cross(axis, omega)
+    for k, (r, c) in enumerate(TENSOR, start=4):
+        out[:, k] = axis[:, r] * alpha[c] + turned[:, r] * omega[c]
+        if r != c:
+            out[:, k] += axis[:, c] * alpha[r] + turned[:, c] * omega[r]
+
+
+def torque_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
+    """The inertial regressor of every sample. (N, n, 10n)
+
+    Only the chain's geometry and gravity are used. Memory is 80 n² bytes a sample: call it on a
+    chunk of a long log.
+
+    Args:
+        chain: The arm.
+        q: Joint positions. (N, n) [rad]
+        dq: Joint velocities. (N, n) [rad/s]
+        ddq: Joint accelerations. (N, n) [rad/s²]
+    """
+    samples, n = q.shape
+    out = np.zeros((n, n, LINK, samples))
+    cosine, sine = np.cos(q.T), np.sin(q.T)
+    omega, alpha = np.zeros((3, samples)), np.zeros((3, samples))
+    acceleration = np.repeat(-chain.gravity[:, None], samples, axis=1)
+    axes, levers = np.zeros((0, 3, samples)), np.zeros((0, 3, samples))
+    for j in range(n):
+        shift = np.repeat(chain.translation[j][:, None], samples, axis=1)
+        acceleration = acceleration + cross(alpha, shift) + cross(omega, cross(omega, shift))
+        levers = levers + cross(axes, np.broadcast_to(shift, axes.shape))
+        turn = chain.rotation[j].T
+        omega, alpha, acceleration, axes, levers = (
+            rotate_z(turn @ v, cosine[j], sine[j])
+            for v in (omega, alpha, acceleration, axes, levers)
+        )
+        spin = np.zeros((3, samples))
+        spin[2] = dq[:, j]
+        alpha = alpha + cross(omega, spin)
+        alpha[2] += ddq[:, j]
+        omega = omega + spin
+        own = np.zeros((1, 3, samples))
+        own[:, 2] = 1.0
+        axes = np.concatenate([axes, own])
+        levers = np.concatenate([levers, np.zeros((1, 3, samples))])
+        link_columns(axes, levers, omega, alpha, acceleration, out[: j + 1, j])
+    return np.ascontiguousarray(out.transpose(3, 0, 1, 2)).reshape(samples, n, n * LINK)
+
+
+def chain_parameters(chain: Chain) -> Array:
+    """The inertial parameters φ of a chain. (10n,)"""
+    phi = np.empty((chain.joints, LINK))
+    for j in range(chain.joints):
+        m, c = chain.mass[j], chain.com[j]
+        about_origin = chain.inertia[j] + m * (np.dot(c, c) * np.eye(3) - np.outer(c, c))
+        phi[j] = [m, *(m * c), *(about_origin[r, s] for r, s in TENSOR)]
+    return phi.ravel()
+
+
+def tensor_of(entries: Sequence[float] | Array) -> Array:
+    """The symmetric matrix of six entries in the regressor's order. (3, 3)"""
+    tensor = np.empty((3, 3))
+    for value, (r, c) in zip(entries, TENSOR, strict=True):
+        tensor[r, c] = tensor[c, r] = value
+    return tensor
+
+
+def with_parameters(chain: Chain, phi: Array, rotor_inertia: Array | None = None) -> Chain:
+    """The chain with other inertial parameters φ (10n,) and, if given, rotor inertias. (n,)"""
+    from dataclasses import replace
+
+    masses, coms, inertias = [], [], []
+    for row in phi.reshape(chain.joints, LINK):
+        mass = float(row[0])
+        com = row[1:4] / mass if mass > 0 else np.zeros(3)
+        masses.append(mass)
+        coms.append(com)
+        inertias.append(
+            tensor_of(row[4:]) - mass * (np.dot(com, com) * np.eye(3) - np.outer(com, com))
+        )
+    return replace(
+        chain,
+        mass=np.array(masses),
+        com=np.array(coms),
+        inertia=np.array(inertias),
+        rotor_inertia=chain.rotor_inertia if rotor_inertia is None else rotor_inertia,
+    )

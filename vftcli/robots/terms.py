@@ -1,0 +1,117 @@
+"""DynamicsTerms: all an observer ever sees of a robot and its log."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vftcli.robots.drive import check_joints, drive_torque, uses_current
+from vftcli.robots.friction import friction_torque
+from vftcli.robots.kernels import CHUNK, Workspace, maps_of, momentum_chunk
+from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import (
+    Array,
+    check_clock,
+    check_shape,
+    empty_series,
+    frozen,
+    handed_over,
+)
+from vftcli.signals.errors import ShapeError
+from vftcli.signals.recording import Recording
+
+
+@dataclass(frozen=True, kw_only=True)
+class DynamicsTerms:
+    r"""Momentum form of the equations of motion: :math:`\dot p = \mu + \tau_{ext}` (33).
+
+    Attributes:
+        t: Time. (T,) [s]
+        p: Generalised momentum M q̇. (T, n) [kg·m²/s]
+        mu: μ = τ + Cᵀq̇ − g − F_f, the torque that changes p without contact. (T, n) [N·m]
+    """
+
+    t: Array
+    p: Array
+    mu: Array
+
+    def __post_init__(self) -> None:
+        for name in ("t", "p", "mu"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        if self.p.ndim != 2:
+            raise ShapeError(f"p has shape {self.p.shape}; expected (T, n)")
+        check_clock(self.t, "the dynamics terms")
+        check_shape(self.p, (len(self.t), self.p.shape[1]), "p", "the dynamics terms")
+        check_shape(self.mu, self.p.shape, "mu", "the dynamics terms")
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return int(self.p.shape[1])
+
+    @property
+    def samples(self) -> int:
+        """Number of samples T."""
+        return len(self.t)
+
+
+def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False) -> DynamicsTerms:
+    """Evaluate p and μ along a recording, chunk by chunk.
+
+    Beside the recording and the two results it needs memory for one chunk only.
+
+    Args:
+        recording: The log.
+        robot: The arm, its payload mounted.
+        literal: Use the paper's numeric method (7)–(16) instead of the batched kernels.
+
+    Raises:
+        MissingSignalError: If velocities, or both currents and torques, are missing.
+        RobotError: If the number of joints differs.
+    """
+    check_joints(recording, robot)
+    q, dq = recording.q, recording.require("dq")
+    effort, scale = effort_of(recording, robot)
+    p, mu = empty_series(*q.shape), empty_series(*q.shape)
+    chunks = literal_chunks if literal else kernel_chunks
+    for span, velocity, momentum, free_torque, gravity in chunks(robot, q, dq):
+        p[span] = momentum
+        mu[span] = effort[span]
+        mu[span] *= scale
+        mu[span] += free_torque
+        if robot.friction:
+            mu[span] -= friction_torque(robot.friction, velocity, gravity)
+    return DynamicsTerms(t=recording.t, p=handed_over(p), mu=handed_over(mu))
+
+
+Chunk = tuple[slice, Array, Array, Array, Array]
+"""Which samples; their velocity, p, Cᵀq̇ − g and g, each (N, n) with its columns whole."""
+
+
+def kernel_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
+    """Yield one chunk of samples after another, by the batched kernels."""
+    samples, n = q.shape
+    maps, size = maps_of(robot.loaded_chain), min(CHUNK, samples)
+    space, rows = Workspace(n, size), np.empty((3, n, size))
+    for start in range(0, samples, CHUNK):
+        span = slice(start, min(start + CHUNK, samples))
+        momentum, coriolis, gravity = rows[:, :, : span.stop - span.start]
+        columns = np.ascontiguousarray(q[span].T), np.ascontiguousarray(dq[span].T)
+        momentum_chunk(maps, space, *columns, momentum, coriolis, gravity)
+        coriolis -= gravity
+        yield span, columns[1].T, momentum.T, coriolis.T, gravity.T
+
+
+def literal_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
+    """Yield the whole log at once, by the paper's numeric method."""
+    from vftcli.robots.literal import literal_momentum_terms
+
+    p, coriolis, gravity = literal_momentum_terms(robot.model, q, dq)
+    yield slice(0, len(q)), dq, p, coriolis - gravity, gravity
+
+
+def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]:
+    """The measured effort (T, n) and what turns it into torque: K [N·m/A], or 1 for torques."""
+    if uses_current(recording, robot) and robot.torque_constant is not None:
+        return recording.require("current"), robot.torque_constant
+    return drive_torque(recording, robot), 1.0

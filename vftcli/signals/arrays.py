@@ -1,0 +1,104 @@
+"""Arrays: one alias, read-only copies, and the checks every type makes at its door."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vftcli.signals.errors import ClockError, ShapeError
+
+Array = NDArray[np.float64]
+"""A float64 array; shapes and units stand in the docstrings, as ``(T, n) [N·m]``."""
+
+
+def frozen(value: ArrayLike) -> Array:
+    """Return a read-only float64 array that nobody else can write to.
+
+    An array that already is float64 and read-only, down to the memory it is a view of, is returned
+    as it is, so that a large log is not copied each time it passes from one type to the next. A
+    copy keeps the order in memory.
+    """
+    if isinstance(value, np.ndarray) and value.dtype == np.float64 and is_sealed(value):
+        return value
+    copy = np.array(value, dtype=np.float64, order="K")
+    copy.setflags(write=False)
+    return copy
+
+
+def is_sealed(value: NDArray[Any]) -> bool:
+    """Whether neither an array nor the array it is a view of can be written to."""
+    owner = value.base
+    if owner is None:
+        return not value.flags.writeable
+    return isinstance(owner, np.ndarray) and not value.flags.writeable and is_sealed(owner)
+
+
+def handed_over(value: Array) -> Array:
+    """Make a freshly computed array read-only in place and return it: `frozen` without the copy.
+
+    Only for arrays that the caller made itself and will not write to again.
+    """
+    value.setflags(write=False)
+    if isinstance(value.base, np.ndarray):
+        value.base.setflags(write=False)
+    return value
+
+
+def empty_series(samples: int, columns: int) -> Array:
+    """An uninitialised (T, n) array whose columns are contiguous: series are read along time."""
+    return np.empty((columns, samples)).T
+
+
+def check_clock(t: Array, what: str) -> None:
+    """Raise unless `t` is one-dimensional, finite and strictly increasing.
+
+    Args:
+        t: Time. (T,) [s]
+        what: Whose clock it is, for the message.
+
+    Raises:
+        ClockError: If the clock stands still, runs backwards or holds a non-finite value.
+    """
+    if t.ndim != 1:
+        raise ShapeError(f"the clock of {what} has shape {t.shape}; it must be one-dimensional")
+    if not np.all(np.isfinite(t)):
+        k = int(np.argmin(np.isfinite(t)))
+        raise ClockError(f"the clock of {what} is not finite at sample {k}")
+    steps = np.diff(t)
+    if np.any(steps <= 0):
+        k = int(np.argmax(steps <= 0))
+        raise ClockError(
+            f"the clock of {what} stops increasing at sample {k + 1} "
+            f"({t[k]:.6f} s, then {t[k + 1]:.6f} s)"
+        )
+
+
+def check_shape(value: Array, shape: tuple[int, ...], name: str, owner: str) -> None:
+    """Raise a ShapeError unless `value` has `shape`."""
+    if value.shape != shape:
+        raise ShapeError(f"{name} of {owner} has shape {value.shape}; expected {shape}")
+
+
+def median(values: Array) -> float:
+    """Median of a non-empty one-dimensional array.
+
+    NumPy's own imports its masked arrays, which cost more than the rest of a short command.
+    """
+    middle = len(values) // 2
+    if len(values) % 2:
+        return float(np.partition(values, middle)[middle])
+    lower, upper = np.partition(values, (middle - 1, middle))[middle - 1 : middle + 1]
+    return 0.5 * float(lower + upper)
+
+
+def is_uniform(t: Array, tolerance: float = 1e-6) -> bool:
+    """Whether all steps of a clock are equal to within `tolerance` of their median.
+
+    The tolerance covers the rounding of stamps printed with nine digits; a clock that jitters more
+    than that is treated step by step, because a fixed mean step would be wrong.
+    """
+    steps = np.diff(t)
+    if steps.size == 0:
+        return True
+    usual = median(steps)
+    return bool(np.max(np.abs(steps - usual)) <= tolerance * usual)

@@ -1,0 +1,214 @@
+"""Recording: one log, in SI units, on one strictly increasing clock."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+
+from vftcli.signals.arrays import Array, check_clock, check_shape, frozen, median
+from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
+
+JOINT_SIGNALS = (
+    "q",
+    "dq",
+    "current",
+    "torque",
+    "target_q",
+    "target_dq",
+    "target_current",
+    "target_torque",
+    "tau_ext",
+    "temperature",
+)
+"""Names of the fields of a Recording that hold one column a joint."""
+
+MEANINGS = {
+    "q": "joint positions",
+    "dq": "joint velocities",
+    "current": "motor currents",
+    "torque": "joint torques",
+    "target_q": "target positions",
+    "target_dq": "target velocities",
+    "target_current": "target currents",
+    "target_torque": "target torques",
+    "tau_ext": "vendor estimates of the external torque",
+    "temperature": "joint temperatures",
+    "wrench": "wrenches",
+}
+
+
+class Awaited:
+    """A field that may be given as a function; it is called when the field is first read.
+
+    A digest is computed beside everything else, and nobody waits for it before it is written down.
+    """
+
+    def __set_name__(self, _owner: type, name: str) -> None:
+        self._key = f"_{name}"
+
+    def __get__(self, instance: object, _owner: type) -> str:
+        if instance is None:
+            return ""  # the field's default
+        value: str | Callable[[], str] = instance.__dict__[self._key]
+        if not isinstance(value, str):
+            value = value()
+            instance.__dict__[self._key] = value
+        return value
+
+    def __set__(self, instance: object, value: str | Callable[[], str]) -> None:
+        instance.__dict__[self._key] = value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """Where a recording came from and what was done to it on the way in.
+
+    Attributes:
+        path: The file or bag directory, or None for a recording made in memory.
+        format: The reader's name.
+        sha256: Hex digest of the file's bytes (of all files of a directory, in name order);
+            reading it waits until it is computed.
+        clock: Which clock the stamps are from, in words.
+        t0: The log's own stamp of the first sample. [s]
+        t0_ns: The same stamp in whole nanoseconds where the log counts them. [ns]
+        rows: Samples the file held before any were dropped.
+        duplicates: Rows dropped because their stamp repeated the one before.
+        repairs: Everything that was dropped, turned or derived, one sentence each.
+        warnings: What looks suspicious but was left as it is, one sentence each.
+    """
+
+    path: Path | None = None
+    format: str = "memory"
+    sha256: Awaited = Awaited()
+    clock: str = "as given"
+    t0: float = 0.0
+    t0_ns: int | None = None
+    rows: int = 0
+    duplicates: int = 0
+    repairs: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """Measurements of an n-joint robot at T instants. A signal the log lacks is None, never zeros.
+
+    Attributes:
+        t: Time since the first sample, strictly increasing. (T,) [s]
+        q: Joint positions. (T, n) [rad]
+        dq: Joint velocities. (T, n) [rad/s]
+        current: Motor currents. (T, n) [A]
+        torque: Measured drive torques, gravity included. (T, n) [N·m]
+        target_q: Commanded positions. (T, n) [rad]
+        target_dq: Commanded velocities. (T, n) [rad/s]
+        target_current: The controller's expected currents. (T, n) [A]
+        target_torque: The controller's inverse-dynamics torques. (T, n) [N·m]
+        tau_ext: The vendor's estimate of the external torque ON the robot. (T, n) [N·m]
+        temperature: Joint temperatures. (T, n) [°C]
+        wrench: Force then moment, in the sign and axes that `wrench_frame` names. (T, 6) [N, N·m]
+        wrench_frame: Frame, axes and sign of `wrench`, in words; None where unknown.
+        joint_names: The joints' names in the log's order, or empty.
+        robot_hint: Name of the profile the log itself settles, or None.
+        payload_mass: Mass of the payload the controller was told of, None if not logged. [kg]
+        payload_com: Its centre of mass in flange axes. (3,) [m]
+        source: Where it came from and what was repaired.
+    """
+
+    t: Array
+    q: Array
+    dq: Array | None = None
+    current: Array | None = None
+    torque: Array | None = None
+    target_q: Array | None = None
+    target_dq: Array | None = None
+    target_current: Array | None = None
+    target_torque: Array | None = None
+    tau_ext: Array | None = None
+    temperature: Array | None = None
+    wrench: Array | None = None
+    wrench_frame: str | None = None
+    joint_names: tuple[str, ...] = ()
+    robot_hint: str | None = None
+    payload_mass: float | None = None
+    payload_com: tuple[float, ...] | None = None
+    source: Source = Source()
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if isinstance(value := getattr(self, field.name), np.ndarray):
+                object.__setattr__(self, field.name, frozen(value))
+        if self.q.ndim != 2:
+            raise ShapeError(f"q of the recording has shape {self.q.shape}; expected (T, n)")
+        if len(self.t) == 0:
+            raise ClockError(f"{self.name}: no samples")
+        check_clock(self.t, self.name)
+        shape = (len(self.t), self.joints)
+        for name in JOINT_SIGNALS:
+            if (signal := getattr(self, name)) is not None:
+                check_shape(signal, shape, name, self.name)
+        if self.wrench is not None:
+            check_shape(self.wrench, (len(self.t), 6), "wrench", self.name)
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return int(self.q.shape[1])
+
+    @property
+    def samples(self) -> int:
+        """Number of samples T."""
+        return len(self.t)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample. [s]"""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def step(self) -> float:
+        """Median time between samples, the nominal sample time. [s]"""
+        if self.samples < 2:
+            raise ClockError(f"{self.name}: one sample has no sample time")
+        return median(np.diff(self.t))
+
+    @property
+    def name(self) -> str:
+        """A short name for tables: the file's name, without its folder."""
+        return self.source.path.name if self.source.path is not None else "recording"
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the signals this log has, in a fixed order."""
+        names = (*JOINT_SIGNALS, "wrench")
+        return tuple(name for name in names if getattr(self, name) is not None)
+
+    def require(self, name: str) -> Array:
+        """Return a signal, or say that the log lacks it and what would supply it.
+
+        Raises:
+            MissingSignalError: If the log does not have the signal.
+        """
+        value: Array | None = getattr(self, name)
+        if value is None:
+            raise MissingSignalError(
+                f"{self.name}: the log has no {MEANINGS[name]} ({name}); it has "
+                f"{', '.join(self.signals)}. Record them, or name their columns with --columns."
+            )
+        return value
+
+    def between(self, start: float, stop: float) -> "Recording":
+        """Return the samples with start ≤ t ≤ stop; their times stay those of the whole log. [s]
+
+        Raises:
+            ClockError: If fewer than two samples fall into the span.
+        """
+        keep = (self.t >= start) & (self.t <= stop)
+        if np.count_nonzero(keep) < 2:
+            raise ClockError(
+                f"{self.name}: fewer than two samples between {start:g} and {stop:g} s; "
+                f"the log runs from {self.t[0]:g} to {self.t[-1]:g} s"
+            )
+        names = ("t", *JOINT_SIGNALS, "wrench")
+        kept = {n: v[keep] for n in names if (v := getattr(self, n)) is not None}
+        return replace(self, **kept)

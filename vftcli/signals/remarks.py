@@ -1,0 +1,162 @@
+"""Remark: what a reader of the numbers should know, as data; its words are made when it is shown.
+
+A remark has a code, a level, values with their units in the names, and a place. The words stand in
+the catalogue, `words/*.toml` beside this file, one table a code::
+
+    [joint-rests]
+    short = "rests in {share:.0%} of the samples and is marked"
+    long = "... where it keeps its stiction, up to about {stiction_Nm:.2g} N·m rms ..."
+
+`short` is one line for the terminal; `long`, which may be left out, is for the page. Both are
+`str.format` templates over the remark's values; a format is applied to each item of a list.
+"""
+
+import string
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal, NamedTuple
+
+Level = Literal["fact", "caution", "warning"]
+"""A fact informs, a caution limits what can be said, a warning can make results wrong."""
+
+WORDS = Path(__file__).parent / "words"
+"""The catalogue: a file a room."""
+
+
+class Place(NamedTuple):
+    """What a remark is about.
+
+    Attributes:
+        about: An observer, log or file by its name; "" where it is the run as a whole.
+        joints: Joints, counted from 1; none where it holds for all alike.
+        span: First and last time, None where it holds throughout. [s]
+    """
+
+    about: str = ""
+    joints: tuple[int, ...] = ()
+    span: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Remark:
+    """What a reader of the numbers should know.
+
+    Attributes:
+        code: Which remark it is: a table of the catalogue.
+        level: How much it matters.
+        values: Its numbers and names; a number's unit ends its key, as in ``shift_s``.
+        where: What it is about.
+    """
+
+    code: str
+    level: Level = "fact"
+    values: Mapping[str, Any] = field(default_factory=dict)
+    where: Place = field(default_factory=Place)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
+
+    def __str__(self) -> str:
+        """The remark on one line."""
+        return sentence(self)
+
+
+def fact(code: str, where: Place = Place(), **values: object) -> Remark:  # noqa: B008 - immutable
+    """A remark that informs."""
+    return Remark(code, "fact", values, where)
+
+
+def caution(code: str, where: Place = Place(), **values: object) -> Remark:  # noqa: B008
+    """A remark on what limits the result."""
+    return Remark(code, "caution", values, where)
+
+
+def warning(code: str, where: Place = Place(), **values: object) -> Remark:  # noqa: B008
+    """A remark on what can make the result wrong."""
+    return Remark(code, "warning", values, where)
+
+
+def sentence(remark: Remark) -> str:
+    """A remark's short words, headed by what it is about.
+
+    Raises:
+        LookupError: If the catalogue does not have its code.
+    """
+    return heading(remark) + filled(words(remark.code)["short"], remark)
+
+
+def explanation(remark: Remark) -> str:
+    """A remark's long words, its short ones where the catalogue has no others."""
+    entry = words(remark.code)
+    return heading(remark) + filled(entry.get("long", entry["short"]), remark)
+
+
+def heading(remark: Remark) -> str:
+    """What a remark is about, as its first words, or ""."""
+    return f"{remark.where.about}: " if remark.where.about else ""
+
+
+def filled(template: str, remark: Remark) -> str:
+    """A template with a remark's values; ``{joints}`` and ``{span}`` are those of its place."""
+    where = remark.where
+    joints = ", ".join(f"J{j}" for j in where.joints)
+    return Template().vformat(template, (), {"joints": joints, "span": where.span, **remark.values})
+
+
+class Template(string.Formatter):
+    """`str.format` that formats the items of a list one by one."""
+
+    def format_field(self, value: Any, format_spec: str) -> str:  # noqa: ANN401 - any value
+        """A value by its format; a list's items by it, numbers apart by spaces, words by commas."""
+        if isinstance(value, str) or not isinstance(value, Iterable):
+            return str(super().format_field(value, format_spec))
+        items = [str(super(Template, self).format_field(item, format_spec)) for item in value]
+        return (" " if format_spec else ", ").join(items)
+
+
+def words(code: str) -> Mapping[str, str]:
+    """A code's entry of the catalogue.
+
+    Raises:
+        LookupError: If there is none.
+    """
+    for text in catalogue():
+        # Reading TOML takes longer than finding the one file of a room that has the code.
+        if f"[{code}]" in text:
+            entry: Mapping[str, str] = parsed(text)[code]
+            return entry
+    raise LookupError(f"no words for the remark {code!r} in {WORDS}")
+
+
+@cache
+def catalogue() -> tuple[str, ...]:
+    """The text of every file of the catalogue."""
+    return tuple(path.read_text(encoding="utf-8") for path in sorted(WORDS.glob("*.toml")))
+
+
+@cache
+def parsed(text: str) -> Mapping[str, Mapping[str, str]]:
+    """One file of the catalogue, by code."""
+    return tomllib.loads(text)
+
+
+def as_record(remark: Remark) -> dict[str, Any]:
+    """A remark as `run.json` holds it: code, level, values, place, and its words."""
+    where = remark.where
+    return {
+        "code": remark.code,
+        "level": remark.level,
+        "message": sentence(remark),
+        "values": dict(remark.values),
+        "about": where.about or None,
+        "joints": list(where.joints),
+        "span_s": None if where.span is None else list(where.span),
+    }
+
+
+Note = Remark | str
+"""For the time of the move only: a remark, or a sentence that has not become one yet."""

@@ -1,0 +1,92 @@
+"""Wrench: force and moment ON the robot along a log, in a named frame."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
+from vftcli.signals.errors import ShapeError
+from vftcli.signals.remarks import Note
+
+AXES = ("fx", "fy", "fz", "mx", "my", "mz")
+"""Names of the six components, force first, as in column names and tables."""
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wrench:
+    """Force and moment that the environment exerts on the robot.
+
+    Attributes:
+        name: Short name of the observer or of the reference it comes from.
+        t: Time on the recording's clock. (T,) [s]
+        values: Force, then moment; also where the pose cannot tell them, so that a blow-up can be
+            seen: use `known` for numbers. (T, 6) [N, N·m]
+        frame: Axes and reference point: a key of `vftcli.virtual_sensor.frames.FRAMES`.
+        sd: One standard deviation of `values`. (T, 6) [N, N·m]
+        sigma_min: Smallest singular value of J with angular rows × 0.3 m, None where no Jacobian
+            was inverted. (T,) [m]
+        masked: Samples in which the pose cannot tell the wrench. (T,)
+        null_space: Norm of the part of the joint torque that no wrench at the flange explains,
+            None for arms of six joints. (T,) [N·m]
+        remarks: What a reader of the numbers should know.
+    """
+
+    name: str
+    t: Array
+    values: Array
+    frame: str
+    sd: Array | None = None
+    sigma_min: Array | None = None
+    masked: Mask | None = None
+    null_space: Array | None = None
+    remarks: tuple[Note, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("t", "values", "sd", "sigma_min", "null_space"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(getattr(self, name)))
+        samples = len(self.t)
+        mask = np.zeros(samples, dtype=bool) if self.masked is None else np.array(self.masked, bool)
+        mask.setflags(write=False)
+        object.__setattr__(self, "masked", mask)
+        check_clock(self.t, self.name)
+        check_shape(self.values, (samples, 6), "wrench", self.name)
+        for name, shape in (("sd", (samples, 6)), ("sigma_min", (samples,))):
+            if (value := getattr(self, name)) is not None:
+                check_shape(value, shape, name, self.name)
+        if mask.shape != (samples,):
+            raise ShapeError(f"mask of {self.name} has shape {mask.shape}; expected {(samples,)}")
+
+    @property
+    def hidden(self) -> Mask:
+        """Samples in which the pose cannot tell the wrench. (T,)"""
+        return np.asarray(self.masked, dtype=bool)
+
+    @property
+    def known(self) -> Array:
+        """The wrench, NaN where the pose cannot tell it. (T, 6) [N, N·m]"""
+        return np.where(self.hidden[:, None], np.nan, self.values)
+
+    @property
+    def known_sd(self) -> Array | None:
+        """The standard deviation, NaN where the pose cannot tell the wrench. (T, 6)"""
+        return None if self.sd is None else np.where(self.hidden[:, None], np.nan, self.sd)
+
+    @property
+    def force(self) -> Array:
+        """The force, NaN where the pose cannot tell it. (T, 3) [N]"""
+        return self.known[:, :3]
+
+    @property
+    def moment(self) -> Array:
+        """The moment about the frame's origin, NaN where unknown. (T, 3) [N·m]"""
+        return self.known[:, 3:]
+
+    def between(self, start: float, stop: float) -> Array:
+        """The known samples with start ≤ t ≤ stop. (k, 6) [N, N·m]"""
+        inside = (self.t >= start) & (self.t <= stop) & np.all(np.isfinite(self.known), axis=1)
+        rows: Array = self.values[inside]
+        return rows

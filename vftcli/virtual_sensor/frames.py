@@ -1,0 +1,241 @@
+"""Frames of a wrench: which axes it is expressed in and which point its moment refers to.
+
+A wrench moves between frames by the adjoint of a pose. With R the orientation of S in F and p the
+origin of S in F, a wrench given in S reads in F
+
+    [F_F; N_F] = [[R, 0], [[p]×R, R]] [F_S; N_S]
+
+which is (56) in its right form (the paper prints R the wrong way round in the lower left block) and
+Pinocchio's ``SE3(R, p).act(Force)``.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.robots.conventions import IDENTITY, Pose, rpy
+from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
+
+ROTATION_TOLERANCE = 1e-6
+"""How far RᵀR may lie from the identity: nine printed digits of a rotation leave 1e-9."""
+
+FRAMES: dict[str, str] = {
+    "flange": "flange axes, moment about the flange point",
+    "base": "base axes, moment about the flange point",
+    "tool": "tool axes, moment about the tool point (--tool)",
+    "sensor": "sensor axes, moment about the sensor's origin (--sensor-pose)",
+}
+"""Name at the command line → axes and reference point."""
+
+
+class Mounting(NamedTuple):
+    """What is fixed to the flange.
+
+    Attributes:
+        tool: Pose of the tool in the flange frame, None if there is none.
+        sensor: Pose of the force/torque sensor in the flange frame, None if there is none.
+    """
+
+    tool: Pose | None = None
+    sensor: Pose | None = None
+
+
+NOTHING = Mounting()
+"""A bare flange."""
+
+
+def skew(p: Array) -> Array:
+    """[p]×, so that [p]× f = p × f. (..., 3, 3) of (..., 3)"""
+    zero = np.zeros(p.shape[:-1])
+    x, y, z = p[..., 0], p[..., 1], p[..., 2]
+    rows = [zero, -z, y, z, zero, -x, -y, x, zero]
+    return np.stack(rows, axis=-1).reshape(*p.shape[:-1], 3, 3)
+
+
+def adjoint(pose: Pose) -> Array:
+    """The matrix that takes a wrench in S to F, for the pose of S in F (56). (..., 6, 6)"""
+    R, p = np.asarray(pose.rotation), np.asarray(pose.translation)
+    X = np.zeros((*R.shape[:-2], 6, 6))
+    X[..., :3, :3] = X[..., 3:, 3:] = R
+    X[..., 3:, :3] = skew(p) @ R
+    return X
+
+
+def inverse(pose: Pose) -> Pose:
+    """The pose of F in S, from the pose of S in F."""
+    turned = np.swapaxes(pose.rotation, -1, -2)
+    return Pose(turned, -np.squeeze(turned @ pose.translation[..., None], axis=-1))
+
+
+def angles_of(rotation: Array) -> tuple[float, float, float]:
+    """Roll, pitch and yaw of a rotation, `rpy` turned round. [rad]"""
+    pitch = float(np.arcsin(np.clip(-rotation[2, 0], -1.0, 1.0)))
+    roll = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
+    yaw = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+    return roll, pitch, yaw
+
+
+def check_frame(name: str) -> str:
+    """Return the frame's name.
+
+    Raises:
+        ParameterError: If there is no such frame; the message lists them.
+    """
+    if name not in FRAMES:
+        raise ParameterError(
+            f"no frame {name!r} for a wrench; there is "
+            + ", ".join(f"{key} ({words})" for key, words in FRAMES.items())
+        )
+    return name
+
+
+def mounted(frame: str, mounting: Mounting) -> Pose:
+    """Pose in the flange frame of what a frame is fixed to.
+
+    Raises:
+        ParameterError: If the tool's or the sensor's pose is needed and not known.
+    """
+    if frame == "tool":
+        if mounting.tool is None:
+            raise ParameterError(
+                "the robot has no tool, so there is no Jacobian for it: give its pose on the "
+                "flange with --tool x,y,z,roll,pitch,yaw, or a [tool.NAME] section in the robot "
+                "file and --tool NAME"
+            )
+        return mounting.tool
+    if frame == "sensor":
+        if mounting.sensor is None:
+            raise ParameterError(
+                "the sensor's pose on the flange is not known: give it with --sensor-pose "
+                "x,y,z,roll,pitch,yaw, or --sensor-pose fit to estimate it from the log"
+            )
+        return mounting.sensor
+    return IDENTITY
+
+
+def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
+    """Matrices that take a wrench in base axes about the flange point to a named frame. (T, 6, 6)
+
+    Args:
+        frame: A key of `FRAMES`.
+        flange: Orientation of the flange in the base. (T, 3, 3)
+        mounting: Where tool and sensor sit.
+
+    Raises:
+        ParameterError: If there is no such frame, or its pose is not known.
+    """
+    if check_frame(frame) == "base":
+        return np.broadcast_to(np.eye(6), (len(flange), 6, 6))
+    turned = np.swapaxes(flange, 1, 2)
+    X = np.zeros((len(flange), 6, 6))
+    X[:, :3, :3] = X[:, 3:, 3:] = turned
+    if frame == "flange":
+        return X
+    moved: Array = adjoint(inverse(mounted(frame, mounting))) @ X
+    return moved
+
+
+def to_base(frame: str, flange: Array, mounting: Mounting) -> Array:
+    """Matrices that take a wrench in a named frame to base axes about the flange point. (T, 6, 6)
+
+    Raises:
+        ParameterError: If there is no such frame, or its pose is not known.
+    """
+    if check_frame(frame) == "base":
+        return np.broadcast_to(np.eye(6), (len(flange), 6, 6))
+    X = np.zeros((len(flange), 6, 6))
+    X[:, :3, :3] = X[:, 3:, 3:] = flange
+    moved: Array = X @ adjoint(mounted(frame, mounting))
+    return moved
+
+
+def checked_pose(rotation: Array, translation: Array, what: str) -> Pose:
+    """A pose whose rotation is one.
+
+    Raises:
+        ParameterError: If the matrix is no rotation, or a number is not finite.
+    """
+    R, p = np.asarray(rotation, dtype=np.float64), np.asarray(translation, dtype=np.float64)
+    if R.shape != (3, 3) or p.shape != (3,) or not (np.isfinite(R).all() and np.isfinite(p).all()):
+        raise ParameterError(f"{what}: a pose has a finite 3×3 rotation and three finite lengths")
+    error = float(np.max(np.abs(R.T @ R - np.eye(3))))
+    if error > ROTATION_TOLERANCE or np.linalg.det(R) < 0:
+        why = f"RᵀR differs from the identity by {error:.3g}"
+        if error <= ROTATION_TOLERANCE:
+            why = "its determinant is −1 (left-handed axes)"
+        raise ParameterError(f"{what}: the matrix is not a rotation: {why}")
+    return Pose(R, p)
+
+
+def pose_of_numbers(numbers: Sequence[float], what: str) -> Pose:
+    """A pose from x, y, z [m]; with roll, pitch, yaw [rad]; or with nine entries of R, row by row.
+
+    Raises:
+        ParameterError: If there are not 3, 6 or 12 numbers, or the nine are no rotation.
+    """
+    p = np.array(numbers[:3], dtype=np.float64)
+    if len(numbers) == 3:
+        return checked_pose(np.eye(3), p, what)
+    if len(numbers) == 6:
+        return checked_pose(rpy(numbers[3:]), p, what)
+    if len(numbers) == 12:
+        return checked_pose(np.reshape(numbers[3:], (3, 3)), p, what)
+    raise ParameterError(
+        f"{what}: {len(numbers)} numbers; a pose is x,y,z or x,y,z,roll,pitch,yaw or x,y,z and "
+        "nine entries of a rotation matrix, row by row [m, rad]"
+    )
+
+
+def read_pose(text: str, robot: Robot, section: str, option: str) -> Pose:
+    """A pose from the command line: numbers, or a name in the robot file.
+
+    Args:
+        text: ``x,y,z``, ``x,y,z,roll,pitch,yaw``, twelve numbers, or NAME of ``[section.NAME]``.
+        robot: Its file's sections are looked up.
+        section: "tool" or "sensor".
+        option: How the option is called, for messages.
+
+    Raises:
+        ParameterError: If it is neither.
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        return named_pose(text, robot, section, option)
+    return pose_of_numbers(numbers, option)
+
+
+def named_pose(name: str, robot: Robot, section: str, option: str) -> Pose:
+    """Pose ``[section.NAME]`` (or ``[section]``) of a robot file: keys xyz [m] and rpy [rad]."""
+    table = robot.document.get(section, {})
+    named = {k: v for k, v in table.items() if isinstance(v, dict)}
+    if name not in named:
+        there = ", ".join(named) or "none"
+        raise ParameterError(
+            f"{option} {name!r}: {robot.name} has no [{section}.{name}]; it has {there}. Give "
+            f"numbers x,y,z,roll,pitch,yaw [m, rad], or add the section with xyz and rpy"
+        )
+    return section_pose(named[name], f"{robot.name}, [{section}.{name}]")
+
+
+def section_pose(table: dict[str, object], what: str) -> Pose:
+    """The pose that a section's xyz and rpy state."""
+    try:
+        xyz = np.asarray(table.get("xyz", (0.0, 0.0, 0.0)), dtype=np.float64)
+        angles = np.asarray(table.get("rpy", (0.0, 0.0, 0.0)), dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{what}: xyz and rpy are three numbers each") from None
+    if xyz.shape != (3,) or angles.shape != (3,):
+        raise ParameterError(f"{what}: xyz and rpy are three numbers each")
+    return checked_pose(rpy(angles.tolist()), xyz, what)
+
+
+def own_pose(robot: Robot, section: str) -> Pose | None:
+    """The pose in a robot file's plain ``[tool]`` or ``[sensor]`` section, None without one."""
+    table = robot.document.get(section, {})
+    if isinstance(table, dict) and ("xyz" in table or "rpy" in table):
+        return section_pose(table, f"{robot.name}, [{section}]")
+    return None

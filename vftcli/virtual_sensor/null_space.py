@@ -1,0 +1,48 @@
+"""The null-space channel: joint torque that no wrench at the flange explains."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.signals.arrays import Array
+from vftcli.signals.wrench import Mask, Wrench
+
+MARGIN = 1.25
+"""The threshold stands so far above the largest value of the free part."""
+
+
+class Elsewhere(NamedTuple):
+    """Where the torque of an arm of more than six joints is no tip wrench's.
+
+    Attributes:
+        name: The observer.
+        threshold: `MARGIN` times the largest norm in the free part. [N·m]
+        above: Samples above it: contact elsewhere on the arm, or a wrong model. (T,)
+        share: Share of the samples above it.
+    """
+
+    name: str
+    threshold: float
+    above: Mask
+    share: float
+
+
+def contact_elsewhere(wrench: Wrench, free: Mask) -> Elsewhere | None:
+    """Judge a wrench's null-space channel by its free part, None for an arm of six joints.
+
+    Args:
+        wrench: A virtual sensor's wrench.
+        free: Samples of the unloaded part. (T,)
+    """
+    if wrench.null_space is None or not np.any(free):
+        return None
+    threshold = MARGIN * float(np.nanmax(wrench.null_space[free]))
+    above: Mask = np.nan_to_num(wrench.null_space) > threshold
+    return Elsewhere(wrench.name, threshold, above, float(np.mean(above)))
+
+
+def explained_share(wrench: Wrench, tau: Array) -> float:
+    """Share of the torque's power that a wrench at the flange explains, 1 for six joints."""
+    if wrench.null_space is None:
+        return 1.0
+    return 1.0 - float(np.nansum(wrench.null_space**2) / np.nansum(tau**2))

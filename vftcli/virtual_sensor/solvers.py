@@ -1,0 +1,185 @@
+"""From joint torque to wrench: τ = J_Fᵀ w turned round (46), for all samples at once.
+
+Everything is solved at the flange point in base axes with lengths in units of 0.3 m, so that a
+newton and a newton-metre weigh alike: J_s = S J, S = diag(1, 1, 1, 0.3, 0.3, 0.3), w_s = S⁻¹w.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError, RobotError
+
+LENGTH = 0.3
+"""Length by which moments are made comparable with forces. [m]"""
+
+SCALE = np.array([1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH])
+"""Diagonal of S."""
+
+LEAST_SIGMA = 0.05
+"""Below this σ_min of S J the pose cannot tell the wrench: 1 N·m of torque error is 20 N. [m]"""
+
+DAMPING = 0.05
+"""Damping δ of the damped solver, the singular value below which it starts to hold back. [m]"""
+
+PRIOR_FORCE, PRIOR_MOMENT = 50.0, 10.0
+"""Standard deviations of the MAP solver's prior about zero. [N], [N·m]"""
+
+TORQUE_SD = 0.3
+"""Joint torque error where neither the observer nor an unloaded span says it. [N·m]"""
+
+
+class Decomposed(NamedTuple):
+    """J_s J_sᵀ = U diag(λ) Uᵀ of every sample.
+
+    Attributes:
+        scaled: J_s. (T, 6, n) [m]
+        U: Eigenvectors, as columns. (T, 6, 6)
+        squares: λ, ascending: squares of the singular values of J_s. (T, 6) [m²]
+    """
+
+    scaled: Array
+    U: Array
+    squares: Array
+
+    @property
+    def sigma_min(self) -> Array:
+        """Smallest singular value of J_s. (T,) [m]"""
+        smallest: Array = np.sqrt(np.maximum(self.squares[:, 0], 0.0))
+        return smallest
+
+
+def decompose(jacobian: Array) -> Decomposed:
+    """Decompose the flange Jacobian in base axes. (T, 6, n)
+
+    Raises:
+        RobotError: If the arm has fewer than six joints, which no pose can tell a wrench from.
+    """
+    n = jacobian.shape[2]
+    if n < 6:
+        raise RobotError(
+            f"an arm of {n} joints cannot tell the six components of a wrench; "
+            "leave --wrench out and use the joint torques"
+        )
+    scaled = SCALE[:, None] * jacobian
+    squares, U = np.linalg.eigh(scaled @ np.swapaxes(scaled, 1, 2))
+    return Decomposed(scaled, U, squares)
+
+
+class Solution(NamedTuple):
+    """A linear estimate w = A τ and the square root B of its covariance, cov = B Bᵀ.
+
+    Attributes:
+        gain: A, from joint torque to wrench. (T, 6, n)
+        root: B. (T, 6, k)
+    """
+
+    gain: Array
+    root: Array
+
+
+def spectral_gain(parts: Decomposed, inverse: Array) -> Array:
+    """S U diag(inverse) Uᵀ J_s, for functions of the squared singular values. (T, 6, n)"""
+    U = parts.U
+    gain: Array = SCALE[:, None] * (
+        (U * inverse[:, None, :]) @ (np.swapaxes(U, 1, 2) @ parts.scaled)
+    )
+    return gain
+
+
+def pinv(parts: Decomposed, sd: Array) -> Solution:
+    """Least squares (46), the pseudo-inverse of Jᵀ: unbiased, and unbounded as σ_min → 0.
+
+    Its covariance is that of the torque, seen through it.
+    """
+    rounding = np.finfo(np.float64).eps * parts.squares[:, -1:]
+    gain = spectral_gain(parts, 1.0 / np.maximum(parts.squares, rounding))
+    return Solution(gain, gain * sd[:, None, :])
+
+
+def damped(parts: Decomposed, sd: Array) -> Solution:
+    """Damped least squares, 1/λ replaced by 1/(λ + δ²).
+
+    Bounded everywhere and biased everywhere, towards zero by the share δ²/(σ² + δ²) in each
+    singular direction; the covariance does not hold that bias.
+    """
+    gain = spectral_gain(parts, 1.0 / (np.maximum(parts.squares, 0.0) + DAMPING**2))
+    return Solution(gain, gain * sd[:, None, :])
+
+
+def maximum_a_posteriori(parts: Decomposed, sd: Array) -> Solution:
+    """The most probable wrench under a normal prior of 50 N and 10 N·m about zero.
+
+    w = C J Σ⁻¹τ with C = (J Σ⁻¹ Jᵀ + P⁻¹)⁻¹, its covariance: next to the least squares where the
+    pose is good, and next to the prior where the pose cannot tell.
+    """
+    prior = np.repeat([PRIOR_FORCE, PRIOR_MOMENT / LENGTH], 3)
+    weighted = parts.scaled / sd[:, None, :]
+    information = weighted @ np.swapaxes(weighted, 1, 2) + np.diag(prior**-2)
+    root = np.linalg.inv(np.linalg.cholesky(information))  # C = rootᵀ root
+    C = np.swapaxes(root, 1, 2) @ root
+    gain = SCALE[:, None] * (C @ (weighted / sd[:, None, :]))
+    return Solution(gain, SCALE[:, None] * np.swapaxes(root, 1, 2))
+
+
+SOLVERS: dict[str, Callable[[Decomposed, Array], Solution]] = {
+    "pinv": pinv,
+    "damped": damped,
+    "map": maximum_a_posteriori,
+}
+"""Name at the command line → what turns a decomposed Jacobian and torque sd (T, n) into A and B."""
+
+
+def check_solver(name: str) -> str:
+    """Return the solver's name.
+
+    Raises:
+        ParameterError: If there is no such solver.
+    """
+    if name not in SOLVERS:
+        raise ParameterError(f"no solver {name!r} for a wrench; there is {', '.join(SOLVERS)}")
+    return name
+
+
+def null_space(parts: Decomposed, tau: Array) -> Array:
+    """(I − Jᵀpinv(Jᵀ))τ: the torque that no wrench at the flange explains. (T, n) [N·m]
+
+    A wrench at the flange leaves it unchanged; a contact further down the arm, or an error of the
+    model, does not. Singular directions count as explained by nothing.
+
+    Args:
+        parts: The decomposed Jacobian.
+        tau: Joint torque. (T, n) [N·m]
+    """
+    # U is orthonormal, so V = J_sᵀU/σ holds the row space; λ below 1e-12 is rounding.
+    tall = np.swapaxes(parts.scaled, 1, 2) @ parts.U
+    share = np.where(parts.squares > 1e-12, 1.0 / np.maximum(parts.squares, 1e-12), 0.0)
+    along = np.squeeze(np.swapaxes(tall, 1, 2) @ tau[:, :, None], axis=2)
+    explained = np.squeeze(tall @ (share * along)[:, :, None], axis=2)
+    residual: Array = tau - explained
+    return residual
+
+
+def wrench_of(
+    tau: Array, jacobian: Array, solver: str = "pinv", sd: Array | float = TORQUE_SD
+) -> tuple[Array, Array, Array]:
+    """Wrench, its standard deviation and σ_min from torques and given Jacobians.
+
+    For logs that hold a Jacobian; `VirtualSensor` takes it from the robot.
+
+    Args:
+        tau: Joint torque on the robot. (T, n) [N·m]
+        jacobian: Jacobian; its frame is the wrench's. (T, 6, n)
+        solver: A key of `SOLVERS`.
+        sd: Joint torque error, one, one a joint or one a sample and joint. [N·m]
+
+    Returns:
+        Wrench (T, 6) and its standard deviation (T, 6) [N, N·m], and σ_min (T,) [m].
+    """
+    parts = decompose(jacobian)
+    deviation = np.broadcast_to(np.asarray(sd, dtype=np.float64), tau.shape)
+    gain, root = SOLVERS[check_solver(solver)](parts, deviation)
+    values = np.squeeze(gain @ tau[:, :, None], axis=2)
+    return values, np.sqrt(np.sum(root**2, axis=2)), parts.sigma_min

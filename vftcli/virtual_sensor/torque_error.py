@@ -1,0 +1,189 @@
+"""The joint torque error that a wrench's band starts from: stated, the observer's own, or measured.
+
+The measured one is sd² = rms_free² + ∫|1 − H|² S_τ df: what the estimator reads while nothing
+touches the arm, and what its lag leaves out of the contacts there are. H is its frequency response;
+S_τ = (S_d − S_n)₊ is the spectrum of the external torque, S_d and S_n those of the raw disturbance
+d = Δp/Δt − ½(μᵗ + μᵗ⁻¹) over the loaded and the free part.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.wrench import Mask
+from vftcli.virtual_sensor.solvers import TORQUE_SD
+
+OWN = "own"
+"""The word for the observers' own covariance as the torque error."""
+
+SEGMENT = 2.0
+"""Length of a segment of the spectra. [s]"""
+
+LEAST_SEGMENT = 16
+"""Fewest samples of a segment."""
+
+
+class Responsive(Protocol):
+    """An observer whose frequency response is known."""
+
+    @property
+    def name(self) -> str:
+        """Its name at the command line."""
+        ...
+
+    def frequency_response(
+        self, frequency: Array, step: float, joints: int
+    ) -> NDArray[np.complex128]:
+        """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disturbance:
+    """The raw disturbance of a log, and of a free run if there is one.
+
+    Attributes:
+        terms: p and μ along the log.
+        free: p and μ along the free run, or None.
+        observers: The observers whose lag is asked for.
+    """
+
+    terms: DynamicsTerms
+    observers: Sequence[Responsive]
+    free: DynamicsTerms | None = None
+
+    def lag(self, free: Mask) -> Mapping[str, Array]:
+        """What each observer's lag leaves out of the contacts, standard deviation. (n,) [N·m]
+
+        Args:
+            free: FreeRunTorque samples of the log, used where there is no free run. (T,)
+        """
+        step = float(np.median(np.diff(self.terms.t)))
+        whole = raw_disturbance(self.terms)
+        loaded, quiet = runs(whole, ~free[1:]), runs(whole, free[1:])
+        if self.free is not None:
+            loaded, quiet = [whole], [raw_disturbance(self.free)]
+        longest = [max([len(run) for run in part], default=0) for part in (loaded, quiet)]
+        size = min(int(SEGMENT / step), *longest)
+        if size < LEAST_SEGMENT:
+            return {o.name: np.zeros(self.terms.joints) for o in self.observers}
+        excess = spectrum(loaded, size, step) - spectrum(quiet, size, step)
+        width = 1.0 / (size * step)
+        frequency = np.arange(size // 2 + 1, dtype=np.float64) * width
+        missed = {}
+        for observer in self.observers:
+            H = observer.frequency_response(frequency, step, self.terms.joints)
+            power = np.sum(np.abs(1.0 - H) ** 2 * np.maximum(excess, 0.0), axis=0) * width
+            missed[observer.name] = np.sqrt(power)
+        return missed
+
+
+def raw_disturbance(terms: DynamicsTerms) -> Array:
+    """The unfiltered external torque Δp/Δt − ½(μᵗ + μᵗ⁻¹). (T−1, n) [N·m]"""
+    rate = np.diff(terms.p, axis=0) / np.diff(terms.t)[:, None]
+    d: Array = rate - 0.5 * (terms.mu[1:] + terms.mu[:-1])
+    return d
+
+
+def runs(series: Array, chosen: Mask) -> list[Array]:
+    """The unbroken stretches of the chosen samples."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
+    return [series[start:stop] for start, stop in edges.reshape(-1, 2)]
+
+
+def spectrum(series: Iterable[Array], size: int, step: float) -> Array:
+    """One-sided power spectrum by Welch's method: Hann windows, half overlap. (F, n) [(N·m)²/Hz]"""
+    window = np.hanning(size)[:, None]
+    total: Array | None = None
+    count = 0
+    for run in series:
+        for start in range(0, len(run) - size + 1, max(size // 2, 1)):
+            power = np.abs(np.fft.rfft(run[start : start + size] * window, axis=0)) ** 2
+            total = power if total is None else total + power
+            count += 1
+    scale = 2.0 * step / (max(count, 1) * float(np.sum(window**2)))
+    return np.zeros((size // 2 + 1, 1)) if total is None else scale * total
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueError:
+    """Joint torque error per observer, where it is not the observer's own account.
+
+    Attributes:
+        sd: Observer → standard deviation. (n,) [N·m]
+        note: Where it comes from, "" where nothing is to be said.
+    """
+
+    sd: Mapping[str, Array]
+    note: str = ""
+
+
+def stated(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
+    """The torque error that ``--torque-sd`` states.
+
+    Raises:
+        ParameterError: If it is neither "own", one positive number, nor one a joint.
+    """
+    if text == OWN:
+        return TorqueError(sd={})
+    joints = torques[0].joints if torques else 0
+    try:
+        values = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        values = np.array([])
+    if len(values) not in {1, joints} or not np.all(np.isfinite(values) & (values > 0)):
+        raise ParameterError(
+            f"--torque-sd {text!r} is not {OWN!r}, one positive number, or one for each of "
+            f"{joints} joints [N·m]"
+        )
+    given = np.array(np.broadcast_to(values, (joints,)))
+    return TorqueError(sd={torque.name: given for torque in torques})
+
+
+def banded(torques: Sequence[ExternalTorque]) -> TorqueError:
+    """The band that each estimate brings along, measured on the log's free part."""
+    sd = {torque.name: torque.band for torque in torques if torque.band is not None}
+    return TorqueError(
+        sd={name: band[0] if np.all(band == band[0]) else band for name, band in sd.items()},
+        note="the wrenches' bands are the joint torques' own, measured on the log's free part",
+    )
+
+
+def assumed(torques: Sequence[ExternalTorque], solver: str) -> TorqueError:
+    """`TORQUE_SD` for observers without a covariance, and for all where a prior is weighed.
+
+    The Kalman filter's own covariance assumes a torque that wanders as fast as its Q_τ says, often
+    tens of N·m; against it the prior of the MAP solver would win everywhere.
+    """
+    wanted = [e for e in torques if e.sd is None or solver == "map"]
+    return TorqueError(sd={e.name: np.full(e.joints, TORQUE_SD) for e in wanted})
+
+
+def measured(
+    torques: Sequence[ExternalTorque],
+    free: Mask,
+    rms: Mapping[str, Array] | None,
+    disturbance: Disturbance | None,
+) -> TorqueError:
+    """The error of the free part and of the lag, as the module's equation has it.
+
+    Args:
+        torques: The estimates.
+        free: FreeRunTorque samples. (T,)
+        rms: Root mean square over a free run, or None to take the spread over `free`. (n,) [N·m]
+        disturbance: What tells the lag, or None to leave it out.
+    """
+    lag = disturbance.lag(free) if disturbance is not None else {}
+    sd = {}
+    for torque in torques:
+        quiet = rms[torque.name] if rms is not None else np.nanstd(torque.tau[free], axis=0)
+        sd[torque.name] = np.hypot(quiet, lag.get(torque.name, 0.0))
+    words = "the 95 % band is ± 1.96 sd, from what the estimate reads unloaded and from its lag"
+    return TorqueError(sd=sd, note=words)

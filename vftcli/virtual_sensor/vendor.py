@@ -1,0 +1,184 @@
+"""Which convention a vendor's wrench is in: sign, axes, lag and gain fitted against ours."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vftcli.robots.chain import Chain
+from vftcli.robots.kinematics import link_poses
+from vftcli.signals.arrays import Array, frozen
+from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import Wrench
+from vftcli.virtual_sensor.sensor import Offset, resampled, time_offset
+
+DERIVED = 0.9995
+"""A correlation that no independent measurement reaches: the field is made from the torques."""
+
+RESEMBLES = 0.5
+"""Below this correlation no convention explains the field."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxesFit:
+    """How one force reads in terms of another: theirs ≈ gain · matrix · ours.
+
+    Attributes:
+        matrix: The signed permutation of axes that fits best. (3, 3)
+        gain: Factor on top of it.
+        correlation: Correlation of theirs with it, all axes together.
+        rms: What it leaves unexplained, per axis of theirs. (3,) [N]
+    """
+
+    matrix: Array
+    gain: float
+    correlation: float
+    rms: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrix", frozen(self.matrix))
+        object.__setattr__(self, "rms", frozen(self.rms))
+
+    @property
+    def derived(self) -> bool:
+        """Whether theirs is no measurement of its own but computed from the same torques."""
+        return self.correlation >= DERIVED
+
+    @property
+    def words(self) -> str:
+        """The axes, as "+x +z −y"."""
+        return axes_words(self.matrix)
+
+
+def axes_words(matrix: Array) -> str:
+    """A signed permutation in words: where each of their axes lies in ours."""
+    places = np.argmax(np.abs(matrix), axis=1)
+    signs = np.sign(matrix[np.arange(3), places])
+    return " ".join(
+        f"{'+' if s > 0 else '−'}{'xyz'[k]}" for s, k in zip(signs, places, strict=True)
+    )
+
+
+def fit_axes(ours: Array, theirs: Array) -> AxesFit:
+    """Find the order and signs of axes that take our force to theirs. Offsets do not matter.
+
+    The best orthogonal matrix (improper ones allowed, as loggers swap axes freely) is rounded to
+    the signed permutation with the largest sum of matching entries.
+
+    Args:
+        ours: Force on the robot. (T, 3) [N]
+        theirs: The field, in its own axes. (T, 3) [N]
+    """
+    known = np.all(np.isfinite(ours) & np.isfinite(theirs), axis=1)
+    x, y = ours[known] - ours[known].mean(axis=0), theirs[known] - theirs[known].mean(axis=0)
+    U, _, Vt = np.linalg.svd(y.T @ x)
+    return judged(x, y, permutation(U @ Vt))
+
+
+def permutation(Q: Array) -> Array:
+    """The signed permutation nearest to an orthogonal matrix. (3, 3)"""
+    orders = [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)]
+    best = max(orders, key=lambda order: float(np.sum(np.abs(Q[np.arange(3), order]))))
+    P = np.zeros((3, 3))
+    P[np.arange(3), best] = np.sign(Q[np.arange(3), best])
+    return P
+
+
+def judged(x: Array, y: Array, matrix: Array) -> AxesFit:
+    """Gain, correlation and remainder of centred forces under a given matrix."""
+    z = x @ matrix.T
+    power = float(np.sum(z**2))
+    gain = float(np.sum(z * y)) / power if power > 0 else float("nan")
+    scale = float(np.sqrt(power * np.sum(y**2)))
+    return AxesFit(
+        matrix=matrix,
+        gain=gain,
+        correlation=float(np.sum(z * y)) / scale if scale > 0 else float("nan"),
+        rms=np.sqrt(np.mean((y - z) ** 2, axis=0)),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class VendorCheck:
+    """What a vendor's wrench field turns out to be.
+
+    Attributes:
+        said: What its reader says of it.
+        frame: "base" or "flange": the axes that fit best.
+        axes: Order, sign and gain of its axes in that frame.
+        offset: Its lag behind ours, negative where it is earlier.
+        zeros: Share of the samples in which it is exactly zero on all axes.
+        at_zeros: What our force reads there, rms of its norm. [N]
+    """
+
+    said: str
+    frame: str
+    axes: AxesFit | None
+    offset: Offset
+    zeros: float
+    at_zeros: float
+
+    def sentences(self) -> tuple[str, ...]:
+        """The findings in words."""
+        found = []
+        if self.zeros > 0:
+            what = "every sample" if self.zeros == 1.0 else f"{self.zeros:.1%} of the samples"
+            found.append(
+                f"the log's wrench is exactly zero in {what}, where ours reads "
+                f"{self.at_zeros:.2g} N rms: a zero there need not mean no force"
+            )
+        if self.axes is None or not self.axes.correlation > RESEMBLES:
+            if self.zeros < 1.0:
+                found.append(
+                    "the log's wrench resembles ours in no frame and sign: it sees other contacts, "
+                    "or there is none"
+                )
+            return tuple(found)
+        sign = "force on the robot"
+        if np.trace(self.axes.matrix) < -2.5:
+            sign = "force BY the robot (sign turned)"
+        elif np.trace(self.axes.matrix) < 2.5:
+            sign = f"axes {self.axes.words} of ours"
+        found.append(
+            f"the log's wrench ({self.said}) fits {self.frame} axes, {sign}, gain "
+            f"{self.axes.gain:.3g}, {self.offset.lag * 1e3:+.0f} ms against ours, correlation "
+            f"{self.axes.correlation:.3f}"
+        )
+        if self.axes.derived:
+            found.append(
+                "it is computed from the same torques (correlation above "
+                f"{DERIVED}): not an independent reference"
+            )
+        return tuple(found)
+
+
+def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorCheck | None:
+    """Compare the log's wrench with ours in base and in flange axes; None if the log has none.
+
+    Args:
+        recording: The log; its wrench is taken as written, whatever its reader says of it.
+        ours: The virtual sensor's wrench in base axes about the flange point.
+        chain: The arm.
+    """
+    theirs = recording.wrench
+    if theirs is None:
+        return None
+    said = recording.wrench_frame or "frame not stated"
+    empty = ~np.any(theirs, axis=1)
+    zeros = float(np.mean(empty))
+    norm = np.linalg.norm(ours.force[empty & ~ours.hidden], axis=1)
+    at_zeros = float(np.sqrt(np.mean(norm**2))) if len(norm) else float("nan")
+    shares = {"zeros": zeros, "at_zeros": at_zeros}
+    usable = ~empty & ~ours.hidden
+    if np.count_nonzero(usable) < 10:
+        nothing = Offset(float("nan"), float("nan"))
+        return VendorCheck(said=said, frame="base", axes=None, offset=nothing, **shares)
+    flange = link_poses(chain, recording.q).rotation[:, -1]
+    forces = {"base": ours.force, "flange": np.einsum("tji,tj->ti", flange, ours.force)}
+    given = np.where(usable[:, None], theirs[:, :3], np.nan)
+    fits = {name: fit_axes(force, given) for name, force in forces.items()}
+    frame = max(fits, key=lambda name: fits[name].correlation)
+    turned = forces[frame] @ fits[frame].matrix.T
+    offset = time_offset(recording.t, given, turned)
+    moved = resampled(recording.t, turned, recording.t - offset.lag)
+    axes = fit_axes(np.where(usable[:, None], moved, np.nan) @ fits[frame].matrix, given)
+    return VendorCheck(said=said, frame=frame, axes=axes, offset=offset, **shares)

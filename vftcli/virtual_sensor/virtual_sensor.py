@@ -1,0 +1,159 @@
+"""The virtual force/torque sensor: observers' joint torques become wrenches in a named frame."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vftcli.robots.chain import Chain
+from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.signals.arrays import Array, handed_over
+from vftcli.signals.errors import ShapeError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.wrench import Wrench
+from vftcli.virtual_sensor.frames import Mounting, check_frame, from_base, mounted
+from vftcli.virtual_sensor.solvers import (
+    LEAST_SIGMA,
+    SOLVERS,
+    TORQUE_SD,
+    Decomposed,
+    check_solver,
+    decompose,
+    null_space,
+)
+
+CHUNK = 4096
+"""Samples that are solved at once: about 10 MB of 6×6 matrices."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class VirtualSensor:
+    """How joint torques become a wrench.
+
+    Attributes:
+        solver: A key of `vftcli.virtual_sensor.solvers.SOLVERS`.
+        frame: A key of `vftcli.virtual_sensor.frames.FRAMES`.
+        mounting: Where tool and sensor sit on the flange.
+        least_sigma: σ_min of J with angular rows × 0.3 m below which a sample is masked. [m]
+
+    Raises:
+        ParameterError: If there is no such solver or frame, or the frame's pose is not known.
+    """
+
+    solver: str = "pinv"
+    frame: str = "flange"
+    mounting: Mounting = field(default_factory=Mounting)
+    least_sigma: float = LEAST_SIGMA
+
+    def __post_init__(self) -> None:
+        check_solver(self.solver)
+        mounted(check_frame(self.frame), self.mounting)
+
+    def wrench(
+        self, torque: ExternalTorque, q: Array, chain: Chain, sd: Array | None = None
+    ) -> Wrench:
+        """The wrench of one estimate; see `wrenches`."""
+        return self.wrenches((torque,), q, chain, {} if sd is None else {torque.name: sd})[0]
+
+    def wrenches(
+        self,
+        torques: Sequence[ExternalTorque],
+        q: Array,
+        chain: Chain,
+        sd: dict[str, Array] | None = None,
+    ) -> tuple[Wrench, ...]:
+        """The wrench of every estimate, about the flange, tool or sensor.
+
+        Args:
+            torques: Estimates on the log's clock.
+            q: Joint positions. (T, n) [rad]
+            chain: The arm.
+            sd: Name of an estimate → standard deviation of its torques, (n,) or (T, n) [N·m], to
+                be used in place of the estimate's own account.
+
+        Raises:
+            RobotError: If the arm has fewer than six joints.
+        """
+        samples, n = q.shape
+        for torque in torques:
+            if torque.tau.shape != q.shape:
+                raise ShapeError(f"{torque.name}: torque {torque.tau.shape} against q {q.shape}")
+        deviations = [deviation_of(torque, (sd or {}).get(torque.name)) for torque in torques]
+        values = np.empty((len(torques), samples, 6))
+        spread = np.empty((len(torques), samples, 6))
+        residual = np.empty((len(torques), samples))
+        sigma = np.empty(samples)
+        for start in range(0, samples, CHUNK):
+            span = slice(start, min(start + CHUNK, samples))
+            parts, X = self.geometry(chain, q[span])
+            sigma[span] = parts.sigma_min
+            for k, torque in enumerate(torques):
+                tau = torque.tau[span]
+                values[k, span], spread[k, span] = self.solve(parts, X, tau, deviations[k].at(span))
+                if n > 6:
+                    residual[k, span] = np.linalg.norm(null_space(parts, tau), axis=1)
+        masked = sigma < self.least_sigma
+        return tuple(
+            Wrench(
+                name=torque.name,
+                t=torque.t,
+                values=handed_over(values[k].copy()),
+                frame=self.frame,
+                sd=handed_over(spread[k].copy()),
+                sigma_min=sigma,
+                masked=masked,
+                null_space=handed_over(residual[k].copy()) if n > 6 else None,
+                remarks=deviations[k].notes,
+            )
+            for k, torque in enumerate(torques)
+        )
+
+    def geometry(self, chain: Chain, q: Array) -> tuple[Decomposed, Array]:
+        """The decomposed Jacobian, and what takes a wrench from base axes to the frame."""
+        flange = link_poses(chain, q).rotation[:, -1]
+        return decompose(flange_jacobian(chain, q)), from_base(self.frame, flange, self.mounting)
+
+    def solve(self, parts: Decomposed, X: Array, tau: Array, sd: Array) -> tuple[Array, Array]:
+        """Wrench and standard deviation of one chunk. (T, 6) each"""
+        gain, root = SOLVERS[self.solver](parts, sd)
+        values = np.squeeze(X @ (gain @ tau[:, :, None]), axis=2)
+        return values, np.sqrt(np.sum((X @ root) ** 2, axis=2))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Deviation:
+    """Standard deviation of an estimate's joint torques, and where it comes from.
+
+    Attributes:
+        sd: One a joint, or one a sample and joint. (n,) or (T, n) [N·m]
+        notes: Where it comes from, one sentence.
+    """
+
+    sd: Array
+    notes: tuple[str, ...]
+
+    def at(self, span: slice) -> Array:
+        """The rows of a chunk. (T, n) or (1, n) [N·m]"""
+        return self.sd[span] if self.sd.ndim == 2 else self.sd[None, :]
+
+
+def deviation_of(torque: ExternalTorque, given: Array | None) -> Deviation:
+    """The torque error a wrench's covariance starts from: given, the observer's own, or stated.
+
+    Zero is raised to a micronewton-metre, so that weights stay finite.
+    """
+    least = 1e-6
+    if given is not None:
+        words = "the band assumes the torque error that was given"
+        return Deviation(sd=np.maximum(np.asarray(given), least), notes=(words,))
+    if torque.sd is not None:
+        words = "the band is the observer's own covariance; errors of the model are not in it"
+        sd = torque.sd
+        if len(sd) > 1 and np.all(sd == sd[0]):
+            sd = sd[0]
+        return Deviation(sd=np.maximum(sd, least), notes=(words,))
+    words = (
+        f"the observer states no covariance and no unloaded span was given: the band assumes "
+        f"{TORQUE_SD:g} N·m on every joint"
+    )
+    return Deviation(sd=np.full(torque.joints, TORQUE_SD), notes=(words,))

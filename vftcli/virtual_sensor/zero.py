@@ -1,0 +1,187 @@
+"""Zero drift: what the virtual sensor reads unloaded, reported per axis and removed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vftcli.signals.arrays import Array, frozen
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.wrench import AXES, Mask, Wrench
+
+SETTLING = 1.0
+"""Start of a log that is left out of an unloaded start: observers rise from zero. [s]"""
+
+LEAST_SPAN = 0.5
+"""Shortest unloaded start. [s]"""
+
+FORCE_STEP, MOMENT_STEP = 3.0, 0.6
+"""A departure from the start's own level that counts as load whatever the noise. [N], [N·m]"""
+
+BACK = 0.3
+"""An unloaded start ends this long before the load shows: it began to rise earlier. [s]"""
+
+SPREADS = 6.0
+"""A departure of so many robust standard deviations counts as load."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drift:
+    """What one virtual sensor reads over one unloaded span.
+
+    Attributes:
+        name: The observer.
+        span: First and last time. [s]
+        mean: Mean wrench, the zero drift. (6,) [N, N·m]
+        sd: Standard deviation about it. (6,) [N, N·m]
+        samples: Known samples in the span.
+        frame: Frame of the numbers.
+        removed: Whether it was subtracted.
+    """
+
+    name: str
+    span: tuple[float, float]
+    mean: Array
+    sd: Array
+    samples: int
+    frame: str
+    removed: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mean", frozen(self.mean))
+        object.__setattr__(self, "sd", frozen(self.sd))
+
+    def sentence(self) -> str:
+        """The drift in words, as the paper prints it."""
+        numbers = ", ".join(
+            f"{axis} {value:.5f}" for axis, value in zip(AXES, self.mean, strict=True)
+        )
+        what = "removed" if self.removed else "left in"
+        return (
+            f"{self.name}: zero drift over {self.span[0]:g} to {self.span[1]:g} s in {self.frame} "
+            f"axes, {what} [N, N·m]: {numbers}"
+        )
+
+
+def zero_drift(wrench: Wrench, span: tuple[float, float]) -> Drift:
+    """Mean and spread of the known samples in a span.
+
+    Raises:
+        ParameterError: If the span lies outside the log, or the pose cannot tell the wrench in it.
+    """
+    start, stop = max(span[0], float(wrench.t[0])), min(span[1], float(wrench.t[-1]))
+    where = f"zero interval {span[0]:g}:{span[1]:g}"
+    if not start < stop:
+        raise ParameterError(
+            f"{where} lies outside the log, which runs from {wrench.t[0]:g} to {wrench.t[-1]:g} s"
+        )
+    inside = wrench.between(start, stop)
+    if len(inside) < 2:
+        raise ParameterError(
+            f"{where}: the pose cannot tell the wrench in any two of its samples (σ_min too "
+            "small); choose a span in a regular pose"
+        )
+    return Drift(
+        name=wrench.name,
+        span=(start, stop),
+        mean=inside.mean(axis=0),
+        sd=inside.std(axis=0),
+        samples=len(inside),
+        frame=wrench.frame,
+    )
+
+
+def without_drift(wrench: Wrench, drift: Drift) -> Wrench:
+    """The wrench with the drift subtracted, as a constant in the wrench's own frame."""
+    removed = replace(drift, removed=True)
+    return replace(
+        wrench, values=wrench.values - drift.mean, remarks=(*wrench.remarks, removed.sentence())
+    )
+
+
+def change(first: Drift, last: Drift) -> str:
+    """How far the zero moved between two unloaded spans, in words."""
+    moved = last.mean - first.mean
+    numbers = ", ".join(f"{axis} {value:+.5f}" for axis, value in zip(AXES, moved, strict=True))
+    return (
+        f"{first.name}: drift from {first.span[0]:g}–{first.span[1]:g} s to "
+        f"{last.span[0]:g}–{last.span[1]:g} s [N, N·m]: {numbers}"
+    )
+
+
+def unloaded_start(wrench: Wrench) -> tuple[float, float] | None:
+    """The span from the start over which the wrench keeps its first level, None if too short. [s]
+
+    That level is the median of the first half second after `SETTLING`; the span ends where a
+    median over 0.1 s leaves it by `SPREADS` robust standard deviations and by at least `FORCE_STEP`
+    or `MOMENT_STEP`. A load that hangs from the first sample on cannot be told from drift.
+    """
+    t = wrench.t - wrench.t[0]
+    known = np.all(np.isfinite(wrench.known), axis=1)
+    first = known & (t >= SETTLING) & (t <= SETTLING + LEAST_SPAN)
+    if np.count_nonzero(first) < 3:
+        return None
+    level = np.median(wrench.values[first], axis=0)
+    spread = 1.4826 * np.median(np.abs(wrench.values[first] - level), axis=0)
+    least = np.repeat([FORCE_STEP, MOMENT_STEP], 3)
+    away = np.any(np.abs(wrench.values - level) > np.maximum(least, SPREADS * spread), axis=1)
+    loaded = lasting(away & known, t, 0.1) & (t >= SETTLING)
+    stop = float(t[np.argmax(loaded)]) - BACK if loaded.any() else float(t[-1])
+    if stop - SETTLING < LEAST_SPAN:
+        return None
+    start = float(wrench.t[0])
+    return start + SETTLING, start + stop
+
+
+def lasting(flags: Mask, t: Array, least: float) -> Mask:
+    """Flags of runs that last at least `least` [s]. (T,)"""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    kept = np.zeros(len(flags), dtype=bool)
+    for start, stop in edges.reshape(-1, 2):
+        if t[min(stop, len(t) - 1)] - t[start] >= least:
+            kept[start:stop] = True
+    return kept
+
+
+def loaded_zero(wrench: Wrench, drift: Drift) -> str:
+    """A warning if a zero interval looks like a contact, else "".
+
+    It does where the wrench changes within it, or lies far from the level of the log's start.
+    """
+    least = np.repeat([FORCE_STEP, MOMENT_STEP], 3)
+    words = f"zero interval {drift.span[0]:g}:{drift.span[1]:g}"
+    inside = wrench.between(*drift.span)
+    swing = np.percentile(inside, 95, axis=0) - np.percentile(inside, 5, axis=0)
+    start = unloaded_start(wrench)
+    if start is not None:
+        level = zero_drift(wrench, start)
+        away = np.abs(drift.mean - level.mean) - SPREADS * level.sd
+        if worst := exceeded(away, least):
+            return (
+                f"{wrench.name}: {words} looks like a contact: {worst} further than the unloaded "
+                f"start at {start[0]:g}–{start[1]:g} s; choose an unloaded span"
+            )
+    if worst := exceeded(swing, 4.0 * least):
+        return (
+            f"{wrench.name}: {words} looks like a contact or a motion: {worst} within it; "
+            "choose an unloaded span"
+        )
+    return ""
+
+
+def exceeded(value: Array, limit: Array) -> str:
+    """The axis that exceeds its limit most, with its value, "" if none does."""
+    share = value / limit
+    if not np.any(share > 1.0):
+        return ""
+    k = int(np.argmax(share))
+    return f"{AXES[k]} is {value[k]:.3g} {'N' if k < 3 else 'N·m'}"
+
+
+def drift_table(drifts: Sequence[Drift]) -> str:
+    """Zero drift per observer and axis, with five decimals as the paper prints it."""
+    lines = ["observer  " + "".join(f"{axis:>11}" for axis in AXES)]
+    lines += [
+        f"{drift.name:<10}" + "".join(f"{value:11.5f}" for value in drift.mean) for drift in drifts
+    ]
+    return "\n".join(lines) + "\n"
