@@ -5,7 +5,7 @@ import string
 import pytest
 
 from vftcli.signals import remarks
-from vftcli.signals.remarks import Place, Remark, as_record, explanation, sentence, words
+from vftcli.signals.remarks import Remark, Where, as_record, explanation, sentence, words
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def test_words_are_made_of_values_and_place() -> None:
         "joint-rests",
         "caution",
         {"share": 0.5, "limits_Nm": [1.25, 2.0]},
-        Place("gmo", (1, 3), (0.5, 2.0)),
+        Where("gmo", (1, 3), (0.5, 2.0)),
     )
     assert sentence(remark) == "gmo: J1, J3 rests in 50% of the samples"
     assert explanation(remark) == "gmo: J1, J3 rests from 0.5 to 2 s: 1.2 2.0 N·m"
@@ -39,7 +39,7 @@ def test_long_words_fall_back_to_the_short_ones_and_lists_are_separated_by_comma
 
 @pytest.mark.usefixtures("catalogue")
 def test_a_record_holds_code_and_values() -> None:
-    record = as_record(Remark("left-out", "warning", {"topics": ["/a"]}, Place(joints=(2,))))
+    record = as_record(Remark("left-out", "warning", {"topics": ["/a"]}, Where(joints=(2,))))
     assert record["code"] == "left-out"
     assert record["level"] == "warning"
     assert record["values"] == {"topics": ["/a"]}

@@ -27,7 +27,7 @@ WORDS = Path(__file__).parent / "words"
 """The catalogue: a file a room."""
 
 
-class Place(NamedTuple):
+class Where(NamedTuple):
     """What a remark is about.
 
     Attributes:
@@ -55,7 +55,7 @@ class Remark:
     code: str
     level: Level = "fact"
     values: Mapping[str, Any] = field(default_factory=dict)
-    where: Place = field(default_factory=Place)
+    where: Where = field(default_factory=Where)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
@@ -65,17 +65,17 @@ class Remark:
         return sentence(self)
 
 
-def fact(code: str, where: Place = Place(), **values: object) -> Remark:  # noqa: B008 - immutable
+def fact(code: str, where: Where = Where(), **values: object) -> Remark:  # noqa: B008 - immutable
     """A remark that informs."""
     return Remark(code, "fact", values, where)
 
 
-def caution(code: str, where: Place = Place(), **values: object) -> Remark:  # noqa: B008
+def caution(code: str, where: Where = Where(), **values: object) -> Remark:  # noqa: B008
     """A remark on what limits the result."""
     return Remark(code, "caution", values, where)
 
 
-def warning(code: str, where: Place = Place(), **values: object) -> Remark:  # noqa: B008
+def warning(code: str, where: Where = Where(), **values: object) -> Remark:  # noqa: B008
     """A remark on what can make the result wrong."""
     return Remark(code, "warning", values, where)
 
@@ -104,17 +104,19 @@ def filled(template: str, remark: Remark) -> str:
     """A template with a remark's values; ``{joints}`` and ``{span}`` are those of its place."""
     where = remark.where
     joints = ", ".join(f"J{j}" for j in where.joints)
-    return Template().vformat(template, (), {"joints": joints, "span": where.span, **remark.values})
+    return ListFormatter().vformat(
+        template, (), {"joints": joints, "span": where.span, **remark.values}
+    )
 
 
-class Template(string.Formatter):
+class ListFormatter(string.Formatter):
     """`str.format` that formats the items of a list one by one."""
 
     def format_field(self, value: Any, format_spec: str) -> str:  # noqa: ANN401 - any value
         """A value by its format; a list's items by it, numbers apart by spaces, words by commas."""
         if isinstance(value, str) or not isinstance(value, Iterable):
             return str(super().format_field(value, format_spec))
-        items = [str(super(Template, self).format_field(item, format_spec)) for item in value]
+        items = [str(super(ListFormatter, self).format_field(item, format_spec)) for item in value]
         return (" " if format_spec else ", ").join(items)
 
 
