@@ -14,9 +14,9 @@ import polars as pl
 import pytest
 
 import vftcli as vft
-from vftcli.pipeline import AnalysisChoice, analyse_log, parse_interval
+from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.robots.kinematics import flange_jacobian
-from vftcli.signals.errors import ParameterError, RobotError
+from vftcli.signals.errors import RobotError
 
 FIXTURE = Path(__file__).parent.parent / "fixtures" / "ur5_circle.csv"
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
@@ -50,17 +50,6 @@ def test_an_interval_keeps_the_logs_own_time() -> None:
     analysis = analyse_log(FIXTURE, AnalysisChoice(robot="ur5", interval="4:8"))
     assert analysis.t[0] >= 4.0
     assert analysis.t[-1] <= 8.0
-
-
-@pytest.mark.parametrize(("text", "span"), [("1:2", (1.0, 2.0)), (":2", (-np.inf, 2.0))])
-def test_intervals(text: str, span: tuple[float, float]) -> None:
-    assert parse_interval(text) == span
-
-
-@pytest.mark.parametrize("text", ["2", "2:1", "a:b", "1:1"])
-def test_intervals_that_are_none(text: str) -> None:
-    with pytest.raises(ParameterError, match="A:B with A < B"):
-        parse_interval(text)
 
 
 def test_as_printed_differs_and_says_so() -> None:

@@ -17,6 +17,7 @@ from vftcli.observers import (
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.errors import ParameterError, RobotError
+from vftcli.signals.parsing import interval
 from vftcli.signals.recording import Recording
 
 if TYPE_CHECKING:
@@ -24,9 +25,10 @@ if TYPE_CHECKING:
     from vftcli.refinement.baseline import Baseline
     from vftcli.robots.terms import DynamicsTerms
     from vftcli.signals.external_torque import ExternalTorque
+    from vftcli.virtual_sensor.choice import WrenchChoice
     from vftcli.virtual_sensor.detection import ContactScore
     from vftcli.virtual_sensor.frames import Mounting
-    from vftcli.virtual_sensor.sensor_reading import FreeRunTorque, SensorReading, WrenchRequest
+    from vftcli.virtual_sensor.sensor_reading import FreeRunTorque, SensorReading
 
 FRICTION = ("profile", "none")
 
@@ -79,7 +81,7 @@ class AnalysisChoice:
     low_pass: str = "auto"
     match: str | None = None
     contacts: bool = False
-    wrench: "WrenchRequest | None" = None
+    wrench: "WrenchChoice | None" = None
     free_part: str | None = None
     bands: bool = False
     remove_bias: str = "none"
@@ -103,27 +105,8 @@ def cut(recording: Recording, request: AnalysisChoice) -> Recording:
     """The part of a log that the request's interval names, or all of it."""
     if request.interval is None:
         return recording
-    start, stop = parse_interval(request.interval)
+    start, stop = interval(request.interval)
     return recording.between(start, stop)
-
-
-def parse_interval(text: str) -> tuple[float, float]:
-    """Read ``A:B``, where either end may be left out. [s]
-
-    Raises:
-        ParameterError: If it is malformed or ends before it starts.
-    """
-    left, colon, right = text.partition(":")
-    try:
-        start = float(left) if left.strip() else float("-inf")
-        stop = float(right) if right.strip() else float("inf")
-    except ValueError:
-        colon = ""
-    if not colon or not start < stop:
-        raise ParameterError(
-            f"interval {text!r} is not A:B with A < B, in seconds from the log's first sample"
-        )
-    return start, stop
 
 
 def choose_robot(request: AnalysisChoice, recording: Recording) -> Robot:
@@ -191,7 +174,7 @@ def look_over(
 
     check_removal(request.remove_bias)
     asked = FreeChoice(
-        span=parse_interval(request.free_part) if request.free_part is not None else None,
+        span=interval(request.free_part) if request.free_part is not None else None,
         runs=tuple(open_log(path, without_interval(request)) for path in request.free),
         period=request.period if not request.free else None,
         free_cycles=request.free_cycles,
@@ -301,13 +284,13 @@ def unloaded_run(
 
     Where it is the same trajectory, their torque at the same place of it is taken; else its mean.
     """
-    if request.wrench is None or request.wrench.zero_log is None:
+    if request.wrench is None or request.wrench.zero.log is None:
         return None
     from vftcli.repetition.alignment import align
     from vftcli.signals.errors import ReferenceTorqueError
     from vftcli.virtual_sensor.sensor_reading import unloaded_from
 
-    free = open_log(request.wrench.zero_log, without_interval(request))
+    free = open_log(request.wrench.zero.log, without_interval(request))
     terms = dynamics_terms(free, robot, literal=request.as_printed)
     estimates = tuple(observer.estimate(terms) for observer in observers)
     shift: float | None = None

@@ -13,7 +13,7 @@ from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.robots import load_robot
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
-from vftcli.virtual_sensor.sensor_reading import WrenchRequest
+from vftcli.virtual_sensor.choice import WrenchChoice
 
 HOSTILE = '<script>alert("x")</script>&_%.csv'
 
@@ -65,5 +65,5 @@ def analysis(without_reference: Analysis) -> Analysis:
 @pytest.fixture(scope="session")
 def with_wrench(recording: Recording) -> Analysis:
     """The log's estimates with their wrenches in base axes."""
-    request = AnalysisChoice(robot="ur5", wrench=WrenchRequest(frame="base"))
+    request = AnalysisChoice(robot="ur5", wrench=WrenchChoice(frame="base"))
     return analyse(recording, load_robot("ur5"), request)

@@ -76,11 +76,11 @@ def test_a_run_that_asks_for_nothing_shows_nothing() -> None:
 @pytest.mark.parametrize("frame", ["base", "flange"])
 def test_the_wrench_takes_its_band_from_the_joint_torques(frame: str) -> None:
     from vftcli.pipeline import AnalysisChoice, analyse_log
-    from vftcli.virtual_sensor.sensor_reading import WrenchRequest
+    from vftcli.virtual_sensor.choice import WrenchChoice
 
     fixture = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
     request = AnalysisChoice(
-        robot="ur5", observers=("rts-auto",), wrench=WrenchRequest(frame=frame), interval="0:12"
+        robot="ur5", observers=("rts-auto",), wrench=WrenchChoice(frame=frame), interval="0:12"
     )
     analysis = analyse_log(fixture, request)
     assert analysis.virtual_sensor is not None

@@ -7,7 +7,7 @@ import pytest
 
 from vftcli.pipeline import AnalysisChoice, analyse, choose_robot
 from vftcli.simulation import load_scenario, simulate
-from vftcli.virtual_sensor.sensor_reading import WrenchRequest
+from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 
 WEIGHT = 9.2
 """Weight of the bearing, Sec. IV-D. [N]"""
@@ -31,8 +31,10 @@ def erring():
     return recorded(load_scenario("panda-bearing"))
 
 
-def sensed(recording, **how):
-    request = AnalysisChoice(robot="panda", wrench=WrenchRequest(frame="base", **how))
+def sensed(recording, **zero):
+    request = AnalysisChoice(
+        robot="panda", wrench=WrenchChoice(frame="base", zero=ZeroChoice(**zero))
+    )
     return analyse(recording, choose_robot(request, recording), request)
 
 
@@ -44,7 +46,7 @@ def test_after_zeroing_the_bearing_weighs_what_it_weighs(log, share, request) ->
     (measured 9.00, 9.16 and 9.15 N with seeds 1 to 3).
     """
     recording = request.getfixturevalue(log)
-    analysis = sensed(recording, zero=((2.0, 3.9),))
+    analysis = sensed(recording, spans=((2.0, 3.9),))
     hung = (recording.t > 6.0) & (recording.t < 8.7)
     for wrench in analysis.wrenches:
         assert wrench.force[hung, 2].mean() == pytest.approx(-WEIGHT, rel=share), wrench.name
@@ -53,12 +55,12 @@ def test_after_zeroing_the_bearing_weighs_what_it_weighs(log, share, request) ->
 
 
 def test_a_zero_under_the_bearing_is_suspected(exact) -> None:
-    warnings = sensed(exact, zero=((6.0, 8.0),)).virtual_sensor.warnings
+    warnings = sensed(exact, spans=((6.0, 8.0),)).virtual_sensor.warnings
     assert "looks like a contact" in warnings[0]
 
 
 def test_the_unloaded_start_ends_before_the_bearing(exact) -> None:
-    (start, stop) = sensed(exact, zero_start=True).virtual_sensor.drifts[0].span
+    (start, stop) = sensed(exact, start=True).virtual_sensor.drifts[0].span
     assert start == pytest.approx(1.0)
     assert 3.5 < stop < 4.0
 

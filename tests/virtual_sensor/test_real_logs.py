@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, open_log
-from vftcli.virtual_sensor.sensor_reading import WrenchRequest
+from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.solvers import wrench_of
 from vftcli.virtual_sensor.vendor import fit_axes
 
@@ -35,7 +35,7 @@ def test_the_ur5e_of_mujoco_reads_its_truth(logs: Path) -> None:
         observers=("gmo",),
         settings=("gmo.gain=30",),
         reference="sensor",
-        wrench=WrenchRequest(frame="base"),
+        wrench=WrenchChoice(frame="base"),
     )
     analysis = analysed(folder / "circle.csv", request)
     errors = by_axis(analysis, "gmo")
@@ -62,7 +62,7 @@ def test_the_fr3_behind_libfranka_reads_its_truth(logs: Path, tmp_path: Path) ->
         settings=("gmo.gain=30",),
         interval="1.5:27.5",
         reference=f"file:{tmp_path / 'pushes_truth.csv'}",
-        wrench=WrenchRequest(frame="base"),
+        wrench=WrenchChoice(frame="base"),
     )
     analysis = analysed(tmp_path / "pushes.csv", request)
     errors = by_axis(analysis, "gmo")
@@ -78,7 +78,7 @@ def payload(logs: Path):
     request = AnalysisChoice(
         columns=UR10E,
         robot="ur10e",
-        wrench=WrenchRequest(frame="base", zero_log=logs / "ur10e" / "free_14harm.csv"),
+        wrench=WrenchChoice(frame="base", zero=ZeroChoice(log=logs / "ur10e" / "free_14harm.csv")),
     )
     return analysed(logs / "ur10e" / "load_14harm.csv", request)
 
@@ -120,7 +120,7 @@ def test_the_pandas_wrench_is_the_atis(logs: Path) -> None:
 
 
 def test_a_franka_that_logs_zeros_is_told(logs: Path) -> None:
-    request = AnalysisChoice(robot="fr3", observers=("gmo",), wrench=WrenchRequest())
+    request = AnalysisChoice(robot="fr3", observers=("gmo",), wrench=WrenchChoice())
     analysis = analysed(logs / "franka_bags" / "calib_0108.bag", request)
     assert analysis.virtual_sensor is not None
     assert any("exactly zero in every sample" in n for n in analysis.virtual_sensor.notes)

@@ -92,8 +92,9 @@ def replayed(
 
     from vftcli.admittance.law import controllers
     from vftcli.admittance.replay import replay
-    from vftcli.pipeline import choose_robot, open_log, parse_interval
+    from vftcli.pipeline import choose_robot, open_log
     from vftcli.readers.estimates import estimates_columns
+    from vftcli.signals.parsing import interval
 
     spec = estimates_columns(log, request.observers[0]) if request.columns is None else None
     recording = open_log(log, replace(request, columns=spec or request.columns))
@@ -102,7 +103,7 @@ def replayed(
     chosen = controllers(settings, choice.kinds, numbers(choice.alpha, "--alpha"))
     record = force_of(recording, arm, request, choice, estimated=spec is not None)
     if choice.zero is not None:
-        record = record.zeroed(*parse_interval(choice.zero))
+        record = record.zeroed(*interval(choice.zero))
     result = replay(record, arm, settings, chosen, force_unstable=choice.force_unstable)
     return result, recording
 
@@ -116,9 +117,9 @@ def looped(
     from vftcli.admittance.replay import replay
     from vftcli.cli.simulate import progress_bar
     from vftcli.observers import KalmanObserver, Setup, build_observers, observer_settings
-    from vftcli.pipeline import parse_interval
     from vftcli.robots import load_robot
     from vftcli.signals.errors import ParameterError
+    from vftcli.signals.parsing import interval
     from vftcli.simulation import load_scenario
     from vftcli.simulation.sensing import log_rate
 
@@ -142,7 +143,7 @@ def looped(
         observer,
         seed=choice.seed,
         torque=choice.torque,
-        zero=parse_interval(choice.zero) if choice.zero is not None else UNLOADED,
+        zero=interval(choice.zero) if choice.zero is not None else UNLOADED,
         force_unstable=choice.force_unstable,
         progress=progress_bar(),
     )

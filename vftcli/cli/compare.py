@@ -55,12 +55,12 @@ def compare(
     import polars as pl
 
     from vftcli.cli.console import chosen, paths, say_notes, say_recording
-    from vftcli.cli.wrench_options import wrench_request
     from vftcli.evaluation.pooling import ScoredLog, pooled_rows
     from vftcli.observers import DEFAULT
     from vftcli.outputs.log import tables
     from vftcli.outputs.log.significance import pairs_text
     from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, open_log
+    from vftcli.virtual_sensor.choice import WrenchChoice
 
     wanted = {"json": json, "csv": csv, "markdown": markdown, "latex": latex}
     show = {
@@ -81,8 +81,15 @@ def compare(
         payload=payload,
         as_printed=as_printed,
         contacts=contacts,
-        wrench=wrench_request(
-            wrench, frame, solver, tool, sensor_pose, zero, sensor_weight, torque_sd
+        wrench=WrenchChoice.parsed(
+            wrench=wrench,
+            frame=frame,
+            solver=solver,
+            tool=tool,
+            sensor_pose=sensor_pose,
+            zero=zero,
+            sensor_weight=sensor_weight,
+            torque_sd=torque_sd,
         ),
         reference=reference,
         free=paths(free),

@@ -56,10 +56,10 @@ def estimate(
     reading = Background(lambda: read(log, format=format_, columns=columns, signals=signals))
 
     from vftcli.cli.console import command_line, say, say_notes, say_recording
-    from vftcli.cli.wrench_options import wrench_request
     from vftcli.observers import DEFAULT
     from vftcli.outputs.log.estimates import write_estimate_folder
     from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, cut
+    from vftcli.virtual_sensor.choice import WrenchChoice
 
     request = AnalysisChoice(
         format=format_,
@@ -79,7 +79,16 @@ def estimate(
         free_part=free_part,
         bands=bands or any((free, free_cycles, period)),
         remove_bias=remove_bias,
-        wrench=wrench_request(*of_wrench),
+        wrench=WrenchChoice.parsed(
+            wrench=wrench,
+            frame=frame,
+            solver=solver,
+            tool=tool,
+            sensor_pose=sensor_pose,
+            zero=zero,
+            sensor_weight=sensor_weight,
+            torque_sd=torque_sd,
+        ),
     )
     recording = cut(reading.result(), request)
     analysis = analyse(recording, choose_robot(request, recording), request)

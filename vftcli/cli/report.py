@@ -52,13 +52,13 @@ def report(
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
     """
     from vftcli.cli.console import command_line, paths, say, say_notes, say_recording
-    from vftcli.cli.wrench_options import wrench_request
     from vftcli.evaluation.print_table import check_published, compare_with
     from vftcli.observers import DEFAULT
     from vftcli.outputs.log.published import terminal_published
     from vftcli.outputs.log.report import write_report, write_reports
     from vftcli.outputs.log.tables import terminal
     from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, open_log
+    from vftcli.virtual_sensor.choice import WrenchChoice
 
     request = AnalysisChoice(
         format=format_,
@@ -71,8 +71,15 @@ def report(
         payload=payload,
         as_printed=as_printed,
         contacts=contacts,
-        wrench=wrench_request(
-            wrench, frame, solver, tool, sensor_pose, zero, sensor_weight, torque_sd
+        wrench=WrenchChoice.parsed(
+            wrench=wrench,
+            frame=frame,
+            solver=solver,
+            tool=tool,
+            sensor_pose=sensor_pose,
+            zero=zero,
+            sensor_weight=sensor_weight,
+            torque_sd=torque_sd,
         ),
         reference=reference,
         free=paths(free),

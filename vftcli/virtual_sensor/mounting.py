@@ -15,10 +15,10 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import Mask
+from vftcli.virtual_sensor.choice import FIT, WrenchChoice
 from vftcli.virtual_sensor.frames import Mounting
 from vftcli.virtual_sensor.log_wrench import stated
 from vftcli.virtual_sensor.sensor import described, fit_pose, tool_words, weigh_tool, without_tool
-from vftcli.virtual_sensor.sensor_reading import FIT, WrenchRequest
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 BEST = "kfo-fe"
@@ -41,7 +41,7 @@ def placed(
     recording: Recording,
     robot: Robot,
     estimates: Sequence[ExternalTorque],
-    request: WrenchRequest,
+    request: WrenchChoice,
 ) -> Placed:
     """Tool and sensor poses as asked; the sensor's estimated from the log for ``fit``.
 

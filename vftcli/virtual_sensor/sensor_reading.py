@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +12,8 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import Mask, Wrench
-from vftcli.virtual_sensor.frames import Mounting, own_pose, read_pose
+from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.virtual_sensor.frames import Mounting
 from vftcli.virtual_sensor.null_space import Elsewhere, contact_elsewhere
 from vftcli.virtual_sensor.sensor import time_offset
 from vftcli.virtual_sensor.torque_error import (
@@ -38,50 +38,6 @@ from vftcli.virtual_sensor.zero import (
 
 PAYLOAD_SLACK = 0.05
 """Difference of payloads that is not worth a remark. [kg]"""
-
-FIT = "fit"
-"""The word for a sensor pose that is to be estimated from the log."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class WrenchRequest:
-    """What a user asks of the virtual sensor.
-
-    Attributes:
-        frame: Frame of the answer, a key of `vftcli.virtual_sensor.frames.FRAMES`.
-        solver: A key of `vftcli.virtual_sensor.solvers.SOLVERS`.
-        tool: The tool's pose as text or a name in the robot file, None for the file's own.
-        sensor_pose: The sensor's pose likewise, or "fit".
-        zero: FreeRunTorque spans: the first is the zero, further ones show its drift. [s]
-        zero_start: Find the unloaded start and take it as the zero.
-        zero_log: A log of the arm unloaded, or None.
-        sensor_weight: Weigh the sensor's own tool in the unloaded spans and remove it.
-        torque_sd: Torque error the covariance starts from: "own", a number or one a joint as text,
-            or None for the best that is known. [N·m]
-    """
-
-    frame: str = "flange"
-    solver: str = "pinv"
-    tool: str | None = None
-    sensor_pose: str | None = None
-    zero: tuple[tuple[float, float], ...] = ()
-    zero_start: bool = False
-    zero_log: Path | None = None
-    sensor_weight: bool = False
-    torque_sd: str | None = None
-
-    def mounting(self, robot: Robot) -> Mounting:
-        """Where tool and sensor sit: as asked, else as the robot file says.
-
-        Raises:
-            ParameterError: If a pose is malformed or names nothing there is.
-        """
-        tool, sensor = own_pose(robot, "tool"), own_pose(robot, "sensor")
-        if self.tool is not None:
-            tool = read_pose(self.tool, robot, "tool", "--tool")
-        if self.sensor_pose not in {None, FIT}:
-            sensor = read_pose(str(self.sensor_pose), robot, "sensor", "--sensor-pose")
-        return Mounting(tool, sensor)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +96,7 @@ def measure(
     recording: Recording,
     robot: Robot,
     estimates: Sequence[ExternalTorque],
-    request: WrenchRequest,
+    request: WrenchChoice,
     unloaded: FreeRunTorque | None = None,
     mounting: Mounting | None = None,
     disturbance: Disturbance | None = None,
@@ -184,7 +140,7 @@ def measure(
     notes += band_notes(error, wrenches)
     if unloaded is not None:
         notes.append(unloaded.note)
-    if spans and (request.zero or request.zero_start):
+    if spans and (request.zero.of_log):
         drifts = tuple(
             replace(d, removed=True) if k < len(wrenches) else d for k, d in enumerate(drifts)
         )
@@ -257,7 +213,7 @@ def relieved(
 
 
 def torque_error(
-    request: WrenchRequest,
+    request: WrenchChoice,
     torques: Sequence[ExternalTorque],
     free: Mask,
     unloaded: FreeRunTorque | None,
@@ -315,16 +271,16 @@ def unloaded_from(
 Spans = tuple[tuple[float, float], ...]
 
 
-def zero_spans(request: WrenchRequest, wrenches: Sequence[Wrench]) -> tuple[Spans, Spans]:
+def zero_spans(request: WrenchChoice, wrenches: Sequence[Wrench]) -> tuple[Spans, Spans]:
     """The spans that are the zero, and the unloaded start that was found where none was given.
 
     Raises:
         ParameterError: If the unloaded start is asked for and there is none.
     """
-    if request.zero:
-        return request.zero, ()
+    if request.zero.spans:
+        return request.zero.spans, ()
     start = unloaded_start(wrenches[0]) if wrenches else None
-    if not request.zero_start:
+    if not request.zero.start:
         return (), () if start is None else (start,)
     if start is None:
         raise ParameterError(

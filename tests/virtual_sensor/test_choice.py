@@ -1,0 +1,89 @@
+"""What a user may choose of the virtual sensor: one meaning of each option."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.robots import load_robot
+from vftcli.signals.errors import ParameterError
+from vftcli.virtual_sensor.choice import FIT, WrenchChoice, ZeroChoice
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        {"wrench": True},
+        {"frame": "base"},
+        {"solver": "map"},
+        {"tool": "0,0,0.1"},
+        {"sensor_pose": FIT},
+        {"zero": ["1:2"]},
+        {"sensor_weight": True},
+        {"torque_sd": "own"},
+    ],
+)
+def test_any_option_asks_for_a_wrench(option: dict[str, object]) -> None:
+    assert WrenchChoice.parsed(**option) is not None  # type: ignore[arg-type]
+
+
+def test_no_option_asks_for_none() -> None:
+    assert WrenchChoice.parsed(zero=[]) is None
+
+
+def test_what_is_not_chosen_is_the_flange_by_the_pseudo_inverse() -> None:
+    assert WrenchChoice.parsed(wrench=True) == WrenchChoice(frame="flange", solver="pinv")
+
+
+def test_a_zero_is_spans_the_start_or_a_log(tmp_path: Path) -> None:
+    log = tmp_path / "free.csv"
+    log.touch()
+    assert ZeroChoice.parsed(["1:2", "8:9"]).spans == ((1.0, 2.0), (8.0, 9.0))
+    assert ZeroChoice.parsed(["start"]) == ZeroChoice(start=True)
+    both = ZeroChoice.parsed([str(log), "start"])
+    assert (both.log, both.start, both.of_log) == (log, True, True)
+    assert not ZeroChoice.parsed([str(log)]).of_log
+    assert ZeroChoice.parsed([]) == ZeroChoice()
+
+
+def test_a_log_may_hold_a_colon_in_its_name(tmp_path: Path) -> None:
+    log = tmp_path / "12:30.csv"
+    log.touch()
+    assert ZeroChoice.parsed([str(log)]).log == log
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["nowhere.csv"], "neither A:B in seconds, nor start, nor a log that exists"),
+        (["start", "1:2"], "either start or spans A:B"),
+        (["2:1"], "A:B with A < B"),
+    ],
+)
+def test_a_zero_that_is_none(words: list[str], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        ZeroChoice.parsed(words)
+
+
+def test_two_free_runs_are_no_zero(tmp_path: Path) -> None:
+    logs = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    for log in logs:
+        log.touch()
+    with pytest.raises(ParameterError, match="one free run"):
+        ZeroChoice.parsed([str(log) for log in logs])
+
+
+@pytest.mark.parametrize("wrong", [{"frame": "wrist"}, {"solver": "svd"}])
+def test_a_choice_is_checked_where_it_is_made(wrong: dict[str, str]) -> None:
+    with pytest.raises(ParameterError, match="for a wrench; there is"):
+        WrenchChoice(**wrong)  # type: ignore[arg-type]
+
+
+def test_what_is_asked_goes_before_the_robot_file() -> None:
+    robot = load_robot("ur5")
+    there = WrenchChoice(tool="0,0,0.1", sensor_pose="0,0,0.03").mounting(robot)
+    assert there.tool is not None
+    assert there.sensor is not None
+    np.testing.assert_array_equal(there.tool.translation, [0, 0, 0.1])
+    np.testing.assert_array_equal(there.sensor.translation, [0, 0, 0.03])
+    assert WrenchChoice(sensor_pose=FIT).mounting(robot).sensor is None

@@ -1,0 +1,30 @@
+"""Words of the command line that several rooms read: a span of time, a list of numbers."""
+
+from vftcli.signals.errors import ParameterError
+
+
+def interval(text: str) -> tuple[float, float]:
+    """First and last time of ``A:B``, infinite where an end is left out. [s]
+
+    Raises:
+        ParameterError: If it is malformed or ends before it starts.
+    """
+    left, colon, right = text.partition(":")
+    try:
+        start = float(left) if left.strip() else float("-inf")
+        stop = float(right) if right.strip() else float("inf")
+    except ValueError:
+        colon = ""
+    if not colon or not start < stop:
+        raise ParameterError(
+            f"interval {text!r} is not A:B with A < B, in seconds from the log's first sample"
+        )
+    return start, stop
+
+
+def numbers(text: str) -> tuple[float, ...] | None:
+    """The numbers of ``A,B,C``, None where a part is no number: the caller says what was due."""
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        return None

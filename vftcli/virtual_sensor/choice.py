@@ -1,0 +1,153 @@
+"""What a user may choose of the virtual sensor, read from the command line and checked once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from vftcli.robots.robot import Robot
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import interval
+from vftcli.virtual_sensor.frames import Mounting, check_frame, own_pose, read_pose
+from vftcli.virtual_sensor.solvers import check_solver
+
+FIT = "fit"
+"""The word for a sensor pose that is to be estimated from the log."""
+
+START = "start"
+"""The word for the unloaded start of the log."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZeroChoice:
+    """What is taken as the zero of a wrench; nothing where all is left at its default.
+
+    Attributes:
+        spans: Unloaded spans of the log: the first is the zero, further ones show its drift. [s]
+        start: Whether the unloaded start is to be found and taken.
+        log: A log of the arm unloaded, or None.
+
+    Raises:
+        ParameterError: If both spans and the start are chosen.
+    """
+
+    spans: tuple[tuple[float, float], ...] = ()
+    start: bool = False
+    log: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.spans and self.start:
+            raise ParameterError("--zero takes either start or spans A:B")
+
+    @property
+    def of_log(self) -> bool:
+        """Whether the zero is taken from a part of the log itself."""
+        return self.start or bool(self.spans)
+
+    @classmethod
+    def parsed(cls, words: Sequence[str]) -> "ZeroChoice":
+        """The choice that ``--zero A:B|start|LOG``, which may be repeated, states.
+
+        Raises:
+            ParameterError: If a word is none of the three, or they exclude each other.
+        """
+        spans, logs = [], []
+        for text in words:
+            if text == START:
+                continue
+            # A file that is there wins: its name may hold a colon.
+            if Path(text).exists():
+                logs.append(Path(text))
+            elif ":" in text:
+                spans.append(interval(text))
+            else:
+                raise ParameterError(
+                    f"--zero {text!r} is neither A:B in seconds, nor start, nor a log that exists"
+                )
+        if len(logs) > 1:
+            raise ParameterError("--zero takes one free run, and either start or spans A:B")
+        return cls(spans=tuple(spans), start=START in words, log=logs[0] if logs else None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WrenchChoice:
+    """What a user asks of the virtual sensor.
+
+    Attributes:
+        frame: Frame of the answer, a key of `vftcli.virtual_sensor.frames.FRAMES`.
+        solver: A key of `vftcli.virtual_sensor.solvers.SOLVERS`.
+        tool: The tool's pose as text or a name in the robot file, None for the file's own.
+        sensor_pose: The sensor's pose likewise, or "fit".
+        zero: What is taken as the zero.
+        sensor_weight: Whether the sensor's own tool is weighed in the unloaded spans and removed.
+        torque_sd: Torque error the covariance starts from: "own", a number or one a joint as text,
+            or None for the best that is known. [N·m]
+
+    Raises:
+        ParameterError: If there is no such frame or solver.
+    """
+
+    frame: str = "flange"
+    solver: str = "pinv"
+    tool: str | None = None
+    sensor_pose: str | None = None
+    zero: ZeroChoice = field(default_factory=ZeroChoice)
+    sensor_weight: bool = False
+    torque_sd: str | None = None
+
+    def __post_init__(self) -> None:
+        check_frame(self.frame)
+        check_solver(self.solver)
+
+    def mounting(self, robot: Robot) -> Mounting:
+        """Where tool and sensor sit: as asked, else as the robot file says.
+
+        Raises:
+            ParameterError: If a pose is malformed or names nothing there is.
+        """
+        tool, sensor = own_pose(robot, "tool"), own_pose(robot, "sensor")
+        if self.tool is not None:
+            tool = read_pose(self.tool, robot, "tool", "--tool")
+        if self.sensor_pose is not None and self.sensor_pose != FIT:
+            sensor = read_pose(self.sensor_pose, robot, "sensor", "--sensor-pose")
+        return Mounting(tool, sensor)
+
+    @classmethod
+    def parsed(
+        cls,
+        *,
+        wrench: bool = False,
+        frame: str | None = None,
+        solver: str | None = None,
+        tool: str | None = None,
+        sensor_pose: str | None = None,
+        zero: Sequence[str] | None = None,
+        sensor_weight: bool = False,
+        torque_sd: str | None = None,
+    ) -> "WrenchChoice | None":
+        """The choice that the options of a command state, None where none of them asks for one.
+
+        Args:
+            wrench: Whether ``--wrench`` was given; any other option of the sensor asks as well.
+            frame: Frame of the answer, None for the flange's.
+            solver: The solver, None for the pseudo-inverse.
+            tool: See the attribute, as the next.
+            sensor_pose: See the attribute.
+            zero: The words of every ``--zero``.
+            sensor_weight: See the attribute, as the next.
+            torque_sd: See the attribute.
+
+        Raises:
+            ParameterError: If a frame or solver does not exist, or a zero is malformed.
+        """
+        options = (frame, solver, tool, sensor_pose, zero or None, torque_sd, sensor_weight or None)
+        if not wrench and all(option is None for option in options):
+            return None
+        return cls(
+            frame=frame or "flange",
+            solver=solver or "pinv",
+            tool=tool,
+            sensor_pose=sensor_pose,
+            zero=ZeroChoice.parsed(zero or ()),
+            sensor_weight=sensor_weight,
+            torque_sd=torque_sd,
+        )
