@@ -206,27 +206,37 @@ def analyse(recording: Recording, robot: Robot, request: AnalysisChoice) -> "Ana
     contacts: tuple[ContactScore, ...] = ()
     if request.reference is not None:
         from vftcli.evaluation import evaluate, with_wrenches
-        from vftcli.evaluation.reference import ReferenceRequest, make_reference
+        from vftcli.evaluation.reference_choice import (
+            ReferenceChoice,
+            ReferenceSource,
+            make_reference,
+        )
+        from vftcli.repetition.two_cycle import TwoCycleOptions
+        from vftcli.virtual_sensor.frames import NOTHING
 
         wanted = request.free if request.reference == "two-cycle" or survey is None else ()
         free = tuple(open_log(path, without_interval(request)) for path in wanted)
-        asked = ReferenceRequest(
+        asked = ReferenceChoice(
             name=request.reference,
-            free=free,
             columns=request.reference_columns,
-            period=request.period,
-            free_cycles=request.free_cycles,
-            alignment=request.alignment,
-            low_pass=request.low_pass,
-            mounting=mounting,
+            two_cycle=TwoCycleOptions(
+                period=request.period,
+                free_cycles=request.free_cycles,
+                alignment=request.alignment,
+                low_pass=request.low_pass,
+            ),
         )
-        reference = make_reference(sensed, robot, asked)
+        source = ReferenceSource(
+            recording=sensed, robot=robot, free=free, mounting=mounting or NOTHING
+        )
+        judge = make_reference(source, asked)
+        reference = judge.torque
         errors = evaluate(recording.name, estimates, reference)
         if measured is not None:
             from vftcli.evaluation.reference_wrench import reference_wrench
             from vftcli.virtual_sensor.sensor_reading import referred
 
-            theirs = reference_wrench(sensed, robot, reference, measured.sensor, asked)
+            theirs = reference_wrench(sensed, robot, judge, measured.sensor)
             measured = referred(measured, theirs)
             errors = with_wrenches(errors, recording.name, measured)
         if request.contacts:

@@ -151,7 +151,7 @@ def test_a_logged_wrench_goes_through_its_frame_to_the_joints() -> None:
         "base axes, force BY the robot ON the environment": -base.values,
     }
     torques = [
-        sensor_reference(log(values, words), load_robot("ur5"), mounting).tau
+        sensor_reference(log(values, words), load_robot("ur5"), mounting).torque.tau
         for words, values in logs.items()
     ]
     for tau in torques[1:]:

@@ -1,50 +1,95 @@
-"""A reference from a file: somebody else's torque, brought onto the log's clock."""
+"""A reference from a file: somebody else's torque or wrench, brought onto the log's clock."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from vftcli.evaluation.reference import Reference
+from vftcli.evaluation.reference_sensor import torque_of
 from vftcli.readers.references import read_reference
+from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import caution
+from vftcli.virtual_sensor.frames import Mounting
+from vftcli.virtual_sensor.log_wrench import logged_wrench
 
 
-def reference_from_file(path: Path, recording: Recording, columns: str | None) -> ExternalTorque:
-    """External torque from a table whose clock is the log's own.
+def file_reference(
+    path: Path,
+    recording: Recording,
+    robot: Robot,
+    mounting: Mounting,
+    columns: str | None = None,
+) -> Reference:
+    """External torque, wrench or both from a table whose clock is the log's own.
 
-    The file's stamps are shifted by the log's first stamp, then interpolated linearly to the log's
-    samples; samples beyond the file are NaN.
+    A file without torques gives those of its wrench, Jᵀ w. A wrench is taken to be in base axes
+    about the flange point unless ``wrench[FRAME]=…`` in the columns says otherwise.
 
     Args:
-        path: The table: t and one torque column a joint.
+        path: The table: t, and one torque column a joint, or six columns of a wrench, or both.
         recording: The log it belongs to.
-        columns: Description of its columns, or None.
+        robot: The arm.
+        mounting: Where tool and sensor sit, for a wrench in their frames.
+        columns: Description of the table's columns, None to recognise them.
 
     Raises:
         ReferenceTorqueError: If the joints differ or the clocks do not overlap.
         LogError: If the table cannot be read.
     """
     table = read_reference(path, columns)
+    # The recording counts from its first sample, a reference file from the same zero as the log.
+    t = table.t - recording.source.t0
+    name = f"file:{path.name}"
+    wrench = None
+    if table.wrench is not None:
+        values = on_the_logs_clock(t, table.wrench, recording, path)
+        frame = table.wrench_frame or "base"
+        given = replace(recording, wrench=values, wrench_frame=frame)
+        wrench = logged_wrench(given, robot.chain, mounting)
     if table.tau is None:
-        raise ReferenceTorqueError(f"{path}: it has a wrench but no torques; compare with --wrench")
+        if wrench is None:
+            raise ReferenceTorqueError(f"{path}: it holds neither a torque nor a wrench")
+        remarks = (caution("reference-wrench-file", file=path.name), *wrench.remarks)
+        return Reference(torque=torque_of(wrench, recording, robot, name, remarks), wrench=wrench)
     if table.tau.shape[1] != recording.joints:
         raise ReferenceTorqueError(
             f"{path}: {table.tau.shape[1]} torque columns for a log of {recording.joints} joints"
         )
-    t = table.t - recording.source.t0
+    tau = on_the_logs_clock(t, table.tau, recording, path)
+    covered = int(np.count_nonzero(np.isfinite(tau[:, 0])))
+    remarks = (
+        caution("reference-file", file=path.name, covered=covered, samples=recording.samples),
+    )
+    torque = ExternalTorque(name=name, t=recording.t, tau=tau, remarks=remarks)
+    return Reference(torque=torque, wrench=wrench)
+
+
+def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path) -> Array:
+    """Columns interpolated linearly to the log's samples, NaN beyond the file. (T, k)
+
+    Args:
+        t: The file's time, from the log's first sample. (M,) [s]
+        columns: Its values. (M, k)
+        recording: The log.
+        path: The file, for the error.
+
+    Raises:
+        ReferenceTorqueError: If the two clocks do not overlap.
+    """
+    # Half a sample more at either end: stamps of one clock, written by two programs, round apart.
     slack = 0.5 * recording.step
     inside = (recording.t >= t[0] - slack) & (recording.t <= t[-1] + slack)
     if not np.any(inside):
+        start = recording.source.t0
         raise ReferenceTorqueError(
-            f"{path}: its clock ({table.t[0]:g} to {table.t[-1]:g} s) does not overlap the log's "
-            f"({recording.source.t0 + recording.t[0]:g} to "
-            f"{recording.source.t0 + recording.t[-1]:g} s); both must be the log's own clock"
+            f"{path}: its clock ({t[0] + start:g} to {t[-1] + start:g} s) does not overlap the "
+            f"log's ({recording.t[0] + start:g} to {recording.t[-1] + start:g} s); both must be "
+            "the log's own clock"
         )
-    there = np.column_stack([np.interp(recording.t, t, tau) for tau in table.tau.T])
-    tau = np.where(inside[:, None], there, np.nan)
-    note = (
-        f"reference from {path.name}: {np.count_nonzero(inside)} of {recording.samples} samples "
-        "covered; its own error is not stated, so no floor is known"
-    )
-    return ExternalTorque(name=f"file:{path.name}", t=recording.t, tau=tau, remarks=(note,))
+    there = np.column_stack([np.interp(recording.t, t, column) for column in columns.T])
+    return np.where(inside[:, None], there, np.nan)

@@ -2,19 +2,19 @@
 
 import numpy as np
 
+from vftcli.evaluation.reference import Reference
 from vftcli.robots.drive import check_joints
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.robot import Robot
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Note, caution
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.frames import Mounting
+from vftcli.virtual_sensor.frames import NOTHING, Mounting
 from vftcli.virtual_sensor.log_wrench import logged_wrench
 
 
-def sensor_reference(
-    recording: Recording, robot: Robot, mounting: Mounting | None = None
-) -> ExternalTorque:
+def sensor_reference(recording: Recording, robot: Robot, mounting: Mounting = NOTHING) -> Reference:
     """τ_ext = J_Fᵀ w of the wrench that the log holds.
 
     Raises:
@@ -22,19 +22,15 @@ def sensor_reference(
         ParameterError: If the wrench's frame is not one there is.
     """
     check_joints(recording, robot)
-    wrench = logged_wrench(recording, robot.chain, mounting or Mounting())
-    note = (
-        "reference sensor: the log's wrench through the transposed flange Jacobian; contacts that "
-        "do not pass through the sensor are not in it, and its own error is not stated, so no "
-        "floor is known"
-    )
-    return torque_of(wrench, recording, robot, "sensor", note)
+    wrench = logged_wrench(recording, robot.chain, mounting)
+    remarks = (caution("reference-sensor"), *wrench.remarks)
+    return Reference(torque=torque_of(wrench, recording, robot, "sensor", remarks), wrench=wrench)
 
 
 def torque_of(
-    wrench: Wrench, recording: Recording, robot: Robot, name: str, note: str
+    wrench: Wrench, recording: Recording, robot: Robot, name: str, remarks: tuple[Note, ...]
 ) -> ExternalTorque:
     """Joint torque of a wrench in base axes about the flange point."""
     J = flange_jacobian(robot.chain, recording.q)
     tau = np.einsum("tij,ti->tj", J, wrench.values)
-    return ExternalTorque(name=name, t=recording.t, tau=tau, remarks=(note, *wrench.remarks))
+    return ExternalTorque(name=name, t=recording.t, tau=tau, remarks=remarks)

@@ -194,7 +194,11 @@ def reference_record(reference: ExternalTorque | None) -> dict[str, Any] | None:
     if reference is None:
         return None
     floor = plain(reference.floor)
-    return {"name": reference.name, "floor_Nm": floor, "notes": list(reference.remarks)}
+    return {
+        "name": reference.name,
+        "floor_Nm": floor,
+        "notes": [str(note) for note in reference.remarks],
+    }
 
 
 def wrench_record(analysis: Analysis) -> dict[str, Any] | None:

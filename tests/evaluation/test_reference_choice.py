@@ -1,0 +1,139 @@
+"""References by name: what is checked before a log is read, and what each is made from."""
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from vftcli.evaluation import reference_file
+from vftcli.evaluation.reference_choice import (
+    REFERENCES,
+    ReferenceChoice,
+    ReferenceSource,
+    make_reference,
+)
+from vftcli.evaluation.reference_wrench import reference_wrench
+from vftcli.readers.references import read_reference
+from vftcli.robots import load_robot
+from vftcli.robots.kinematics import flange_jacobian
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.recording import Recording
+from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+
+ROBOT = load_robot("ur5")
+T = 0.01 * np.arange(300)
+RNG = np.random.default_rng(3)
+Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.2 * np.sin(np.outer(T, RNG.uniform(0.3, 1, 6)))
+RECORDING = Recording(t=T, q=Q, tau_ext=RNG.standard_normal((300, 6)))
+SOURCE = ReferenceSource(recording=RECORDING, robot=ROBOT)
+WRENCH = 5.0 * RNG.standard_normal((300, 6))
+
+
+def write(path: Path, t: np.ndarray = T, **groups: np.ndarray) -> ReferenceChoice:
+    """A reference file of groups of columns, chosen."""
+    columns = {"t": t}
+    for name, values in groups.items():
+        columns |= {f"{name}/{k + 1}": values[:, k] for k in range(values.shape[1])}
+    pl.DataFrame(columns).write_parquet(path)
+    return ReferenceChoice(name=f"file:{path}")
+
+
+def write_wrench(path: Path, values: np.ndarray, **groups: np.ndarray) -> ReferenceChoice:
+    choice = write(path, **groups)
+    axes = [f"wrench/{a}" for a in ("fx", "fy", "fz", "mx", "my", "mz")]
+    table = pl.read_parquet(path).with_columns(
+        pl.Series(name, values[:, k]) for k, name in enumerate(axes)
+    )
+    table.write_parquet(path)
+    return choice
+
+
+def test_an_unknown_name_is_refused_before_any_log_is_read() -> None:
+    with pytest.raises(
+        ReferenceTorqueError, match="there is zero, vendor, two-cycle, sensor, file"
+    ):
+        ReferenceChoice(name="magic")
+    assert [ReferenceChoice(name=name).path for name in REFERENCES] == [None] * len(REFERENCES)
+
+
+def test_zero_is_zero_with_no_floor_and_vendor_is_the_log_s_own() -> None:
+    zero = make_reference(SOURCE, ReferenceChoice(name="zero")).torque
+    assert not zero.tau.any()
+    assert zero.floor is not None
+    assert not zero.floor.any()
+    vendor = make_reference(SOURCE, ReferenceChoice(name="vendor")).torque
+    np.testing.assert_array_equal(vendor.tau, RECORDING.tau_ext)
+    assert vendor.floor is None  # its error is not known
+
+
+def test_free_runs_go_with_the_two_cycle_difference_only() -> None:
+    source = ReferenceSource(recording=RECORDING, robot=ROBOT, free=(RECORDING,))
+    with pytest.raises(ReferenceTorqueError, match="--free goes with --reference two-cycle"):
+        make_reference(source, ReferenceChoice(name="zero"))
+
+
+def test_a_file_is_read_once_for_torque_and_wrench(tmp_path, monkeypatch) -> None:
+    reads = []
+    monkeypatch.setattr(
+        reference_file, "read_reference", lambda *a: reads.append(a) or read_reference(*a)
+    )
+    choice = write_wrench(tmp_path / "truth.parquet", WRENCH)
+    reference = make_reference(SOURCE, choice)
+    wrench = reference_wrench(RECORDING, ROBOT, reference, VirtualSensor(frame="base"))
+    assert len(reads) == 1
+    # A file of base axes, asked for in base axes, comes back as it is.
+    np.testing.assert_allclose(wrench.values, WRENCH, atol=1e-9)
+
+
+def test_a_wrench_alone_gives_the_torque_of_its_transposed_jacobian(tmp_path) -> None:
+    choice = write_wrench(tmp_path / "truth.parquet", WRENCH)
+    tau = make_reference(SOURCE, choice).torque.tau
+    J = flange_jacobian(ROBOT.chain, Q)
+    np.testing.assert_allclose(tau[7], J[7].T @ WRENCH[7], atol=1e-12)
+
+
+def test_torques_of_a_file_go_before_its_wrench(tmp_path) -> None:
+    tau = RNG.standard_normal((300, 6))
+    choice = write_wrench(tmp_path / "truth.parquet", WRENCH, tau_ext=tau)
+    reference = make_reference(SOURCE, choice)
+    np.testing.assert_allclose(reference.torque.tau, tau, atol=1e-12)
+    assert reference.wrench is not None
+    remark = reference.torque.remarks[0]
+    assert remark.values["covered"] == remark.values["samples"] == 300
+
+
+def test_samples_beyond_the_file_are_unknown_half_a_sample_allowed(tmp_path) -> None:
+    """The file begins 4 ms after the log's 50th sample: half of the 10 ms step covers it."""
+    t = T[50:200] + 0.004
+    choice = write(tmp_path / "truth.parquet", t, tau_ext=np.repeat(t[:, None], 6, axis=1))
+    tau = make_reference(SOURCE, choice).torque.tau
+    known = np.isfinite(tau).all(axis=1)
+    np.testing.assert_array_equal(np.flatnonzero(known), np.arange(50, 200))
+    np.testing.assert_allclose(tau[51:200, 0], T[51:200], atol=1e-12)  # linear between stamps
+
+
+@pytest.mark.parametrize("what", ["tau_ext", "wrench"])
+def test_a_clock_of_another_day_is_refused(tmp_path, what) -> None:
+    path = tmp_path / "truth.parquet"
+    choice = write_wrench(path, WRENCH) if what == "wrench" else write(path, tau_ext=WRENCH)
+    pl.read_parquet(path).with_columns(pl.col("t") + 1e6).write_parquet(path)
+    with pytest.raises(ReferenceTorqueError, match="does not overlap the log's"):
+        make_reference(SOURCE, choice)
+
+
+def test_a_file_of_another_arm_is_refused(tmp_path) -> None:
+    choice = write(tmp_path / "truth.parquet", tau_ext=np.zeros((300, 7)))
+    with pytest.raises(ReferenceTorqueError, match="7 torque columns for a log of 6 joints"):
+        make_reference(SOURCE, choice)
+
+
+def test_a_torque_becomes_a_wrench_by_least_squares(tmp_path) -> None:
+    """Jᵀ w of a wrench, away from singular poses, gives the wrench back."""
+    tau = np.einsum("tij,ti->tj", flange_jacobian(ROBOT.chain, Q), WRENCH)
+    choice = write(tmp_path / "truth.parquet", tau_ext=tau)
+    reference = make_reference(SOURCE, choice)
+    assert reference.wrench is None
+    solved = reference_wrench(RECORDING, ROBOT, reference, VirtualSensor(frame="base"))
+    assert not solved.hidden.any()
+    np.testing.assert_allclose(solved.values, WRENCH, atol=1e-6)  # condition of J below 1e3

@@ -1,0 +1,94 @@
+"""ReferenceChoice: which reference a comparison is made against, and the table of all there are."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from vftcli.evaluation.reference import Reference, vendor_reference, zero_reference
+from vftcli.evaluation.reference_file import file_reference
+from vftcli.evaluation.reference_sensor import sensor_reference
+from vftcli.repetition.two_cycle import TwoCycleOptions, two_cycle_difference
+from vftcli.robots.robot import Robot
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.recording import Recording
+from vftcli.virtual_sensor.frames import NOTHING, Mounting
+
+FILE = "file:"
+"""The one reference whose name holds a path."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReferenceChoice:
+    """Which reference a user asks for; checked when it is made, before any log is read.
+
+    Attributes:
+        name: A key of `REFERENCES`, or ``file:PATH``.
+        columns: The column description of a reference file, None to recognise its columns.
+        two_cycle: How the two-cycle difference is made.
+
+    Raises:
+        ReferenceTorqueError: If there is no such reference.
+    """
+
+    name: str
+    columns: str | None = None
+    two_cycle: TwoCycleOptions = field(default_factory=TwoCycleOptions)
+
+    def __post_init__(self) -> None:
+        if self.path is None and self.name not in REFERENCES:
+            there = ", ".join((*REFERENCES, f"{FILE}PATH"))
+            raise ReferenceTorqueError(f"no reference {self.name!r}; there is {there}")
+
+    @property
+    def path(self) -> Path | None:
+        """The file of ``file:PATH``, None for a reference that is made from the log."""
+        return Path(self.name.removeprefix(FILE)) if self.name.startswith(FILE) else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReferenceSource:
+    """All that a reference can be made from.
+
+    Attributes:
+        recording: The log that is compared.
+        robot: The arm, its payload mounted.
+        free: Free runs of the same motion, for the two-cycle difference.
+        mounting: Where tool and sensor sit on the flange.
+    """
+
+    recording: Recording
+    robot: Robot
+    free: Sequence[Recording] = ()
+    mounting: Mounting = NOTHING
+
+
+def two_cycle(source: ReferenceSource, options: TwoCycleOptions) -> Reference:
+    """The two-cycle difference, against cycles of the same log or free runs in others."""
+    return Reference(
+        torque=two_cycle_difference(source.recording, source.free, source.robot, options)
+    )
+
+
+REFERENCES: dict[str, Callable[[ReferenceSource, ReferenceChoice], Reference]] = {
+    "zero": lambda source, _: zero_reference(source.recording),
+    "vendor": lambda source, _: vendor_reference(source.recording),
+    "two-cycle": lambda source, choice: two_cycle(source, choice.two_cycle),
+    "sensor": lambda source, _: sensor_reference(source.recording, source.robot, source.mounting),
+}
+"""Name at the command line → what makes it; ``file:PATH`` is the one name with a path in it."""
+
+
+def make_reference(source: ReferenceSource, choice: ReferenceChoice) -> Reference:
+    """The reference that is asked for, on the log's clock.
+
+    Raises:
+        ReferenceTorqueError: If it cannot be made from the log, or takes no free run and has one.
+    """
+    if source.free and choice.name != "two-cycle":
+        raise ReferenceTorqueError(
+            f"--free goes with --reference two-cycle, not with {choice.name}"
+        )
+    if choice.path is not None:
+        mounting = source.mounting
+        return file_reference(choice.path, source.recording, source.robot, mounting, choice.columns)
+    return REFERENCES[choice.name](source, choice)
