@@ -16,11 +16,11 @@ from vftcli.admittance.motion import Recursion
 from vftcli.admittance.online import OnlineKalman
 from vftcli.admittance.replay import deviation_of
 from vftcli.admittance.stability import check_stable
-from vftcli.admittance.thresholds import Flags
 from vftcli.observers.kalman import KalmanObserver
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix
+from vftcli.signals.series import resampled
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.experiment import Progress, Simulation, observe
 from vftcli.simulation.motion import Reference
@@ -53,11 +53,11 @@ class ClosedLoop:
     t: Array
     estimate: Array
     truth: Array
-    dragged: Flags
+    dragged: Mask
     commanded: Array
     q: Array
     moved: Array
-    reached: Flags
+    reached: Mask
     zero: Array
     simulation: Simulation | None
 
@@ -83,7 +83,7 @@ class Log:
 
     t: list[float]
     estimate: list[Array]
-    dragged: list[Flags]
+    dragged: list[Mask]
     commanded: list[Array]
     q: list[Array]
     reached: list[bool]
@@ -309,7 +309,7 @@ def finished(loop: Loop, log: Log, zero: tuple[float, float] | None) -> ClosedLo
     truth = np.full((len(t), 6), np.nan)
     if simulation is not None:
         seen = simulation.truth
-        truth = np.column_stack([np.interp(t, seen.t, column) for column in seen.wrench.T])
+        truth = resampled(t, seen.t, seen.wrench)
     estimate = np.array(log.estimate)
     if zero is not None:
         estimate[t < zero[0]] = np.nan

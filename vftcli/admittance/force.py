@@ -11,6 +11,7 @@ from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import resampled
 from vftcli.virtual_sensor.frames import FRAMES, Mounting, to_base
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
@@ -144,7 +145,7 @@ def from_truth(recording: Recording, t: Array, wrench: Array, source: str) -> Fo
         source: Where it comes from, in words.
     """
     inside = (recording.t >= t[0] - 1e-9) & (recording.t <= t[-1] + 1e-9)
-    values = np.column_stack([np.interp(recording.t, t, column) for column in wrench.T])
+    values = resampled(recording.t, t, wrench)
     values[~inside] = np.nan
     return ForceRecord(t=recording.t, wrench=values, q=recording.q, source=source)
 

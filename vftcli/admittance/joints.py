@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.admittance.thresholds import Flags
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix
 
@@ -114,7 +113,7 @@ class JointPath:
     """
 
     q: Array
-    reached: Flags
+    reached: Mask
     speed: Array
 
 
@@ -143,9 +142,9 @@ def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> Joint
 def one_path(
     solver: FlangeSolver,
     start: Array,
-    goals: tuple[Array, Array, Flags],
+    goals: tuple[Array, Array, Mask],
     q: Array,
-    reached: Flags,
+    reached: Mask,
 ) -> None:
     """Fill in one controller's joint positions (T, n), each guessed from the two before it."""
     shown, last, before, good = start, start, start, True
@@ -172,7 +171,7 @@ def try_pose(
     return solver.reach(rotation, point, last)
 
 
-def largest_speed(robot: Robot, q: Array, reached: Flags, period: float) -> Array:
+def largest_speed(robot: Robot, q: Array, reached: Mask, period: float) -> Array:
     """Largest joint speed between reached samples as a share of the limit. (N,)"""
     share = np.abs(np.diff(q, axis=0)) / period / robot.limits.qd_max
     both = (reached[1:] & reached[:-1])[:, :, None] & np.isfinite(share)

@@ -11,6 +11,7 @@ from vftcli.admittance.motion import AxisMotion
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.thresholds import Phases
 from vftcli.signals.arrays import Array
+from vftcli.signals.series import runs_of
 
 PAUSE = 1.0
 """Drags of one axis that follow each other within this time are one. [s]"""
@@ -43,10 +44,8 @@ def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
     rows = len(phases.dragged) + 1
     found: list[Drag] = []
     for axis in range(6):
-        flags = np.concatenate([[False], phases.dragged[:, axis], [False]])
-        edges = np.flatnonzero(flags[1:] != flags[:-1]).reshape(-1, 2)
         spans: list[list[int]] = []
-        for begin, release in edges.tolist():
+        for begin, release in runs_of(phases.dragged[:, axis]):
             if spans and (begin - spans[-1][1]) * period < PAUSE:
                 spans[-1][1] = release
             else:

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vftcli.admittance.law import Controller
-from vftcli.admittance.thresholds import Flags
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_quaternion, log_quaternion, product
 
@@ -29,12 +28,12 @@ class AxisMotion:
     t: Array
     x: Array
     v: Array
-    clipped: Flags
+    clipped: Mask
 
     @property
-    def escaped(self) -> Flags:
+    def escaped(self) -> Mask:
         """Controllers whose motion left the finite numbers: finite-time escape. (N,)"""
-        found: Flags = ~np.all(np.isfinite(self.x) & np.isfinite(self.v), axis=(0, 2))
+        found: Mask = ~np.all(np.isfinite(self.x) & np.isfinite(self.v), axis=(0, 2))
         return found
 
 
@@ -72,7 +71,7 @@ class Recursion:
         self.turn = exp_quaternion(self.x[:, 3:])
         self.turns = bool(np.any(self.x[:, 3:]) or np.any(self.v[:, 3:]))
 
-    def step(self, force: Array, dragged: Flags) -> None:
+    def step(self, force: Array, dragged: Mask) -> None:
         """Move one control period on under the force that enters the law.
 
         Args:
@@ -102,7 +101,7 @@ class Recursion:
 def run(
     controllers: Sequence[Controller],
     force: Array,
-    dragged: Flags,
+    dragged: Mask,
     x: Array | None = None,
     v: Array | None = None,
 ) -> AxisMotion:

@@ -20,9 +20,9 @@ from vftcli.admittance.replay_checks import (
     travel_note,
 )
 from vftcli.admittance.stability import Verdict, check_stable
-from vftcli.admittance.thresholds import Flags, Phases, phases
+from vftcli.admittance.thresholds import Phases, phases
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 
 RISE = 1e-12
@@ -250,7 +250,7 @@ def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
 
 
 def lyapunov_along(
-    controllers: Sequence[Controller], motion: AxisMotion, dragged: Flags
+    controllers: Sequence[Controller], motion: AxisMotion, dragged: Mask
 ) -> Lyapunov:
     """Energies along a run, and where the corrected one rises inside a recovery phase."""
     shape = motion.x.shape
@@ -267,7 +267,7 @@ def lyapunov_along(
     return Lyapunov(corrected=corrected, printed=printed, rises=rises)
 
 
-def count_rises(W: Array, recovering: Flags) -> int:
+def count_rises(W: Array, recovering: Mask) -> int:
     """Steps in which W (T+1, 6) rises while its axes recover through the whole step (T, 6)."""
     together = np.all(recovering[:, 3:], axis=1, keepdims=True)
     columns = np.column_stack([W[:, :3], W[:, 3:].sum(axis=1)])

@@ -3,12 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.admittance.parameters import Admittance
-from vftcli.signals.arrays import Array
-
-Flags = NDArray[np.bool_]
+from vftcli.signals.arrays import Array, Mask
 
 
 class Phases(NamedTuple):
@@ -19,7 +16,7 @@ class Phases(NamedTuple):
         force: Force and moment that enter the law; zero in the recovery phase. (T, 6) [N, N·m]
     """
 
-    dragged: Flags
+    dragged: Mask
     force: Array
 
 
@@ -44,7 +41,7 @@ def phases(wrench: Array, parameters: Admittance) -> Phases:
     return Phases(dragged, np.where(dragged, force, 0.0))
 
 
-def latched(on: Flags, off: Flags) -> Flags:
+def latched(on: Mask, off: Mask) -> Mask:
     """True from where `on` is until `off` is, False before the first of them. (T, 6)"""
     rows = np.arange(len(on))[:, None]
     last = np.maximum.accumulate(np.where(on | off, rows, -1), axis=0)

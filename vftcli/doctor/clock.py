@@ -6,6 +6,7 @@ import numpy as np
 
 from vftcli.doctor.findings import Finding
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
+from vftcli.signals.series import gaps_of
 
 SLOW_RATE = 50.0
 """Below this rate a contact of a tenth of a second is a handful of samples. [Hz]"""
@@ -89,7 +90,7 @@ def _jitter(recording: Recording) -> Iterator[Finding]:
 
 def _gaps(recording: Recording) -> Iterator[Finding]:
     steps = np.diff(recording.t)
-    gaps = np.flatnonzero(steps > GAP_STEPS * np.median(steps))
+    gaps = gaps_of(recording.t, GAP_STEPS)
     if gaps.size:
         k = int(gaps[np.argmax(steps[gaps])])
         yield Finding(

@@ -7,6 +7,7 @@ import numpy as np
 from vftcli.doctor.findings import Finding
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import runs_of
 
 MOVING = 1e-3
 """Speed from which a joint counts as moving. [rad/s]"""
@@ -243,8 +244,7 @@ def _is_clipped(value: Array, least: int = 10) -> bool:
         at = value == extreme
         if abs(extreme) < 0.5 * np.ptp(value) or at.sum() < least or at.mean() > 0.5:
             continue
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], at.view(np.int8), [0]])))
-        if (edges[1::2] - edges[::2]).max() >= least:
+        if max(stop - start for start, stop in runs_of(at)) >= least:
             return True
     return False
 

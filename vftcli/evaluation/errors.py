@@ -5,15 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
 from vftcli.evaluation.coverage import coverage
 from vftcli.evaluation.intervals import Resampled, interval, resample
 from vftcli.evaluation.significance import p_value
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import lags
+from vftcli.signals.series import median_step
 
 SCHEMA: dict[str, type[pl.DataType]] = {
     "recording": pl.String,
@@ -86,7 +86,7 @@ class Scored(NamedTuple):
     joint: int
     estimates: Array
     reference: Array
-    trusted: NDArray[np.bool_]
+    trusted: Mask
     floor: float
     resampled: Resampled
     lag: Array
@@ -123,7 +123,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> li
                 f"estimate {estimate.tau.shape} against reference {reference.tau.shape}"
             )
     names = tuple(estimate.name for estimate in estimates)
-    step = float(np.median(np.diff(reference.t))) if len(reference.t) > 1 else 1.0
+    step = median_step(reference.t) if len(reference.t) > 1 else 1.0
     lag = np.array([lags(e.tau, reference.tau, step) for e in estimates])
     covered = np.array([coverage(e, reference) for e in estimates])
     trusted = reference.trusted if reference.trusted is not None else reference.finite
@@ -140,7 +140,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> li
     return found
 
 
-def comparable(estimates: Array, reference: Array) -> NDArray[np.bool_]:
+def comparable(estimates: Array, reference: Array) -> Mask:
     """Samples at which the reference and every observer that mostly works are known. (T,)
 
     An observer that is known for less than half as many samples as the others (an unstable one)

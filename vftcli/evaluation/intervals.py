@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 
 REPETITIONS = 1000
 """Bootstrap repetitions; the ends of a 95 % interval rest on 25 of them."""
@@ -114,6 +113,6 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
     return float(np.sqrt(mean_square * np.exp(-half))), float(np.sqrt(mean_square / (1.0 - half)))
 
 
-def known_rows(errors: Array) -> NDArray[np.bool_]:
+def known_rows(errors: Array) -> Mask:
     """Samples in which every column is known. (T,)"""
     return np.asarray(np.isfinite(errors).all(axis=1))

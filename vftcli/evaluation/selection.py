@@ -10,6 +10,7 @@ import polars as pl
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
+from vftcli.signals.series import median_step
 
 STEP_TIME = 3.0
 """Length of the step that response times are read from. [s]"""
@@ -80,7 +81,7 @@ def facts(
         errors: The tidy error table, or None.
     """
     noise = white_noise(terms.mu)
-    step = float(np.median(np.diff(terms.t)))
+    step = median_step(terms.t)
     return tuple(
         facts_of(observer, tunings[observer.name], terms, noise, step, errors)
         for observer in observers

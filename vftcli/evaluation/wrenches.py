@@ -6,8 +6,8 @@ import numpy as np
 import polars as pl
 
 from vftcli.evaluation.errors import SCHEMA, correlation, number, rmse
-from vftcli.signals.arrays import Array
-from vftcli.signals.wrench import AXES, Mask, Wrench
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.wrench import AXES, Wrench
 from vftcli.virtual_sensor.detection import ContactScore
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 

@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.identification.least_squares import robust_sd
-from vftcli.identification.processing import PreparedLog, Samples, runs
-from vftcli.signals.arrays import Array
+from vftcli.identification.processing import PreparedLog
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.series import median_step, runs_of
 
 SLOW = 0.02
 """A joint must move faster than this to identify anything. [rad/s]"""
@@ -41,8 +42,8 @@ class Excitation(NamedTuple):
         reverses: Whether it moves both ways. (n,)
     """
 
-    moves: Samples
-    reverses: Samples
+    moves: Mask
+    reverses: Mask
 
 
 def excitation(motions: Sequence[PreparedLog]) -> Excitation:
@@ -55,7 +56,7 @@ def excitation(motions: Sequence[PreparedLog]) -> Excitation:
     for motion in motions:
         if motion.samples < 2:
             continue
-        step = float(np.median(np.diff(motion.t)))
+        step = median_step(motion.t)
         times[0] += step * np.count_nonzero(motion.dq > SLOW, axis=0)
         times[1] += step * np.count_nonzero(motion.dq < -SLOW, axis=0)
     moves = times.sum(axis=0) >= ENOUGH
@@ -102,7 +103,7 @@ def contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSp
     z = excess * usable / np.maximum(sd, 1e-9)
     worst = z.max(axis=1)
     found = []
-    for start, stop in runs(worst > TOUCH):
+    for start, stop in runs_of(worst > TOUCH):
         if motion.t[stop - 1] - motion.t[start] >= TOUCH_TIME:
             k, j = np.unravel_index(int(np.argmax(z[start:stop])), (stop - start, z.shape[1]))
             found.append(
@@ -116,12 +117,12 @@ def contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSp
     return merged(found)
 
 
-def sticking(motion: PreparedLog) -> Samples:
+def sticking(motion: PreparedLog) -> Mask:
     """Whether a joint is slower than `STICKING` within a filter's length of a sample. (M, n)"""
     slow = np.abs(motion.dq) < STICKING
     if motion.samples < 2:
         return slow
-    step = float(np.median(np.diff(motion.t)))
+    step = median_step(motion.t)
     reach = max(1, round(1.0 / (motion.processing.cutoff * step)))
     spread = slow.copy()
     for k in range(1, min(reach, motion.samples - 1) + 1):
@@ -142,7 +143,7 @@ def merged(found: Sequence[ContactSpan]) -> list[ContactSpan]:
     return out
 
 
-def without(motion: PreparedLog, found: Sequence[ContactSpan]) -> Samples:
+def without(motion: PreparedLog, found: Sequence[ContactSpan]) -> Mask:
     """Samples outside all contacts and their margins. (M,)"""
     free = np.ones(motion.samples, dtype=bool)
     for contact in found:
@@ -151,7 +152,7 @@ def without(motion: PreparedLog, found: Sequence[ContactSpan]) -> Samples:
     return free
 
 
-def doubt(name: str, robot: str, torque: Array, residual: Array, heavy: Samples) -> str:
+def doubt(name: str, robot: str, torque: Array, residual: Array, heavy: Mask) -> str:
     """Say which joint that carries weight the model explains worst, or "" if it does well.
 
     Args:

@@ -4,6 +4,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, is_uniform
 from vftcli.signals.errors import ClockError
+from vftcli.signals.series import median_step, resampled
 
 ORDER = 4
 """Order of the Butterworth low-pass, run forwards and backwards (so its roll-off counts twice)."""
@@ -11,7 +12,7 @@ ORDER = 4
 
 def even_clock(t: Array) -> Array:
     """Instants at the clock's median step, from its first sample to its last. (K,) [s]"""
-    step = float(np.median(np.diff(t)))
+    step = median_step(t)
     count = max(2, round(float(t[-1] - t[0]) / step) + 1)
     return np.linspace(t[0], t[-1], count)
 
@@ -37,7 +38,7 @@ def zero_phase(t: Array, signals: Array, cutoff: float) -> Array:
             f"{t[-1] - t[0]:.2f} s of log are too short for a {cutoff:g} Hz filter; "
             f"use a longer interval than {2.0 / cutoff:g} s"
         )
-    rate = 1.0 / float(np.median(np.diff(t)))
+    rate = 1.0 / median_step(t)
     if cutoff >= 0.45 * rate:
         return signals
     sections = butter(ORDER, cutoff, fs=rate, output="sos")
@@ -47,11 +48,6 @@ def zero_phase(t: Array, signals: Array, cutoff: float) -> Array:
     padding = min(len(grid) - 1, int(3 * rate / cutoff))
     smooth = sosfiltfilt(sections, columns, axis=0, padlen=padding)
     return np.asarray(smooth if even else resampled(t, grid, smooth))
-
-
-def resampled(instants: Array, t: Array, signals: Array) -> Array:
-    """Interpolate linearly every column of `signals` (T, m) from t to `instants`. (K, m)"""
-    return np.stack([np.interp(instants, t, column) for column in signals.T], axis=1)
 
 
 def derivative(t: Array, signals: Array) -> Array:

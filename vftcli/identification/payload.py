@@ -5,23 +5,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.filtering import resampled, zero_phase
+from vftcli.identification.filtering import zero_phase
 from vftcli.identification.least_squares import fit_column, solve
 from vftcli.identification.processing import (
     PreparedLog,
     Processing,
-    Samples,
     gravity_torque,
     prepare,
-    runs,
 )
 from vftcli.robots.chain import Payload
 from vftcli.robots.drive import drive_torque
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import resampled, runs_of
 
 STATIC = 4
 """Parameters that gravity tells: mass and three first moments."""
@@ -249,7 +248,7 @@ def poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:
     q, torque = [], []
     for recording in recordings:
         effort = drive_torque(recording, robot)
-        for start, stop in runs(holds(recording)):
+        for start, stop in runs_of(holds(recording)):
             if recording.t[stop - 1] - recording.t[start] >= DWELL:
                 edge = (stop - start) // 5
                 span = slice(start + edge, stop - edge)
@@ -259,7 +258,7 @@ def poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:
     return np.reshape(q, (-1, n)), np.reshape(torque, (-1, n))
 
 
-def holds(recording: Recording) -> Samples:
+def holds(recording: Recording) -> Mask:
     """Whether no joint travels further than `HELD` around a sample. (T,)"""
     reach = max(1, round(0.5 * WINDOW / recording.step))
     held = np.zeros(recording.samples, dtype=bool)

@@ -4,16 +4,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vftcli.identification.filtering import ORDER, derivative, zero_phase
 from vftcli.robots.drive import drive_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
-
-Samples = np.ndarray
+from vftcli.signals.series import gaps_of, runs_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,13 +80,13 @@ class PreparedLog:
 
     recording: Recording
     processing: Processing
-    kept: Samples
+    kept: NDArray[np.int64]
     t: Array
     q: Array
     dq: Array
     ddq: Array
     tau: Array
-    usable: Samples
+    usable: Mask
 
     @property
     def joints(self) -> int:
@@ -143,24 +143,17 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
     )
 
 
-def told(t: Array, dq: Array, processing: Processing) -> Samples:
+def told(t: Array, dq: Array, processing: Processing) -> Mask:
     """Whether each sample of each joint tells anything: no long stop, no gap beside it. (T, n)"""
     usable = np.ones(dq.shape, dtype=bool)
     for j, column in enumerate(np.abs(dq).T):
-        for start, stop in runs(column <= processing.still):
+        for start, stop in runs_of(column <= processing.still):
             if t[stop - 1] - t[start] >= processing.rest:
                 usable[start:stop, j] = False
-    steps = np.diff(t)
     margin = 0.5 / processing.cutoff
-    for k in np.flatnonzero(steps > processing.gap * np.median(steps)):
+    for k in gaps_of(t, processing.gap):
         usable[(t > t[k] - margin) & (t < t[k + 1] + margin)] = False
     return usable
-
-
-def runs(flags: Samples) -> list[tuple[int, int]]:
-    """First and one-past-last index of every stretch of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def gravity_torque(robot: Robot, q: Array) -> Array:

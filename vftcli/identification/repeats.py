@@ -3,6 +3,7 @@
 import numpy as np
 
 from vftcli.identification.processing import PreparedLog
+from vftcli.signals.series import resampled
 
 NEAR = 0.01
 """Largest joint distance at which two samples are the same place. [rad]"""
@@ -30,8 +31,7 @@ def densified(motion: PreparedLog, per_step: int = 4) -> np.ndarray:
     """The path through (q, q̇), interpolated so that neighbours are nearer than `NEAR`."""
     points = np.hstack([motion.q, SLOWNESS * motion.dq])
     index = np.arange(0, len(points) - 1 + 1e-9, 1.0 / per_step)
-    columns = [np.interp(index, np.arange(len(points)), column) for column in points.T]
-    return np.stack(columns, axis=1)
+    return resampled(index, np.arange(float(len(points))), points)
 
 
 def repeats(train: PreparedLog, test: PreparedLog) -> bool:

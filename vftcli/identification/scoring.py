@@ -6,11 +6,11 @@ import numpy as np
 
 from vftcli.identification.excitation import SLOW
 from vftcli.identification.least_squares import fit_column
-from vftcli.identification.processing import PreparedLog, Samples, gravity_torque
+from vftcli.identification.processing import PreparedLog, gravity_torque
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 
 EXPLAINS = 0.4
 """Share of a residual that a cause must explain to be named."""
@@ -81,9 +81,9 @@ def diagnosis(robot: Robot, motion: PreparedLog, residual: Array, trained: Array
     return [f"{name}: {text}" for text in remarks]
 
 
-def in_motion(motion: PreparedLog, j: int) -> Samples:
+def in_motion(motion: PreparedLog, j: int) -> Mask:
     """Where a joint moves fast enough to tell its friction. (M,)"""
-    moving: Samples = motion.usable[:, j] & (np.abs(motion.dq[:, j]) > SLOW)
+    moving: Mask = motion.usable[:, j] & (np.abs(motion.dq[:, j]) > SLOW)
     return moving
 
 

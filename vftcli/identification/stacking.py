@@ -19,10 +19,10 @@ from vftcli.identification.least_squares import (
     huber,
     robust_sd,
 )
-from vftcli.identification.processing import PreparedLog, Samples
+from vftcli.identification.processing import PreparedLog
 from vftcli.robots.chain import Chain
 from vftcli.robots.regressor import INERTIAL_NAMES, LINK, torque_regressor
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 
 
 class ParameterColumns(NamedTuple):
@@ -198,7 +198,7 @@ def weighted_rows(
         A = layout.rows(data.motion, data.columns, span)
         rows = np.concatenate([A, data.motion.tau[span, :, None]], axis=2) * scale[span, :, None]
         flat = rows.reshape(-1, rows.shape[2])
-        told: Samples = scale[span].ravel() > 0
+        told: Mask = scale[span].ravel() > 0
         yield flat[told]
 
 

@@ -14,12 +14,13 @@ import numpy as np
 from vftcli.identification.filtering import derivative, zero_phase
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.least_squares import fit_column, solve
-from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare, runs
+from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import runs_of
 
 CUTOFF = 4.0
 """Cutoff for targets: above it the measured motion no longer follows the asked one. [Hz]"""
@@ -169,7 +170,7 @@ def constant_at_rest(j: int, logs: Sequence[Targets]) -> Estimate:
             continue
         step = resolution(current[:, j])
         at_rest = np.all(np.abs(dq) <= log.motion.processing.still, axis=1)
-        for start, stop in runs(at_rest):
+        for start, stop in runs_of(at_rest):
             inside = (t[start:stop] > t[start] + SETTLE) & (t[start:stop] < t[stop - 1] - SETTLE)
             if np.count_nonzero(inside) > 3:
                 i, m = current[start:stop, j][inside], moment[start:stop, j][inside]

@@ -4,13 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.recursion import PIECE, Steps, recursion, steps_of
 from vftcli.observers.steady_filter import steady_filter
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, empty_series
+from vftcli.signals.arrays import Array, Mask, empty_series
 
 
 @dataclass(frozen=True)
@@ -71,11 +70,11 @@ def run_first_order(
     )
 
 
-def restarts(a: Array, rate: Array, steps: Steps) -> NDArray[np.bool_] | None:
+def restarts(a: Array, rate: Array, steps: Steps) -> Mask | None:
     """Where a gap makes the filter start afresh (N, n), or None where nothing does."""
     if steps.uniform:
         return None
-    where: NDArray[np.bool_] = (a > 1.0) & (0.5 * steps.median * rate <= 1.0)
+    where: Mask = (a > 1.0) & (0.5 * steps.median * rate <= 1.0)
     return where if where.any() else None
 
 

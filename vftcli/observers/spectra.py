@@ -23,10 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, frozen, handed_over, is_uniform, median
+from vftcli.signals.arrays import Array, Mask, frozen, handed_over, is_uniform
 from vftcli.signals.errors import ParameterError
-
-Flags = NDArray[np.bool_]
+from vftcli.signals.series import median_step, resampled, runs_of
 
 SEGMENT = 4.0
 """Length of a segment: what changes more slowly counts as constant. [s]"""
@@ -133,7 +132,7 @@ class Part(NamedTuple):
     """
 
     terms: DynamicsTerms
-    inside: Flags
+    inside: Mask
 
 
 def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
@@ -147,7 +146,7 @@ def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
         ParameterError: If one of the parts is too short for a spectrum.
     """
     t = loaded.terms.t
-    nominal = median(np.diff(t)) if len(t) > 1 else 0.0
+    nominal = median_step(t) if len(t) > 1 else 0.0
     heavy = list(runs(loaded, nominal))
     quiet = [run for part in free for run in runs(part, nominal)]
     longest = [max((len(run) for run in found), default=0) for found in (heavy, quiet)]
@@ -187,8 +186,7 @@ def runs(part: Part, step: float) -> Iterator[Array]:
     whole = part.inside[1:] & part.inside[:-1]
     if not uniform:
         whole = whole & (np.diff(t) <= GAP * step)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], whole.astype(np.int8), [0]])))
-    for first, stop in edges.reshape(-1, 2):
+    for first, stop in runs_of(whole):
         stretch = d[first:stop]
         if uniform:
             yield stretch
@@ -197,7 +195,7 @@ def runs(part: Part, step: float) -> Iterator[Array]:
         even = np.arange(clock[0], clock[-1], step)
         total = np.concatenate([np.zeros((1, d.shape[1])), stretch * np.diff(clock)[:, None]])
         np.cumsum(total, axis=0, out=total)
-        at = np.column_stack([np.interp(even, clock, column) for column in total.T])
+        at = resampled(even, clock, total)
         yield np.diff(at, axis=0) / step
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.signals.arrays import Array
+from vftcli.signals.series import gaps_of
 
 GAP_STEPS = 10.0
 """A step this many times the median is drawn as a break in the line."""
@@ -37,7 +38,7 @@ def decimated(t: Array, values: Array, stretches: int) -> list[Line]:
         values: One column a series; NaN where not known. (T, n)
         stretches: Number of stretches the log is cut into.
     """
-    gaps = gaps_of(t)
+    gaps = gaps_of(t, GAP_STEPS)
     if len(t) <= 2 * stretches:
         everything = np.arange(len(t))
         return [broken(t, column, everything, gaps) for column in values.T]
@@ -63,14 +64,6 @@ def extremes(values: Array, stretches: int) -> tuple[Index, Index]:
     low = np.where(unknown, np.inf, cut).argmin(axis=1) + start
     high = np.where(unknown, -np.inf, cut).argmax(axis=1) + start
     return low, high
-
-
-def gaps_of(t: Array) -> Index:
-    """Numbers of the samples after which the clock makes a long step."""
-    steps = np.diff(t)
-    if steps.size == 0:
-        return np.zeros(0, dtype=np.intp)
-    return np.flatnonzero(steps > GAP_STEPS * np.median(steps))
 
 
 def broken(t: Array, column: Array, index: Index, gaps: Index) -> Line:

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.readers.reader import RawLog
-from vftcli.signals.arrays import Array, handed_over, median
+from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.recording import Recording, Source
+from vftcli.signals.series import gaps_of, median_step
 
 GARBAGE_ROWS = 100
 """Rows at the start of a log among which a misaligned packet may have left garbage."""
@@ -31,8 +31,6 @@ GAP_STEPS = 4.0
 
 SEGMENT_ROWS = 20
 """A stretch between two restarts of the clock that is shorter is not a recording of its own."""
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass
@@ -208,7 +206,7 @@ def refuse_backward_steps(raw: RawLog, path: Path) -> None:
     restarts = np.flatnonzero(backward) + 1
     k, t = int(restarts[0]), seconds(raw)
     where = f"at sample {raw.first_row + k} (from {t[k - 1]:.6f} to {t[k]:.6f} s)"
-    usual = float(np.median(np.diff(t)))
+    usual = median_step(t)
     lengths = np.diff([0, *restarts, len(t)])
     if np.all(np.abs(t[restarts]) <= 3 * usual) and lengths.min() >= SEGMENT_ROWS:
         raise RestartError(
@@ -265,8 +263,7 @@ def report_gaps(t: Array, findings: Findings) -> None:
     if len(t) < 3:
         return
     steps = np.diff(t)
-    usual = median(steps)
-    gaps = np.flatnonzero(steps > GAP_STEPS * usual)
+    gaps = gaps_of(t, GAP_STEPS)
     if gaps.size:
         k = int(gaps[np.argmax(steps[gaps])])
         findings.warnings.append(

@@ -13,6 +13,7 @@ from vftcli.readers.columns import ColumnSpec, Item
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
+from vftcli.signals.series import median_step
 
 Column = NDArray[Any]
 """One column as it is stored: (T,) numbers, or (T, k) for a column of lists."""
@@ -194,7 +195,7 @@ def tick_of(stamps: Column, name: str) -> tuple[float, str]:
     for size, unit in ((1e17, "ns"), (1e14, "us"), (1e11, "ms")):
         if size < usual < 1e20:
             return units[unit], unit
-    step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    step = median_step(stamps) if len(stamps) > 1 else 0.0
     whole = stamps.dtype.kind in "iu" or bool(np.all(np.mod(stamps[:1000], 1) == 0))
     return (1e-3, "ms") if whole and 0.8 <= step <= 1.2 else (1.0, "s")
 

@@ -16,6 +16,7 @@ from vftcli.signals.arrays import Array, frozen
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import resampled
 
 QUIETER = 0.85
 """A free part that was found is believed if on most joints the loaded part has this share of its
@@ -98,8 +99,7 @@ def without_free_motion(found: Baseline) -> Spectra | None:
     except ParameterError:
         return spectra
     floor = (1.0 + 1.0 / len(part.pairings)) * spectra.floor
-    columns = [np.interp(loaded.frequency, spectra.frequency, column) for column in floor.T]
-    return replace(loaded, free=np.column_stack(columns))
+    return replace(loaded, free=resampled(loaded.frequency, spectra.frequency, floor))
 
 
 def padded(d: Array) -> Array:

@@ -20,6 +20,7 @@ from vftcli.observers.smoother import innovations
 from vftcli.refinement.baseline import Baseline
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.series import median_step
 
 LAGS = 20
 """Lags of the autocorrelation that are looked at."""
@@ -67,7 +68,7 @@ def consistency(
     inner = observer.observer if isinstance(observer, AutoTuned) else observer
     if not isinstance(inner, KalmanObserver) or found.terms.samples <= 2 * LAGS:
         return None
-    step, n = float(np.median(np.diff(found.terms.t))), found.terms.joints
+    step, n = median_step(found.terms.t), found.terms.joints
     settled, model = inner.steady(step, n), inner.model(step, n)
     nu = innovations(estimate.tau, settled.gains.l2, model.a22)[1:]
     nis = nu**2 / (settled.prior.p11 + model.r)

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.observers import FilteredDynamicsObserver, MomentumObserver, Observer, Setup
 from vftcli.observers.auto_tuning import (
@@ -17,7 +16,7 @@ from vftcli.observers.auto_tuning import (
 )
 from vftcli.observers.matching import MatchTarget, tune
 from vftcli.observers.spectra import Spectra
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 
 GOALS = {
@@ -196,7 +195,7 @@ def shared_rate(kind: Kind, spectra: Spectra, goal: TuningGoal) -> float:
     return float(grid[np.argmin(expected_error(kind, grid, spectra).mean(axis=1))])
 
 
-def check_reachable(few: NDArray[np.bool_], spectra: Spectra, goal: TuningGoal) -> None:
+def check_reachable(few: Mask, spectra: Spectra, goal: TuningGoal) -> None:
     """Raise unless every joint has a rate with few enough false alarms."""
     never = np.flatnonzero(~np.any(few, axis=0))
     if not len(never):

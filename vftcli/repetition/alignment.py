@@ -4,11 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.repetition.standstill import Flags, runs
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.filters import resampled
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import resampled, runs_of
 
 LEAST_OVERLAP = 0.3
 """Share of the shorter log that must overlap at an admissible shift."""
@@ -39,7 +38,7 @@ class Alignment(NamedTuple):
     shift: float
     rate: float
     deviation: float
-    overlap: Flags
+    overlap: Mask
 
 
 def align(recording: Recording, free: Recording) -> Alignment:
@@ -102,8 +101,8 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     shift, rate = refined(recording, free, best, 1.0)
     matched = near(recording.q, rate * recording.t + shift, free)
     overlap = np.zeros(recording.samples, dtype=bool)
-    for first, last in runs(matched):
-        overlap[first : last + 1] = recording.t[last] - recording.t[first] >= 1.0
+    for start, stop in runs_of(matched):
+        overlap[start:stop] = recording.t[stop - 1] - recording.t[start] >= 1.0
     there = resampled(rate * recording.t[overlap] + shift, free.t, free.q)
     if not len(there):
         return None
@@ -111,7 +110,7 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     return Alignment(shift, rate, deviation, overlap)
 
 
-def near(q: Array, t: Array, free: Recording) -> Flags:
+def near(q: Array, t: Array, free: Recording) -> Mask:
     """Whether positions lie within `SAME_TRAJECTORY` of the free run at instants of its clock."""
     distance = np.max(np.abs(resampled(t, free.t, free.q) - q), axis=1)
     return np.asarray((t >= free.t[0]) & (t <= free.t[-1]) & (distance <= SAME_TRAJECTORY))
@@ -158,8 +157,7 @@ def explaining_rate(recording: Recording, free: Recording) -> float | None:
 def uniform(recording: Recording, step: float) -> Array:
     """Joint positions on a uniform clock. (N, n) [rad]"""
     t = np.arange(0.0, recording.duration + 0.5 * step, step)
-    start = recording.t[0]
-    return np.column_stack([np.interp(t + start, recording.t, q) for q in recording.q.T])
+    return resampled(t + recording.t[0], recording.t, recording.q)
 
 
 def coarse_shift(recording: Recording, free: Recording, step: float) -> float:
@@ -232,7 +230,7 @@ def gauss_newton_step(
 
 def deviation_at(
     recording: Recording, free: Recording, shift: float, rate: float = 1.0
-) -> tuple[float, Flags]:
+) -> tuple[float, Mask]:
     """Rms position difference at a shift [rad], and the samples that overlap. (T,)"""
     t = rate * recording.t + shift
     overlap = (t >= free.t[0]) & (t <= free.t[-1])

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.repetition.periodicity import Period, moving_part
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.filters import resampled
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import resampled
 
 ON_PATH = 0.1
 """A sample is on the repeated path if it is there again one period away, within this. [rad]"""
@@ -74,14 +74,14 @@ def segment(recording: Recording, period: Period) -> Cycles:
     return cycles
 
 
-def comes_back(t: Array, q: Array, shift: float) -> NDArray[np.bool_]:
+def comes_back(t: Array, q: Array, shift: float) -> Mask:
     """Whether the arm is at the same place `shift` seconds away. (T,)"""
     there = t + shift
     distance = np.abs(resampled(there, t, q) - q).max(axis=1)
     return np.asarray((there >= t[0]) & (there <= t[-1]) & (distance <= ON_PATH))
 
 
-def settled(t: Array, on_path: NDArray[np.bool_], seconds: float) -> float:
+def settled(t: Array, on_path: Mask, seconds: float) -> float:
     """The first instant from which three quarters of the next cycle are on the path. [s]"""
     count = np.concatenate([[0], np.cumsum(on_path)])
     stop = np.searchsorted(t, t + seconds)

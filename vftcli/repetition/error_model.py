@@ -7,9 +7,9 @@ import numpy as np
 
 from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.pairing import Pairing, mean_of
-from vftcli.repetition.standstill import Flags
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.filters import band_pass, low_pass, passed
+from vftcli.signals.series import median_step
 
 STUCK = 0.3
 """A stop of this length leaves the whole of the dry friction open, a shorter one its share. [s]"""
@@ -44,12 +44,12 @@ class ErrorModel(NamedTuple):
         return np.asarray(np.mean(self.rest[self.known], axis=0))
 
     @property
-    def known(self) -> Flags:
+    def known(self) -> Mask:
         """Samples with a reference. (T,)"""
         return np.asarray(np.isfinite(self.sd).all(axis=1))
 
     @property
-    def trusted_joints(self) -> Flags:
+    def trusted_joints(self) -> Mask:
         """Joints that move enough for friction to cancel; all if none does. (n,)"""
         trusted = np.asarray(self.at_rest <= 1.0 - TRUSTED_SHARE)
         return trusted if np.any(trusted) else np.ones_like(trusted)
@@ -106,7 +106,7 @@ def error_model(
     rest = resting(motion, pairings)
     momentum = motion.momentum - mean_of(pairings, [p.free.momentum for p in pairings])
     moving = rest[known] == 0.0
-    step = float(np.median(np.diff(motion.t)))
+    step = median_step(motion.t)
     said = change[known]
     signal = raw[known] + said if corrected else raw[known]
     noise = noise_of(t, signal, moving, step, cutoff)
@@ -136,7 +136,7 @@ def band(step: float, cutoff: float | None) -> tuple[float, float]:
     return low, min(2.0 * low, 0.45 / step)
 
 
-def noise_of(t: Array, x: Array, moving: Flags, step: float, cutoff: float | None) -> Array:
+def noise_of(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:
     """Noise of a difference. (n,) [N·m]
 
     Without a low-pass from second differences: for white noise of deviation σ on a smooth signal
@@ -152,20 +152,20 @@ def noise_of(t: Array, x: Array, moving: Flags, step: float, cutoff: float | Non
     return np.asarray(dense * np.sqrt(passed(step, cutoff, "lowpass")))
 
 
-def slope_noise(t: Array, momentum: Array, moving: Flags, step: float, cutoff: float) -> Array:
+def slope_noise(t: Array, momentum: Array, moving: Mask, step: float, cutoff: float) -> Array:
     """Noise that differentiated momenta put into the model's low-passed torque. (n,) [N·m]"""
     limits = band(step, cutoff)
     dense = rms(band_pass(t, momentum, *limits), moving) / np.sqrt(passed(step, limits, "bandpass"))
     return np.asarray(dense * np.sqrt(passed(step, cutoff, "lowpass", slope=1)))
 
 
-def white(x: Array, moving: Flags) -> Array:
+def white(x: Array, moving: Mask) -> Array:
     """Standard deviation of the white part of a signal, from second differences. (n,)"""
     curvature = x[:-2] - 2.0 * x[1:-1] + x[2:]
     return np.asarray(rms(curvature, moving[1:-1]) / np.sqrt(6.0))
 
 
-def rms(x: Array, where: Flags) -> Array:
+def rms(x: Array, where: Mask) -> Array:
     """Root mean square of each column over the chosen samples, over all if none is. (n,)"""
     where = np.where(np.any(where, axis=0), where, True)
     result: Array = np.sqrt(np.sum(np.where(where, x**2, 0.0), axis=0) / np.sum(where, axis=0))
@@ -196,7 +196,7 @@ def misfit(pairings: Sequence[Pairing]) -> Array:
     missed = said = np.zeros(pairings[0].free.torque.shape[1])
     for p in pairings:
         used = np.unique(np.searchsorted(p.free.t, p.times[p.known]).clip(0, len(p.free.t) - 1))
-        step = float(np.median(np.diff(p.free.t)))
+        step = median_step(p.free.t)
         gap = low_pass(p.free.t, p.free.torque - p.free.model, band(step, None)[0])[used]
         model = low_pass(p.free.t, p.free.model, band(step, None)[0])[used]
         missed = missed + np.var(gap, axis=0)

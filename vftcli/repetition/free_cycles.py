@@ -13,6 +13,7 @@ from vftcli.repetition.pairing import pair_with_cycle
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
+from vftcli.signals.series import median_step
 
 ALIKE = 1.5
 """A cycle is free too if its difference from the freest is within this many expected errors."""
@@ -61,7 +62,7 @@ def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
 
 def residuals(motion: DriveRun, cycles: Cycles) -> Array:
     """Mean over joints of each cycle's residual relative to the smallest. (cycles,)"""
-    step = float(np.median(np.diff(motion.t)))
+    step = median_step(motion.t)
     cutoff = min(5.0, band(step, None)[0])
     gap = low_pass(motion.t, motion.torque - motion.model, cutoff)
     number = cycles.number(motion.t)
@@ -76,7 +77,7 @@ def differs_by_noise(motion: DriveRun, cycles: Cycles, freest: int, other: int) 
     pairing = pair_with_cycle(motion, cycles, freest, cycles.period)
     only = cycles.number(motion.t) == other
     pairing = pairing._replace(times=np.where(only, pairing.times, np.nan))
-    step = float(np.median(np.diff(motion.t)))
+    step = median_step(motion.t)
     found = difference(motion, [pairing], "model", band(step, None)[0])
     shown = np.sqrt(np.nanmean(found.tau**2, axis=0))
     return bool(np.all(shown <= ALIKE * found.floor))

@@ -4,7 +4,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.repetition.alignment import align
 from vftcli.repetition.cycles import segment
@@ -13,10 +12,9 @@ from vftcli.repetition.pairing import Pairing, pair_with_cycle, pair_with_run
 from vftcli.repetition.periodicity import find_period
 from vftcli.repetition.two_cycle import TwoCycleOptions, partners_in_log
 from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
-
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +46,7 @@ class FreePart:
         note: What it is and how it was found.
     """
 
-    inside: Flags
+    inside: Mask
     runs: tuple[Recording, ...] = ()
     pairings: tuple[Pairing, ...] = ()
     note: str = ""

@@ -7,9 +7,9 @@ import numpy as np
 
 from vftcli.repetition.cycles import Cycles
 from vftcli.repetition.drive_run import DriveRun
-from vftcli.repetition.standstill import Flags
-from vftcli.signals.arrays import Array
-from vftcli.signals.filters import low_pass, resampled
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.filters import low_pass
+from vftcli.signals.series import median_step, resampled
 
 GAP = 5.5
 """A gap of more than this many median steps is not interpolated across."""
@@ -33,7 +33,7 @@ class Pairing(NamedTuple):
     times: Array
 
     @property
-    def known(self) -> Flags:
+    def known(self) -> Mask:
         """Whether a sample has a partner. (T,)"""
         return np.isfinite(self.times)
 
@@ -71,7 +71,7 @@ def pair_with_run(motion: DriveRun, free: DriveRun, shift: float, rate: float = 
     return Pairing(free, np.where(inside, times, np.nan))
 
 
-def in_gap(clock: Array, times: Array) -> Flags:
+def in_gap(clock: Array, times: Array) -> Mask:
     """Whether an instant lies in a gap of a clock. (T,)"""
     steps = np.diff(clock)
     at = np.clip(np.searchsorted(clock, times) - 1, 0, len(steps) - 1)
@@ -90,7 +90,7 @@ def by_phase(motion: DriveRun, pairing: Pairing) -> Pairing:
         return pairing
     times, q = pairing.times[known], motion.q[known]
     free = pairing.free
-    speed = low_pass(free.t, free.dq, min(12.0, 0.2 / float(np.median(np.diff(free.t)))))
+    speed = low_pass(free.t, free.dq, min(12.0, 0.2 / median_step(free.t)))
     shift = np.zeros(len(times))
     damping = 0.01 * float(np.mean(np.sum(speed**2, axis=1))) + 1e-6
     for _ in range(4):
@@ -99,7 +99,7 @@ def by_phase(motion: DriveRun, pairing: Pairing) -> Pairing:
         distance = resampled(at, free.t, free.q) - q
         shift -= np.sum(distance * path, axis=1) / (np.sum(path**2, axis=1) + damping)
         shift = np.clip(shift, -FARTHEST, FARTHEST)
-    step = float(np.median(np.diff(motion.t)))
+    step = median_step(motion.t)
     smooth = low_pass(motion.t[known], shift[:, None], min(PHASE_CUTOFF, 0.2 / step))[:, 0]
     moved = pairing.times.copy()
     moved[known] = np.clip(times + smooth, times.min(), times.max())

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from vftcli.repetition.standstill import at_rest, stops
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.filters import resampled
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import resampled
 
 LEAST_REPEATED = 0.15
 """Share of the moving part of the log that must be there twice."""

@@ -1,12 +1,9 @@
 """Where a joint stands still: there it keeps whatever stiction it came to rest with."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.signals.arrays import Array
-
-Flags = NDArray[np.bool_]
-"""True or false, sample by sample or joint by joint."""
+from vftcli.signals.series import median_step, runs_of
 
 STILL = 0.01
 """Speed below which a joint counts as standing. [rad/s]"""
@@ -26,10 +23,10 @@ def stops(t: Array, dq: Array) -> Array:
         dq: Joint velocities. (T, n) [rad/s]
     """
     length = np.zeros(dq.shape)
-    step = float(np.median(np.diff(t)))
+    step = median_step(t)
     for j, speed in enumerate(np.abs(dq).T):
-        for first, last in runs(speed < STILL):
-            length[first : last + 1, j] = t[last] - t[first] + step
+        for start, stop in runs_of(speed < STILL):
+            length[start:stop, j] = t[stop - 1] - t[start] + step
     return length
 
 
@@ -44,13 +41,7 @@ def at_rest(t: Array, stop: Array) -> Array:
     """
     rest = np.zeros(stop.shape)
     for j, long in enumerate((stop >= LEAST).T):
-        for first, last in runs(long):
-            around = (t >= t[first] - BREAKAWAY) & (t <= t[last] + BREAKAWAY)
+        for start, end in runs_of(long):
+            around = (t >= t[start] - BREAKAWAY) & (t <= t[end - 1] + BREAKAWAY)
             rest[around, j] = 1.0
     return rest
-
-
-def runs(flags: Flags) -> NDArray[np.int64]:
-    """First and last index of every unbroken run of true flags. (R, 2)"""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int64), [0]])))
-    return np.asarray(edges.reshape(-1, 2) - np.array([0, 1]))

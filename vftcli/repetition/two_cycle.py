@@ -15,9 +15,8 @@ from vftcli.repetition.friction_change import friction_change
 from vftcli.repetition.ladder import LOW_PASS, RUNGS, Difference, best, climb
 from vftcli.repetition.pairing import Pairing, pair_with_cycle, pair_with_run
 from vftcli.repetition.periodicity import find_period
-from vftcli.repetition.standstill import Flags
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
@@ -53,7 +52,7 @@ class Partners(NamedTuple):
 
     clocks: Mapping[str, Sequence[Pairing]]
     notes: tuple[str, ...]
-    free: Flags
+    free: Mask
 
 
 def two_cycle_difference(
@@ -230,7 +229,7 @@ def pair_runs(first: Pairing, second: Pairing) -> Pairing:
     return pair_with_run(first.free, second.free, float(shift), float(rate))
 
 
-def ratio(found: Difference, where: Flags) -> Array:
+def ratio(found: Difference, where: Mask) -> Array:
     """Root mean square of a difference that should be zero, over its expected error. (n,)"""
     moving = found.error.rest[where] == 0.0
     expected = rms(found.error.sd[where], moving)

@@ -10,6 +10,9 @@ from vftcli.signals.errors import ClockError, ShapeError
 Array = NDArray[np.float64]
 """A float64 array; shapes and units stand in the docstrings, as ``(T, n) [N·m]``."""
 
+Mask = NDArray[np.bool_]
+"""True or false, sample by sample or joint by joint, named for what is true."""
+
 
 def frozen(value: ArrayLike) -> Array:
     """Return a read-only float64 array that nobody else can write to.

@@ -4,6 +4,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, is_uniform
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.series import median_step, resampled
 
 ORDER = 2
 """Order of the Butterworth filter; run forwards and backwards it attenuates twice as much."""
@@ -35,7 +36,7 @@ def filtered(t: Array, x: Array, cutoff: float | tuple[float, float], kind: str)
     """Forward and backward Butterworth filter along time. (T, n)"""
     from scipy.signal import sosfiltfilt
 
-    step = float(np.median(np.diff(t)))
+    step = median_step(t)
     sos = design(step, cutoff, kind)
     if len(t) <= 3 * (2 * len(sos) + 1):
         return x.copy()
@@ -61,11 +62,6 @@ def design(step: float, cutoff: float | tuple[float, float], kind: str) -> Array
         )
     sos: Array = butter(ORDER, cutoff, kind, fs=1.0 / step, output="sos")
     return sos
-
-
-def resampled(at: Array, t: Array, x: Array) -> Array:
-    """Columns of `x`, known at `t`, interpolated linearly to the times `at`. (len(at), n)"""
-    return np.column_stack([np.interp(at, t, column) for column in x.T])
 
 
 def passed(step: float, cutoff: float | tuple[float, float], kind: str, slope: int = 0) -> float:

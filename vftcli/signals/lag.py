@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 
 LONGEST = 1.0
 """Longest delay looked for. [s]"""
@@ -44,7 +44,7 @@ def sliding(later: Array, earlier: Array, size: int, at: NDArray[np.int64]) -> A
     return np.asarray(np.fft.irfft(spectra, size, axis=0)[at])
 
 
-def centred(signal: Array, known: NDArray[np.bool_]) -> Array:
+def centred(signal: Array, known: Mask) -> Array:
     """A signal without its mean over the known samples, zero elsewhere. (T, n)"""
     count = np.maximum(np.sum(known, axis=0), 1)
     filled = np.where(known, signal, 0.0)

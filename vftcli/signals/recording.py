@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_clock, check_shape, frozen, median
+from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
+from vftcli.signals.series import median_step
 
 JOINT_SIGNALS = (
     "q",
@@ -170,7 +171,7 @@ class Recording:
         """Median time between samples, the nominal sample time. [s]"""
         if self.samples < 2:
             raise ClockError(f"{self.name}: one sample has no sample time")
-        return median(np.diff(self.t))
+        return median_step(self.t)
 
     @property
     def name(self) -> str:

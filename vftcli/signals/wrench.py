@@ -3,16 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
+from vftcli.signals.arrays import Array, Mask, check_clock, check_shape, frozen
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.remarks import Note
 
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 """Names of the six components, force first, as in column names and tables."""
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)

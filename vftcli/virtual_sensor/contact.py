@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, frozen
+from vftcli.signals.arrays import Array, Mask, frozen
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.wrench import Mask
+from vftcli.signals.series import runs_of
 
 LEAVE = 0.6
 """A contact ends where the score falls below this share of the threshold: hysteresis."""
@@ -110,12 +110,10 @@ def hysteresis(score: Array, enter: float) -> list[tuple[int, int]]:
 
     A run begins where `enter` is first exceeded.
     """
-    inside = np.concatenate([[False], score > LEAVE * enter, [False]])
-    edges = np.flatnonzero(np.diff(inside.astype(np.int8))).reshape(-1, 2)
     above = score > enter
     return [
-        (int(start + np.argmax(above[start:stop])), int(stop - 1))
-        for start, stop in edges
+        (start + int(np.argmax(above[start:stop])), stop - 1)
+        for start, stop in runs_of(score > LEAVE * enter)
         if above[start:stop].any()
     ]
 

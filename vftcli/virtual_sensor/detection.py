@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.wrench import Mask
 from vftcli.virtual_sensor.contact import (
     TRUE_FORCE,
     TRUE_MOMENT,

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array
-from vftcli.signals.wrench import Mask, Wrench
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.wrench import Wrench
 
 MARGIN = 1.25
 """The threshold stands so far above the largest value of the free part."""

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.robots.conventions import Pose
-from vftcli.signals.arrays import Array, frozen, is_uniform, median
+from vftcli.signals.arrays import Array, frozen, is_uniform
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.wrench import Mask
+from vftcli.signals.series import bridged, median_step, resampled
 from vftcli.virtual_sensor.frames import angles_of, skew
 from vftcli.virtual_sensor.solvers import SCALE
 
@@ -179,9 +179,9 @@ def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offs
         early: Another. (T, k)
         limit: Largest lag considered, either way. [s]
     """
-    step = median(np.diff(t))
+    step = median_step(t)
     even = t if is_uniform(t) else np.arange(t[0], t[-1], step)
-    x, y = (comparable(resampled(t, series, even)) for series in (late, early))
+    x, y = (comparable(resampled(even, t, bridged(t, series))) for series in (late, early))
     count = len(even)
     reach = min(int(limit / step), count - 2)
     size = 1 << int(np.ceil(np.log2(2 * count)))
@@ -208,17 +208,6 @@ def overlap_energy(series: Array, lags: NDArray[np.intp]) -> Array:
     energy = total[np.minimum(count, count + lags)] - total[np.maximum(0, lags)]
     positive: Array = np.maximum(energy, np.finfo(np.float64).tiny)
     return positive
-
-
-def resampled(t: Array, series: Array, even: Array) -> Array:
-    """A series on another clock, unknown samples bridged. (N, k)"""
-    columns = []
-    for column in series.T:
-        good: Mask = np.isfinite(column)
-        columns.append(
-            np.interp(even, t[good], column[good]) if good.any() else np.zeros(len(even))
-        )
-    return np.column_stack(columns)
 
 
 def comparable(series: Array) -> Array:

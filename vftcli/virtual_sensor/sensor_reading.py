@@ -7,11 +7,12 @@ import numpy as np
 
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, handed_over
+from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.wrench import Mask, Wrench
+from vftcli.signals.series import resampled
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.frames import Mounting
 from vftcli.virtual_sensor.null_space import Elsewhere, contact_elsewhere
@@ -258,8 +259,7 @@ def unloaded_from(
     if shift is not None:
         words = f"its torque at the same place of the trajectory is removed (shift {shift:+.4f} s)"
         for e in estimates:
-            columns = [np.interp(t + shift, e.t, x, np.nan, np.nan) for x in e.tau.T]
-            there[e.name] = np.column_stack(columns)
+            there[e.name] = resampled(t + shift, e.t, e.tau, outside=np.nan)
     return FreeRunTorque(
         torque=there,
         mean={name: tau.mean(axis=0) for name, tau in settled.items()},

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.wrench import Mask
+from vftcli.signals.series import median_step, runs_of
 from vftcli.virtual_sensor.solvers import TORQUE_SD
 
 OWN = "own"
@@ -65,7 +65,7 @@ class Disturbance:
         Args:
             free: FreeRunTorque samples of the log, used where there is no free run. (T,)
         """
-        step = float(np.median(np.diff(self.terms.t)))
+        step = median_step(self.terms.t)
         whole = raw_disturbance(self.terms)
         loaded, quiet = runs(whole, ~free[1:]), runs(whole, free[1:])
         if self.free is not None:
@@ -94,8 +94,7 @@ def raw_disturbance(terms: DynamicsTerms) -> Array:
 
 def runs(series: Array, chosen: Mask) -> list[Array]:
     """The unbroken stretches of the chosen samples."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
-    return [series[start:stop] for start, stop in edges.reshape(-1, 2)]
+    return [series[start:stop] for start, stop in runs_of(chosen)]
 
 
 def spectrum(series: Iterable[Array], size: int, step: float) -> Array:

@@ -8,8 +8,9 @@ from vftcli.robots.chain import Chain
 from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array, frozen
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import bridged, resampled
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.sensor import Offset, resampled, time_offset
+from vftcli.virtual_sensor.sensor import Offset, time_offset
 
 DERIVED = 0.9995
 """A correlation that no independent measurement reaches: the field is made from the torques."""
@@ -179,6 +180,6 @@ def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorChec
     frame = max(fits, key=lambda name: fits[name].correlation)
     turned = forces[frame] @ fits[frame].matrix.T
     offset = time_offset(recording.t, given, turned)
-    moved = resampled(recording.t, turned, recording.t - offset.lag)
+    moved = resampled(recording.t - offset.lag, recording.t, bridged(recording.t, turned))
     axes = fit_axes(np.where(usable[:, None], moved, np.nan) @ fits[frame].matrix, given)
     return VendorCheck(said=said, frame=frame, axes=axes, offset=offset, **shares)

@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, frozen
+from vftcli.signals.arrays import Array, Mask, frozen
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.wrench import AXES, Mask, Wrench
+from vftcli.signals.series import runs_of
+from vftcli.signals.wrench import AXES, Wrench
 
 SETTLING = 1.0
 """Start of a log that is left out of an unloaded start: observers rise from zero. [s]"""
@@ -135,9 +136,8 @@ def unloaded_start(wrench: Wrench) -> tuple[float, float] | None:
 
 def lasting(flags: Mask, t: Array, least: float) -> Mask:
     """Flags of runs that last at least `least` [s]. (T,)"""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     kept = np.zeros(len(flags), dtype=bool)
-    for start, stop in edges.reshape(-1, 2):
+    for start, stop in runs_of(flags):
         if t[min(stop, len(t) - 1)] - t[start] >= least:
             kept[start:stop] = True
     return kept

@@ -9,8 +9,8 @@ from vftcli.analysis import Analysis
 from vftcli.outputs.log.tables import significant
 from vftcli.outputs.page.payload import Chart, ChartLine
 from vftcli.outputs.palette import DASHED, colours_of
-from vftcli.signals.arrays import Array
-from vftcli.signals.wrench import AXES, Mask
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.detection import ContactScore
 from vftcli.virtual_sensor.frames import FRAMES
 from vftcli.virtual_sensor.sensor_reading import SensorReading

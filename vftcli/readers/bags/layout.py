@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.readers.bags.container import Bytes, Integers, strided
+from vftcli.signals.arrays import Mask
 
 MAX_DEPTH = 24
 MAX_LEAVES = 20_000
@@ -86,7 +87,7 @@ class MessageLayout:
         self.expected = [message[a:b].copy() for a, b in merged]
         self.length = len(message)
 
-    def fits(self, buffer: Bytes, offsets: Integers) -> NDArray[np.bool_]:
+    def fits(self, buffer: Bytes, offsets: Integers) -> Mask:
         """Which messages, all of this layout's length, have this layout. (k,)"""
         same = np.ones(len(offsets), dtype=bool)
         for (a, b), expected in zip(self.fixed, self.expected, strict=True):

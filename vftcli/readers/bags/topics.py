@@ -16,6 +16,7 @@ from vftcli.readers.joints import UR_NAMES, robot_of
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
+from vftcli.signals.series import median_step, resampled
 
 TARGETS = re.compile(r"desired|command|target|goal|reference", re.IGNORECASE)
 VENDOR_WRENCH = re.compile(r"franka|F_ext$|external_wrench", re.IGNORECASE)
@@ -329,14 +330,14 @@ def interpolated(
     fresh = np.concatenate([[True], np.diff(own) > 0])
     own, values = own[fresh], stream.signals[signal][fresh]
     topic = stream.channel.topic
-    usual = float(np.median(np.diff(own))) if len(own) > 1 else 0.0
+    usual = median_step(own.astype(np.float64)) if len(own) > 1 else 0.0
     outside = (times < own[0] - NEAR * usual) | (times > own[-1] + NEAR * usual)
     if len(own) < 2 or np.mean(outside) > 0.05 or np.any(np.diff(own) < 0):
         notes.warnings.append(f"left out {signal} of {topic}: it does not cover the joints' time")
         return None
     start = int(own[0])
-    x, xp = (times - start) * 1e-9, (own - start) * 1e-9
-    result: Array = np.column_stack([np.interp(x, xp, column) for column in values.T])
+    x, xp = np.asarray((times - start) * 1e-9, float), np.asarray((own - start) * 1e-9, float)
+    result = resampled(x, xp, values)
     notes.repairs.append(
         f"interpolated {signal} of {topic} ({1e9 / usual:.4g} Hz) at the times of "
         f"{lead.channel.topic}"

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 
 CUT = 0.05
 """Singular values of J (lengths in units of 0.3 m) below which a direction is left out."""
@@ -53,7 +52,7 @@ def rotation_vectors(rotation: Array) -> Array:
     return np.array([pin.log3(R) for R in rotation])
 
 
-def force_estimate(jacobian: Array, tau_ext: Array) -> tuple[Array, NDArray[np.bool_]]:
+def force_estimate(jacobian: Array, tau_ext: Array) -> tuple[Array, Mask]:
     """The wrench (M, 6) that explains joint torques (M, n), and where J is regular. (M,)
 
     Least squares through Jᵀ with lengths scaled by 0.3 m.

@@ -1,0 +1,83 @@
+"""Time series: runs, gaps, steps and other clocks, each against the plainest way to say it."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vftcli.signals.errors import ClockError
+from vftcli.signals.series import bridged, gaps_of, median_step, resampled, runs_of
+
+
+@given(st.lists(st.booleans(), max_size=60))
+def test_runs_are_the_true_samples_and_nothing_else(flags: list[bool]) -> None:
+    mask = np.array(flags, dtype=bool)
+    runs = runs_of(mask)
+    again = np.zeros(len(mask), dtype=bool)
+    for start, stop in runs:
+        assert start < stop
+        again[start:stop] = True
+    assert np.array_equal(again, mask)
+    # Unbroken: between two runs lies at least one false sample.
+    assert all(second[0] > first[1] for first, second in pairwise(runs))
+
+
+def test_runs_reach_the_first_and_the_last_sample() -> None:
+    assert runs_of(np.array([True, True, False, True])) == [(0, 2), (3, 4)]
+    assert runs_of(np.zeros(0, dtype=bool)) == []
+
+
+@given(st.lists(st.floats(1e-3, 1.0), min_size=1, max_size=40))
+def test_the_step_is_the_median_one(steps: list[float]) -> None:
+    t = np.concatenate([[0.0], np.cumsum(steps)])
+    assert median_step(t) == np.median(np.diff(t))
+
+
+def test_one_sample_has_no_step() -> None:
+    with pytest.raises(ClockError, match="no sample time"):
+        median_step(np.zeros(1))
+
+
+def test_a_gap_is_longer_than_so_many_steps() -> None:
+    t = np.array([0.0, 1.0, 2.0, 6.0, 7.0, 12.0, 13.0])
+    assert gaps_of(t, 3.0).tolist() == [2, 4]
+    assert gaps_of(t, 4.0).tolist() == [4]  # a step of just so many is none
+    assert gaps_of(t[:1], 4.0).size == 0
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_columns_on_another_clock_are_interpolated_one_by_one(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(rng.uniform(0.1, 1.0, 20))
+    x = rng.standard_normal((20, 3))
+    at = rng.uniform(t[0] - 1.0, t[-1] + 1.0, 15)
+    expected = np.array([[np.interp(time, t, x[:, k]) for k in range(3)] for time in at])
+    assert np.array_equal(resampled(at, t, x), expected)
+    away = (at < t[0]) | (at > t[-1])
+    open_ended = resampled(at, t, x, outside=np.nan)
+    assert np.array_equal(np.isnan(open_ended[:, 0]), away)
+    assert np.array_equal(open_ended[~away], expected[~away])
+
+
+def test_unknown_samples_are_bridged_by_a_straight_line() -> None:
+    t = np.array([0.0, 1.0, 3.0, 4.0, 5.0])
+    nan = np.nan
+    x = np.array([[0.0, nan, 6.0, 8.0, nan], [nan] * 5]).T
+    assert bridged(t, x)[:, 0].tolist() == [0.0, 2.0, 6.0, 8.0, 8.0]
+    assert not bridged(t, x)[:, 1].any()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_bridging_then_resampling_reads_the_line_between_known_samples(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(rng.uniform(0.1, 1.0, 30))
+    x = np.where(rng.random((30, 2)) < 0.4, np.nan, rng.standard_normal((30, 2)))
+    x[0] = 0.0  # each column knows a sample
+    at = rng.uniform(t[0], t[-1], 25)
+    for k in range(2):
+        known = np.isfinite(x[:, k])
+        direct = np.interp(at, t[known], x[known, k])
+        # Both are the same line; their arithmetic differs by rounding.
+        np.testing.assert_allclose(resampled(at, t, bridged(t, x))[:, k], direct, atol=1e-12)

@@ -1,0 +1,69 @@
+"""What is done to a time series whatever it holds: its step, its gaps, its runs, another clock."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.signals.arrays import Array, Mask, median
+from vftcli.signals.errors import ClockError
+
+
+def median_step(t: Array) -> float:
+    """Median time between samples, the nominal sample time of a clock (T,). [s]
+
+    The median rather than the mean, because a gap belongs to no sample time.
+
+    Raises:
+        ClockError: If there are fewer than two samples.
+    """
+    if len(t) < 2:
+        raise ClockError("one sample has no sample time")
+    return median(np.diff(t))
+
+
+def gaps_of(t: Array, steps: float) -> NDArray[np.intp]:
+    """Numbers of the samples after which a clock waits longer than `steps` median steps. (G,)"""
+    if len(t) < 2:
+        return np.zeros(0, dtype=np.intp)
+    taken = np.diff(t)
+    return np.flatnonzero(taken > steps * median(taken))
+
+
+def runs_of(mask: Mask) -> list[tuple[int, int]]:
+    """Where the unbroken runs of true samples begin and end, as ``slice`` takes them.
+
+    Args:
+        mask: True or false, sample by sample. (T,)
+
+    Returns:
+        Of each run the index of its first sample and of the one behind its last.
+    """
+    # With a false sample at either end every run has both its edges.
+    walled = np.concatenate([[False], mask, [False]])
+    edges = np.flatnonzero(walled[1:] != walled[:-1]).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def resampled(at: Array, t: Array, x: Array, outside: float | None = None) -> Array:
+    """Columns of `x`, known at `t`, interpolated linearly to the times `at`. (S, n)
+
+    Args:
+        at: Times to have the columns at. (S,) [s]
+        t: Times at which they are known, increasing. (T,) [s]
+        x: Columns. (T, n)
+        outside: Value before the first and after the last known time; None holds the end values.
+    """
+    columns = [np.interp(at, t, column, left=outside, right=outside) for column in x.T]
+    return np.column_stack(columns) if columns else np.zeros((len(at), 0))
+
+
+def bridged(t: Array, x: Array) -> Array:
+    """Columns with their unknown (non-finite) samples replaced by a straight line across. (T, n)
+
+    Before the first known sample and after the last the column keeps that sample's value; one
+    without any becomes zero.
+    """
+    columns = []
+    for column in x.T:
+        known = np.isfinite(column)
+        columns.append(np.interp(t, t[known], column[known]) if known.any() else np.zeros(len(t)))
+    return np.column_stack(columns)
