@@ -15,6 +15,7 @@ import pytest
 
 import vftcli as vft
 from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.signals.errors import RobotError
 
@@ -129,7 +130,7 @@ def test_ur10e_payload_shows_in_the_two_cycle_difference(logs: Path) -> None:
         robot="ur10e",
         columns=UR10E,
         reference="two-cycle",
-        free=(folder / "free_14harm.csv",),
+        free=FreeChoice(logs=(folder / "free_14harm.csv",)),
         observers=("gmo",),
     )
     analysis = analyse_log(folder / "load_14harm.csv", request)

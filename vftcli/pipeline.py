@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from vftcli.observers import (
     build_observers,
     observer_settings,
 )
+from vftcli.repetition.choice import FreeChoice
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.errors import ParameterError, RobotError
@@ -48,16 +49,11 @@ class AnalysisChoice:
         payload: Name of a payload in the robot file, or None.
         as_printed: Use the paper's printed formulas, and its numeric dynamics.
         reference: Name of the reference, or None.
-        free: Logs of free runs for the two-cycle difference.
+        free: What motion nobody touched, and how the two-cycle difference lays it under the log.
         reference_columns: Column description of a reference file.
-        period: The commanded period of a repeated motion, None to find it. [s]
-        free_cycles: Its free cycles, as ``1`` or ``1,2``, None to find them.
-        alignment: Rung of the alignment ladder of the two-cycle difference, or "auto".
-        low_pass: Its zero-phase cutoff in Hz, "none", or "auto".
         match: ``delay=S`` or ``bandwidth=HZ`` for all observers alike, or None.
         contacts: Whether to judge each observer's contacts by the reference's.
         wrench: What is asked of the virtual force/torque sensor, None for joint torques alone.
-        free_part: Span of the log that is free of contact, ``A:B`` in seconds, or None to find it.
         bands: Whether to measure on the free part how far the estimates may be off.
         remove_bias: "none", "free-cycle" or "model".
         gains_file: A file of gains that go before the robot's own, or None.
@@ -73,16 +69,11 @@ class AnalysisChoice:
     payload: str | None = None
     as_printed: bool = False
     reference: str | None = None
-    free: tuple[Path, ...] = ()
+    free: FreeChoice = field(default_factory=FreeChoice)
     reference_columns: str | None = None
-    period: float | None = None
-    free_cycles: str | None = None
-    alignment: str = "auto"
-    low_pass: str = "auto"
     match: str | None = None
     contacts: bool = False
     wrench: "WrenchChoice | None" = None
-    free_part: str | None = None
     bands: bool = False
     remove_bias: str = "none"
     gains_file: Path | None = None
@@ -91,7 +82,7 @@ class AnalysisChoice:
     def looks_back(self) -> bool:
         """Whether anything is asked that needs the complete log and its free part."""
         tuned = any(name in OBSERVERS and OBSERVERS[name].from_spectra for name in self.observers)
-        return tuned or self.bands or self.remove_bias != "none" or self.free_part is not None
+        return tuned or self.bands or self.remove_bias != "none" or self.free.is_asked
 
 
 def open_log(path: Path, request: AnalysisChoice) -> Recording:
@@ -170,16 +161,10 @@ def look_over(
         return None
     from vftcli.refinement.baseline import survey, without_free_motion
     from vftcli.refinement.bias import check_removal
-    from vftcli.repetition.free_part import FreeChoice
 
     check_removal(request.remove_bias)
-    asked = FreeChoice(
-        span=interval(request.free_part) if request.free_part is not None else None,
-        runs=tuple(open_log(path, without_interval(request)) for path in request.free),
-        period=request.period if not request.free else None,
-        free_cycles=request.free_cycles,
-    )
-    found = survey(recording, robot, terms, asked)
+    runs = tuple(open_log(path, without_interval(request)) for path in request.free.logs)
+    found = survey(recording, robot, terms, request.free, runs)
     if request.remove_bias == "free-cycle":
         return replace(found, spectra=without_free_motion(found))
     return found
@@ -211,23 +196,20 @@ def analyse(recording: Recording, robot: Robot, request: AnalysisChoice) -> "Ana
             ReferenceSource,
             make_reference,
         )
-        from vftcli.repetition.two_cycle import TwoCycleOptions
         from vftcli.virtual_sensor.frames import NOTHING
 
-        wanted = request.free if request.reference == "two-cycle" or survey is None else ()
+        wanted = request.free.logs if request.reference == "two-cycle" else ()
         free = tuple(open_log(path, without_interval(request)) for path in wanted)
         asked = ReferenceChoice(
             name=request.reference,
             columns=request.reference_columns,
-            two_cycle=TwoCycleOptions(
-                period=request.period,
-                free_cycles=request.free_cycles,
-                alignment=request.alignment,
-                low_pass=request.low_pass,
-            ),
         )
         source = ReferenceSource(
-            recording=sensed, robot=robot, free=free, mounting=mounting or NOTHING
+            recording=sensed,
+            robot=robot,
+            free=free,
+            free_choice=request.free,
+            mounting=mounting or NOTHING,
         )
         judge = make_reference(source, asked)
         reference = judge.torque

@@ -204,7 +204,6 @@ def test_wrong_usage_exits_two(run: Run, words: tuple[str, ...]) -> None:
         ("vendor", (), "no vendor estimates"),
         ("magic", (), "no reference 'magic'; there is zero"),
         ("file:nowhere.csv", (), "nowhere.csv"),
-        ("zero", ("--free", FIXTURE), "--free goes with"),
     ],
 )
 def test_a_reference_that_cannot_be_made_is_one_line(

@@ -67,10 +67,10 @@ def test_zero_is_zero_with_no_floor_and_vendor_is_the_log_s_own() -> None:
     assert vendor.floor is None  # its error is not known
 
 
-def test_free_runs_go_with_the_two_cycle_difference_only() -> None:
+def test_free_runs_may_stand_beside_any_reference() -> None:
+    """Once `compare --reference zero --free F` was an error without --bands, accepted with it."""
     source = ReferenceSource(recording=RECORDING, robot=ROBOT, free=(RECORDING,))
-    with pytest.raises(ReferenceTorqueError, match="--free goes with --reference two-cycle"):
-        make_reference(source, ReferenceChoice(name="zero"))
+    assert not make_reference(source, ReferenceChoice(name="zero")).torque.tau.any()
 
 
 def test_a_file_is_read_once_for_torque_and_wrench(tmp_path, monkeypatch) -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -9,6 +10,7 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, choose_robot, open_log
+from vftcli.repetition.choice import FreeChoice
 from vftcli.signals.errors import ParameterError, VftError
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
@@ -104,7 +106,11 @@ def test_what_is_left_without_the_bias_is_tuned_on(
 
 def test_a_bias_model_helps_where_nothing_repeats(request_: AnalysisChoice) -> None:
     asked = replace(
-        request_, remove_bias="model", free_part="0:4", interval="0:7", observers=("rts-auto",)
+        request_,
+        remove_bias="model",
+        free=FreeChoice(spans=((0.0, 4.0),)),
+        interval="0:7",
+        observers=("rts-auto",),
     )
     modelled = analyse_log(FIXTURE, asked)
     plain = analyse_log(FIXTURE, replace(asked, remove_bias="none"))
@@ -147,7 +153,9 @@ def test_a_log_that_repeats_nothing_falls_back_and_says_so() -> None:
 
 
 def test_a_free_part_that_is_too_short_falls_back_and_says_so() -> None:
-    request = AnalysisChoice(robot="ur5", free_part="0:0.1", observers=("rts-auto",))
+    request = AnalysisChoice(
+        robot="ur5", free=FreeChoice(spans=((0.0, 0.1),)), observers=("rts-auto",)
+    )
     analysis = analyse_log(FIXTURE, request)
     assert any("no spectra: a spectrum needs 32 samples" in note for note in analysis.notes)
     assert analysis.estimates[0].band is None
@@ -184,7 +192,7 @@ def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: Analys
     with pytest.raises(ParameterError, match="something touches the arm in all of them"):
         analyse_log(FIXTURE, replace(always, remove_bias="free-cycle"))
     # what the user states is not doubted
-    stated = analyse_log(FIXTURE, replace(always, free_cycles="1"))
+    stated = analyse_log(FIXTURE, replace(always, free=FreeChoice(cycles=(1,))))
     assert stated.estimates[0].band is not None
 
 
@@ -214,13 +222,12 @@ def test_a_gap_in_the_log_is_survived() -> None:
     ("changes", "message"),
     [
         ({"remove_bias": "all"}, "there is none, free-cycle, model"),
-        ({"free_part": "40:50"}, "it must be a part of the log"),
-        ({"free_part": "4"}, "is not A:B"),
+        ({"free": FreeChoice(spans=((40.0, 50.0),))}, "it must be a part of the log"),
         ({"remove_bias": "free-cycle", "interval": "4.5:6"}, "needs a motion that repeats"),
         ({"remove_bias": "model", "interval": "4.5:6"}, "needs a free part"),
     ],
 )
-def test_what_cannot_be_done_is_one_line(changes: dict[str, str], message: str) -> None:
+def test_what_cannot_be_done_is_one_line(changes: dict[str, Any], message: str) -> None:
     request = replace(AnalysisChoice(robot="ur5", observers=("kfo-zoh",)), **changes)
     with pytest.raises(VftError, match=message) as caught:
         analyse_log(FIXTURE, request)

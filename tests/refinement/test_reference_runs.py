@@ -12,6 +12,7 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.pipeline import AnalysisChoice, analyse_log, choose_observers, look_over
 from vftcli.refinement.refine import work_up
+from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.terms import dynamics_terms
 from vftcli.simulation import load_scenario, simulate
 
@@ -100,7 +101,7 @@ def test_libfranka_simulation(logs: Path, tmp_path: Path) -> None:
         settings=("gmo.gain=30",),
         reference=f"file:{tmp_path / 'pushes_truth.csv'}",
         interval="1.5:27.5",
-        free_part="1.5:6",
+        free=FreeChoice(spans=((1.5, 6.0),)),
         observers=("gmo", "rts-auto"),
     )
     analysis = analyse_log(tmp_path / "pushes.csv", request)
@@ -117,7 +118,7 @@ def test_ur10e_payload_by_the_free_run(logs: Path) -> None:
         robot="ur10e",
         columns=UR10E,
         reference="two-cycle",
-        free=(folder / "free_14harm.csv",),
+        free=FreeChoice(logs=(folder / "free_14harm.csv",)),
         observers=("fdo", "gmo", "kfo-fe", "kfo-zoh", "rts-auto"),
         bands=True,
     )
@@ -131,7 +132,9 @@ def test_ur10e_payload_by_the_free_run(logs: Path) -> None:
 
 def test_ur10e_pushes_between_which_stiction_is_named(logs: Path) -> None:
     """Real: a held pose; what is left between pushes is stiction, and is said to be."""
-    request = AnalysisChoice(robot="ur10e", columns=UR10E, free_part="0:2", observers=("rts-auto",))
+    request = AnalysisChoice(
+        robot="ur10e", columns=UR10E, free=FreeChoice(spans=((0.0, 2.0),)), observers=("rts-auto",)
+    )
     analysis = analyse_log(logs / "ur10e" / "push_pose.csv", request)
     assert any(
         "J1, J2, J3, J4, J5, J6 rest in most of the log: stiction" in note

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.ladder import RUNGS
 from vftcli.repetition.periodicity import find_period
-from vftcli.repetition.two_cycle import TwoCycleOptions, two_cycle_difference
+from vftcli.repetition.two_cycle import two_cycle_difference
 from vftcli.robots import load_robot
 from vftcli.signals.arrays import Array
 from vftcli.simulation import Simulation, load_scenario, simulate
@@ -21,11 +22,11 @@ SETTINGS = {
 }
 
 
-def error_of(run: Simulation, options: TwoCycleOptions) -> tuple[Array, Array]:
+def error_of(run: Simulation, choice: FreeChoice) -> tuple[Array, Array]:
     """True and reported error of the moving joints. (5,), (5,) [N·m]"""
     log = run.recording
     truth = np.column_stack([np.interp(log.t, run.truth.t, x) for x in run.truth.tau_ext.T])
-    reference = two_cycle_difference(log, (), load_robot("ur5"), options)
+    reference = two_cycle_difference(log, (), load_robot("ur5"), choice)
     assert reference.floor is not None
     shown = np.sqrt(np.nanmean((reference.tau - truth) ** 2, axis=0))
     return shown[MOVING], reference.floor[MOVING]
@@ -39,13 +40,13 @@ def test_required_figures(name: str, seed: int) -> None:
     wanted = 4.0 * (1.003 if name == "drift" else 1.0)
     assert find_period(run.recording).seconds == pytest.approx(wanted, rel=2e-4)
 
-    best, floor = error_of(run, TwoCycleOptions())
-    plain = TwoCycleOptions(period=4.0, alignment="commanded", low_pass="none")
+    best, floor = error_of(run, FreeChoice())
+    plain = FreeChoice(period=4.0, alignment="commanded", low_pass=None)
     commanded, _ = error_of(run, plain)
     assert best.mean() <= 0.6 * commanded.mean()
     assert np.all((best / floor >= 0.7) & (best / floor <= 1.4)), best / floor
 
-    for low_pass in ("none", "12"):
-        chosen, _ = error_of(run, TwoCycleOptions(period=4.0, low_pass=low_pass))
+    for low_pass in (None, 12.0):
+        chosen, _ = error_of(run, FreeChoice(period=4.0, low_pass=low_pass))
         lowest, _ = error_of(run, replace(plain, low_pass=low_pass))
         assert chosen.mean() <= 1.05 * lowest.mean(), RUNGS

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vftcli.readers import read
-from vftcli.repetition.cycles import parse_cycles, segment
+from vftcli.repetition.cycles import segment
 from vftcli.repetition.periodicity import find_period
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
@@ -100,10 +100,3 @@ def test_sweeps_of_a_real_arm_are_no_repetition(logs: Path) -> None:
     log = read(logs / "ur10e" / "jointwise_2.csv", columns=columns)
     with pytest.raises(ReferenceTorqueError, match="no repetition"):
         find_period(log)
-
-
-def test_lists_of_cycles() -> None:
-    assert parse_cycles("1") == (1,)
-    assert parse_cycles("1, 3-5,3") == (1, 3, 4, 5)
-    with pytest.raises(ReferenceTorqueError, match="1 or 1,2 or 1-3"):
-        parse_cycles("first")

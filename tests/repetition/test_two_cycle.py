@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from vftcli.readers import read
+from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.ladder import RUNGS
-from vftcli.repetition.two_cycle import TwoCycleOptions, two_cycle_difference
+from vftcli.repetition.two_cycle import two_cycle_difference
 from vftcli.robots import Robot, load_robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
@@ -52,21 +53,23 @@ def error_of(reference: ExternalTorque, truth: Array) -> Array:
 def test_default_beats_the_commanded_period(circle: Circle, ur5: Robot) -> None:
     """Required: at most 0.6 times its error, mean over J1–J4 and J6."""
     best = two_cycle_difference(circle.recording, (), ur5)
-    plain = TwoCycleOptions(period=4.0, alignment="commanded", low_pass="none")
+    plain = FreeChoice(period=4.0, alignment="commanded", low_pass=None)
     commanded = two_cycle_difference(circle.recording, (), ur5, plain)
     errors = [error_of(r, circle.truth)[MOVING].mean() for r in (best, commanded)]
     assert errors[0] <= 0.6 * errors[1]
 
 
-@pytest.mark.parametrize("low_pass", ["none", "12", "6"])
+@pytest.mark.parametrize("low_pass", [None, 12.0, 6.0])
 @pytest.mark.parametrize("rung", RUNGS)
-def test_every_rung_knows_its_error(circle: Circle, ur5: Robot, rung: str, low_pass: str) -> None:
-    options = TwoCycleOptions(period=4.0, alignment=rung, low_pass=low_pass)
-    reference = two_cycle_difference(circle.recording, (), ur5, options)
+def test_every_rung_knows_its_error(
+    circle: Circle, ur5: Robot, rung: str, low_pass: float | None
+) -> None:
+    choice = FreeChoice(period=4.0, alignment=rung, low_pass=low_pass)
+    reference = two_cycle_difference(circle.recording, (), ur5, choice)
     assert reference.floor is not None
     ratio = (error_of(reference, circle.truth) / reference.floor)[MOVING]
     # Required of the default rung; the others take J4's short stops for worse than they are.
-    least = HONEST[0] if (rung, low_pass) == ("model", "12") else 0.6
+    least = HONEST[0] if (rung, low_pass) == ("model", 12.0) else 0.6
     assert np.all((ratio >= least) & (ratio <= HONEST[1])), ratio
 
 
@@ -92,8 +95,8 @@ def test_sign(circle: Circle, ur5: Robot) -> None:
 
 def test_two_free_cycles_measure_the_floor(circle: Circle, ur5: Robot) -> None:
     """Given cycles 2 and 3, both pushed, the measured floor must say how wrong that is."""
-    options = TwoCycleOptions(free_cycles="2,3")
-    pushed = two_cycle_difference(circle.recording, (), ur5, options)
+    choice = FreeChoice(cycles=(2, 3))
+    pushed = two_cycle_difference(circle.recording, (), ur5, choice)
     free = two_cycle_difference(circle.recording, (), ur5)
     assert pushed.floor is not None
     assert free.floor is not None
@@ -116,19 +119,11 @@ def test_missing_samples(circle: Circle, ur5: Robot) -> None:
     assert np.isnan(reference.tau[hole]).all()
 
 
-def test_rungs_and_filters_that_do_not_exist(circle: Circle, ur5: Robot) -> None:
-    def make(**options: object) -> None:
-        asked = TwoCycleOptions(**options)  # type: ignore[arg-type]
-        two_cycle_difference(circle.recording, (), ur5, asked)
-
-    with pytest.raises(ReferenceTorqueError, match="commanded, period, phase, model"):
-        make(alignment="best")
-    with pytest.raises(ReferenceTorqueError, match="add --period S"):
-        make(alignment="commanded")
+def test_filters_and_cycles_that_do_not_exist(circle: Circle, ur5: Robot) -> None:
     with pytest.raises(ReferenceTorqueError, match=r"between 0 and 62\.5 Hz"):
-        make(low_pass="80")
+        two_cycle_difference(circle.recording, (), ur5, FreeChoice(low_pass=80.0))
     with pytest.raises(ReferenceTorqueError, match="no cycle 7; the log holds 5"):
-        make(free_cycles="7")
+        two_cycle_difference(circle.recording, (), ur5, FreeChoice(cycles=(7,)))
 
 
 def test_a_log_is_not_its_own_free_run(circle: Circle, ur5: Robot) -> None:
@@ -140,18 +135,18 @@ def test_options_of_one_log_do_not_go_with_two(circle: Circle, ur5: Robot) -> No
     source = replace(circle.recording.source, path=Path("other.csv"))
     other = replace(circle.recording, source=source)
     with pytest.raises(ReferenceTorqueError, match="leave them away with --free"):
-        two_cycle_difference(circle.recording, other, ur5, TwoCycleOptions(period=4.0))
+        two_cycle_difference(circle.recording, other, ur5, FreeChoice(period=4.0))
 
 
 @pytest.mark.parametrize("pair", ["ab", "ac", "ba", "bc", "ca", "cb"])
-@pytest.mark.parametrize("low_pass", ["none", "auto"])
+@pytest.mark.parametrize("low_pass", [None, "auto"])
 def test_floor_covers_real_free_pairs(
-    repeats: dict[str, Recording], pair: str, low_pass: str
+    repeats: dict[str, Recording], pair: str, low_pass: str | None
 ) -> None:
     """The same free motion twice: what the difference shows on moving samples is its error."""
     robot = load_robot("ur10e")
-    options = TwoCycleOptions(low_pass=low_pass)
-    reference = two_cycle_difference(repeats[pair[0]], repeats[pair[1]], robot, options)
+    choice = FreeChoice(low_pass=low_pass)
+    reference = two_cycle_difference(repeats[pair[0]], repeats[pair[1]], robot, choice)
     assert reference.floor is not None
     assert reference.trusted is not None
     moving = reference.trusted > 0

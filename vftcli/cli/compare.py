@@ -54,12 +54,13 @@ def compare(
     """
     import polars as pl
 
-    from vftcli.cli.console import chosen, paths, say_notes, say_recording
+    from vftcli.cli.console import chosen, say_notes, say_recording
     from vftcli.evaluation.pooling import ScoredLog, pooled_rows
     from vftcli.observers import DEFAULT
     from vftcli.outputs.log import tables
     from vftcli.outputs.log.significance import pairs_text
     from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, open_log
+    from vftcli.repetition.choice import FreeChoice
     from vftcli.virtual_sensor.choice import WrenchChoice
 
     wanted = {"json": json, "csv": csv, "markdown": markdown, "latex": latex}
@@ -70,6 +71,14 @@ def compare(
         "markdown": tables.to_markdown,
         "latex": tables.to_latex,
     }[chosen(wanted, default="terminal")]
+    free_choice = FreeChoice.parsed(
+        free=free,
+        free_part=free_part,
+        period=period,
+        free_cycles=free_cycles,
+        alignment=alignment,
+        low_pass=low_pass,
+    )
     request = AnalysisChoice(
         format=format_,
         columns=columns,
@@ -92,15 +101,10 @@ def compare(
             torque_sd=torque_sd,
         ),
         reference=reference,
-        free=paths(free),
+        free=free_choice,
         reference_columns=reference_columns,
-        period=period,
-        free_cycles=free_cycles,
-        alignment=alignment,
-        low_pass=low_pass,
         match=match,
         gains_file=gains_file,
-        free_part=free_part,
         bands=bands,
         remove_bias=remove_bias,
     )

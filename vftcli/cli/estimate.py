@@ -59,8 +59,15 @@ def estimate(
     from vftcli.observers import DEFAULT
     from vftcli.outputs.log.estimates import write_estimate_folder
     from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, cut
+    from vftcli.repetition.choice import FreeChoice
     from vftcli.virtual_sensor.choice import WrenchChoice
 
+    free_choice = FreeChoice.parsed(
+        free=free,
+        free_part=free_part,
+        period=period,
+        free_cycles=free_cycles,
+    )
     request = AnalysisChoice(
         format=format_,
         columns=columns,
@@ -72,12 +79,9 @@ def estimate(
         payload=payload,
         as_printed=as_printed,
         match=match,
-        free=tuple(free or ()),
-        period=period,
-        free_cycles=free_cycles,
+        free=free_choice,
         gains_file=gains_file,
-        free_part=free_part,
-        bands=bands or any((free, free_cycles, period)),
+        bands=bands,
         remove_bias=remove_bias,
         wrench=WrenchChoice.parsed(
             wrench=wrench,

@@ -74,10 +74,11 @@ RequiredReference = Annotated[
     ),
 ]
 Free = Annotated[
-    list[Path] | None,
+    list[str] | None,
     typer.Option(
-        metavar="LOG",
-        help="A free run of the same trajectory; give two and they measure the floor.",
+        metavar="LOG|A:B",
+        help="Motion that nobody touched: another log, two of the same trajectory measure the "
+        "floor; or a span of this one.",
     ),
 ]
 ReferenceColumns = Annotated[
@@ -189,7 +190,7 @@ FreePart = Annotated[
     str | None,
     typer.Option(
         metavar="A:B",
-        help="Span of the log that nothing touches; else --free logs, or its own free cycles.",
+        help="The same as --free A:B: a span of the log that nothing touches.",
     ),
 ]
 Bands = Annotated[

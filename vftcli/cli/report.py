@@ -51,15 +51,24 @@ def report(
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
     """
-    from vftcli.cli.console import command_line, paths, say, say_notes, say_recording
+    from vftcli.cli.console import command_line, say, say_notes, say_recording
     from vftcli.evaluation.print_table import check_published, compare_with
     from vftcli.observers import DEFAULT
     from vftcli.outputs.log.published import terminal_published
     from vftcli.outputs.log.report import write_report, write_reports
     from vftcli.outputs.log.tables import terminal
     from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, open_log
+    from vftcli.repetition.choice import FreeChoice
     from vftcli.virtual_sensor.choice import WrenchChoice
 
+    free_choice = FreeChoice.parsed(
+        free=free,
+        free_part=free_part,
+        period=period,
+        free_cycles=free_cycles,
+        alignment=alignment,
+        low_pass=low_pass,
+    )
     request = AnalysisChoice(
         format=format_,
         columns=columns,
@@ -82,15 +91,10 @@ def report(
             torque_sd=torque_sd,
         ),
         reference=reference,
-        free=paths(free),
+        free=free_choice,
         reference_columns=reference_columns,
-        period=period,
-        free_cycles=free_cycles,
-        alignment=alignment,
-        low_pass=low_pass,
         match=match,
         gains_file=gains_file,
-        free_part=free_part,
         bands=bands,
         remove_bias=remove_bias,
     )

@@ -50,11 +50,12 @@ def tune_gains(
     """
     import json as json_module
 
-    from vftcli.cli.console import command_line, paths, say, say_recording
+    from vftcli.cli.console import command_line, say, say_recording
     from vftcli.outputs.files import refuse_existing, write_text
     from vftcli.outputs.log.run_record import plain
     from vftcli.pipeline import AnalysisChoice, choose_robot, look_over, open_log
     from vftcli.refinement.tuning import gains_document, parse_goal, tune_all
+    from vftcli.repetition.choice import FreeChoice
     from vftcli.robots.terms import dynamics_terms
     from vftcli.robots.writing import lines_of
     from vftcli.signals.errors import ParameterError
@@ -68,10 +69,9 @@ def tune_gains(
         interval=interval,
         friction=friction,
         payload=payload,
-        free=paths(free),
-        period=period,
-        free_cycles=free_cycles,
-        free_part=free_part,
+        free=FreeChoice.parsed(
+            free=free, free_part=free_part, period=period, free_cycles=free_cycles
+        ),
         bands=True,
     )
     recording = open_log(log, request)

@@ -7,7 +7,8 @@ from pathlib import Path
 from vftcli.evaluation.reference import Reference, vendor_reference, zero_reference
 from vftcli.evaluation.reference_file import file_reference
 from vftcli.evaluation.reference_sensor import sensor_reference
-from vftcli.repetition.two_cycle import TwoCycleOptions, two_cycle_difference
+from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.two_cycle import two_cycle_difference
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
@@ -24,7 +25,6 @@ class ReferenceChoice:
     Attributes:
         name: A key of `REFERENCES`, or ``file:PATH``.
         columns: The column description of a reference file, None to recognise its columns.
-        two_cycle: How the two-cycle difference is made.
 
     Raises:
         ReferenceTorqueError: If there is no such reference.
@@ -32,7 +32,6 @@ class ReferenceChoice:
 
     name: str
     columns: str | None = None
-    two_cycle: TwoCycleOptions = field(default_factory=TwoCycleOptions)
 
     def __post_init__(self) -> None:
         if self.path is None and self.name not in REFERENCES:
@@ -53,26 +52,28 @@ class ReferenceSource:
         recording: The log that is compared.
         robot: The arm, its payload mounted.
         free: Free runs of the same motion, for the two-cycle difference.
+        free_choice: What is free in the log itself, and how that difference is made.
         mounting: Where tool and sensor sit on the flange.
     """
 
     recording: Recording
     robot: Robot
     free: Sequence[Recording] = ()
+    free_choice: FreeChoice = field(default_factory=FreeChoice)
     mounting: Mounting = NOTHING
 
 
-def two_cycle(source: ReferenceSource, options: TwoCycleOptions) -> Reference:
+def two_cycle(source: ReferenceSource) -> Reference:
     """The two-cycle difference, against cycles of the same log or free runs in others."""
     return Reference(
-        torque=two_cycle_difference(source.recording, source.free, source.robot, options)
+        torque=two_cycle_difference(source.recording, source.free, source.robot, source.free_choice)
     )
 
 
 REFERENCES: dict[str, Callable[[ReferenceSource, ReferenceChoice], Reference]] = {
     "zero": lambda source, _: zero_reference(source.recording),
     "vendor": lambda source, _: vendor_reference(source.recording),
-    "two-cycle": lambda source, choice: two_cycle(source, choice.two_cycle),
+    "two-cycle": lambda source, _: two_cycle(source),
     "sensor": lambda source, _: sensor_reference(source.recording, source.robot, source.mounting),
 }
 """Name at the command line → what makes it; ``file:PATH`` is the one name with a path in it."""
@@ -82,12 +83,8 @@ def make_reference(source: ReferenceSource, choice: ReferenceChoice) -> Referenc
     """The reference that is asked for, on the log's clock.
 
     Raises:
-        ReferenceTorqueError: If it cannot be made from the log, or takes no free run and has one.
+        ReferenceTorqueError: If it cannot be made from the log.
     """
-    if source.free and choice.name != "two-cycle":
-        raise ReferenceTorqueError(
-            f"--free goes with --reference two-cycle, not with {choice.name}"
-        )
     if choice.path is not None:
         mounting = source.mounting
         return file_reference(choice.path, source.recording, source.robot, mounting, choice.columns)

@@ -7,7 +7,8 @@ import numpy as np
 
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Part, Spectra, raw_disturbance, spectra_of
-from vftcli.repetition.free_part import FreeChoice, FreePart, find_free_part
+from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.free_part import FreePart, find_free_part
 from vftcli.repetition.pairing import mean_of
 from vftcli.repetition.standstill import at_rest, stops
 from vftcli.robots.robot import Robot
@@ -59,11 +60,17 @@ class Baseline:
         return np.asarray(self.rest.mean(axis=0) > RESTS, dtype=np.float64)
 
 
-def survey(recording: Recording, robot: Robot, terms: DynamicsTerms, asked: FreeChoice) -> Baseline:
+def survey(
+    recording: Recording,
+    robot: Robot,
+    terms: DynamicsTerms,
+    choice: FreeChoice,
+    runs: tuple[Recording, ...] = (),
+) -> Baseline:
     """Find the free part of a log and its spectra, or say why there are none."""
     rest = at_rest(recording.t, stops(recording.t, recording.require("dq")))
     try:
-        part = find_free_part(recording, robot, asked)
+        part = find_free_part(recording, robot, choice, runs)
     except ReferenceTorqueError as error:
         why = f"no free part: {error}. State one with --free-part A:B or --free LOG"
         return Baseline(terms=terms, part=None, rest=rest, notes=(why,))
@@ -73,7 +80,7 @@ def survey(recording: Recording, robot: Robot, terms: DynamicsTerms, asked: Free
         spectra = spectra_of(Part(terms, ~part.inside), free_samples(found))
     except ParameterError as error:
         return replace(found, notes=(part.note, f"no spectra: {error}"))
-    if stated(asked) or looks_free(spectra):
+    if choice.is_given or looks_free(spectra):
         return replace(found, spectra=spectra)
     return Baseline(terms=terms, part=None, rest=rest, notes=(not_free(recording, part),))
 
@@ -113,11 +120,6 @@ def free_samples(found: Baseline) -> list[Part]:
         return [Part(terms, np.ones(terms.samples, dtype=bool)) for terms in found.run_terms]
     inside = found.part.inside if found.part is not None else np.zeros(found.terms.samples, bool)
     return [Part(found.terms, inside)]
-
-
-def stated(asked: FreeChoice) -> bool:
-    """Whether the user said what is free; then nothing is doubted."""
-    return asked.span is not None or bool(asked.runs) or asked.free_cycles is not None
 
 
 def looks_free(spectra: Spectra) -> bool:

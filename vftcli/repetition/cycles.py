@@ -91,23 +91,6 @@ def settled(t: Array, on_path: Mask, seconds: float) -> float:
     return float(t[good[0]]) if len(good) else float(t[-1])
 
 
-def parse_cycles(text: str) -> tuple[int, ...]:
-    """Read ``1`` or ``1,2`` or ``1-3`` into cycle numbers, counted from 1.
-
-    Raises:
-        ReferenceTorqueError: If it is something else.
-    """
-    found: list[int] = []
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        if not first.isdecimal() or (dash and not last.isdecimal()):
-            raise ReferenceTorqueError(
-                f"--free-cycles {text!r} is not a list of cycle numbers such as 1 or 1,2 or 1-3"
-            )
-        found += range(int(first), int(last or first) + 1)
-    return tuple(dict.fromkeys(found))
-
-
 def check_cycles(recording: Recording, cycles: Cycles, asked: Sequence[int]) -> None:
     """Raise unless the asked cycles are in the log, and something else to compare with them."""
     beyond = [c for c in asked if not 1 <= c <= cycles.whole]

@@ -6,32 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from vftcli.repetition.alignment import align
+from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.cycles import segment
 from vftcli.repetition.drive_run import DriveRun, drive_run_of
 from vftcli.repetition.pairing import Pairing, pair_with_cycle, pair_with_run
 from vftcli.repetition.periodicity import find_period
-from vftcli.repetition.two_cycle import TwoCycleOptions, partners_in_log
+from vftcli.repetition.two_cycle import partners_in_log
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
-
-
-@dataclass(frozen=True, kw_only=True)
-class FreeChoice:
-    """What the user says of the free part; nothing at all lets free cycles be found.
-
-    Attributes:
-        span: Free span of the log itself, from and to. [s]
-        runs: Free runs in other logs.
-        period: The commanded period of a repeated motion, or None. [s]
-        free_cycles: Its free cycles, as ``1`` or ``1,2`` or ``1-3``, or None.
-    """
-
-    span: tuple[float, float] | None = None
-    runs: tuple[Recording, ...] = ()
-    period: float | None = None
-    free_cycles: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,20 +36,21 @@ class FreePart:
     note: str = ""
 
 
-def find_free_part(recording: Recording, robot: Robot, asked: FreeChoice) -> FreePart:
+def find_free_part(
+    recording: Recording, robot: Robot, choice: FreeChoice, runs: tuple[Recording, ...] = ()
+) -> FreePart:
     """The free part as stated, else in other logs, else the free cycles of a repeated motion.
 
     Raises:
         ReferenceTorqueError: If nothing is stated and the log repeats nothing.
         ParameterError: If the stated span holds no samples.
     """
-    if asked.span is not None:
-        return stated_span(recording, robot, asked.span)
-    if asked.runs:
-        return other_runs(recording, robot, asked.runs)
+    if choice.spans:
+        return stated_spans(recording, robot, choice.spans)
+    if runs:
+        return other_runs(recording, robot, runs)
     motion = drive_run_of(recording, robot)
-    options = TwoCycleOptions(period=asked.period, free_cycles=asked.free_cycles)
-    found = partners_in_log(recording, motion, options)
+    found = partners_in_log(recording, motion, choice)
     return FreePart(
         inside=found.free,
         pairings=tuple(found.clocks["found"]),
@@ -73,35 +58,37 @@ def find_free_part(recording: Recording, robot: Robot, asked: FreeChoice) -> Fre
     )
 
 
-def stated_span(recording: Recording, robot: Robot, span: tuple[float, float]) -> FreePart:
-    """A stated span of the log, with the free cycles it holds if the motion repeats."""
-    first, last = span
-    inside = (recording.t >= first) & (recording.t <= last)
+def stated_spans(
+    recording: Recording, robot: Robot, spans: tuple[tuple[float, float], ...]
+) -> FreePart:
+    """Stated spans of the log, with the free cycles they hold if the motion repeats."""
+    t = recording.t
+    inside = np.zeros(recording.samples, dtype=bool)
+    for first, last in spans:
+        inside |= (t >= first) & (t <= last)
+    listed = ", ".join(f"{max(a, t[0]):g} to {min(b, t[-1]):g} s" for a, b in spans)
     if np.count_nonzero(inside) < 2 or inside.all():
         raise ParameterError(
-            f"{recording.name}: --free-part {first:g}:{last:g} holds "
+            f"{recording.name}: the free part {', '.join(f'{a:g}:{b:g}' for a, b in spans)} holds "
             f"{np.count_nonzero(inside)} of its {recording.samples} samples; it must be a part of "
-            f"the log, which runs from {recording.t[0]:g} to {recording.t[-1]:g} s"
+            f"the log, which runs from {t[0]:g} to {t[-1]:g} s"
         )
     pairings: tuple[Pairing, ...] = ()
     with suppress(ReferenceTorqueError):
-        pairings = cycles_within(recording, drive_run_of(recording, robot), span)
-    note = (
-        f"free part: {max(first, recording.t[0]):g} to {min(last, recording.t[-1]):g} s, as given"
-    )
-    return FreePart(inside=inside, pairings=pairings, note=note)
+        pairings = cycles_within(recording, drive_run_of(recording, robot), spans)
+    return FreePart(inside=inside, pairings=pairings, note=f"free part: {listed}, as given")
 
 
 def cycles_within(
-    recording: Recording, motion: DriveRun, span: tuple[float, float]
+    recording: Recording, motion: DriveRun, spans: tuple[tuple[float, float], ...]
 ) -> tuple[Pairing, ...]:
-    """The whole cycles inside a span, each laid under the log."""
+    """The whole cycles inside any of the spans, each laid under the log."""
     cycles = segment(recording, find_period(recording))
     slack = 0.03 * cycles.period
     found = []
     for number in range(cycles.whole):
         first, last = cycles.span(number)
-        if first >= span[0] - slack and last <= span[1] + slack:
+        if any(first >= a - slack and last <= b + slack for a, b in spans):
             found.append(pair_with_cycle(motion, cycles, number, cycles.period))
     return tuple(found)
 

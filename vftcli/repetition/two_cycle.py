@@ -1,13 +1,13 @@
 """The two-cycle difference: the paper's ground truth, from repeated cycles or from a free run."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.repetition.alignment import align
-from vftcli.repetition.cycles import check_cycles, parse_cycles, segment
+from vftcli.repetition.choice import AUTOMATIC, FreeChoice
+from vftcli.repetition.cycles import check_cycles, segment
 from vftcli.repetition.drive_run import DriveRun, drive_run_of
 from vftcli.repetition.error_model import TRUSTED_SHARE, rms
 from vftcli.repetition.free_cycles import find_free_cycles, named
@@ -20,25 +20,6 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-
-AUTOMATIC = "auto"
-
-
-@dataclass(frozen=True, kw_only=True)
-class TwoCycleOptions:
-    """How the two-cycle difference is made.
-
-    Attributes:
-        period: The commanded period, or None to go by the positions alone. [s]
-        free_cycles: Free cycles as ``1`` or ``1,2`` or ``1-3``, or None to find them.
-        alignment: A name in `RUNGS`, or "auto" for the best for the log at hand.
-        low_pass: Cutoff in Hz as text, "none", or "auto".
-    """
-
-    period: float | None = None
-    free_cycles: str | None = None
-    alignment: str = AUTOMATIC
-    low_pass: str = AUTOMATIC
 
 
 class Partners(NamedTuple):
@@ -59,7 +40,7 @@ def two_cycle_difference(
     recording: Recording,
     free: Recording | Sequence[Recording],
     robot: Robot,
-    options: TwoCycleOptions | None = None,
+    choice: FreeChoice | None = None,
 ) -> ExternalTorque:
     """τ_ext = τ_free − τ at the same place of a repeated motion, with its own error.
 
@@ -72,21 +53,21 @@ def two_cycle_difference(
         recording: The log with contact.
         free: A free run in another log or several; none to find free cycles in the log itself.
         robot: For drive constants and the model's torque.
-        options: Period, free cycles, alignment and low-pass, each found if not given.
+        choice: Period, free cycles, alignment and low-pass, each found if not given.
 
     Raises:
         ReferenceTorqueError: If nothing repeats, or what is asked for is not there.
         MissingSignalError: If a log has neither currents nor torques, or no velocities.
     """
-    options = options or TwoCycleOptions()
+    choice = choice or FreeChoice()
     motion = drive_run_of(recording, robot)
     runs = (free,) if isinstance(free, Recording) else tuple(free)
     if runs:
-        partners = partners_in_logs(recording, motion, runs, robot, options)
+        partners = partners_in_logs(recording, motion, runs, robot, choice)
     else:
-        partners = partners_in_log(recording, motion, options)
-    cutoffs = cutoffs_for(options.low_pass, recording.step)
-    ladder = climb(motion, partners.clocks, rungs_for(options), cutoffs)
+        partners = partners_in_log(recording, motion, choice)
+    cutoffs = cutoffs_for(choice.low_pass, recording.step)
+    ladder = climb(motion, partners.clocks, rungs_for(choice), cutoffs)
     chosen = best(ladder)
     measured = measured_scale(partners, chosen)
     trusted = np.isfinite(chosen.tau) * (1.0 - chosen.error.rest)
@@ -108,25 +89,24 @@ def two_cycle_difference(
     )
 
 
-def partners_in_log(recording: Recording, motion: DriveRun, options: TwoCycleOptions) -> Partners:
+def partners_in_log(recording: Recording, motion: DriveRun, choice: FreeChoice) -> Partners:
     """Find the cycles of a log and lay its free ones under the others."""
-    period = find_period(recording, options.period)
+    period = find_period(recording, choice.period)
     cycles = segment(recording, period)
-    if options.free_cycles is not None:
-        asked = parse_cycles(options.free_cycles)
-        check_cycles(recording, cycles, asked)
-        numbers = tuple(c - 1 for c in asked)
+    if choice.cycles:
+        check_cycles(recording, cycles, choice.cycles)
+        numbers = tuple(c - 1 for c in choice.cycles)
         note = f"free: {named(numbers)} of {cycles.whole}, as given"
     else:
         numbers, note = find_free_cycles(motion, cycles)
     found = (
         f"period {cycles.period:.6g} s, found on the joint positions to {period.deviation:.2g} rad"
     )
-    stated = f" (stated: {options.period:g} s)" if options.period is not None else ""
+    stated = f" (stated: {choice.period:g} s)" if choice.period is not None else ""
     span = f"{cycles.whole} whole cycles from {cycles.begin:.4g} to {cycles.end:.4g} s"
     clocks = {"found": [pair_with_cycle(motion, cycles, c, cycles.period) for c in numbers]}
-    if options.period is not None:
-        clocks["commanded"] = [pair_with_cycle(motion, cycles, c, options.period) for c in numbers]
+    if choice.period is not None:
+        clocks["commanded"] = [pair_with_cycle(motion, cycles, c, choice.period) for c in numbers]
     lone = "; the free cycle has no reference of its own" if len(numbers) == 1 else ""
     inside = np.isin(cycles.number(motion.t), numbers)
     return Partners(clocks, (f"{found}{stated}: {span}", f"{note}{lone}"), inside)
@@ -137,10 +117,10 @@ def partners_in_logs(
     motion: DriveRun,
     free: Sequence[Recording],
     robot: Robot,
-    options: TwoCycleOptions,
+    choice: FreeChoice,
 ) -> Partners:
     """Lay free runs in other logs under a log."""
-    if options.free_cycles is not None or options.period is not None:
+    if choice.cycles or choice.period is not None:
         raise ReferenceTorqueError(
             "--period and --free-cycles are for cycles of one log; leave them away with --free"
         )
@@ -163,42 +143,27 @@ def partners_in_logs(
     return Partners({"found": pairings}, tuple(notes), np.zeros(recording.samples, dtype=bool))
 
 
-def rungs_for(options: TwoCycleOptions) -> tuple[str, ...]:
-    """The rungs to make: the one asked for, else all.
-
-    Raises:
-        ReferenceTorqueError: If there is no such rung, or it needs a period nobody stated.
-    """
-    if options.alignment == AUTOMATIC:
-        return tuple(RUNGS)
-    if options.alignment not in RUNGS:
-        raise ReferenceTorqueError(
-            f"no alignment {options.alignment!r}; there is auto, {', '.join(RUNGS)}"
-        )
-    if options.alignment == "commanded" and options.period is None:
-        raise ReferenceTorqueError("alignment commanded needs the commanded period: add --period S")
-    return (options.alignment,)
+def rungs_for(choice: FreeChoice) -> tuple[str, ...]:
+    """The rungs to make: the one that is chosen, else all."""
+    return tuple(RUNGS) if choice.alignment == AUTOMATIC else (choice.alignment,)
 
 
-def cutoffs_for(text: str, step: float) -> tuple[float | None, ...]:
+def cutoffs_for(low_pass: float | str | None, step: float) -> tuple[float | None, ...]:
     """Cutoffs of the low-pass to make: both none and the default for "auto". [Hz]
 
     Raises:
-        ReferenceTorqueError: If it is not a number below half the sample rate, "none" or "auto".
+        ReferenceTorqueError: If it is not below half the sample rate.
     """
-    if text == AUTOMATIC:
-        return (None, min(LOW_PASS, 0.2 / step))
-    if text == "none":
+    if low_pass is None:
         return (None,)
-    try:
-        cutoff = float(text)
-    except ValueError:
-        cutoff = float("nan")
-    if not 0.0 < cutoff < 0.5 / step:
+    if isinstance(low_pass, str):
+        return (None, min(LOW_PASS, 0.2 / step))
+    if not low_pass < 0.5 / step:
         raise ReferenceTorqueError(
-            f"--low-pass {text!r} is not a cutoff between 0 and {0.5 / step:.4g} Hz, none or auto"
+            f"--low-pass {low_pass:g} is not a cutoff between 0 and {0.5 / step:.4g} Hz, none or "
+            "auto"
         )
-    return (cutoff,)
+    return (low_pass,)
 
 
 def measured_scale(partners: Partners, chosen: Difference) -> Array | None:
