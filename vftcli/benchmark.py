@@ -97,7 +97,7 @@ def analytic_script(model: Any, recording: Recording, kalman: KalmanObserver) ->
     import pinocchio as pin
 
     q, dq, tau = recording.q, recording.require("dq"), recording.require("torque")
-    data, step = model.createData(), recording.step
+    data, step = model.createData(), recording.median_step
     p, mu = np.empty_like(q), np.empty_like(q)
     for k in range(len(q)):
         M = pin.crba(model, data, q[k])
@@ -118,9 +118,9 @@ def literal_script(model: Any, recording: Recording, kalman: KalmanObserver) -> 
     """
     terms = literal_momentum_terms(model, recording.q, recording.require("dq"))
     mu = recording.require("torque") + terms.coriolis_transpose_dq - terms.gravity
-    first_order_loops(terms.p, mu, recording.step)
-    dense_kalman_loop(terms.p, mu, recording.step, kalman)
-    dense_kalman_loop(terms.p, mu, recording.step, kalman, rebuild=True)
+    first_order_loops(terms.p, mu, recording.median_step)
+    dense_kalman_loop(terms.p, mu, recording.median_step, kalman)
+    dense_kalman_loop(terms.p, mu, recording.median_step, kalman, rebuild=True)
 
 
 def first_order_loops(p: Array, mu: Array, step: float, rate: float = 10.0) -> tuple[Array, Array]:
@@ -208,7 +208,11 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
     robot = load_robot(robot_name)
     recording = circle(robot, samples)
     setup = Setup(
-        gains=robot.gains, settings={}, joints=robot.joints, step=recording.step, as_printed=False
+        gains=robot.gains,
+        settings={},
+        joints=robot.joints,
+        step=recording.median_step,
+        as_printed=False,
     )
     observers = {name: OBSERVERS[name].build(setup)[0] for name in DEFAULT}
     timings = Timings()
@@ -315,7 +319,11 @@ def memory_per_sample(robot_name: str = "panda", samples: int = 1_000_000) -> fl
     robot = load_robot(robot_name)
     recording = circle(robot, samples, rate=1000.0)
     setup = Setup(
-        gains=robot.gains, settings={}, joints=robot.joints, step=recording.step, as_printed=False
+        gains=robot.gains,
+        settings={},
+        joints=robot.joints,
+        step=recording.median_step,
+        as_printed=False,
     )
     observers = [OBSERVERS[name].build(setup)[0] for name in DEFAULT]
     tracemalloc.start()

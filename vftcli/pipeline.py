@@ -130,7 +130,7 @@ def choose_observers(
         gains=chosen_gains(request, robot),
         settings=observer_settings(request.settings),
         joints=robot.joints,
-        step=recording.step,
+        step=recording.median_step,
         as_printed=request.as_printed,
         spectra=survey.spectra if survey is not None else None,
     )
@@ -185,7 +185,7 @@ def analyse(recording: Recording, robot: Robot, request: AnalysisChoice) -> "Ana
         removal = request.remove_bias
         estimates, workup = work_up(survey, recording, robot, observers, estimates, removal)
         notes = (*notes, *workup.notes)
-    tunings = {o.name: o.tuning(recording.step, robot.joints) for o in observers}
+    tunings = {o.name: o.tuning(recording.median_step, robot.joints) for o in observers}
     measured, mounting, sensed = sense(recording, robot, estimates, request, terms, observers)
     reference, errors = None, None
     contacts: tuple[ContactScore, ...] = ()

@@ -63,7 +63,7 @@ def test_joints_at_rest_are_marked() -> None:
     """J1 moves in 80 % of the samples, J2 in 20 %; the error is 1 in motion, 3 at rest."""
     share = np.array([0.8, 0.2])
     moving = (np.arange(len(T))[:, None] < share * len(T)).astype(float)
-    reference = torque("two-cycle", WAVE, WAVE, trusted=moving, floor=np.array([0.5, 0.6]))
+    reference = torque("two-cycle", WAVE, WAVE, moving=moving, floor=np.array([0.5, 0.6]))
     error = np.where(moving > 0, 1.0, 3.0)
     table = rows_of(evaluate("log", [torque("fdo", *(WAVE[:, None] + error).T)], reference))
     assert [table["fdo", j]["reference_trusted"] for j in (1, 2)] == [True, False]

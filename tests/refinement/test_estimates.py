@@ -73,8 +73,8 @@ def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
         response = observer.frequency_response(spectra.frequency, spectra.step, 6)
         lag = np.sum(np.abs(1 - response) ** 2 * spectra.external, axis=0) * spectra.width
         free = np.mean(estimate.tau[found.survey.part.inside] ** 2, axis=0)
-        np.testing.assert_allclose(estimate.band[7], np.sqrt(free + lag), rtol=1e-12)
-        assert estimate.sd is None or not np.allclose(estimate.sd[7], estimate.band[7])
+        np.testing.assert_allclose(estimate.error_sd[7], np.sqrt(free + lag), rtol=1e-12)
+        assert estimate.sd is None or not np.allclose(estimate.sd[7], estimate.error_sd[7])
 
 
 def test_removing_the_bias_subtracts_the_free_cycle_at_the_same_phase(
@@ -149,7 +149,7 @@ def test_a_log_that_repeats_nothing_falls_back_and_says_so() -> None:
     assert any("State one with --free-part A:B or --free LOG" in note for note in analysis.notes)
     auto, by_hand = analysis.estimates
     np.testing.assert_array_equal(auto.tau, by_hand.tau)
-    assert auto.band is None
+    assert auto.error_sd is None
 
 
 def test_a_free_part_that_is_too_short_falls_back_and_says_so() -> None:
@@ -158,7 +158,7 @@ def test_a_free_part_that_is_too_short_falls_back_and_says_so() -> None:
     )
     analysis = analyse_log(FIXTURE, request)
     assert any("no spectra: a spectrum needs 32 samples" in note for note in analysis.notes)
-    assert analysis.estimates[0].band is None
+    assert analysis.estimates[0].error_sd is None
 
 
 def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
@@ -166,7 +166,7 @@ def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
     recording = open_log(FIXTURE, AnalysisChoice(robot="ur5", interval="0:4"))
     twice = replace(
         recording,
-        t=np.concatenate([recording.t, recording.t + 4.0 + recording.step]),
+        t=np.concatenate([recording.t, recording.t + 4.0 + recording.median_step]),
         **{
             name: np.concatenate([value, value])
             for name in ("q", "dq", "current")
@@ -179,7 +179,7 @@ def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
     request = AnalysisChoice(robot="ur5", observers=("kfo-auto",))
     analysis = analyse(twice, choose_robot(request, twice), request)
     assert any("is not much quieter than the rest" in note for note in analysis.notes)
-    assert analysis.estimates[0].band is None
+    assert analysis.estimates[0].error_sd is None
 
 
 def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: AnalysisChoice) -> None:
@@ -188,12 +188,12 @@ def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: Analys
     analysis = analyse_log(FIXTURE, always)
     assert any("something touches the arm in all of them" in note for note in analysis.notes)
     np.testing.assert_array_equal(analysis.estimates[0].tau, analysis.estimates[1].tau)
-    assert analysis.estimates[0].band is None
+    assert analysis.estimates[0].error_sd is None
     with pytest.raises(ParameterError, match="something touches the arm in all of them"):
         analyse_log(FIXTURE, replace(always, remove_bias="free-cycle"))
     # what the user states is not doubted
     stated = analyse_log(FIXTURE, replace(always, free=FreeChoice(cycles=(1,))))
-    assert stated.estimates[0].band is not None
+    assert stated.estimates[0].error_sd is not None
 
 
 def test_a_gap_in_the_log_is_survived() -> None:
@@ -214,8 +214,8 @@ def test_a_gap_in_the_log_is_survived() -> None:
     analysis = analyse(cut, choose_robot(request, cut), request)
     for estimate in analysis.estimates:
         assert np.all(np.isfinite(estimate.tau))
-        assert estimate.band is not None
-        assert np.all(np.isfinite(estimate.band))
+        assert estimate.error_sd is not None
+        assert np.all(np.isfinite(estimate.error_sd))
 
 
 @pytest.mark.parametrize(
@@ -238,8 +238,8 @@ def test_bias_removal_needs_no_tuned_observer() -> None:
     request = AnalysisChoice(robot="ur5", observers=("gmo",), remove_bias="free-cycle")
     estimate = analyse_log(FIXTURE, request).estimates[0]
     plain = analyse_log(FIXTURE, AnalysisChoice(robot="ur5", observers=("gmo",))).estimates[0]
-    assert estimate.band is not None
-    assert plain.band is None
+    assert estimate.error_sd is not None
+    assert plain.error_sd is None
     assert np.max(np.abs(estimate.tau - plain.tau)) > 0.5
 
 

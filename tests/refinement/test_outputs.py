@@ -20,7 +20,7 @@ def test_the_parquet_holds_the_band_beside_the_covariance(worked_up: Analysis) -
     table = estimates_table(worked_up)
     assert isinstance(table, pl.DataFrame)
     for j in (1, 6):
-        band = worked_up.estimates[-1].band
+        band = worked_up.estimates[-1].error_sd
         assert band is not None
         np.testing.assert_array_equal(table[f"band/rts-auto/{j}"].to_numpy(), band[:, j - 1])
         assert f"sd/rts-auto/{j}" in table.columns
@@ -30,7 +30,7 @@ def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -
     data = json.loads(payload(worked_up))
     tau, error = data["charts"][:2]
     halves = {s["name"]: s["half"] for s in tau["series"]}
-    band = worked_up.estimates[-1].band
+    band = worked_up.estimates[-1].error_sd
     assert band is not None
     np.testing.assert_allclose(halves["rts-auto"], 1.96 * band[0])
     assert all(s["half"] is None for s in error["series"])
@@ -48,9 +48,9 @@ def test_the_recording_shows_both_edges_of_the_last_band(worked_up: Analysis) ->
     upper = lines.values[:, lines.names.index("rts-auto 95 % upper")]
     lower = lines.values[:, lines.names.index("rts-auto 95 % lower")]
     estimate = worked_up.estimates[-1]
-    assert estimate.band is not None
+    assert estimate.error_sd is not None
     np.testing.assert_allclose(0.5 * (upper + lower), estimate.tau[:, 0], atol=1e-9)
-    np.testing.assert_allclose(upper - lower, 2 * 1.96 * estimate.band[:, 0], rtol=1e-9)
+    np.testing.assert_allclose(upper - lower, 2 * 1.96 * estimate.error_sd[:, 0], rtol=1e-9)
     assert not any("kfo-auto 95 %" in name for name in lines.names)
 
 

@@ -52,9 +52,9 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
     shown = [error(x) for x in (quick[1].tau, estimates[3].tau, unbiased[3].tau)]
     ratios = [e / d for e in shown for d in (density, faster)]
     covered = [
-        float(np.mean((np.abs(e.tau - truth) <= 1.96 * e.band)[:, moving]))
+        float(np.mean((np.abs(e.tau - truth) <= 1.96 * e.error_sd)[:, moving]))
         for e in (banded[2], banded[3])
-        if e.band is not None
+        if e.error_sd is not None
     ]
     return [*ratios, error(estimates[2].tau) / min(density, faster)], covered
 

@@ -21,7 +21,7 @@ def test_a_change_is_found(seed: int) -> None:
     """0.4 N·m of friction under 0.3 N·m of noise: 2500 samples tell it to 0.006 N·m."""
     motion, rng = swing(seed)
     tau = 0.4 * np.sign(motion.dq) * [1.0, 0.0] + 0.3 * rng.standard_normal(motion.dq.shape)
-    found = friction_change(motion, tau, np.ones_like(tau))
+    found = friction_change(motion, tau, np.ones_like(tau, bool))
     assert found[0] == pytest.approx(0.4, abs=0.03)
     assert found[1] == 0.0
 
@@ -34,4 +34,4 @@ def test_pushes_are_not_taken_for_it(seed: int) -> None:
     for start in rng.uniform(0.0, 19.0, 8):
         pushed = (motion.t >= start) & (motion.t < start + 1.0)
         tau[pushed] += 10.0 * rng.choice([-1, 1], 2)
-    assert np.array_equal(friction_change(motion, tau, np.ones_like(tau)), [0.0, 0.0])
+    assert np.array_equal(friction_change(motion, tau, np.ones_like(tau, bool)), [0.0, 0.0])

@@ -148,8 +148,8 @@ def test_floor_covers_real_free_pairs(
     choice = FreeChoice(low_pass=low_pass)
     reference = two_cycle_difference(repeats[pair[0]], repeats[pair[1]], robot, choice)
     assert reference.floor is not None
-    assert reference.trusted is not None
-    moving = reference.trusted > 0
+    assert reference.moving is not None
+    moving = reference.moving
     shown = np.sqrt(np.nanmean(np.where(moving, reference.tau, np.nan) ** 2, axis=0))
     ratio = shown / reference.floor
     assert np.all((ratio >= HONEST[0]) & (ratio <= HONEST[1])), ratio
@@ -159,8 +159,8 @@ def test_three_free_runs_measure_the_floor(repeats: dict[str, Recording]) -> Non
     free = [repeats["b"], repeats["c"]]
     reference = two_cycle_difference(repeats["a"], free, load_robot("ur10e"))
     assert reference.floor is not None
-    assert reference.trusted is not None
-    shown = np.where(reference.trusted > 0, reference.tau, np.nan)
+    assert reference.moving is not None
+    shown = np.where(reference.moving, reference.tau, np.nan)
     ratio = np.sqrt(np.nanmean(shown**2, axis=0)) / reference.floor
     assert np.all((ratio >= HONEST[0]) & (ratio <= HONEST[1])), ratio
 

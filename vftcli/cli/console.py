@@ -26,7 +26,7 @@ def say(text: str) -> None:
 def say_recording(recording: "Recording") -> None:
     """One line on what was read, then what was repaired or looks odd."""
     source = recording.source
-    rate = f", {1.0 / recording.step:.4g} Hz" if recording.samples > 1 else ""
+    rate = f", {1.0 / recording.median_step:.4g} Hz" if recording.samples > 1 else ""
     say(
         f"{recording.name}: {source.format}, {recording.joints} joints, "
         f"{recording.samples} samples, {recording.duration:.1f} s{rate}"

@@ -77,7 +77,7 @@ def report_of(examination: "Examination") -> dict[str, Any]:
 
 def rate_of(recording: "Recording") -> float | None:
     """Samples a second, or None for a single sample. [Hz]"""
-    return 1 / recording.step if recording.samples > 1 else None
+    return 1 / recording.median_step if recording.samples > 1 else None
 
 
 def largest_step(recording: "Recording") -> float | None:

@@ -47,7 +47,7 @@ def _length_and_rate(recording: Recording) -> Iterator[Finding]:
             consequence="Observers of 10 1/s need half a second to settle",
             remedy="Record longer, from rest",
         )
-    rate = 1 / recording.step
+    rate = 1 / recording.median_step
     if rate < SLOW_RATE:
         yield Finding(
             name="slow-rate",

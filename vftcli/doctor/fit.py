@@ -139,7 +139,7 @@ class Windows:
 
     def __init__(self, recording: Recording, robot: Robot) -> None:
         t, dq = recording.t, recording.require("dq")
-        length = max(1, round(WINDOW / recording.step))
+        length = max(1, round(WINDOW / recording.median_step))
         length = min(length, max(1, (recording.samples - 1) // 3))
         starts = np.arange(0, recording.samples - length, max(1, length // 2))
         if len(starts) > WINDOWS:

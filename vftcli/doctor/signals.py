@@ -89,7 +89,7 @@ def velocity_slopes(recording: Recording) -> Array:
     """
     if recording.dq is None or recording.samples < 20:
         return np.full(recording.joints, np.nan)
-    t, length = recording.t, max(1, round(0.1 / recording.step))
+    t, length = recording.t, max(1, round(0.1 / recording.median_step))
     length = min(length, (recording.samples - 1) // 4)
     first = np.arange(0, recording.samples - length, length)
     steps = np.diff(t)[:, None]
@@ -97,7 +97,7 @@ def velocity_slopes(recording: Recording) -> Array:
     ways = np.vstack([np.zeros(recording.joints), ways])
     by_velocity = ways[first + length] - ways[first]
     by_position = recording.q[first + length] - recording.q[first]
-    even = (t[first + length] - t[first] < 2 * length * recording.step)[:, None]
+    even = (t[first + length] - t[first] < 2 * length * recording.median_step)[:, None]
     weight = np.sum(even * by_position**2, axis=0)
     slopes = np.sum(even * by_position * by_velocity, axis=0) / np.where(weight > 0, weight, 1.0)
     slopes[np.ptp(recording.q, axis=0) < TRAVEL] = np.nan

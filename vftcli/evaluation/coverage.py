@@ -15,14 +15,14 @@ def coverage(estimate: ExternalTorque, reference: ExternalTorque) -> Array:
     Samples in which the joint rests do not count: stiction hides there what the band cannot know.
     NaN where the estimate has no band or the joint hardly moves.
     """
-    if estimate.band is None:
+    if estimate.error_sd is None:
         return np.full(estimate.joints, np.nan)
     error = estimate.tau - reference.tau
     counted = np.isfinite(error)
     for torque in (estimate, reference):
-        if torque.trusted is not None:
-            counted &= torque.trusted > 0
-    inside = counted & (np.abs(np.nan_to_num(error)) <= COVERS * estimate.band)
+        if torque.moving is not None:
+            counted &= torque.moving
+    inside = counted & (np.abs(np.nan_to_num(error)) <= COVERS * estimate.error_sd)
     count = np.count_nonzero(counted, axis=0)
     share = np.count_nonzero(inside, axis=0) / np.maximum(count, 1)
     return np.where(count >= LEAST, share, np.nan)

@@ -126,7 +126,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> li
     step = median_step(reference.t) if len(reference.t) > 1 else 1.0
     lag = np.array([lags(e.tau, reference.tau, step) for e in estimates])
     covered = np.array([coverage(e, reference) for e in estimates])
-    trusted = reference.trusted if reference.trusted is not None else reference.finite
+    moving = reference.moving if reference.moving is not None else reference.known
     found = []
     for j in range(reference.joints if estimates else 0):
         x, y = np.column_stack([e.tau[:, j] for e in estimates]), reference.tau[:, j]
@@ -134,7 +134,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> li
         squares = np.nan_to_num((x[known] - y[known, None]) ** 2)
         draws = resample(squares) if len(squares) else Resampled(np.ones((1, len(names))), 0)
         floor = float(reference.floor[j]) if reference.floor is not None else float("nan")
-        sure = trusted[known, j] > 0
+        sure = moving[known, j]
         told = (draws, lag[:, j], covered[:, j])
         found.append(Scored(names, j + 1, x[known], y[known], sure, floor, *told))
     return found

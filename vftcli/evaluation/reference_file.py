@@ -83,7 +83,7 @@ def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path
         ReferenceTorqueError: If the two clocks do not overlap.
     """
     # Half a sample more at either end: stamps of one clock, written by two programs, round apart.
-    slack = 0.5 * recording.step
+    slack = 0.5 * recording.median_step
     inside = (recording.t >= t[0] - slack) & (recording.t <= t[-1] + slack)
     if not np.any(inside):
         start = recording.source.t0

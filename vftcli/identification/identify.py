@@ -94,7 +94,7 @@ def identify(
     notes += remarks(new, scored, others, traces, tested)
     if load is not None:
         new, numbers, notes = with_load(new, load, numbers, notes)
-    processing = task.processing.described(logs[0].step)
+    processing = task.processing.described(logs[0].median_step)
     table = pl.DataFrame([*rows, *more], schema=RESIDUALS, orient="row")
     sources = tuple(logs) if free is None else (*logs, free)
     story = Provenance(

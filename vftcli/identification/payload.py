@@ -260,7 +260,7 @@ def poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:
 
 def holds(recording: Recording) -> Mask:
     """Whether no joint travels further than `HELD` around a sample. (T,)"""
-    reach = max(1, round(0.5 * WINDOW / recording.step))
+    reach = max(1, round(0.5 * WINDOW / recording.median_step))
     held = np.zeros(recording.samples, dtype=bool)
     if recording.samples > 2 * reach:
         travel = np.abs(recording.q[2 * reach :] - recording.q[: -2 * reach])

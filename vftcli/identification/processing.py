@@ -122,7 +122,7 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
         ClockError: If the log is too short for the filter.
     """
     torque, dq = drive_torque(recording, robot), recording.require("dq")
-    t, stride = recording.t, processing.stride(recording.step)
+    t, stride = recording.t, processing.stride(recording.median_step)
     moving = np.flatnonzero(np.any(np.abs(dq) > processing.still, axis=1))
     kept = np.arange(moving[0], moving[-1] + 1, stride) if moving.size else np.arange(0)
     columns: dict[str, list[Array]] = {"q": [], "dq": [], "ddq": [], "tau": []}

@@ -27,7 +27,7 @@ def with_band(found: Baseline, observer: Observer, estimate: ExternalTorque) -> 
     variance = free_rms(found, free_estimates(found, observer, estimate)) ** 2
     variance = variance + found.spectra.missed(response)
     sd = np.broadcast_to(handed_over(np.sqrt(variance)), estimate.tau.shape)
-    return replace(estimate, band=sd, trusted=handed_over(1.0 - found.rest))
+    return replace(estimate, error_sd=sd, moving=found.rest == 0.0)
 
 
 def band_notes(found: Baseline) -> tuple[str, ...]:

@@ -118,13 +118,13 @@ def signal_of(clock: Array, estimates: Sequence[ExternalTorque]) -> ExternalTorq
 
 def less(estimate: ExternalTorque, bias: Array, found: Baseline, known: Array) -> ExternalTorque:
     """The estimate less its bias, its band rid of it where two free motions tell what is left."""
-    band = estimate.band
+    band = estimate.error_sd
     part = found.part
     if band is not None and part is not None and len(part.pairings) > 1 and part.inside.any():
         left = np.sqrt(np.nanmean((estimate.tau - known)[part.inside] ** 2, axis=0))
         free = free_rms(found, (estimate,))
         band = handed_over(np.sqrt(np.maximum(band**2 - free**2, 0.0) + left**2))
-    return replace(estimate, tau=handed_over(estimate.tau - bias), band=band)
+    return replace(estimate, tau=handed_over(estimate.tau - bias), error_sd=band)
 
 
 def remove_modelled(
@@ -224,11 +224,11 @@ def without_model(
     estimate: ExternalTorque, bias: Array, share: Array, free: Array
 ) -> ExternalTorque:
     """The estimate less the modelled bias, its band rid of what the model predicts unseen."""
-    band = estimate.band
+    band = estimate.error_sd
     if band is not None:
         square = np.mean(free**2, axis=0)
         band = handed_over(np.sqrt(np.maximum(band**2 - square * (1.0 - share**2), 0.0)))
-    return replace(estimate, tau=handed_over(estimate.tau - bias), band=band)
+    return replace(estimate, tau=handed_over(estimate.tau - bias), error_sd=band)
 
 
 REMOVALS: dict[

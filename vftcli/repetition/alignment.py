@@ -53,7 +53,7 @@ def align(recording: Recording, free: Recording) -> Alignment:
             their clocks run at rates that differ by more than `SAME_RATE`.
     """
     check_same_arm(recording, free)
-    step = max(recording.step, free.step)
+    step = max(recording.median_step, free.median_step)
     shift, rate = refined(recording, free, coarse_shift(recording, free, step), 1.0)
     deviation, overlap = deviation_at(recording, free, shift, rate)
     if not deviation <= SAME_TRAJECTORY:
@@ -145,7 +145,7 @@ def explaining_rate(recording: Recording, free: Recording) -> float | None:
         )
         if span < LEAST_OVERLAP:
             continue
-        step = max(recording.step * rate, free.step, free.duration / 4000.0)
+        step = max(recording.median_step * rate, free.median_step, free.duration / 4000.0)
         lag = lag_of(uniform(recording, step / rate), uniform(free, step)) * step
         shift = lag + float(free.t[0] - rate * recording.t[0])
         shift, found = refined(recording, free, shift, float(rate))

@@ -4,7 +4,7 @@ import numpy as np
 
 from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.standstill import STILL
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 
 BLOCK = 1.0
 """Length of the pieces whose scatter tells chance from change. [s]"""
@@ -13,7 +13,7 @@ SURE = 3.0
 """Standard errors from which on a change is believed: contacts alone rarely look like one."""
 
 
-def friction_change(motion: DriveRun, tau: Array, moving: Array) -> Array:
+def friction_change(motion: DriveRun, tau: Array, moving: Mask) -> Array:
     """Change of dry friction from the free run to the log, 0 where it may be chance. (n,) [N·m]
 
     The mean of the difference times the sign of the velocity. Contacts do not follow the sign of
@@ -22,13 +22,13 @@ def friction_change(motion: DriveRun, tau: Array, moving: Array) -> Array:
     Args:
         motion: The log.
         tau: The two-cycle difference, NaN where there is none. (T, n) [N·m]
-        moving: 1 where a sample may be relied on. (T, n)
+        moving: Whether the joint moves. (T, n)
     """
     t, n = motion.t, tau.shape[1]
     piece = ((t - t[0]) / BLOCK).astype(np.int64)
     change = np.zeros(n)
     for j in range(n):
-        used = np.isfinite(tau[:, j]) & (moving[:, j] > 0) & (np.abs(motion.dq[:, j]) > STILL)
+        used = np.isfinite(tau[:, j]) & moving[:, j] & (np.abs(motion.dq[:, j]) > STILL)
         along = tau[used, j] * np.sign(motion.dq[used, j])
         count = np.bincount(piece[used]).astype(np.float64)
         total = np.bincount(piece[used], weights=along)

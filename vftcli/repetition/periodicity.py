@@ -62,7 +62,7 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     """
     t, q = moving_part(recording)
     check_stated(recording, stated, float(t[-1] - t[0]))
-    step = recording.step
+    step = recording.median_step
     x = resampled(np.arange(t[0], t[-1], step), t, q)
     spread = float(np.sqrt(np.mean((x - x.mean(axis=0)) ** 2) * x.shape[1]))
     closest = (float("nan"), float("inf"))
@@ -89,10 +89,10 @@ def check_stated(recording: Recording, stated: float | None, duration: float) ->
             "the arm moves, which must hold more than one cycle; give a shorter --period, or a "
             "free run in another log with --free"
         )
-    if stated < 4.0 * recording.step:
+    if stated < 4.0 * recording.median_step:
         raise ReferenceTorqueError(
             f"{recording.name}: a period of {stated:g} s is shorter than four samples "
-            f"({recording.step:g} s each); --period is in seconds"
+            f"({recording.median_step:g} s each); --period is in seconds"
         )
 
 

@@ -66,20 +66,20 @@ def two_cycle_difference(
         partners = partners_in_logs(recording, motion, runs, robot, choice)
     else:
         partners = partners_in_log(recording, motion, choice)
-    cutoffs = cutoffs_for(choice.low_pass, recording.step)
+    cutoffs = cutoffs_for(choice.low_pass, recording.median_step)
     ladder = climb(motion, partners.clocks, rungs_for(choice), cutoffs)
     chosen = best(ladder)
     measured = measured_scale(partners, chosen)
-    trusted = np.isfinite(chosen.tau) * (1.0 - chosen.error.rest)
+    moving = np.isfinite(chosen.tau) & (chosen.error.rest == 0.0)
     scale = measured if measured is not None else np.ones(motion.torque.shape[1])
-    change = friction_change(motion, chosen.tau, trusted) if runs else np.zeros(len(scale))
+    change = friction_change(motion, chosen.tau, moving) if runs else np.zeros(len(scale))
     return ExternalTorque(
         name="two-cycle",
         t=recording.t,
         tau=chosen.tau,
         sd=np.hypot(chosen.error.sd * scale, change),
         floor=np.hypot(chosen.floor * scale, change),
-        trusted=trusted,
+        moving=moving,
         remarks=(
             *partners.notes,
             *ladder_notes(ladder, chosen),
@@ -135,7 +135,7 @@ def partners_in_logs(
         pairing = pair_with_run(motion, drive_run_of(other, robot), found.shift, found.rate)
         pairings.append(pairing._replace(times=np.where(found.overlap, pairing.times, np.nan)))
         rate = f", clock rate {found.rate:.6f}" if abs(found.rate - 1.0) > 1e-4 else ""
-        covered = float(np.count_nonzero(pairings[-1].known)) * recording.step
+        covered = float(np.count_nonzero(pairings[-1].known)) * recording.median_step
         notes.append(
             f"free run {other.name}: shift {found.shift:+.4f} s{rate}, joint positions agree to "
             f"{found.deviation * 1e3:.3g} mrad rms over {covered:.1f} s"

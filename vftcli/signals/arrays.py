@@ -47,6 +47,13 @@ def handed_over(value: Array) -> Array:
     return value
 
 
+def frozen_mask(value: ArrayLike) -> Mask:
+    """Return a read-only boolean copy: non-zero is true."""
+    copy = np.array(value, dtype=np.bool_)
+    copy.setflags(write=False)
+    return copy
+
+
 def empty_series(samples: int, columns: int) -> Array:
     """An uninitialised (T, n) array whose columns are contiguous: series are read along time."""
     return np.empty((columns, samples)).T
@@ -76,7 +83,7 @@ def check_clock(t: Array, what: str) -> None:
         )
 
 
-def check_shape(value: Array, shape: tuple[int, ...], name: str, owner: str) -> None:
+def check_shape(value: NDArray[Any], shape: tuple[int, ...], name: str, owner: str) -> None:
     """Raise a ShapeError unless `value` has `shape`."""
     if value.shape != shape:
         raise ShapeError(f"{name} of {owner} has shape {value.shape}; expected {shape}")

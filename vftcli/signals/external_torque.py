@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
+from vftcli.signals.arrays import Array, Mask, check_clock, check_shape, frozen, frozen_mask
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.remarks import Note
 
@@ -22,10 +22,10 @@ class ExternalTorque:
         tau: External torque; NaN where it is not known. (T, n) [N·m]
         sd: One standard deviation of `tau` by the estimator's own account. (T, n) [N·m]
         floor: Root-mean-square error that the estimate itself is known to have. (n,) [N·m]
-        trusted: 1 where a sample may be relied on, 0 where it is shown but may not, as the
-            two-cycle difference of a joint at rest; None where nothing speaks against any. (T, n)
-        band: One standard deviation of the error of `tau` as the log itself shows it, model error
-            and lag included; None where no free part is known to measure it on. (T, n) [N·m]
+        error_sd: One standard deviation of the error of `tau` as the log itself shows it, model
+            error and lag included; None where no free part is known to measure it on. (T, n) [N·m]
+        moving: Whether the joint moves, so that the sample may be relied on; where it stands,
+            stiction hides what `tau` cannot know. None where that was not looked at. (T, n)
         remarks: What a reader of the numbers should know.
     """
 
@@ -34,24 +34,23 @@ class ExternalTorque:
     tau: Array
     sd: Array | None = None
     floor: Array | None = None
-    trusted: Array | None = None
-    band: Array | None = None
+    error_sd: Array | None = None
+    moving: Mask | None = None
     remarks: tuple[Note, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("t", "tau", "sd", "floor", "trusted", "band"):
+        for name in ("t", "tau", "sd", "floor", "error_sd"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(getattr(self, name)))
+        if self.moving is not None:
+            object.__setattr__(self, "moving", frozen_mask(self.moving))
         if self.tau.ndim != 2:
             raise ShapeError(f"tau of {self.name} has shape {self.tau.shape}; expected (T, n)")
         check_clock(self.t, self.name)
         check_shape(self.tau, (len(self.t), self.tau.shape[1]), "tau", self.name)
-        if self.sd is not None:
-            check_shape(self.sd, self.tau.shape, "sd", self.name)
-        if self.trusted is not None:
-            check_shape(self.trusted, self.tau.shape, "trusted", self.name)
-        if self.band is not None:
-            check_shape(self.band, self.tau.shape, "band", self.name)
+        for name in ("sd", "error_sd", "moving"):
+            if (value := getattr(self, name)) is not None:
+                check_shape(value, self.tau.shape, name, self.name)
         if self.floor is not None:
             check_shape(self.floor, self.tau.shape[1:], "floor", self.name)
 
@@ -62,13 +61,14 @@ class ExternalTorque:
 
     @property
     def mostly_rests(self) -> tuple[bool, ...]:
-        """Whether less than half of a joint's known samples may be relied on, joint by joint."""
-        if self.trusted is None:
+        """Whether a joint moves in less than half of its known samples, joint by joint."""
+        if self.moving is None:
             return (False,) * self.joints
-        known = np.maximum(np.sum(self.finite, axis=0), 1.0)
-        return tuple(bool(x) for x in np.sum(self.trusted * self.finite, axis=0) < 0.5 * known)
+        known = np.maximum(np.count_nonzero(self.known, axis=0), 1)
+        used = np.count_nonzero(self.moving & self.known, axis=0)
+        return tuple(bool(rests) for rests in used < 0.5 * known)
 
     @property
-    def finite(self) -> Array:
-        """1 where a sample is known for a joint, 0 elsewhere. (T, n)"""
-        return np.isfinite(self.tau).astype(np.float64)
+    def known(self) -> Mask:
+        """Whether a joint's torque is known, sample by sample. (T, n)"""
+        return np.isfinite(self.tau)

@@ -167,7 +167,7 @@ class Recording:
         return float(self.t[-1] - self.t[0])
 
     @property
-    def step(self) -> float:
+    def median_step(self) -> float:
         """Median time between samples, the nominal sample time. [s]"""
         if self.samples < 2:
             raise ClockError(f"{self.name}: one sample has no sample time")

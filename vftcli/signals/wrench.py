@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask, check_clock, check_shape, frozen
-from vftcli.signals.errors import ShapeError
+from vftcli.signals.arrays import Array, Mask, check_clock, check_shape, frozen, frozen_mask
 from vftcli.signals.remarks import Note
 
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -46,16 +45,14 @@ class Wrench:
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(getattr(self, name)))
         samples = len(self.t)
-        mask = np.zeros(samples, dtype=bool) if self.masked is None else np.array(self.masked, bool)
-        mask.setflags(write=False)
+        mask = frozen_mask(np.zeros(samples) if self.masked is None else self.masked)
         object.__setattr__(self, "masked", mask)
         check_clock(self.t, self.name)
         check_shape(self.values, (samples, 6), "wrench", self.name)
         for name, shape in (("sd", (samples, 6)), ("sigma_min", (samples,))):
             if (value := getattr(self, name)) is not None:
                 check_shape(value, shape, name, self.name)
-        if mask.shape != (samples,):
-            raise ShapeError(f"mask of {self.name} has shape {mask.shape}; expected {(samples,)}")
+        check_shape(mask, (samples,), "mask", self.name)
 
     @property
     def hidden(self) -> Mask:

@@ -235,7 +235,7 @@ def torque_error(
         return measured(torques, free, unloaded.rms, disturbance)
     if np.count_nonzero(free) > 1:
         return measured(torques, free, None, disturbance)
-    if torques and all(torque.band is not None for torque in torques):
+    if torques and all(torque.error_sd is not None for torque in torques):
         return banded(torques)
     return assumed(torques, request.solver)
 

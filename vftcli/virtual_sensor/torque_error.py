@@ -148,7 +148,7 @@ def stated(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
 
 def banded(torques: Sequence[ExternalTorque]) -> TorqueError:
     """The band that each estimate brings along, measured on the log's free part."""
-    sd = {torque.name: torque.band for torque in torques if torque.band is not None}
+    sd = {torque.name: torque.error_sd for torque in torques if torque.error_sd is not None}
     return TorqueError(
         sd={name: band[0] if np.all(band == band[0]) else band for name, band in sd.items()},
         note="the wrenches' bands are the joint torques' own, measured on the log's free part",

@@ -45,8 +45,8 @@ def columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
         yield from per_joint(f"tau_ext/{estimate.name}", estimate.tau)
         if estimate.sd is not None:
             yield from per_joint(f"sd/{estimate.name}", estimate.sd)
-        if estimate.band is not None:
-            yield from per_joint(f"band/{estimate.name}", estimate.band)
+        if estimate.error_sd is not None:
+            yield from per_joint(f"band/{estimate.name}", estimate.error_sd)
     if analysis.reference is not None:
         yield from per_joint("tau_ext/reference", analysis.reference.tau)
         if analysis.reference.sd is not None:

@@ -170,9 +170,9 @@ def band_lines(analysis: Analysis, j: int) -> Iterator[tuple[str, Array, str]]:
     """
     colours = colours_of(analysis.estimates)
     for estimate in reversed(analysis.estimates):
-        if estimate.band is not None:
+        if estimate.error_sd is not None:
             for sign, edge in ((1.0, "upper"), (-1.0, "lower")):
-                column = estimate.tau[:, j] + sign * COVERS * estimate.band[:, j]
+                column = estimate.tau[:, j] + sign * COVERS * estimate.error_sd[:, j]
                 yield f"{estimate.name} 95 % {edge}", column, colours[estimate.name]
             return
 
@@ -262,7 +262,8 @@ def summary(analysis: Analysis) -> str:
     lines = [
         f"# {escape_markdown(recording.name)}",
         f"{escape_markdown(robot.title or robot.name)}, {recording.samples} samples in "
-        f"{recording.duration:.3f} s at {1.0 / recording.step:.4g} Hz; format {source.format}.",
+        f"{recording.duration:.3f} s at {1.0 / recording.median_step:.4g} Hz; "
+        f"format {source.format}.",
         "",
         *(f"- **{name}**: {escape_markdown(text)}" for name, text in CONVENTIONS.items()),
     ]

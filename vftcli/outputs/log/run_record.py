@@ -133,7 +133,7 @@ def input_record(recording: Recording) -> dict[str, Any]:
         "joints": recording.joints,
         "start_s": float(recording.t[0]),
         "end_s": float(recording.t[-1]),
-        "rate_hz": 1.0 / recording.step if recording.samples > 1 else None,
+        "rate_hz": 1.0 / recording.median_step if recording.samples > 1 else None,
         "signals": list(recording.signals),
     }
 
@@ -236,9 +236,9 @@ def workup_record(analysis: Analysis) -> dict[str, Any] | None:
         "error_budget_Nm": {budget.name: budget.parts for budget in found.budgets},
         "consistency": {one.name: one._asdict() for one in found.consistency},
         "band_sd_Nm": {
-            e.name: np.sqrt(np.mean(e.band**2, axis=0))
+            e.name: np.sqrt(np.mean(e.error_sd**2, axis=0))
             for e in analysis.estimates
-            if e.band is not None
+            if e.error_sd is not None
         },
         "notes": list(found.notes),
     }

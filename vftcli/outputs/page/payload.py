@@ -111,20 +111,20 @@ def estimate_series(analysis: Analysis) -> tuple[ChartLine, ...]:
 
 def half_band(estimate: ExternalTorque) -> Array | None:
     """Half the width of the 95 % band, its root mean square over time. (n,)"""
-    if estimate.band is None:
+    if estimate.error_sd is None:
         return None
-    return np.asarray(COVERS * np.sqrt(np.mean(estimate.band**2, axis=0)))
+    return np.asarray(COVERS * np.sqrt(np.mean(estimate.error_sd**2, axis=0)))
 
 
 def reference_series(analysis: Analysis) -> tuple[ChartLine, ...]:
     """The reference in the page's ink, if there is one."""
     if analysis.reference is None:
         return ()
-    tau, trusted = analysis.reference.tau, analysis.reference.trusted
+    tau, moving = analysis.reference.tau, analysis.reference.moving
     whole = ChartLine(legend_name(analysis, "reference"), tau)
-    if trusted is None or np.all((trusted > 0) | ~np.isfinite(tau)):
+    if moving is None or np.all(moving | ~np.isfinite(tau)):
         return (whole,)
-    resting = np.where(trusted > 0, np.nan, tau)
+    resting = np.where(moving, np.nan, tau)
     return (whole, ChartLine("reference while the joint rests", resting, RESTING))
 
 
@@ -218,7 +218,7 @@ def known(values: Array | None) -> list[float | None] | None:
 
 def responses(analysis: Analysis) -> list[dict[str, Any]]:
     """Gain, phase and delay of every observer over frequency, up to half the sample rate."""
-    step, n = analysis.recording.step, analysis.recording.joints
+    step, n = analysis.recording.median_step, analysis.recording.joints
     frequency = np.geomspace(1e-2, 0.5 / step, FREQUENCIES)
     gains, phases, delays = [], [], []
     colours = colours_of(analysis.estimates)

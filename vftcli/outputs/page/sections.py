@@ -39,7 +39,7 @@ def facts(analysis: Analysis) -> str:
         "Log format": recording.source.format,
         "Span": f"{recording.t[0]:.3f} – {recording.t[-1]:.3f} s",
         "Samples": f"{recording.samples}",
-        "Rate (median step)": f"{1.0 / recording.step:.4g} Hz",
+        "Rate (median step)": f"{1.0 / recording.median_step:.4g} Hz",
         "Longest step": f"{1e3 * float(steps.max()):.4g} ms",
         "Reference": analysis.reference.name if analysis.reference else "none",
     }
