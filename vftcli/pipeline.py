@@ -1,6 +1,6 @@
 """The whole way from a log to its numbers, in the order the data flows."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,10 +14,12 @@ from vftcli.observers import (
     build_observers,
     observer_settings,
 )
+from vftcli.readers.library import Library
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.errors import ParameterError, RobotError
+from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.parsing import interval
 from vftcli.signals.recording import Recording
 
@@ -57,6 +59,7 @@ class AnalysisChoice:
         bands: Whether to measure on the free part how far the estimates may be off.
         remove_bias: "none", "free-cycle" or "model".
         gains_file: A file of gains that go before the robot's own, or None.
+        library: Where the logs of the command are read, each once.
     """
 
     format: str | None = None
@@ -77,6 +80,7 @@ class AnalysisChoice:
     bands: bool = False
     remove_bias: str = "none"
     gains_file: Path | None = None
+    library: Library = field(default_factory=Library, repr=False, compare=False)
 
     @property
     def looks_back(self) -> bool:
@@ -87,9 +91,19 @@ class AnalysisChoice:
 
 def open_log(path: Path, request: AnalysisChoice) -> Recording:
     """Read a log and cut it to the asked interval."""
-    from vftcli.readers import read
+    read = request.library.read(path, format=request.format, columns=request.columns)
+    return cut(read, request)
 
-    return cut(read(path, format=request.format, columns=request.columns), request)
+
+def open_logs(paths: Sequence[Path], request: AnalysisChoice) -> tuple[Recording, ...]:
+    """Read the logs of a command.
+
+    Raises:
+        ParameterError: If two of them are the same run.
+    """
+    logs = tuple(open_log(path, request) for path in paths)
+    refuse_repeated_logs(logs)
+    return logs
 
 
 def cut(recording: Recording, request: AnalysisChoice) -> Recording:

@@ -59,7 +59,8 @@ def compare(
     from vftcli.observers import DEFAULT
     from vftcli.outputs.log import tables
     from vftcli.outputs.log.significance import pairs_text
-    from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, open_log
+    from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, open_logs
+    from vftcli.readers.library import Library
     from vftcli.repetition.choice import FreeChoice
     from vftcli.virtual_sensor.choice import WrenchChoice
 
@@ -107,10 +108,10 @@ def compare(
         gains_file=gains_file,
         bands=bands,
         remove_bias=remove_bias,
+        library=Library([*logs, *free_choice.logs]),
     )
     analyses = []
-    for log in logs:
-        recording = open_log(log, request)
+    for recording in open_logs(logs, request):
         analysis = analyse(recording, choose_robot(request, recording), request)
         if not json:
             say_recording(recording)

@@ -1,5 +1,6 @@
 """`vftcli identify`: logs become a robot."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -66,6 +67,7 @@ def identify_robot(
     from vftcli.outputs.files import refuse_existing
     from vftcli.outputs.identification.files import beside, write_identification
     from vftcli.pipeline import AnalysisChoice, choose_robot, open_log
+    from vftcli.readers.library import Library
 
     task = Task(
         method=method or (None if find_payload else "friction"),
@@ -76,18 +78,24 @@ def identify_robot(
     )
     for file in beside(output).values():
         refuse_existing(file, force)
+    without_load = [free] if free is not None else []
     request = AnalysisChoice(
-        format=format_, columns=columns, robot=robot, interval=interval, payload=payload
+        format=format_,
+        columns=columns,
+        robot=robot,
+        interval=interval,
+        payload=payload,
+        library=Library([*logs, *paths(validate), *without_load]),
     )
-    whole = AnalysisChoice(format=format_, columns=columns, interval=validate_interval)
     train = [open_log(log, request) for log in logs]
+    whole = replace(request, interval=validate_interval)
     held_out = [open_log(log, whole) for log in paths(validate)]
-    unloaded = open_log(free, request) if free is not None else None
-    read = [*train, *held_out, *([unloaded] if unloaded is not None else [])]
+    unloaded = [open_log(log, request) for log in without_load]
+    read = [*train, *held_out, *unloaded]
     for recording in read:
         say_recording(recording)
     profile = choose_robot(request, train[0])
-    found = identify(train, profile, task, held_out, unloaded)
+    found = identify(train, profile, task, held_out, unloaded[0] if unloaded else None)
     record = write_identification(output, found, read, command_line(), force)
     for note in found.notes:
         say(f"note: {note}")

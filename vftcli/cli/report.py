@@ -57,7 +57,8 @@ def report(
     from vftcli.outputs.log.published import terminal_published
     from vftcli.outputs.log.report import write_report, write_reports
     from vftcli.outputs.log.tables import terminal
-    from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, open_log
+    from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, open_logs
+    from vftcli.readers.library import Library
     from vftcli.repetition.choice import FreeChoice
     from vftcli.virtual_sensor.choice import WrenchChoice
 
@@ -97,12 +98,12 @@ def report(
         gains_file=gains_file,
         bands=bands,
         remove_bias=remove_bias,
+        library=Library([*logs, *free_choice.logs]),
     )
     if published is not None:
         check_published(published, reference)
     analyses = []
-    for log in logs:
-        recording = open_log(log, request)
+    for recording in open_logs(logs, request):
         analysis = analyse(recording, choose_robot(request, recording), request)
         if published is not None and analysis.errors is not None:
             found = compare_with(published, analysis.errors, analysis.observers, analysis.tunings)

@@ -28,6 +28,7 @@ from vftcli.identification.training import training
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError, ParameterError
+from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.recording import Recording
 
 
@@ -77,7 +78,10 @@ def identify(
     Raises:
         IdentificationError: If the logs do not determine it, or contradict the robot.
         MissingSignalError: If a signal is missing.
+        ParameterError: If two logs are the same run: it would count as two.
     """
+    refuse_repeated_logs(logs if free is None else [*logs, free])
+    refuse_repeated_logs(held_out, "--validate")
     load = find_load(logs, robot, free) if task.find_payload else None
     train = free_logs(logs, free, load)
     if load is not None and (task.method is None or not train):
@@ -128,7 +132,7 @@ def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -
     bare = robot.with_payload(None)
     if free is not None:
         fit = payload_from_pair(logs[0], free, bare)
-        if fit.loaded == free.name and free.name != logs[0].name:
+        if fit.loaded[0] is free:
             raise IdentificationError(
                 f"{free.name}, given as free of load, is the heavier one; swap the two logs"
             )
@@ -155,13 +159,7 @@ def free_logs(
         return tuple(logs)
     if free is not None:
         return (free,)
-    if len(logs) == 2:
-        return tuple(r for r in logs if r.name != load.loaded and load.loaded in _names(logs))
-    return ()
-
-
-def _names(logs: Sequence[Recording]) -> set[str]:
-    return {r.name for r in logs}
+    return tuple(log for log in logs if not any(log is loaded for loaded in load.loaded))
 
 
 def residual_rows(

@@ -49,7 +49,7 @@ class LoadFit(NamedTuple):
         mass_sd: Standard deviation of the mass. [kg]
         com_sd: Standard deviations of the centre of mass. (3,) [m]
         residual: RMS torque left in each joint. (n,) [N·m]
-        loaded: Name of the log that carries it.
+        loaded: The logs that carry it.
         notes: How it was found.
     """
 
@@ -57,8 +57,13 @@ class LoadFit(NamedTuple):
     mass_sd: float
     com_sd: Array
     residual: Array
-    loaded: str
+    loaded: tuple[Recording, ...]
     notes: tuple[str, ...]
+
+    @property
+    def names(self) -> str:
+        """The logs that carry it, by name."""
+        return names_of(self.loaded)
 
 
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
@@ -83,14 +88,14 @@ class PairFit(NamedTuple):
         x: Mass and first moments in the last link's frame. (4,)
         sd: Standard deviations. (4,)
         residual: RMS left in each joint. (n,) [N·m]
-        loaded: Name of the log with the load.
+        loaded: The logs with the load.
         notes: How it was found.
     """
 
     x: Array
     sd: Array
     residual: Array
-    loaded: str
+    loaded: tuple[Recording, ...]
     notes: tuple[str, ...]
 
     @property
@@ -107,7 +112,7 @@ class PairFit(NamedTuple):
         mass, sd = self.payload_mass, float(self.sd[0])
         if mass <= 0 or sd > 0.5 * mass:
             raise IdentificationError(
-                f"{self.loaded}: no load can be told: mass {mass:.3g} ± {sd:.2g} kg; "
+                f"{names_of(self.loaded)}: no load can be told: mass {mass:.3g} ± {sd:.2g} kg; "
                 "use poses or motions in which gravity loads several joints differently"
             )
         chain = robot.chain
@@ -118,7 +123,7 @@ class PairFit(NamedTuple):
         if np.linalg.norm(at_flange) > 1.0:
             away = float(np.linalg.norm(at_flange))
             raise IdentificationError(
-                f"{self.loaded}: the load's centre of mass comes out {away:.2g}"
+                f"{names_of(self.loaded)}: the load's centre of mass comes out {away:.2g}"
                 " m from the flange; the logs do not fit this robot"
             )
         load = Payload(mass=mass, com=at_flange, inertia=np.zeros((3, 3)))
@@ -151,7 +156,7 @@ def pair_fit(loaded: Recording, free: Recording, robot: Robot) -> PairFit:
         f"positions {1e3 * distance:.2g} mrad rms apart; Coulomb friction that grows with the load "
         "fitted along; the load is taken as a point mass"
     )
-    return PairFit(x, sd, np.sqrt(np.mean(left**2, axis=0)), loaded.name, (note,))
+    return PairFit(x, sd, np.sqrt(np.mean(left**2, axis=0)), (loaded,), (note,))
 
 
 def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
@@ -226,11 +231,10 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
         IdentificationError: If there are too few different poses.
     """
     q, torque = poses(recordings, robot)
-    names = ", ".join(r.name for r in recordings)
     if len(q) < POSES or np.max(np.ptp(q, axis=0), initial=0.0) < 0.1:
         raise IdentificationError(
-            f"{names}: {len(q)} poses at rest of at least {DWELL:g} s; a load needs {POSES} "
-            "different ones, or a pair of logs of one motion with and without it"
+            f"{names_of(recordings)}: {len(q)} poses at rest of at least {DWELL:g} s; a load needs "
+            f"{POSES} different ones, or a pair of logs of one motion with and without it"
         )
     zero = np.zeros_like(q)
     Y = torque_regressor(robot.chain, q, zero, zero)[:, :, -LINK:][:, :, :STATIC]
@@ -239,8 +243,14 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     x = weighted(Y, extra, usable)
     left = extra - np.einsum("knp,p->kn", Y, x)
     note = f"load from {len(q)} poses at rest; stiction is part of the residual; a point mass"
-    fit = PairFit(x, column_sd(Y, left, usable), np.std(left, axis=0), names, (note,))
+    loaded = tuple(recordings)
+    fit = PairFit(x, column_sd(Y, left, usable), np.std(left, axis=0), loaded, (note,))
     return fit.finished(robot)
+
+
+def names_of(recordings: Sequence[Recording]) -> str:
+    """The recordings' names as one text."""
+    return ", ".join(recording.name for recording in recordings)
 
 
 def poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:

@@ -71,7 +71,7 @@ def documented(robot: Robot, story: Provenance) -> Robot:
     if load is not None:
         document["payload"]["source"] = load.notes[0]
         account["payload"] = {
-            "loaded": load.loaded,
+            "loaded": load.names,
             "mass_sd": load.mass_sd,
             "com_sd": load.com_sd.tolist(),
             "residual_Nm": load.residual.tolist(),

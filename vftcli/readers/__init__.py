@@ -46,6 +46,7 @@ def read(
     format: str | None = None,
     columns: str | None = None,
     signals: Collection[str] | None = None,
+    label: str = "",
 ) -> Recording:
     """Read a log, recognising its format by content unless one is named.
 
@@ -54,6 +55,7 @@ def read(
         format: Name of a format in READERS.
         columns: Which columns hold which signals, in the grammar of ``--columns``.
         signals: Fields of Recording that are wanted; others may be left unread. None for all.
+        label: What to call it in tables; its file's name if "".
 
     Raises:
         UnknownFormatError: If no format fits, or more than one.
@@ -73,7 +75,7 @@ def read(
         raw = reader.read(file, request)
         raw = replace(raw, repairs=(*file.repairs, *raw.repairs)) if file.repairs else raw
     digest.start()
-    return cleaned(raw, path, reader.name, digest.hexdigest)
+    return cleaned(raw, path, reader.name, digest.hexdigest, label)
 
 
 def read_first_recording(

@@ -43,7 +43,11 @@ class Findings:
 
 
 def cleaned(
-    raw: RawLog, path: Path, format_name: str, sha256: str | Callable[[], str] = ""
+    raw: RawLog,
+    path: Path,
+    format_name: str,
+    sha256: str | Callable[[], str] = "",
+    label: str = "",
 ) -> Recording:
     """Make a Recording of what a reader found.
 
@@ -56,11 +60,11 @@ def cleaned(
         ClockError: If the clock is not finite, runs backwards, or holds no samples.
     """
     with np.errstate(all="ignore"):  # whatever a damaged file holds is judged, not computed with
-        return _cleaned(raw, path, format_name, sha256)
+        return _cleaned(raw, path, format_name, sha256, label)
 
 
 def _cleaned(
-    raw: RawLog, path: Path, format_name: str, sha256: str | Callable[[], str]
+    raw: RawLog, path: Path, format_name: str, sha256: str | Callable[[], str], label: str
 ) -> Recording:
     rows = len(raw.stamps)
     if rows == 0:
@@ -78,6 +82,7 @@ def _cleaned(
     report_gaps(t, findings)
     source = Source(
         path=path,
+        label=label,
         format=format_name,
         sha256=sha256,
         clock=raw.clock,

@@ -16,6 +16,7 @@ from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array, frozen
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.identity import refuse_repeated_runs
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import resampled
 
@@ -67,7 +68,12 @@ def survey(
     choice: FreeChoice,
     runs: tuple[Recording, ...] = (),
 ) -> Baseline:
-    """Find the free part of a log and its spectra, or say why there are none."""
+    """Find the free part of a log and its spectra, or say why there are none.
+
+    Raises:
+        ReferenceTorqueError: If a free run is the log itself, or two free runs are one.
+    """
+    refuse_repeated_runs(recording, runs)
     rest = at_rest(recording.t, stops(recording.t, recording.require("dq")))
     try:
         part = find_free_part(recording, robot, choice, runs)

@@ -19,6 +19,7 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.identity import refuse_repeated_runs
 from vftcli.signals.recording import Recording
 
 
@@ -124,13 +125,9 @@ def partners_in_logs(
         raise ReferenceTorqueError(
             "--period and --free-cycles are for cycles of one log; leave them away with --free"
         )
+    refuse_repeated_runs(recording, free)
     pairings, notes = [], []
     for other in free:
-        if other.source.path is not None and other.source.path == recording.source.path:
-            raise ReferenceTorqueError(
-                f"{other.name} is the log itself: a free run is another log of the same motion; "
-                "for free cycles within one log leave --free away"
-            )
         found = align(recording, other)
         pairing = pair_with_run(motion, drive_run_of(other, robot), found.shift, found.rate)
         pairings.append(pairing._replace(times=np.where(found.overlap, pairing.times, np.nan)))

@@ -68,8 +68,10 @@ class Source:
     Attributes:
         path: The file or bag directory, or None for a recording made in memory.
         format: The reader's name.
-        sha256: Hex digest of the file's bytes (of all files of a directory, in name order);
-            reading it waits until it is computed.
+        label: What the log is called in tables, unique within a command; the file's name where
+            that is unique.
+        sha256: Hex digest of the file's bytes (of all files of a directory, in name order), by
+            which a run is known again; reading it waits until it is computed.
         clock: Which clock the stamps are from, in words.
         t0: The log's own stamp of the first sample. [s]
         t0_ns: The same stamp in whole nanoseconds where the log counts them. [ns]
@@ -80,6 +82,7 @@ class Source:
     """
 
     path: Path | None = None
+    label: str = ""
     format: str = "memory"
     sha256: Awaited = Awaited()
     clock: str = "as given"
@@ -89,6 +92,10 @@ class Source:
     duplicates: int = 0
     repairs: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.label and self.path is not None:
+            object.__setattr__(self, "label", self.path.name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,8 +182,8 @@ class Recording:
 
     @property
     def name(self) -> str:
-        """A short name for tables: the file's name, without its folder."""
-        return self.source.path.name if self.source.path is not None else "recording"
+        """What it is called in tables and messages: its label, unique within a command."""
+        return self.source.label or "recording"
 
     @property
     def signals(self) -> tuple[str, ...]:

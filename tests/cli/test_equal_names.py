@@ -1,0 +1,148 @@
+"""Logs of one file name: every command tells them apart, and refuses copies of one run."""
+
+import csv
+import io
+import json
+import shutil
+import tomllib
+from itertools import islice
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from vftcli.cli import app
+from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+
+FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
+RUNNER = CliRunner()
+ROWS = {"a": 1501, "b": 1001}
+"""Lines kept of the fixture, header included: two different runs."""
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """`a/log.csv` and `b/log.csv`, two logs with one file name, and a copy of the first."""
+    folder = tmp_path_factory.mktemp("logs")
+    for name, rows in ROWS.items():
+        (folder / name).mkdir()
+        with FIXTURE.open(encoding="utf-8") as file:
+            (folder / name / "log.csv").write_text("".join(islice(file, rows)), encoding="utf-8")
+    shutil.copy(folder / "a" / "log.csv", folder / "copy.csv")
+    return folder
+
+
+def invoke(*words):
+    return RUNNER.invoke(app, [str(word) for word in words])
+
+
+def compared(logs, *options):
+    both = [logs / name / "log.csv" for name in ROWS]
+    result = invoke("compare", *both, "--robot", "ur5", "--reference", "zero", *options)
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def test_json_has_the_rows_of_both_logs(logs):
+    rows = json.loads(compared(logs, "--json"))
+    samples = {row["recording"]: row["samples"] for row in rows}
+    assert samples["a/log.csv"] == ROWS["a"] - 1
+    assert samples["b/log.csv"] == ROWS["b"] - 1
+
+
+def test_csv_has_the_rows_of_both_logs(logs):
+    rows = list(csv.DictReader(io.StringIO(compared(logs, "--csv"))))
+    assert {row["recording"] for row in rows} == {"a/log.csv", "b/log.csv", "pooled"}
+
+
+@pytest.mark.parametrize("option", [None, "--markdown", "--latex"])
+def test_every_table_shows_both_logs(logs, option):
+    text = compared(logs, *([option] if option else []))
+    for name, rows in ROWS.items():
+        assert f"{name}/log.csv against zero, {rows - 1} samples" in text.replace("\\_", "_")
+
+
+def test_significance_names_both_logs(logs):
+    text = compared(logs, "--significance")
+    assert "a/log.csv" in text
+    assert "b/log.csv" in text
+
+
+def test_a_report_of_both_has_both_in_its_table(logs, tmp_path):
+    both = [logs / name / "log.csv" for name in ROWS]
+    result = invoke(
+        "report", *both, "--robot", "ur5", "--reference", "zero", "-o", tmp_path / "out"
+    )
+    assert result.exit_code == 0, result.output
+    rows = json.loads((tmp_path / "out" / "errors.json").read_text(encoding="utf-8"))
+    assert {row["recording"] for row in rows} == {"a/log.csv", "b/log.csv"}
+
+
+def test_an_identified_robot_has_one_rms_a_joint_and_log(logs, tmp_path):
+    robot = tmp_path / "robot.toml"
+    both = [logs / name / "log.csv" for name in ROWS]
+    result = invoke("identify", *both, "--robot", "ur5", "-o", robot)
+    assert result.exit_code == 0, result.output
+    sets = tomllib.loads(robot.read_text(encoding="utf-8"))["identification"]["residuals"]
+    assert [one["log"] for one in sets] == ["a/log.csv", "b/log.csv"]
+    assert all(len(one["rms_Nm"]) == 6 for one in sets)
+
+
+def test_a_payload_pair_of_equal_names_trains_friction_on_the_log_without_load(tmp_path):
+    """The loaded log of a pair is the heavier one, whatever the files are called."""
+    made = invoke("simulate", "payload-pair", "-o", tmp_path / "log.csv", "--seed", 1)
+    assert made.exit_code == 0, made.output
+    for name, ending in (("a", "csv"), ("b", "free.csv")):
+        (tmp_path / name).mkdir()
+        (tmp_path / f"log.{ending}").rename(tmp_path / name / "log.csv")
+    robot = tmp_path / "robot.toml"
+    both = [tmp_path / name / "log.csv" for name in "ab"]
+    options = ("--find-payload", "--method", "friction", "--json", "-o", robot)
+    result = invoke("identify", *both, "--robot", "ur5", *options)
+    assert result.exit_code == 0, result.output
+    record = json.loads(result.stdout)
+    assert record["method"] == "friction"
+    assert {row["log"] for row in record["residuals"]} == {"b/log.csv"}
+    assert any(row["parameter"] == "coulomb" for row in record["parameters"])
+
+
+def test_one_run_given_twice_is_refused(logs, tmp_path):
+    log, copy = logs / "a" / "log.csv", logs / "copy.csv"
+    common = ("--robot", "ur5")
+    zero = (*common, "--reference", "zero")
+    for words in (
+        ("compare", log, copy, *zero),
+        ("compare", log, log, *zero),
+        ("report", log, copy, *zero, "-o", tmp_path / "out"),
+        ("identify", log, copy, *common, "-o", tmp_path / "robot.toml"),
+        ("identify", log, "--free", copy, "--find-payload", *common, "-o", tmp_path / "r.toml"),
+    ):
+        result = invoke(*words)
+        assert isinstance(result.exception, ParameterError), result.output
+        assert "are the same run" in str(result.exception)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("compare", "--reference", "two-cycle"),
+        ("compare", "--reference", "zero", "--bands"),
+        ("compare", "--reference", "zero", "--remove-bias", "free-cycle"),
+        ("estimate", "--bands"),
+        ("tune",),
+    ],
+    ids=" ".join,
+)
+def test_a_copy_of_the_log_is_no_free_run_and_a_free_run_counts_once(logs, tmp_path, command):
+    name, *options = command
+    log, other = logs / "a" / "log.csv", logs / "b" / "log.csv"
+    out = () if name == "compare" else ("-o", tmp_path / "out.toml")
+    words = (name, log, "--robot", "ur5", *options, *out)
+    itself = invoke(*words, "--free", logs / "copy.csv")
+    assert isinstance(itself.exception, ReferenceTorqueError), itself.output
+    assert "is the log itself" in str(itself.exception)
+    twice = invoke(*words, "--free", other, "--free", other)
+    assert isinstance(twice.exception, ReferenceTorqueError), twice.output
+    assert "are the same run" in str(twice.exception)
+    assert not list(tmp_path.iterdir())
