@@ -5,16 +5,16 @@ import pytest
 
 from vftcli.evaluation.reference_sensor import sensor_reference
 from vftcli.robots import load_robot
-from vftcli.robots.conventions import Pose, rpy
 from vftcli.signals.errors import MissingSignalError, ParameterError
+from vftcli.signals.pose import Pose, adjoint, inverse, rpy_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.frames import Mounting, adjoint, inverse
+from vftcli.virtual_sensor.frames import Mounting
 from vftcli.virtual_sensor.log_wrench import in_sensor_axes, logged_wrench, stated
 from vftcli.virtual_sensor.sensor import fit_pose, time_offset, weigh_tool
 from vftcli.virtual_sensor.vendor import axes_words, check_vendor, fit_axes
 
-POSE = Pose(rpy((0.1, -0.2, 0.8)), np.array([0.01, -0.02, 0.04]))
+POSE = Pose(rpy_matrix((0.1, -0.2, 0.8)), np.array([0.01, -0.02, 0.04]))
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
 
@@ -53,7 +53,7 @@ def test_pushes_along_one_line_tell_no_pose() -> None:
 
 def test_a_tool_is_weighed_from_poses() -> None:
     rng = np.random.default_rng(3)
-    rotation = np.array([rpy(a) for a in rng.uniform(-2, 2, (30, 3))])
+    rotation = np.array([rpy_matrix(a) for a in rng.uniform(-2, 2, (30, 3))])
     com, zero = np.array([0.01, 0.0, 0.05]), np.array([0.5, -1.0, 2.0, 0.02, 0.03, -0.01])
     weight = 0.35 * np.einsum("tji,j->ti", rotation, GRAVITY)
     reading = np.concatenate([weight, np.cross(com, weight)], axis=1) + zero

@@ -8,7 +8,7 @@ import numpy as np
 from vftcli.admittance.law import Controller
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.pose import exp_quaternion, log_quaternion, product
+from vftcli.signals.pose import exp_quaternion, log_quaternion, quaternion_product
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +93,7 @@ class Recursion:
         self.x = np.concatenate([moved, turned], axis=1)
 
     def _turned(self) -> Array:
-        turn = product(exp_quaternion(self.v[:, 3:] * self.period), self.turn)
+        turn = quaternion_product(exp_quaternion(self.v[:, 3:] * self.period), self.turn)
         self.turn = turn / np.sqrt(np.sum(turn**2, axis=1, keepdims=True))
         return log_quaternion(self.turn)
 

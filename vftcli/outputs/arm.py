@@ -7,6 +7,7 @@ import numpy as np
 from vftcli.robots.chain import Chain
 from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.signals.arrays import Array
+from vftcli.signals.pose import matrix_quaternion
 
 THICKNESS = (0.048, 0.030)
 """Radius of the first and of the last link, as a share of the arm's length."""
@@ -81,31 +82,8 @@ def motion(chain: Chain, t: Array, q: Array, rate: float) -> ArmPoses:
     every = max(1, int(len(t) / max(float(t[-1] - t[0]) * rate, 1.0)))
     t, q = t[::every], np.ascontiguousarray(q[::every])
     poses = link_poses(chain, q)
-    return ArmPoses(t, poses.translation, quat_xyzw(poses.rotation), q)
-
-
-def quat_xyzw(rotation: Array) -> Array:
-    """Unit quaternions of rotation matrices, scalar last. (..., 3, 3) → (..., 4)
-
-    Of the four ways to take a quaternion from a matrix the one with the largest divisor is used for
-    each matrix (Shepperd, J. Guidance and Control 1(3), 1978).
-    """
-    R = rotation
-    xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
-    squares = np.stack([xx - yy - zz, yy - zz - xx, zz - xx - yy, xx + yy + zz], axis=-1)
-    sums = np.empty((*R.shape[:-2], 4, 4))
-    for i in range(3):
-        for j in range(3):
-            sums[..., i, j] = R[..., i, j] + R[..., j, i]
-        sums[..., i, i] = 1.0 + squares[..., i]
-    skew = (R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1])
-    for i, difference in enumerate(skew):
-        sums[..., i, 3] = sums[..., 3, i] = difference
-    sums[..., 3, 3] = 1.0 + squares[..., 3]
-    largest = np.argmax(squares, axis=-1)
-    row = np.take_along_axis(sums, largest[..., None, None], axis=-2)[..., 0, :]
-    unit: Array = row / np.linalg.norm(row, axis=-1, keepdims=True)
-    return unit
+    scalar_last = np.roll(matrix_quaternion(poses.rotation), -1, axis=-1)
+    return ArmPoses(t, poses.translation, scalar_last, q)
 
 
 def flange_force(chain: Chain, q: Array, tau: Array) -> Array:

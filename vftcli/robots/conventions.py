@@ -14,19 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array
-
-
-class Pose(NamedTuple):
-    """Orientation (3, 3) and origin (3,) [m] of one frame in another."""
-
-    rotation: Array
-    translation: Array
-
-    def __matmul__(self, other: "Pose") -> "Pose":
-        return Pose(
-            self.rotation @ other.rotation, self.rotation @ other.translation + self.translation
-        )
+from vftcli.signals.pose import IDENTITY, Pose, rotation_x, rotation_z, rpy_matrix
 
 
 class Kinematics(NamedTuple):
@@ -43,33 +31,7 @@ class Kinematics(NamedTuple):
     tip: Pose
 
 
-IDENTITY = Pose(np.eye(3), np.zeros(3))
-
 Joint = Mapping[str, Any]
-
-
-def rotation_x(angle: float) -> Array:
-    """Rotation about x. (3, 3)"""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-
-
-def rotation_y(angle: float) -> Array:
-    """Rotation about y. (3, 3)"""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-
-
-def rotation_z(angle: float) -> Array:
-    """Rotation about z. (3, 3)"""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def rpy(angles: Sequence[float]) -> Array:
-    """Rz(yaw) Ry(pitch) Rx(roll), the URDF's fixed-axis angles. (3, 3)"""
-    roll, pitch, yaw = angles
-    return rotation_z(yaw) @ rotation_y(pitch) @ rotation_x(roll)
 
 
 def standard_dh(joints: Sequence[Joint], document: Mapping[str, Any]) -> Kinematics:
@@ -97,14 +59,14 @@ def modified_dh(joints: Sequence[Joint], document: Mapping[str, Any]) -> Kinemat
 
 def xyz_rpy(joints: Sequence[Joint], document: Mapping[str, Any]) -> Kinematics:
     """Chain frames stated as positions and fixed-axis angles."""
-    placements = [Pose(rpy(j["rpy"]), np.asarray(j["xyz"], dtype=float)) for j in joints]
+    placements = [Pose(rpy_matrix(j["rpy"]), np.asarray(j["xyz"], dtype=float)) for j in joints]
     return Kinematics(placements, [IDENTITY] * len(joints), tip_offset(document))
 
 
 def tip_offset(document: Mapping[str, Any]) -> Pose:
     """The flange in the last frame: `flange_d` along z, then `ee_xyz` and `ee_rpy`."""
     out = Pose(np.eye(3), np.array([0.0, 0.0, float(document.get("flange_d", 0.0))]))
-    turn = rpy(document.get("ee_rpy", (0.0, 0.0, 0.0)))
+    turn = rpy_matrix(document.get("ee_rpy", (0.0, 0.0, 0.0)))
     return out @ Pose(turn, np.asarray(document.get("ee_xyz", (0.0, 0.0, 0.0)), dtype=float))
 
 

@@ -24,6 +24,7 @@ import numpy as np
 
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array, empty_series
+from vftcli.signals.pose import skew
 
 CHUNK = 4096
 """Samples worked on at a time: small enough that a chunk's arrays stay in the cache."""
@@ -73,28 +74,22 @@ def interleave(rows: list[list[Array]]) -> Array:
     return np.ascontiguousarray(dense[np.ix_(order, order)])
 
 
-def cross_matrix(v: Array) -> Array:
-    """The matrix of v × ·. (3, 3)"""
-    x, y, z = v
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
 def maps_of(chain: Chain) -> Maps:
     """Prepare a chain's constants for `momentum_terms`."""
     n, zero = chain.joints, np.zeros((3, 3))
     outward, back, first_moment = np.empty((n, 9, 9)), np.zeros((n, 9, 18)), np.zeros((n, 3, 1))
     behind = np.append(np.cumsum(chain.mass[::-1])[::-1], 0.0)
     for j in range(n):
-        R, r = chain.rotation[j], cross_matrix(chain.translation[j])
+        R, r = chain.rotation[j], skew(chain.translation[j])
         outward[j] = interleave([[R.T, zero, zero], [-R.T @ r, R.T, zero], [zero, zero, R.T]])
-        m, c = chain.mass[j], cross_matrix(chain.com[j])
+        m, c = chain.mass[j], skew(chain.com[j])
         about_origin = chain.inertia[j] - m * c @ c
         back[j, :, :9] = interleave(
             [[-m * c, m * np.eye(3), zero], [about_origin, m * c, zero], [zero, zero, zero]]
         )
         moment = m * chain.com[j]
         if j + 1 < n:
-            R, r = chain.rotation[j + 1], cross_matrix(chain.translation[j + 1])
+            R, r = chain.rotation[j + 1], skew(chain.translation[j + 1])
             back[j, :, 9:] = interleave([[R, zero, zero], [r @ R, R, zero], [zero, zero, R]])
             moment = moment + behind[j + 1] * chain.translation[j + 1]
         first_moment[j, :, 0] = moment

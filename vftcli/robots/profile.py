@@ -10,10 +10,11 @@ from typing import Any, NoReturn
 import numpy as np
 
 from vftcli.robots.chain import Chain, Payload, symmetric, unphysical
-from vftcli.robots.conventions import CONVENTIONS, Convention, Kinematics, rpy
+from vftcli.robots.conventions import CONVENTIONS, Convention, Kinematics
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
+from vftcli.signals.pose import rpy_matrix
 
 SCHEMA = 1
 UPRIGHT = (0.0, 0.0, -9.81)
@@ -293,7 +294,11 @@ def checked_payload(file: RobotFile, section: Mapping[str, Any], table: str) -> 
     mass = number(file, section, "mass", table)
     com = vector(file, section, "com", 3, table) if "com" in section else np.zeros(3)
     tensor = vector(file, section, "inertia", 6, table) if "inertia" in section else np.zeros(6)
-    turn = rpy(vector(file, section, "rpy", 3, table).tolist()) if "rpy" in section else np.eye(3)
+    turn = (
+        rpy_matrix(vector(file, section, "rpy", 3, table).tolist())
+        if "rpy" in section
+        else np.eye(3)
+    )
     com, inertia = turn @ com, turn @ symmetric(tensor.tolist()) @ turn.T
     if why := unphysical(mass, inertia):
         file.refuse(why, table, None, "mass" if why.startswith("mass") else "inertia")

@@ -11,6 +11,7 @@ import numpy as np
 
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
+from vftcli.signals.pose import cross
 
 LINK = 10
 """Inertial parameters a link."""
@@ -22,43 +23,36 @@ TENSOR = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 """Row and column of the six tensor entries, in order."""
 
 
-def cross(a: Array, b: Array) -> Array:
-    """A × b of vectors that stand in the last axis but one. (..., 3, N)"""
-    x, y, z = a[..., 0, :], a[..., 1, :], a[..., 2, :]
-    u, v, w = b[..., 0, :], b[..., 1, :], b[..., 2, :]
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-2)
-
-
 def rotate_z(vectors: Array, cosine: Array, sine: Array) -> Array:
-    """Coordinates of vectors (..., 3, N) in a frame turned about z by the angle."""
-    x, y, z = vectors[..., 0, :], vectors[..., 1, :], vectors[..., 2, :]
-    return np.stack([cosine * x + sine * y, cosine * y - sine * x, z], axis=-2)
+    """Coordinates of vectors (3, ..., N) in a frame turned about z by the angle. (N,)"""
+    x, y, z = vectors
+    return np.stack([cosine * x + sine * y, cosine * y - sine * x, z])
 
 
 def link_columns(
     axis: Array, lever: Array, omega: Array, alpha: Array, acceleration: Array, out: Array
 ) -> None:
-    """Fill the ten columns of one link for the joints before it. `out` is (j+1, 10, N).
+    """Fill the ten columns of one link for the joints up to its own.
 
     The link's force is f = m a + (α̂ + ω̂²) h, its moment about the frame's origin
     n = I α + ω × I ω + h × a; a joint feels axis·n + lever·f, all in the link's axes.
 
     Args:
-        axis: Joint axes. (j+1, 3, N)
-        lever: axis × (origin of the link − origin of the joint). (j+1, 3, N) [m]
+        axis: Joint axes. (3, j+1, N)
+        lever: axis × (origin of the link − origin of the joint). (3, j+1, N) [m]
         omega: Angular velocity ω. (3, N) [rad/s]
         alpha: Angular acceleration α. (3, N) [rad/s²]
         acceleration: Acceleration a of the origin, less gravity. (3, N) [m/s²]
         out: The columns. (j+1, 10, N)
     """
-    out[:, 0] = np.sum(lever * acceleration, axis=1)
-    out[:, 1:4] = cross(lever, alpha) + cross(omega, cross(omega, lever))
-    out[:, 1:4] += cross(acceleration, axis)
+    out[:, 0] = np.sum(lever * acceleration[:, None], axis=0)
+    first_moment = cross(lever, alpha) + cross(omega, cross(omega, lever))
+    out[:, 1:4] = (first_moment + cross(acceleration, axis)).swapaxes(0, 1)
     turned = cross(axis, omega)
     for k, (r, c) in enumerate(TENSOR, start=4):
-        out[:, k] = axis[:, r] * alpha[c] + turned[:, r] * omega[c]
+        out[:, k] = axis[r] * alpha[c] + turned[r] * omega[c]
         if r != c:
-            out[:, k] += axis[:, c] * alpha[r] + turned[:, c] * omega[r]
+            out[:, k] += axis[c] * alpha[r] + turned[c] * omega[r]
 
 
 def torque_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
@@ -78,14 +72,14 @@ def torque_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
     cosine, sine = np.cos(q.T), np.sin(q.T)
     omega, alpha = np.zeros((3, samples)), np.zeros((3, samples))
     acceleration = np.repeat(-chain.gravity[:, None], samples, axis=1)
-    axes, levers = np.zeros((0, 3, samples)), np.zeros((0, 3, samples))
+    axes, levers = np.zeros((3, 0, samples)), np.zeros((3, 0, samples))
     for j in range(n):
         shift = np.repeat(chain.translation[j][:, None], samples, axis=1)
         acceleration = acceleration + cross(alpha, shift) + cross(omega, cross(omega, shift))
-        levers = levers + cross(axes, np.broadcast_to(shift, axes.shape))
+        levers = levers + cross(axes, shift)
         turn = chain.rotation[j].T
         omega, alpha, acceleration, axes, levers = (
-            rotate_z(turn @ v, cosine[j], sine[j])
+            rotate_z(np.tensordot(turn, v, axes=1), cosine[j], sine[j])
             for v in (omega, alpha, acceleration, axes, levers)
         )
         spin = np.zeros((3, samples))
@@ -93,10 +87,10 @@ def torque_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
         alpha = alpha + cross(omega, spin)
         alpha[2] += ddq[:, j]
         omega = omega + spin
-        own = np.zeros((1, 3, samples))
-        own[:, 2] = 1.0
-        axes = np.concatenate([axes, own])
-        levers = np.concatenate([levers, np.zeros((1, 3, samples))])
+        own = np.zeros((3, 1, samples))
+        own[2] = 1.0
+        axes = np.concatenate([axes, own], axis=1)
+        levers = np.concatenate([levers, np.zeros((3, 1, samples))], axis=1)
         link_columns(axes, levers, omega, alpha, acceleration, out[: j + 1, j])
     return np.ascontiguousarray(out.transpose(3, 0, 1, 2)).reshape(samples, n, n * LINK)
 

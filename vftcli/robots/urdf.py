@@ -12,6 +12,7 @@ from vftcli.robots.profile import UPRIGHT, RobotFile, assemble, column
 from vftcli.robots.robot import Limits, Robot, SensorNoise
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
+from vftcli.signals.pose import rotation_onto
 
 FREE_JOINTS = (
     "JointModelRUBX",
@@ -103,7 +104,7 @@ def chain_from_model(model: Any, owner: str) -> Chain:  # noqa: ANN401 - Pinocch
                 f"{owner}: joint {name!r} branches off {model.names[model.parents[k]]!r}; only "
                 "serial arms are supported. Remove the gripper or lock its joints (type fixed)."
             )
-        turn = align_z(joint_axis(model, k, owner))
+        turn = rotation_onto(joint_axis(model, k, owner))
         place = model.jointPlacements[k]
         rotations.append(turn_before.T @ place.rotation @ turn)
         translations.append(turn_before.T @ place.translation)
@@ -149,17 +150,6 @@ def joint_axis(model: Any, index: int, owner: str) -> Array:  # noqa: ANN401
     pin.computeJointJacobians(model, data, pin.neutral(model))
     local = pin.getJointJacobian(model, data, index, pin.ReferenceFrame.LOCAL)
     return np.array(local[3:, joint.idx_v])
-
-
-def align_z(axis: Array) -> Array:
-    """A rotation whose third column is `axis` (any turn about it is as good). (3, 3)"""
-    z = axis / np.linalg.norm(axis)
-    if np.allclose(z, (0.0, 0.0, 1.0), atol=1e-15):
-        return np.eye(3)
-    start = np.eye(3)[int(np.argmin(np.abs(z)))]
-    x = np.cross(start, z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
 
 
 def flange_placement(model: Any, last: int) -> Any:  # noqa: ANN401

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from vftcli.robots.chain import Chain, Payload
-from vftcli.robots.conventions import CONVENTIONS, Pose
+from vftcli.robots.conventions import CONVENTIONS
 from vftcli.robots.profile import SCHEMA
 from vftcli.robots.robot import Limits, Robot, SensorNoise
-from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
+from vftcli.signals.pose import Pose, rpy_angles
 
 Table = dict[str, Any]
 
@@ -105,7 +105,11 @@ def xyz_rpy_document(robot: Robot) -> Table:
     joints: list[Table] = []
     for j, name in enumerate(chain.names):
         place = Pose(chain.rotation[j], chain.translation[j])
-        table = {"name": name, "xyz": place.translation.tolist(), "rpy": angles(place.rotation)}
+        table = {
+            "name": name,
+            "xyz": place.translation.tolist(),
+            "rpy": list(rpy_angles(place.rotation)),
+        }
         for group in (robot.limits, robot.noise):
             table |= known_numbers(group, j)
         joints.append(table)
@@ -113,7 +117,7 @@ def xyz_rpy_document(robot: Robot) -> Table:
         **{key: value for key, value in robot.document.items() if key != "joints"},
         "convention": "xyz-rpy",
         "ee_xyz": chain.flange_translation.tolist(),
-        "ee_rpy": angles(chain.flange_rotation),
+        "ee_rpy": list(rpy_angles(chain.flange_rotation)),
         "joints": joints,
     }
 
@@ -123,14 +127,6 @@ def known_numbers(group: Limits | SensorNoise, j: int) -> Table:
     prefix = "noise_" if isinstance(group, SensorNoise) else ""
     values = {f"{prefix}{key}": float(getattr(group, key)[j]) for key in vars(group)}
     return {key: value for key, value in values.items() if math.isfinite(value)}
-
-
-def angles(R: Array) -> list[float]:
-    """Roll, pitch and yaw of a rotation Rz(yaw) Ry(pitch) Rx(roll). [rad]"""
-    pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
-    if math.hypot(R[0, 0], R[1, 0]) < 1e-9:  # yaw and roll turn about one axis
-        return [math.atan2(-R[1, 2], R[1, 1]), pitch, 0.0]
-    return [math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])]
 
 
 def lines_of(document: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[str]:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from vftcli.robots.conventions import rpy
 from vftcli.signals.arrays import Array
+from vftcli.signals.pose import rpy_matrix
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.scenario import ForceSensorSpec
 from vftcli.simulation.sensing import Samples
@@ -21,7 +21,7 @@ def read_force_sensor(arm: Arm, samples: Samples, truth: Truth) -> Array | None:
         return None
     rng = np.random.default_rng(arm.seeds["sensing"].spawn(1)[0])
     clean = np.zeros((len(samples.time), 6))
-    turn = rpy(spec.rpy)
+    turn = rpy_matrix(spec.rpy)
     rotations, specific = tool_motion(arm, samples, spec, turn)
     for k, R in enumerate(rotations):
         force = R.T @ truth.wrench[k, :3]

@@ -7,6 +7,7 @@ import numpy as np
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.pose import cross
 from vftcli.simulation.contact import Place, Touch
 from vftcli.simulation.contacts import ContactSpec, RandomWalkSpec, WrenchSpec
 
@@ -77,13 +78,6 @@ def draw_walk(
     late = np.arange(steps) * step >= spec.begin
     begun = walk - (walk[np.argmax(late)] if spec.begin > 0 else 0.0)
     return Walk(spec.name, begun * late[:, None])
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Cross product of two 3-vectors, without NumPy's general machinery."""
-    return np.array(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
 
 
 class Touching:

@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.conventions import IDENTITY, Pose, rpy
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.pose import IDENTITY, Pose, adjoint, inverse, rpy_matrix
 
 ROTATION_TOLERANCE = 1e-6
 """How far RᵀR may lie from the identity: nine printed digits of a rotation leave 1e-9."""
@@ -45,37 +45,6 @@ class Mounting(NamedTuple):
 
 NOTHING = Mounting()
 """A bare flange."""
-
-
-def skew(p: Array) -> Array:
-    """[p]×, so that [p]× f = p × f. (..., 3, 3) of (..., 3)"""
-    zero = np.zeros(p.shape[:-1])
-    x, y, z = p[..., 0], p[..., 1], p[..., 2]
-    rows = [zero, -z, y, z, zero, -x, -y, x, zero]
-    return np.stack(rows, axis=-1).reshape(*p.shape[:-1], 3, 3)
-
-
-def adjoint(pose: Pose) -> Array:
-    """The matrix that takes a wrench in S to F, for the pose of S in F (56). (..., 6, 6)"""
-    R, p = np.asarray(pose.rotation), np.asarray(pose.translation)
-    X = np.zeros((*R.shape[:-2], 6, 6))
-    X[..., :3, :3] = X[..., 3:, 3:] = R
-    X[..., 3:, :3] = skew(p) @ R
-    return X
-
-
-def inverse(pose: Pose) -> Pose:
-    """The pose of F in S, from the pose of S in F."""
-    turned = np.swapaxes(pose.rotation, -1, -2)
-    return Pose(turned, -np.squeeze(turned @ pose.translation[..., None], axis=-1))
-
-
-def angles_of(rotation: Array) -> tuple[float, float, float]:
-    """Roll, pitch and yaw of a rotation, `rpy` turned round. [rad]"""
-    pitch = float(np.arcsin(np.clip(-rotation[2, 0], -1.0, 1.0)))
-    roll = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
-    yaw = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
-    return roll, pitch, yaw
 
 
 def check_frame(name: str) -> str:
@@ -180,7 +149,7 @@ def pose_of_numbers(numbers: Sequence[float], what: str) -> Pose:
     if len(numbers) == 3:
         return checked_pose(np.eye(3), p, what)
     if len(numbers) == 6:
-        return checked_pose(rpy(numbers[3:]), p, what)
+        return checked_pose(rpy_matrix(numbers[3:]), p, what)
     if len(numbers) == 12:
         return checked_pose(np.reshape(numbers[3:], (3, 3)), p, what)
     raise ParameterError(
@@ -230,7 +199,7 @@ def section_pose(table: dict[str, object], what: str) -> Pose:
         raise ParameterError(f"{what}: xyz and rpy are three numbers each") from None
     if xyz.shape != (3,) or angles.shape != (3,):
         raise ParameterError(f"{what}: xyz and rpy are three numbers each")
-    return checked_pose(rpy(angles.tolist()), xyz, what)
+    return checked_pose(rpy_matrix(angles.tolist()), xyz, what)
 
 
 def own_pose(robot: Robot, section: str) -> Pose | None:

@@ -5,13 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.robots.chain import Chain
-from vftcli.robots.conventions import IDENTITY
 from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, ParameterError
+from vftcli.signals.pose import IDENTITY, adjoint
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.frames import FRAMES, Mounting, adjoint, to_base
+from vftcli.virtual_sensor.frames import FRAMES, Mounting, to_base
 
 
 class Stated(NamedTuple):

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.robots.chain import Chain
-from vftcli.robots.conventions import IDENTITY
 from vftcli.robots.kinematics import link_poses
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.pose import IDENTITY
 from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.choice import FIT, WrenchChoice
 from vftcli.virtual_sensor.frames import Mounting

@@ -6,11 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.robots.conventions import Pose
 from vftcli.signals.arrays import Array, frozen, is_uniform
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.pose import Pose, rpy_angles, skew
 from vftcli.signals.series import bridged, median_step, resampled
-from vftcli.virtual_sensor.frames import angles_of, skew
 from vftcli.virtual_sensor.solvers import SCALE
 
 LEAST_DIRECTIONS = 0.02
@@ -219,7 +218,7 @@ def comparable(series: Array) -> Array:
 def described(fit: PoseFit) -> str:
     """A fitted pose in words."""
     x, y, z = fit.pose.translation * 1e3
-    roll, pitch, yaw = np.degrees(angles_of(fit.pose.rotation))
+    roll, pitch, yaw = np.degrees(rpy_angles(fit.pose.rotation))
     sx, sy, sz = fit.position_sd * 1e3
     return (
         f"sensor pose found from the log: x, y, z = {x:.1f} ± {sx:.1f}, {y:.1f} ± {sy:.1f}, "

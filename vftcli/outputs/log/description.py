@@ -7,6 +7,7 @@ import numpy as np
 from vftcli.outputs.arm import Capsule, capsules
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
+from vftcli.signals.pose import rotation_onto, rpy_angles
 
 
 def urdf_text(robot: Robot, names: tuple[str, ...]) -> str:
@@ -40,7 +41,7 @@ def urdf_text(robot: Robot, names: tuple[str, ...]) -> str:
 def link(name: str, shapes: list[Capsule], inertial: str) -> str:
     """One link with what it looks like."""
     visuals = "".join(
-        f"<visual>{origin(s.start + 0.5 * s.direction, turn_z_to(s.direction))}<geometry>"
+        f"<visual>{origin(s.start + 0.5 * s.direction, rotation_onto(s.direction))}<geometry>"
         f'<cylinder radius="{s.radius:.6g}" length="{np.linalg.norm(s.direction):.9g}"/>'
         "</geometry></visual>"
         for s in shapes
@@ -72,19 +73,6 @@ def limit_text(robot: Robot, j: int) -> str:
 
 def origin(translation: Array, rotation: Array) -> str:
     """A pose as URDF writes it: R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    R = rotation
-    pitch = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
-    if np.hypot(R[0, 0], R[1, 0]) > 1e-9:
-        roll, yaw = np.arctan2(R[2, 1], R[2, 2]), np.arctan2(R[1, 0], R[0, 0])
-    else:  # gimbal lock: only roll − yaw or roll + yaw counts
-        roll, yaw = np.arctan2(-R[1, 2], R[1, 1]), 0.0
+    roll, pitch, yaw = rpy_angles(rotation)
     xyz = " ".join(f"{value:.12g}" for value in translation)
     return f'<origin xyz="{xyz}" rpy="{roll:.15g} {pitch:.15g} {yaw:.15g}"/>'
-
-
-def turn_z_to(direction: Array) -> Array:
-    """A rotation whose z axis points along a direction. (3, 3)"""
-    z = direction / np.linalg.norm(direction)
-    across = np.eye(3)[int(np.argmin(np.abs(z)))]
-    x = np.cross(across, z) / np.linalg.norm(np.cross(across, z))
-    return np.column_stack([x, np.cross(z, x), z])

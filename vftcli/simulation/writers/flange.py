@@ -45,13 +45,6 @@ def flange_signals(model: Any, q: Array, dq: Array) -> FlangeSignals:  # noqa: A
     return FlangeSignals(rotation=rotation, position=position, twist=twist, jacobian=jacobian)
 
 
-def rotation_vectors(rotation: Array) -> Array:
-    """Rotation vectors of orientations (M, 3, 3), as UR logs them. (M, 3) [rad]"""
-    import pinocchio as pin
-
-    return np.array([pin.log3(R) for R in rotation])
-
-
 def force_estimate(jacobian: Array, tau_ext: Array) -> tuple[Array, Mask]:
     """The wrench (M, 6) that explains joint torques (M, n), and where J is regular. (M,)
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.pose import log_matrix
 from vftcli.simulation.experiment import Simulation
-from vftcli.simulation.writers.flange import flange_signals, force_estimate, rotation_vectors
+from vftcli.simulation.writers.flange import flange_signals, force_estimate
 
 DIGITS = 9
 """Decimals kept; the client prints all seventeen digits, noise included."""
@@ -151,8 +152,8 @@ def tool_fields(simulation: Simulation) -> dict[str, Array]:
     actual = flange_signals(model, measured.q, measured.dq)
     target = flange_signals(model, samples.target_q, samples.target_dq)
     force, _ = force_estimate(actual.jacobian, simulation.vendor.tau_ext)
-    pose = np.hstack([actual.position, rotation_vectors(actual.rotation)])
-    target_pose = np.hstack([target.position, rotation_vectors(target.rotation)])
+    pose = np.hstack([actual.position, log_matrix(actual.rotation)])
+    target_pose = np.hstack([target.position, log_matrix(target.rotation)])
     weightless = np.gradient(samples.target_dq, samples.time, axis=0)
     felt = np.einsum("kij,kj->ki", target.jacobian[:, :3], weightless) - model.gravity.linear
     return {
