@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vftcli.readers.bags.container import Batch, Channel, Ingest, Integers
-from vftcli.readers.bags.definitions import types_for
 from vftcli.readers.bags.kinds import KINDS, Kind, constant_in, paths_in
 from vftcli.readers.bags.layout import LayoutError, MessageLayout, Types, Walker
+from vftcli.readers.bags.ros_messages import types_for
 from vftcli.readers.joints import kinematic_order
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError

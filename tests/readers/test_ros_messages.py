@@ -1,0 +1,84 @@
+"""Messages are written as rosbags writes them, and the definitions are what it understands."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from vftcli.readers.bags.layout import fields_of, short
+from vftcli.readers.bags.ros_messages import (
+    FRANKA,
+    ROS,
+    in_parts,
+    long_name,
+    own_types,
+    schema_text,
+    serialised,
+    stamped,
+)
+from vftcli.signals.errors import OutputError
+
+STORE = get_typestore(Stores.ROS2_HUMBLE)
+TIMES = np.array([0, 1_700_000_000_123_456_789, 4_000_000_000], dtype=np.int64)
+
+
+def header(time, frame):
+    """The header that rosbags makes of a stamp [ns]."""
+    stamp = STORE.types["builtin_interfaces/msg/Time"](sec=time // 10**9, nanosec=time % 10**9)
+    return STORE.types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
+
+
+@pytest.mark.parametrize("kind", sorted(ROS))
+def test_the_types_of_ros_are_those_of_rosbags(kind):
+    assert own_types()[kind] == fields_of(STORE.fielddefs[long_name(kind)][1])
+
+
+@pytest.mark.parametrize("kind", sorted(FRANKA))
+def test_the_fields_of_frankas_types_are_those_that_rosbags_parses(kind):
+    parsed = get_types_from_msg(FRANKA[kind], long_name(kind))[long_name(kind)][1]
+    assert own_types()[kind] == fields_of(parsed)
+
+
+@pytest.mark.parametrize("kind", ["sensor_msgs/JointState", "geometry_msgs/WrenchStamped"])
+def test_a_schema_embeds_every_type_it_needs(kind):
+    parsed = get_types_from_msg(schema_text(kind), long_name(kind))
+    needed = {field.type for name in parsed for field in fields_of(parsed[name][1])}
+    assert {name for name in needed if "/" in name} <= {short(name) for name in parsed}
+
+
+@given(
+    names=st.lists(st.text(max_size=9).filter(lambda text: "\0" not in text), max_size=8),
+    joints=st.integers(0, 8),
+    frame=st.text(max_size=7).filter(lambda text: "\0" not in text),
+    seed=st.integers(0, 99),
+)
+def test_joint_states_are_the_bytes_that_rosbags_writes(names, joints, frame, seed):
+    position, effort = np.random.default_rng(seed).normal(size=(2, len(TIMES), joints))
+    values = {**stamped(TIMES), "header.frame_id": frame, "name": names}
+    values |= {"position": position, "effort": effort}
+    found = serialised("sensor_msgs/JointState", values, len(TIMES))
+    kind = STORE.types["sensor_msgs/msg/JointState"]
+    for k, time in enumerate(TIMES.tolist()):
+        columns = {"position": position[k], "velocity": np.zeros(0), "effort": effort[k]}
+        message = kind(header=header(time, frame), name=names, **columns)
+        expected = bytes(STORE.serialize_cdr(message, "sensor_msgs/msg/JointState"))
+        assert found[k].tobytes() == expected
+
+
+def test_parts_and_constants_go_to_their_fields():
+    force, torque = np.random.default_rng(0).normal(size=(2, 3, 3))
+    values = {**stamped(TIMES), "header.frame_id": "tool"}
+    values |= {**in_parts("wrench.force", "xyz", force), **in_parts("wrench.torque", "xyz", torque)}
+    found = serialised("geometry_msgs/WrenchStamped", values, 3)
+    message = STORE.deserialize_cdr(found[2].tobytes(), "geometry_msgs/msg/WrenchStamped")
+    assert message.header.stamp.sec == 4
+    assert message.wrench.force.y == force[2, 1]
+    assert message.wrench.torque.z == torque[2, 2]
+    constant = serialised("geometry_msgs/Vector3", {"y": 2.5}, 4)
+    assert STORE.deserialize_cdr(constant[3].tobytes(), "geometry_msgs/msg/Vector3").y == 2.5
+
+
+def test_a_field_that_is_not_there_is_refused():
+    with pytest.raises(OutputError, match="has no field positions"):
+        serialised("sensor_msgs/JointState", {"positions": np.zeros((1, 6))}, 1)

@@ -1,0 +1,293 @@
+"""ROS 2 messages that vftcli knows by itself: their definitions, for reading bags and for writing.
+
+Bags of ROS 2 Humble and older hold no definitions, and a bag that is written needs them. Names,
+types and order of Franka's fields are those published in frankarobotics/franka_ros2 (0.1.10).
+"""
+
+import re
+import struct
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.readers.bags.container import Bytes, Channel
+from vftcli.readers.bags.layout import SIZES, Field, LayoutError, Types, fields_of, short, types_of
+from vftcli.signals.errors import LogError, OutputError
+
+FRANKA_ERRORS = (
+    "joint_position_limits_violation cartesian_position_limits_violation "
+    "self_collision_avoidance_violation joint_velocity_violation cartesian_velocity_violation "
+    "force_control_safety_violation joint_reflex cartesian_reflex "
+    "max_goal_pose_deviation_violation max_path_pose_deviation_violation "
+    "cartesian_velocity_profile_safety_violation "
+    "joint_position_motion_generator_start_pose_invalid "
+    "joint_motion_generator_position_limits_violation "
+    "joint_motion_generator_velocity_limits_violation "
+    "joint_motion_generator_velocity_discontinuity "
+    "joint_motion_generator_acceleration_discontinuity "
+    "cartesian_position_motion_generator_start_pose_invalid "
+    "cartesian_motion_generator_elbow_limit_violation "
+    "cartesian_motion_generator_velocity_limits_violation "
+    "cartesian_motion_generator_velocity_discontinuity "
+    "cartesian_motion_generator_acceleration_discontinuity "
+    "cartesian_motion_generator_elbow_sign_inconsistent "
+    "cartesian_motion_generator_start_elbow_invalid "
+    "cartesian_motion_generator_joint_position_limits_violation "
+    "cartesian_motion_generator_joint_velocity_limits_violation "
+    "cartesian_motion_generator_joint_velocity_discontinuity "
+    "cartesian_motion_generator_joint_acceleration_discontinuity "
+    "cartesian_position_motion_generator_invalid_frame "
+    "force_controller_desired_force_tolerance_violation controller_torque_discontinuity "
+    "start_elbow_sign_inconsistent communication_constraints_violation power_limit_violation "
+    "joint_p2p_insufficient_torque_for_planning tau_j_range_violation instability_detected"
+)
+
+FRANKA: dict[str, str] = {
+    "franka_msgs/Errors": "\n".join(f"bool {name}" for name in FRANKA_ERRORS.split()),
+    "franka_msgs/Elbow": """float64[2] position
+float64[2] desired_position
+float64[2] commanded_position
+float64[2] commanded_velocity
+float64[2] commanded_acceleration
+""",
+    "franka_msgs/CollisionIndicators": """geometry_msgs/Vector3 is_cartesian_linear_collision
+geometry_msgs/Vector3 is_cartesian_angular_collision
+geometry_msgs/Vector3 is_cartesian_linear_contact
+geometry_msgs/Vector3 is_cartesian_angular_contact
+float64[7] is_joint_collision
+float64[7] is_joint_contact
+""",
+    "franka_msgs/FrankaRobotState": """uint8 ROBOT_MODE_OTHER=0
+uint8 ROBOT_MODE_IDLE=1
+uint8 ROBOT_MODE_MOVE=2
+uint8 ROBOT_MODE_GUIDING=3
+uint8 ROBOT_MODE_REFLEX=4
+uint8 ROBOT_MODE_USER_STOPPED=5
+uint8 ROBOT_MODE_AUTOMATIC_ERROR_RECOVERY=6
+std_msgs/Header header
+franka_msgs/CollisionIndicators collision_indicators
+sensor_msgs/JointState measured_joint_state
+sensor_msgs/JointState desired_joint_state
+sensor_msgs/JointState measured_joint_motor_state
+float64[7] ddq_d
+float64[7] dtau_j
+sensor_msgs/JointState tau_ext_hat_filtered
+franka_msgs/Elbow elbow
+geometry_msgs/WrenchStamped k_f_ext_hat_k
+geometry_msgs/WrenchStamped o_f_ext_hat_k
+geometry_msgs/InertiaStamped inertia_ee
+geometry_msgs/InertiaStamped inertia_load
+geometry_msgs/InertiaStamped inertia_total
+geometry_msgs/PoseStamped o_t_ee
+geometry_msgs/PoseStamped o_t_ee_d
+geometry_msgs/PoseStamped o_t_ee_c
+geometry_msgs/PoseStamped f_t_ee
+geometry_msgs/PoseStamped ee_t_k
+geometry_msgs/TwistStamped o_dp_ee_d
+geometry_msgs/TwistStamped o_dp_ee_c
+geometry_msgs/AccelStamped o_ddp_ee_c
+float64 time
+float64 control_command_success_rate
+uint8 robot_mode
+franka_msgs/Errors current_errors
+franka_msgs/Errors last_motion_errors
+""",
+}
+"""Type of Franka's state → its definition."""
+
+ROS: dict[str, str] = {
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec",
+    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id",
+    "std_msgs/String": "string data",
+    "sensor_msgs/JointState": """std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+""",
+    "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z",
+    "geometry_msgs/Wrench": "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque",
+    "geometry_msgs/WrenchStamped": "std_msgs/Header header\ngeometry_msgs/Wrench wrench",
+}
+"""Types of ROS 2's own packages that are written, here so that writing needs no type store."""
+
+DEFINITIONS = {**ROS, **FRANKA}
+"""Message type as package/Name → its definition."""
+
+LINE = re.compile(r"(?P<type>[\w/]+)(?:\[(?P<many>\d*)\])? (?P<name>\w+)")
+"""A field in a definition; lines that set a constant do not match."""
+
+
+def long_name(kind: str) -> str:
+    """A type's name as ROS 2 has it: std_msgs/Header → std_msgs/msg/Header."""
+    return kind.replace("/", "/msg/")
+
+
+@cache
+def own_types() -> dict[str, tuple[Field, ...]]:
+    """The fields of every type of `DEFINITIONS`."""
+    return {
+        kind: tuple(
+            Field(m["name"], m["type"], None if m["many"] is None else int(m["many"] or -1))
+            for m in map(LINE.fullmatch, text.splitlines())
+            if m is not None
+        )
+        for kind, text in DEFINITIONS.items()
+    }
+
+
+def schema_text(kind: str) -> str:
+    """A type's definition followed by those of the types it is made of, as bags embed them."""
+    parts = (f"{'=' * 80}\nMSG: {name}\n{DEFINITIONS[name].rstrip()}" for name in parts_of(kind))
+    return "\n".join([DEFINITIONS[kind].rstrip(), *parts]) + "\n"
+
+
+def parts_of(kind: str) -> Sequence[str]:
+    """The types of `DEFINITIONS` that a type is made of, each once, in the order they are met."""
+    found: dict[str, None] = {}
+    for field in own_types()[kind]:
+        if field.type in DEFINITIONS:
+            found |= dict.fromkeys([field.type, *parts_of(field.type)])
+    return tuple(found)
+
+
+@cache
+def known_types() -> dict[str, tuple[Field, ...]]:
+    """The fields of ROS 2 Humble's types, from rosbags' store, and of those defined here."""
+    from rosbags.typesys import Stores, get_typestore
+
+    found = {}
+    for name, (_, fields) in get_typestore(Stores.ROS2_HUMBLE).fielddefs.items():
+        try:
+            found[short(name)] = fields_of(fields)
+        except LayoutError:
+            continue
+    return found | own_types()
+
+
+def types_for(channel: Channel) -> dict[str, tuple[Field, ...]]:
+    """All types that a channel's messages are made of: the container's own first.
+
+    Raises:
+        LogError: If neither the container nor this package knows the type.
+        LayoutError: If the container's definition cannot be parsed.
+    """
+    known = dict(known_types())
+    if channel.definition:
+        known |= types_of(channel.definition, long_name(channel.type), idl=channel.idl)
+    if channel.encoding == "ros1":
+        # ROS 1 has no int32 seconds in a message of their own: time is a primitive of two words.
+        time = own_types()["builtin_interfaces/Time"]
+        known |= {"builtin_interfaces/Time": time, "builtin_interfaces/Duration": time}
+    if channel.type not in known:
+        raise LogError(
+            f"topic {channel.topic}: the bag holds no definition of {channel.type}. Convert it "
+            "with ros2 bag convert on a machine that has the package."
+        )
+    return known
+
+
+Value = str | Sequence[str] | float | NDArray[Any]
+"""Text, names, a number, or numbers: one row a message, or one row for all."""
+
+
+def serialised(
+    kind: str, values: Mapping[str, Value], rows: int, types: Types | None = None
+) -> Bytes:
+    """Many messages of one type and one layout in CDR, little-endian. (T, size)
+
+    The definition is walked once; every message has the same bytes but for the numbers, which are
+    put in column by column.
+
+    Args:
+        kind: The type, as package/Name.
+        values: Dotted path of a field → its value; a field without one is zero or empty.
+        rows: Number of messages T.
+        types: The definitions; None for those of this file.
+
+    Raises:
+        OutputError: If a path is none of the type's fields.
+    """
+    message = Serialiser(types if types is not None else own_types(), values)
+    message.walk("", kind)
+    if unknown := set(values) - message.met:
+        raise OutputError(f"{kind} has no field {sorted(unknown)[0]}")
+    out = np.tile(np.frombuffer(bytes(message.template), dtype=np.uint8), (rows, 1))
+    for start, numbers in message.numbers:
+        packed = numbers.view(np.uint8)
+        out[:, start : start + packed.shape[1]] = packed
+    return out
+
+
+def stamped(times: NDArray[np.int64], path: str = "header.stamp") -> dict[str, Value]:
+    """The values of a stamp, of times since 1970. (T,) [ns]"""
+    return {f"{path}.sec": times // 10**9, f"{path}.nanosec": times % 10**9}
+
+
+def in_parts(path: str, names: str, columns: NDArray[Any]) -> dict[str, Value]:
+    """The values of a vector's parts: ``in_parts("force", "xyz", …)`` gives force.x and so on."""
+    return {f"{path}.{name}": column for name, column in zip(names, columns.T, strict=True)}
+
+
+class Serialiser:
+    """Walks a definition and lays its fields one behind the other.
+
+    Attributes:
+        template: The bytes of a message, zeros where numbers go.
+        numbers: Where numbers go, and one row of them a message or one for all.
+        met: Paths of all fields that were walked.
+    """
+
+    def __init__(self, types: Types, values: Mapping[str, Value]) -> None:
+        self.types = types
+        self.values = values
+        self.template = bytearray(b"\0\1\0\0")  # CDR, little-endian
+        self.numbers: list[tuple[int, NDArray[Any]]] = []
+        self.met: set[str] = set()
+
+    def walk(self, path: str, kind: str) -> None:
+        """Lay the fields of one message."""
+        for field in self.types[kind]:
+            self._field(f"{path}.{field.name}" if path else field.name, field)
+
+    def _field(self, path: str, field: Field) -> None:
+        self.met.add(path)
+        value = self.values.get(path)
+        if field.type in SIZES:
+            self._numbers(value, np.dtype(f"<{SIZES[field.type]}"), field.many)
+        elif field.type == "string":
+            texts: Any = [value or ""] if field.many is None else value or ()
+            if field.many == -1:
+                self._count(len(texts))
+            for text in texts:
+                raw = str(text).encode() + b"\0"
+                self._count(len(raw))
+                self.template += raw
+        elif field.many is None:
+            self.walk(path, field.type)
+        else:
+            self._count(0)  # sequences of messages stay empty
+
+    def _numbers(self, value: Value | None, dtype: np.dtype[Any], many: int | None) -> None:
+        given = np.zeros(0) if value is None else np.asarray(value, dtype=dtype)
+        width = 1 if many is None else many
+        if width < 0:
+            width = given.shape[-1]
+            self._count(width)
+        if not width:
+            return
+        self._align(dtype.itemsize)
+        if value is not None:
+            table = np.ascontiguousarray(given.reshape(-1, width), dtype=dtype)
+            self.numbers.append((len(self.template), table))
+        self.template += bytes(width * dtype.itemsize)
+
+    def _count(self, count: int) -> None:
+        self._align(4)
+        self.template += struct.pack("<I", count)
+
+    def _align(self, size: int) -> None:
+        self.template += bytes(-(len(self.template) - 4) % size)
