@@ -14,8 +14,12 @@ import polars as pl
 import pytest
 
 import vftcli as vft
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.readers.reader import ReadChoice
 from vftcli.repetition.choice import FreeChoice
+from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.signals.errors import RobotError
 
@@ -29,7 +33,10 @@ def rmse_of(analysis: vft.Analysis, observer: str = "gmo") -> np.ndarray:
 
 
 def test_a_fixture_goes_all_the_way_to_a_table() -> None:
-    request = AnalysisChoice(robot="ur5", reference=f"file:{FIXTURE}.truth.parquet")
+    request = AnalysisChoice(
+        robot=RobotChoice(name="ur5"),
+        reference=ReferenceChoice(name=f"file:{FIXTURE}.truth.parquet"),
+    )
     analysis = analyse_log(FIXTURE, request)
     assert analysis.errors is not None
     joint_rows = analysis.errors
@@ -48,14 +55,16 @@ def test_the_log_must_settle_its_robot_or_be_told() -> None:
 
 
 def test_an_interval_keeps_the_logs_own_time() -> None:
-    analysis = analyse_log(FIXTURE, AnalysisChoice(robot="ur5", interval="4:8"))
+    analysis = analyse_log(
+        FIXTURE, AnalysisChoice(read=ReadChoice(interval=(4.0, 8.0)), robot=RobotChoice(name="ur5"))
+    )
     assert analysis.t[0] >= 4.0
     assert analysis.t[-1] <= 8.0
 
 
 def test_as_printed_differs_and_says_so() -> None:
-    short = AnalysisChoice(robot="ur5", interval="4:6")
-    printed = analyse_log(FIXTURE, replace(short, as_printed=True))
+    short = AnalysisChoice(read=ReadChoice(interval=(4.0, 6.0)), robot=RobotChoice(name="ur5"))
+    printed = analyse_log(FIXTURE, replace(short, observers=ObserverChoice(as_printed=True)))
     corrected = analyse_log(FIXTURE, short)
     assert any("as printed" in note for note in printed.notes)
     for one, other in zip(printed.estimates, corrected.estimates, strict=True):
@@ -66,9 +75,9 @@ def test_mujoco_ur5e_with_its_own_model(logs: Path) -> None:
     """An independent engine's log; its own truth is the vendor column. Prototype .426 … .058."""
     folder = logs / "mujoco_ur5e"
     request = AnalysisChoice(
-        robot=str(folder / "robot.toml"),
-        settings=("gmo.gain=30",),
-        reference="vendor",
+        robot=RobotChoice(name=str(folder / "robot.toml")),
+        observers=ObserverChoice.parsed(assignments=("gmo.gain=30",)),
+        reference=ReferenceChoice(name="vendor"),
     )
     rmse = rmse_of(analyse_log(folder / "circle.csv", request))
     assert np.all(rmse <= [0.47, 0.54, 0.40, 0.13, 0.05, 0.08])
@@ -81,10 +90,10 @@ def test_libfranka_simulation_against_its_truth(logs: Path, tmp_path: Path) -> N
         with gzip.open(folder / f"{name}.gz") as packed, (tmp_path / name).open("wb") as plain:
             shutil.copyfileobj(packed, plain)
     request = AnalysisChoice(
-        robot=str(folder / "robot.toml"),
-        settings=("gmo.gain=30",),
-        reference=f"file:{tmp_path / 'pushes_truth.csv'}",
-        interval="1.5:27.5",
+        read=ReadChoice(interval=(1.5, 27.5)),
+        robot=RobotChoice(name=str(folder / "robot.toml")),
+        observers=ObserverChoice.parsed(assignments=("gmo.gain=30",)),
+        reference=ReferenceChoice(name=f"file:{tmp_path / 'pushes_truth.csv'}"),
     )
     rmse = rmse_of(analyse_log(tmp_path / "pushes.csv", request))
     assert np.all(rmse <= [0.16, 0.22, 0.19, 0.25, 0.04, 0.05, 0.02])
@@ -110,9 +119,16 @@ def test_panda_in_free_motion_from_its_four_text_files(logs: Path) -> None:
 def test_ur10e_in_free_motion_needs_rotor_and_friction(logs: Path) -> None:
     """Real: the prototype's mean of six rms is 1.64 N·m; without rotor or friction it is worse."""
     path = logs / "ur10e" / "free_14harm.csv"
-    request = AnalysisChoice(robot="ur10e", columns=UR10E, reference="zero", observers=("gmo",))
+    request = AnalysisChoice(
+        read=ReadChoice(columns=UR10E),
+        robot=RobotChoice(name="ur10e"),
+        observers=ObserverChoice(names=("gmo",)),
+        reference=ReferenceChoice(name="zero"),
+    )
     full = rmse_of(analyse_log(path, request)).mean()
-    without_friction = rmse_of(analyse_log(path, replace(request, friction="none"))).mean()
+    without_friction = rmse_of(
+        analyse_log(path, replace(request, robot=RobotChoice(name="ur10e", friction="none")))
+    ).mean()
     recording, robot = vft.read(path, columns=UR10E), vft.load_robot("ur10e")
     bare = replace(robot, chain=replace(robot.chain, rotor_inertia=np.zeros(6)))
     gain = robot.gains["gmo"]["gain"]
@@ -127,11 +143,11 @@ def test_ur10e_payload_shows_in_the_two_cycle_difference(logs: Path) -> None:
     """A loaded run less a free one is the payload's own torque, 2.805 kg at the flange."""
     folder = logs / "ur10e"
     request = AnalysisChoice(
-        robot="ur10e",
-        columns=UR10E,
-        reference="two-cycle",
         free=FreeChoice(logs=(folder / "free_14harm.csv",)),
-        observers=("gmo",),
+        read=ReadChoice(columns=UR10E),
+        robot=RobotChoice(name="ur10e"),
+        observers=ObserverChoice(names=("gmo",)),
+        reference=ReferenceChoice(name="two-cycle"),
     )
     analysis = analyse_log(folder / "load_14harm.csv", request)
     assert analysis.reference is not None
@@ -158,7 +174,11 @@ def low_passed(t: np.ndarray, x: np.ndarray, cutoff: float = 1.0) -> np.ndarray:
 
 def test_fr3_table_against_the_vendor(logs: Path) -> None:
     columns = "t[ns],q:7,dq:7,tau:7,-tau_ext:7,_:13"
-    request = AnalysisChoice(robot="fr3", columns=columns, reference="vendor")
+    request = AnalysisChoice(
+        read=ReadChoice(columns=columns),
+        robot=RobotChoice(name="fr3"),
+        reference=ReferenceChoice(name="vendor"),
+    )
     analysis = analyse_log(logs / "fr3" / "run_a.npy", request)
     assert analysis.errors is not None
     assert analysis.errors.height == 4 * 7

@@ -9,6 +9,16 @@ For notebooks, everything one needs is here; it is imported when it is first use
     terms = vft.dynamics_terms(recording, robot)
     estimate = vft.MomentumObserver(gain=10.0).estimate(terms)
     estimate.tau  # (T, n) [N·m], torque on the robot
+
+Everything that ``vftcli estimate`` and ``vftcli compare`` do with a log is one call, and a choice a
+room says how::
+
+    choice = vft.AnalysisChoice(
+        robot=vft.RobotChoice(name="ur5"),
+        observers=vft.ObserverChoice(names=("gmo", "rts-auto")),
+        reference=vft.ReferenceChoice(name="two-cycle"),
+    )
+    vft.analyse_log("fixtures/ur5_circle.csv", choice).errors
 """
 
 from importlib import import_module
@@ -17,38 +27,53 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.evaluation import evaluate, rmse
+    from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.observers import (
         FilteredDynamicsObserver,
         KalmanObserver,
         MomentumObserver,
         Observer,
     )
+    from vftcli.observers.choice import ObserverChoice
     from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
     from vftcli.readers import read
     from vftcli.readers.assembly import assemble
+    from vftcli.readers.reader import ReadChoice
+    from vftcli.refinement.choice import RefinementChoice
+    from vftcli.repetition.choice import FreeChoice
     from vftcli.repetition.two_cycle import two_cycle_difference
     from vftcli.robots import Payload, Robot, load_robot
+    from vftcli.robots.choice import RobotChoice
     from vftcli.robots.kinematics import flange_jacobian, link_poses
     from vftcli.robots.terms import DynamicsTerms, dynamics_terms
     from vftcli.signals.errors import VftError
     from vftcli.signals.external_torque import ExternalTorque
     from vftcli.signals.recording import Recording
+    from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 
 __version__ = "0.1.0"
 
 HOMES = {
     "Analysis": "analysis",
+    "AnalysisChoice": "pipeline",
     "DynamicsTerms": "robots.terms",
     "ExternalTorque": "signals.external_torque",
     "FilteredDynamicsObserver": "observers",
+    "FreeChoice": "repetition.choice",
     "KalmanObserver": "observers",
     "MomentumObserver": "observers",
     "Observer": "observers",
+    "ObserverChoice": "observers.choice",
     "Payload": "robots",
+    "ReadChoice": "readers.reader",
     "Recording": "signals.recording",
-    "AnalysisChoice": "pipeline",
+    "ReferenceChoice": "evaluation.reference_choice",
+    "RefinementChoice": "refinement.choice",
     "Robot": "robots",
+    "RobotChoice": "robots.choice",
     "VftError": "signals.errors",
+    "WrenchChoice": "virtual_sensor.choice",
+    "ZeroChoice": "virtual_sensor.choice",
     "analyse": "pipeline",
     "analyse_log": "pipeline",
     "assemble": "readers.assembly",
@@ -80,13 +105,21 @@ __all__ = [
     "DynamicsTerms",
     "ExternalTorque",
     "FilteredDynamicsObserver",
+    "FreeChoice",
     "KalmanObserver",
     "MomentumObserver",
     "Observer",
+    "ObserverChoice",
     "Payload",
+    "ReadChoice",
     "Recording",
+    "ReferenceChoice",
+    "RefinementChoice",
     "Robot",
+    "RobotChoice",
     "VftError",
+    "WrenchChoice",
+    "ZeroChoice",
     "analyse",
     "analyse_log",
     "assemble",

@@ -11,6 +11,7 @@ from vftcli.evaluation import evaluate
 from vftcli.outputs.log.run_record import run_record
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.robots import load_robot
+from vftcli.robots.choice import RobotChoice
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
 from vftcli.virtual_sensor.choice import WrenchChoice
@@ -47,7 +48,7 @@ def recording() -> Recording:
 @pytest.fixture(scope="session")
 def without_reference(recording: Recording) -> Analysis:
     """All default observers on the log, with nothing to be judged by."""
-    return analyse(recording, load_robot("ur5"), AnalysisChoice(robot="ur5"))
+    return analyse(recording, load_robot("ur5"), AnalysisChoice(robot=RobotChoice(name="ur5")))
 
 
 @pytest.fixture(scope="session")
@@ -65,5 +66,5 @@ def analysis(without_reference: Analysis) -> Analysis:
 @pytest.fixture(scope="session")
 def with_wrench(recording: Recording) -> Analysis:
     """The log's estimates with their wrenches in base axes."""
-    request = AnalysisChoice(robot="ur5", wrench=WrenchChoice(frame="base"))
+    request = AnalysisChoice(wrench=WrenchChoice(frame="base"), robot=RobotChoice(name="ur5"))
     return analyse(recording, load_robot("ur5"), request)

@@ -6,7 +6,11 @@ from pathlib import Path
 import pytest
 
 from vftcli.analysis import Analysis
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.refinement.choice import RefinementChoice
+from vftcli.robots.choice import RobotChoice
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 OBSERVERS = ("gmo", "kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto")
@@ -15,7 +19,11 @@ OBSERVERS = ("gmo", "kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto")
 @pytest.fixture(scope="session")
 def request_() -> AnalysisChoice:
     truth = f"file:{FIXTURE}.truth.parquet"
-    return AnalysisChoice(robot="ur5", reference=truth, observers=OBSERVERS)
+    return AnalysisChoice(
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=OBSERVERS),
+        reference=ReferenceChoice(name=truth),
+    )
 
 
 @pytest.fixture(scope="session")
@@ -25,4 +33,6 @@ def worked_up(request_: AnalysisChoice) -> Analysis:
 
 @pytest.fixture(scope="session")
 def without_bias(request_: AnalysisChoice) -> Analysis:
-    return analyse_log(FIXTURE, replace(request_, remove_bias="free-cycle"))
+    return analyse_log(
+        FIXTURE, replace(request_, refinement=RefinementChoice(remove_bias="free-cycle"))
+    )

@@ -9,11 +9,19 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.pipeline import AnalysisChoice, analyse, analyse_log, choose_robot, open_log
+from vftcli.observers.choice import ObserverChoice
+from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
+from vftcli.readers.library import Library
+from vftcli.readers.reader import ReadChoice
+from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
+from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, VftError
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
+FREE_CYCLE, MODEL = (RefinementChoice(remove_bias=name) for name in ("free-cycle", "model"))
+SHORT = ReadChoice(interval=(4.5, 6.0))
+"""Less than one lap of the circle: nothing repeats."""
 MOVING = np.array([1, 2, 3, 4, 6])
 """Joint 5 of the circle rests."""
 
@@ -39,9 +47,13 @@ def test_ratios_to_the_hand_set_filter(
     worked_up: Analysis, without_bias: Analysis, request_: AnalysisChoice
 ) -> None:
     """Bounds of the reference simulation for this one run, seed 1 of mixed pushes."""
-    discrete = replace(request_, settings=("kfo.noise_convention=discrete",))
+    discrete = replace(
+        request_.observers,
+        names=("kfo-zoh", "kfo-rts"),
+        settings={"kfo": {"noise_convention": "discrete"}},
+    )
     by_hand = mean_rmse(worked_up, "kfo-zoh")
-    quick = analyse_log(FIXTURE, replace(discrete, observers=("kfo-zoh", "kfo-rts")))
+    quick = analyse_log(FIXTURE, replace(request_, observers=discrete))
     faster = mean_rmse(quick, "kfo-zoh")
     for error, bounds in (
         (mean_rmse(quick, "kfo-rts"), (0.60, 0.85)),
@@ -107,13 +119,13 @@ def test_what_is_left_without_the_bias_is_tuned_on(
 def test_a_bias_model_helps_where_nothing_repeats(request_: AnalysisChoice) -> None:
     asked = replace(
         request_,
-        remove_bias="model",
+        refinement=MODEL,
         free=FreeChoice(spans=((0.0, 4.0),)),
-        interval="0:7",
-        observers=("rts-auto",),
+        read=ReadChoice(interval=(0.0, 7.0)),
+        observers=ObserverChoice(names=("rts-auto",)),
     )
     modelled = analyse_log(FIXTURE, asked)
-    plain = analyse_log(FIXTURE, replace(asked, remove_bias="none"))
+    plain = analyse_log(FIXTURE, replace(asked, refinement=RefinementChoice()))
     assert mean_rmse(modelled, "rts-auto") < 0.8 * mean_rmse(plain, "rts-auto")
     assert any("cross-validated" in note for note in modelled.notes)
 
@@ -143,7 +155,11 @@ def test_innovations_of_the_tuned_filter_have_their_expected_size(worked_up: Ana
 
 
 def test_a_log_that_repeats_nothing_falls_back_and_says_so() -> None:
-    request = AnalysisChoice(robot="ur5", interval="4.5:6", observers=("rts-auto", "kfo-rts"))
+    request = AnalysisChoice(
+        read=ReadChoice(interval=(4.5, 6.0)),
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=("rts-auto", "kfo-rts")),
+    )
     analysis = analyse_log(FIXTURE, request)
     assert any("rts-auto: no free part to tune on" in note for note in analysis.notes)
     assert any("State one with --free-part A:B or --free LOG" in note for note in analysis.notes)
@@ -154,7 +170,9 @@ def test_a_log_that_repeats_nothing_falls_back_and_says_so() -> None:
 
 def test_a_free_part_that_is_too_short_falls_back_and_says_so() -> None:
     request = AnalysisChoice(
-        robot="ur5", free=FreeChoice(spans=((0.0, 0.1),)), observers=("rts-auto",)
+        free=FreeChoice(spans=((0.0, 0.1),)),
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=("rts-auto",)),
     )
     analysis = analyse_log(FIXTURE, request)
     assert any("no spectra: a spectrum needs 32 samples" in note for note in analysis.notes)
@@ -163,7 +181,7 @@ def test_a_free_part_that_is_too_short_falls_back_and_says_so() -> None:
 
 def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
     """Two free cycles of one log: the part is no quieter than the rest."""
-    recording = open_log(FIXTURE, AnalysisChoice(robot="ur5", interval="0:4"))
+    recording = Library().open(FIXTURE, ReadChoice(interval=(0.0, 4.0)))
     twice = replace(
         recording,
         t=np.concatenate([recording.t, recording.t + 4.0 + recording.median_step]),
@@ -176,21 +194,27 @@ def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
             ("target_q", "target_dq", "target_current", "target_torque", "temperature", "wrench")
         ),
     )
-    request = AnalysisChoice(robot="ur5", observers=("kfo-auto",))
-    analysis = analyse(twice, choose_robot(request, twice), request)
+    request = AnalysisChoice(
+        robot=RobotChoice(name="ur5"), observers=ObserverChoice(names=("kfo-auto",))
+    )
+    analysis = analyse(twice, request.robot.load(twice), request)
     assert any("is not much quieter than the rest" in note for note in analysis.notes)
     assert analysis.estimates[0].error_sd is None
 
 
 def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: AnalysisChoice) -> None:
     """Its quietest cycle is pushed too: hand-set gains, no bands, no bias removed, all said."""
-    always = replace(request_, interval="4.3:20", observers=("rts-auto", "kfo-rts"))
+    always = replace(
+        request_,
+        read=ReadChoice(interval=(4.3, 20.0)),
+        observers=ObserverChoice(names=("rts-auto", "kfo-rts")),
+    )
     analysis = analyse_log(FIXTURE, always)
     assert any("something touches the arm in all of them" in note for note in analysis.notes)
     np.testing.assert_array_equal(analysis.estimates[0].tau, analysis.estimates[1].tau)
     assert analysis.estimates[0].error_sd is None
     with pytest.raises(ParameterError, match="something touches the arm in all of them"):
-        analyse_log(FIXTURE, replace(always, remove_bias="free-cycle"))
+        analyse_log(FIXTURE, replace(always, refinement=FREE_CYCLE))
     # what the user states is not doubted
     stated = analyse_log(FIXTURE, replace(always, free=FreeChoice(cycles=(1,))))
     assert stated.estimates[0].error_sd is not None
@@ -199,9 +223,11 @@ def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: Analys
 def test_a_gap_in_the_log_is_survived() -> None:
     """Half a second is missing amid a push: everything stays finite."""
     request = AnalysisChoice(
-        robot="ur5", observers=("kfo-auto", "rts-auto"), remove_bias="free-cycle"
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=("kfo-auto", "rts-auto")),
+        refinement=FREE_CYCLE,
     )
-    whole = open_log(FIXTURE, request)
+    whole = request.library.open(FIXTURE, request.read)
     keep = (whole.t < 9.0) | (whole.t > 9.5)
     names = ("t", "q", "dq", "current")
     cut = replace(
@@ -211,7 +237,7 @@ def test_a_gap_in_the_log_is_survived() -> None:
             ("target_q", "target_dq", "target_current", "target_torque", "temperature", "wrench")
         ),
     )
-    analysis = analyse(cut, choose_robot(request, cut), request)
+    analysis = analyse(cut, request.robot.load(cut), request)
     for estimate in analysis.estimates:
         assert np.all(np.isfinite(estimate.tau))
         assert estimate.error_sd is not None
@@ -221,23 +247,32 @@ def test_a_gap_in_the_log_is_survived() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"remove_bias": "all"}, "there is none, free-cycle, model"),
         ({"free": FreeChoice(spans=((40.0, 50.0),))}, "it must be a part of the log"),
-        ({"remove_bias": "free-cycle", "interval": "4.5:6"}, "needs a motion that repeats"),
-        ({"remove_bias": "model", "interval": "4.5:6"}, "needs a free part"),
+        ({"refinement": FREE_CYCLE, "read": SHORT}, "needs a motion that repeats"),
+        ({"refinement": MODEL, "read": SHORT}, "needs a free part"),
     ],
 )
 def test_what_cannot_be_done_is_one_line(changes: dict[str, Any], message: str) -> None:
-    request = replace(AnalysisChoice(robot="ur5", observers=("kfo-zoh",)), **changes)
+    request = replace(
+        AnalysisChoice(robot=RobotChoice(name="ur5"), observers=ObserverChoice(names=("kfo-zoh",))),
+        **changes,
+    )
     with pytest.raises(VftError, match=message) as caught:
         analyse_log(FIXTURE, request)
     assert "\n" not in str(caught.value)
 
 
 def test_bias_removal_needs_no_tuned_observer() -> None:
-    request = AnalysisChoice(robot="ur5", observers=("gmo",), remove_bias="free-cycle")
+    request = AnalysisChoice(
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=("gmo",)),
+        refinement=FREE_CYCLE,
+    )
     estimate = analyse_log(FIXTURE, request).estimates[0]
-    plain = analyse_log(FIXTURE, AnalysisChoice(robot="ur5", observers=("gmo",))).estimates[0]
+    plain = analyse_log(
+        FIXTURE,
+        AnalysisChoice(robot=RobotChoice(name="ur5"), observers=ObserverChoice(names=("gmo",))),
+    ).estimates[0]
     assert estimate.error_sd is not None
     assert plain.error_sd is None
     assert np.max(np.abs(estimate.tau - plain.tau)) > 0.5
@@ -247,7 +282,17 @@ def test_an_unknown_gains_file_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "gains.toml"
     file.write_text("[observers.gmo]\ngian = 3.0\n", encoding="utf-8")
     with pytest.raises(ParameterError, match="Did you mean gain"):
-        analyse_log(FIXTURE, AnalysisChoice(robot="ur5", gains_file=file))
+        analyse_log(
+            FIXTURE,
+            AnalysisChoice(
+                robot=RobotChoice(name="ur5"), observers=ObserverChoice(gains_file=file)
+            ),
+        )
     file.write_text("gain = 3.0\n", encoding="utf-8")
     with pytest.raises(ParameterError, match=r"no \[observers"):
-        analyse_log(FIXTURE, AnalysisChoice(robot="ur5", gains_file=file))
+        analyse_log(
+            FIXTURE,
+            AnalysisChoice(
+                robot=RobotChoice(name="ur5"), observers=ObserverChoice(gains_file=file)
+            ),
+        )

@@ -9,11 +9,14 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
+from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.log.parquet import estimates_table
 from vftcli.outputs.log.rerun_recording import line_groups
 from vftcli.outputs.log.run_record import run_record, to_json
 from vftcli.outputs.page.page import render
 from vftcli.outputs.page.payload import payload
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots.choice import RobotChoice
 
 
 def test_the_parquet_holds_the_band_beside_the_covariance(worked_up: Analysis) -> None:
@@ -67,7 +70,14 @@ def test_a_run_that_asks_for_nothing_shows_nothing() -> None:
     from vftcli.pipeline import AnalysisChoice, analyse_log
 
     fixture = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
-    plain = analyse_log(fixture, AnalysisChoice(robot="ur5", interval="0:5", observers=("gmo",)))
+    plain = analyse_log(
+        fixture,
+        AnalysisChoice(
+            read=ReadChoice(interval=(0.0, 5.0)),
+            robot=RobotChoice(name="ur5"),
+            observers=ObserverChoice(names=("gmo",)),
+        ),
+    )
     assert plain.workup is None
     assert "What the complete log tells" not in render(plain)
     assert json.loads(to_json(run_record(plain, "")))["complete_log"] is None
@@ -80,7 +90,10 @@ def test_the_wrench_takes_its_band_from_the_joint_torques(frame: str) -> None:
 
     fixture = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
     request = AnalysisChoice(
-        robot="ur5", observers=("rts-auto",), wrench=WrenchChoice(frame=frame), interval="0:12"
+        wrench=WrenchChoice(frame=frame),
+        read=ReadChoice(interval=(0.0, 12.0)),
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=("rts-auto",)),
     )
     analysis = analyse_log(fixture, request)
     assert analysis.virtual_sensor is not None

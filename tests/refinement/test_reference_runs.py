@@ -10,9 +10,14 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.pipeline import AnalysisChoice, analyse_log, choose_observers, look_over
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.observers.choice import ObserverChoice
+from vftcli.pipeline import AnalysisChoice, analyse_log, look_over
+from vftcli.readers.reader import ReadChoice
+from vftcli.refinement.choice import RefinementChoice
 from vftcli.refinement.refine import work_up
 from vftcli.repetition.choice import FreeChoice
+from vftcli.robots.choice import RobotChoice
 from vftcli.robots.terms import dynamics_terms
 from vftcli.simulation import load_scenario, simulate
 
@@ -28,19 +33,24 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
     """Ratios to the hand-set filters, and coverages, of one reference run."""
     run = simulate(load_scenario("ur5-circle", [f"contacts.hand.style={style}"]), seed)
     log, robot, truth = run.recording, run.robot, run.truth.tau_ext
-    asked = AnalysisChoice(observers=("kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto"), bands=True)
+    asked = AnalysisChoice(
+        observers=ObserverChoice(names=("kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto")),
+        refinement=RefinementChoice(bands=True),
+    )
     terms = dynamics_terms(log, robot)
     found = look_over(log, robot, terms, asked)
     assert found is not None
-    observers, _ = choose_observers(asked, robot, log, found)
+    observers, _ = asked.observers.build(robot, log.median_step, found.spectra)
     estimates = [observer.estimate(terms) for observer in observers]
-    discrete = replace(asked, settings=("kfo.noise_convention=discrete",))
-    quick = [o.estimate(terms) for o in choose_observers(discrete, robot, log, found)[0][:2]]
+    discrete = replace(asked.observers, settings={"kfo": {"noise_convention": "discrete"}})
+    quick = [
+        o.estimate(terms) for o in discrete.build(robot, log.median_step, found.spectra)[0][:2]
+    ]
     banded, _ = work_up(found, log, robot, observers, estimates)
-    rid = replace(asked, remove_bias="free-cycle")
+    rid = replace(asked, refinement=RefinementChoice(remove_bias="free-cycle"))
     relieved = look_over(log, robot, terms, rid)
     assert relieved is not None
-    tuned, _ = choose_observers(rid, robot, log, relieved)
+    tuned, _ = rid.observers.build(robot, log.median_step, relieved.spectra)
     raw = [observer.estimate(terms) for observer in tuned]
     unbiased, _ = work_up(relieved, log, robot, tuned, raw, "free-cycle")
     moving = found.stuck == 0
@@ -78,10 +88,9 @@ def test_mujoco_ur5e(logs: Path) -> None:
     """An independent engine: the tuned smoother at most 0.6 of GMO(30). Measured .53."""
     folder = logs / "mujoco_ur5e"
     request = AnalysisChoice(
-        robot=str(folder / "robot.toml"),
-        settings=("gmo.gain=30",),
-        reference="vendor",
-        observers=("gmo", "rts-auto"),
+        robot=RobotChoice(name=str(folder / "robot.toml")),
+        observers=ObserverChoice.parsed(assignments=("gmo.gain=30",), observer=("gmo", "rts-auto")),
+        reference=ReferenceChoice(name="vendor"),
     )
     analysis = analyse_log(folder / "circle.csv", request)
     assert mean_rmse(analysis, "rts-auto") <= 0.6 * mean_rmse(analysis, "gmo")
@@ -97,12 +106,11 @@ def test_libfranka_simulation(logs: Path, tmp_path: Path) -> None:
         with gzip.open(folder / f"{name}.gz") as packed, (tmp_path / name).open("wb") as plain:
             shutil.copyfileobj(packed, plain)
     request = AnalysisChoice(
-        robot=str(folder / "robot.toml"),
-        settings=("gmo.gain=30",),
-        reference=f"file:{tmp_path / 'pushes_truth.csv'}",
-        interval="1.5:27.5",
         free=FreeChoice(spans=((1.5, 6.0),)),
-        observers=("gmo", "rts-auto"),
+        read=ReadChoice(interval=(1.5, 27.5)),
+        robot=RobotChoice(name=str(folder / "robot.toml")),
+        observers=ObserverChoice.parsed(assignments=("gmo.gain=30",), observer=("gmo", "rts-auto")),
+        reference=ReferenceChoice(name=f"file:{tmp_path / 'pushes_truth.csv'}"),
     )
     analysis = analyse_log(tmp_path / "pushes.csv", request)
     assert mean_rmse(analysis, "rts-auto") <= 0.6 * mean_rmse(analysis, "gmo")
@@ -115,17 +123,19 @@ def test_ur10e_payload_by_the_free_run(logs: Path) -> None:
     """
     folder = logs / "ur10e"
     request = AnalysisChoice(
-        robot="ur10e",
-        columns=UR10E,
-        reference="two-cycle",
         free=FreeChoice(logs=(folder / "free_14harm.csv",)),
-        observers=("fdo", "gmo", "kfo-fe", "kfo-zoh", "rts-auto"),
-        bands=True,
+        read=ReadChoice(columns=UR10E),
+        robot=RobotChoice(name="ur10e"),
+        observers=ObserverChoice(names=("fdo", "gmo", "kfo-fe", "kfo-zoh", "rts-auto")),
+        refinement=RefinementChoice(bands=True),
+        reference=ReferenceChoice(name="two-cycle"),
     )
     path = folder / "load_14harm.csv"
     plain = analyse_log(path, request)
-    unbiased = analyse_log(path, replace(request, remove_bias="free-cycle"))
-    causal = min(mean_rmse(plain, name) for name in request.observers[:4])
+    unbiased = analyse_log(
+        path, replace(request, refinement=RefinementChoice(remove_bias="free-cycle"))
+    )
+    causal = min(mean_rmse(plain, name) for name in request.observers.names[:4])
     assert mean_rmse(plain, "rts-auto") <= causal
     assert mean_rmse(unbiased, "rts-auto") <= 0.7 * causal
 
@@ -133,7 +143,10 @@ def test_ur10e_payload_by_the_free_run(logs: Path) -> None:
 def test_ur10e_pushes_between_which_stiction_is_named(logs: Path) -> None:
     """Real: a held pose; what is left between pushes is stiction, and is said to be."""
     request = AnalysisChoice(
-        robot="ur10e", columns=UR10E, free=FreeChoice(spans=((0.0, 2.0),)), observers=("rts-auto",)
+        free=FreeChoice(spans=((0.0, 2.0),)),
+        read=ReadChoice(columns=UR10E),
+        robot=RobotChoice(name="ur10e"),
+        observers=ObserverChoice(names=("rts-auto",)),
     )
     analysis = analyse_log(logs / "ur10e" / "push_pose.csv", request)
     assert any(

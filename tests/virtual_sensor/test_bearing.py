@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.pipeline import AnalysisChoice, analyse, choose_robot
+from vftcli.pipeline import AnalysisChoice, analyse
+from vftcli.robots.choice import RobotChoice
 from vftcli.simulation import load_scenario, simulate
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 
@@ -33,9 +34,9 @@ def erring():
 
 def sensed(recording, **zero):
     request = AnalysisChoice(
-        robot="panda", wrench=WrenchChoice(frame="base", zero=ZeroChoice(**zero))
+        wrench=WrenchChoice(frame="base", zero=ZeroChoice(**zero)), robot=RobotChoice(name="panda")
     )
-    return analyse(recording, choose_robot(request, recording), request)
+    return analyse(recording, request.robot.load(recording), request)
 
 
 @pytest.mark.parametrize(("log", "share"), [("exact", 0.02), ("erring", 0.025)])

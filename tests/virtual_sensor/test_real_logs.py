@@ -7,7 +7,11 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.pipeline import AnalysisChoice, analyse, choose_robot, open_log
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.observers.choice import ObserverChoice
+from vftcli.pipeline import AnalysisChoice, analyse
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots.choice import RobotChoice
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.solvers import wrench_of
 from vftcli.virtual_sensor.vendor import fit_axes
@@ -17,8 +21,8 @@ MUJOCO = "t=time,q=q{i},dq=qd{i},tau=tau{i},tau_ext=tau_ext{i},wrench[base]=Fx|F
 
 
 def analysed(path: Path, request: AnalysisChoice):
-    recording = open_log(path, request)
-    return analyse(recording, choose_robot(request, recording), request)
+    recording = request.library.open(path, request.read)
+    return analyse(recording, request.robot.load(recording), request)
 
 
 def by_axis(analysis, observer: str) -> np.ndarray:
@@ -30,12 +34,11 @@ def test_the_ur5e_of_mujoco_reads_its_truth(logs: Path) -> None:
     """Exact profile, gain 30: ≤ 3 N and ≤ 0.6 N·m in unmasked samples (measured 1.19 and 0.12)."""
     folder = logs / "mujoco_ur5e"
     request = AnalysisChoice(
-        columns=MUJOCO,
-        robot=str(folder / "robot.toml"),
-        observers=("gmo",),
-        settings=("gmo.gain=30",),
-        reference="sensor",
         wrench=WrenchChoice(frame="base"),
+        read=ReadChoice(columns=MUJOCO),
+        robot=RobotChoice(name=str(folder / "robot.toml")),
+        observers=ObserverChoice.parsed(observer=("gmo",), assignments=("gmo.gain=30",)),
+        reference=ReferenceChoice(name="sensor"),
     )
     analysis = analysed(folder / "circle.csv", request)
     errors = by_axis(analysis, "gmo")
@@ -57,12 +60,11 @@ def test_the_fr3_behind_libfranka_reads_its_truth(logs: Path, tmp_path: Path) ->
         packed = (logs / "libfranka_sim" / f"{name}.csv.gz").read_bytes()
         (tmp_path / f"{name}.csv").write_bytes(gzip.decompress(packed))
     request = AnalysisChoice(
-        robot=str(logs / "libfranka_sim" / "robot.toml"),
-        observers=("gmo",),
-        settings=("gmo.gain=30",),
-        interval="1.5:27.5",
-        reference=f"file:{tmp_path / 'pushes_truth.csv'}",
         wrench=WrenchChoice(frame="base"),
+        read=ReadChoice(interval=(1.5, 27.5)),
+        robot=RobotChoice(name=str(logs / "libfranka_sim" / "robot.toml")),
+        observers=ObserverChoice.parsed(observer=("gmo",), assignments=("gmo.gain=30",)),
+        reference=ReferenceChoice(name=f"file:{tmp_path / 'pushes_truth.csv'}"),
     )
     analysis = analysed(tmp_path / "pushes.csv", request)
     errors = by_axis(analysis, "gmo")
@@ -76,9 +78,9 @@ def test_the_fr3_behind_libfranka_reads_its_truth(logs: Path, tmp_path: Path) ->
 def payload(logs: Path):
     """The UR10e under 2.805 kg, the free run of the same trajectory as its zero."""
     request = AnalysisChoice(
-        columns=UR10E,
-        robot="ur10e",
         wrench=WrenchChoice(frame="base", zero=ZeroChoice(log=logs / "ur10e" / "free_14harm.csv")),
+        read=ReadChoice(columns=UR10E),
+        robot=RobotChoice(name="ur10e"),
     )
     return analysed(logs / "ur10e" / "load_14harm.csv", request)
 
@@ -120,7 +122,11 @@ def test_the_pandas_wrench_is_the_atis(logs: Path) -> None:
 
 
 def test_a_franka_that_logs_zeros_is_told(logs: Path) -> None:
-    request = AnalysisChoice(robot="fr3", observers=("gmo",), wrench=WrenchChoice())
+    request = AnalysisChoice(
+        wrench=WrenchChoice(),
+        robot=RobotChoice(name="fr3"),
+        observers=ObserverChoice(names=("gmo",)),
+    )
     analysis = analysed(logs / "franka_bags" / "calib_0108.bag", request)
     assert analysis.virtual_sensor is not None
     assert any("exactly zero in every sample" in n for n in analysis.virtual_sensor.notes)

@@ -58,14 +58,12 @@ def released(
     from vftcli.admittance.law import controllers
     from vftcli.admittance.parameters import release_deviation
     from vftcli.admittance.replay import replay_release
-    from vftcli.observers import observer_settings
     from vftcli.robots import PROFILES, load_robot
     from vftcli.signals.errors import ParameterError, RobotError
 
-    observer_settings(request.settings)  # nothing uses them, but a slip of the pen is told
-    if request.robot is None:
+    if request.robot.name is None:
         raise RobotError(f"a release needs an arm: --robot {'|'.join(PROFILES)}, or a file")
-    arm = load_robot(request.robot)
+    arm = load_robot(request.robot.name)
     settings = read_parameters(arm, own, parameters)
     pose = choice.start or arm.document.get("admittance", {}).get("start")
     if pose is None:
@@ -85,23 +83,32 @@ def released(
 
 
 def replayed(
-    log: Path, request: "AnalysisChoice", choice: Choice, own: list[str], parameters: Path | None
+    log: Path,
+    request: "AnalysisChoice",
+    choice: Choice,
+    own: list[str],
+    parameters: Path | None,
+    estimated: str | None = None,
 ) -> "tuple[Replay, Recording]":
-    """A log's forces through every controller."""
-    from dataclasses import replace
+    """A log's forces through every controller.
 
+    Args:
+        log: The log.
+        request: What is asked of it.
+        choice: Which controllers, and which force.
+        own: Settings of the controllers.
+        parameters: A file of their parameters, or None.
+        estimated: The observer whose torque the log itself holds, None if it is to be estimated.
+    """
     from vftcli.admittance.law import controllers
     from vftcli.admittance.replay import replay
-    from vftcli.pipeline import choose_robot, open_log
-    from vftcli.readers.estimates import estimates_columns
     from vftcli.signals.parsing import interval
 
-    spec = estimates_columns(log, request.observers[0]) if request.columns is None else None
-    recording = open_log(log, replace(request, columns=spec or request.columns))
-    arm = choose_robot(request, recording)
+    recording = request.library.open(log, request.read)
+    arm = request.robot.load(recording)
     settings = read_parameters(arm, own, parameters)
     chosen = controllers(settings, choice.kinds, numbers(choice.alpha, "--alpha"))
-    record = force_of(recording, arm, request, choice, estimated=spec is not None)
+    record = force_of(recording, arm, request, choice, estimated)
     if choice.zero is not None:
         record = record.zeroed(*interval(choice.zero))
     result = replay(record, arm, settings, chosen, force_unstable=choice.force_unstable)
@@ -116,7 +123,7 @@ def looped(
     from vftcli.admittance.law import controllers
     from vftcli.admittance.replay import replay
     from vftcli.cli.simulate import progress_bar
-    from vftcli.observers import KalmanObserver, Setup, build_observers, observer_settings
+    from vftcli.observers import KalmanObserver
     from vftcli.robots import load_robot
     from vftcli.signals.errors import ParameterError
     from vftcli.signals.parsing import interval
@@ -126,14 +133,7 @@ def looped(
     scenario = load_scenario(name, ())
     arm = load_robot(scenario.robot)
     settings = read_parameters(arm, own, parameters)
-    setup = Setup(
-        gains=arm.gains,
-        settings=observer_settings(request.settings),
-        joints=arm.joints,
-        step=1.0 / log_rate(scenario.sensing, arm),
-        as_printed=False,
-    )
-    observer = build_observers(request.observers, setup)[0][0]
+    observer = request.observers.build(arm, 1.0 / log_rate(scenario.sensing, arm))[0][0]
     if not isinstance(observer, KalmanObserver):
         raise ParameterError("the closed loop runs kfo-fe or kfo-zoh; choose one with --observer")
     chosen = controllers(settings, choice.kinds, numbers(choice.alpha, "--alpha"))
@@ -160,8 +160,7 @@ def force_of(
     robot: "Robot",
     request: "AnalysisChoice",
     choice: Choice,
-    *,
-    estimated: bool,
+    estimated: str | None,
 ) -> "ForceRecord":
     """The wrench that drives the replay: truth, sensor, or an observer's."""
     from vftcli.admittance.force import from_sensor, from_torque
@@ -173,10 +172,9 @@ def force_of(
         return truth_of(recording, choice.truth)
     if choice.sensor:
         return from_sensor(recording, robot, choice.frame)
-    name = request.observers[0]
-    if estimated:
+    if estimated is not None:
         tau = recording.require("tau_ext")
-        estimate = ExternalTorque(name=name, t=recording.t, tau=tau)
+        estimate = ExternalTorque(name=estimated, t=recording.t, tau=tau)
     else:
         from vftcli.pipeline import analyse
 

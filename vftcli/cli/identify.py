@@ -1,58 +1,91 @@
 """`vftcli identify`: logs become a robot."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.bundles import taken_apart
 
 if TYPE_CHECKING:
-    from vftcli.identification import Identification
+    from vftcli.identification import Identification, Task
 
 
-def identify_robot(
-    logs: opt.Logs,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE.toml", help="The new robot file.")
-    ],
-    robot: opt.RobotName = None,
+@dataclass(frozen=True, kw_only=True)
+class TaskOptions(opt.Bundle):
+    """What is identified, and how."""
+
     method: Annotated[
         str | None,
         typer.Option(
+            "--method",
             metavar="METHOD",
             help="friction, base, consistent or targets. Default: friction; none with "
             "--find-payload.",
         ),
-    ] = None,
-    validate: Annotated[
-        list[Path] | None,
-        typer.Option(metavar="LOG", help="Score on this log too. Repeatable."),
-    ] = None,
+    ] = None
     find_payload: Annotated[
         bool,
         typer.Option(
             "--find-payload",
             help="Find a load on the flange: from two LOGs of one motion, from --free, or poses.",
         ),
-    ] = False,
-    free: Annotated[
-        Path | None, typer.Option(metavar="LOG", help="The same motion without the load.")
-    ] = None,
+    ] = False
     fit_constants: Annotated[
         bool, typer.Option("--fit-constants", help="Friction method: drive constants K too.")
-    ] = False,
+    ] = False
     cutoff: Annotated[
-        float, typer.Option(metavar="HZ", help="Cutoff of the zero-phase filter.")
-    ] = 8.0,
-    format_: opt.Format = None,
-    columns: opt.Columns = None,
-    interval: opt.Interval = None,
-    validate_interval: Annotated[
-        str | None, typer.Option(metavar="A:B", help="Use only this span of the --validate logs.")
-    ] = None,
-    payload: opt.PayloadName = None,
+        float, typer.Option("--cutoff", metavar="HZ", help="Cutoff of the zero-phase filter.")
+    ] = 8.0
+
+    def task(self, name: str) -> "Task":
+        """What shall be identified, for a robot of this name.
+
+        Raises:
+            ParameterError: If the method does not exist, or the options contradict each other.
+        """
+        from vftcli.identification import Processing, Task
+
+        return Task(
+            method=self.method or (None if self.find_payload else "friction"),
+            name=name,
+            find_payload=self.find_payload,
+            fit_constants=self.fit_constants,
+            processing=Processing(cutoff=self.cutoff),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValidationOptions(opt.Bundle):
+    """Which logs the new robot is scored on besides those it is made from."""
+
+    validate: Annotated[
+        list[Path] | None,
+        typer.Option("--validate", metavar="LOG", help="Score on this log too. Repeatable."),
+    ] = None
+    interval: Annotated[
+        str | None,
+        typer.Option(
+            "--validate-interval",
+            metavar="A:B",
+            help="Use only this span of the --validate logs.",
+        ),
+    ] = None
+
+
+@taken_apart
+def identify_robot(
+    logs: opt.Logs,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE.toml", help="The new robot file.")
+    ],
+    reading: opt.ReadOptions,
+    robot: opt.RobotOptions,
+    asked: TaskOptions,
+    validation: ValidationOptions,
+    free: Annotated[list[str] | None, opt.FREE] = None,
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
@@ -62,45 +95,49 @@ def identify_robot(
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
-    from vftcli.cli.console import command_line, paths, say, say_recording
-    from vftcli.identification import Processing, Task, identify
+    from vftcli.cli.console import command_line, say, say_recording
+    from vftcli.identification import identify
     from vftcli.outputs.files import refuse_existing
     from vftcli.outputs.identification.files import beside, write_identification
-    from vftcli.pipeline import AnalysisChoice, choose_robot, open_log
     from vftcli.readers.library import Library
 
-    task = Task(
-        method=method or (None if find_payload else "friction"),
-        name=output.stem,
-        find_payload=find_payload,
-        fit_constants=fit_constants,
-        processing=Processing(cutoff=cutoff),
-    )
+    task = asked.task(output.stem)
     for file in beside(output).values():
         refuse_existing(file, force)
-    without_load = [free] if free is not None else []
-    request = AnalysisChoice(
-        format=format_,
-        columns=columns,
-        robot=robot,
-        interval=interval,
-        payload=payload,
-        library=Library([*logs, *paths(validate), *without_load]),
-    )
-    train = [open_log(log, request) for log in logs]
-    whole = replace(request, interval=validate_interval)
-    held_out = [open_log(log, whole) for log in paths(validate)]
-    unloaded = [open_log(log, request) for log in without_load]
+    choice, chosen = reading.choice(), robot.choice()
+    held_out_choice = replace(reading, interval=validation.interval).choice()
+    validated, without_load = validation.validate or [], unloaded_logs(free)
+    library = Library([*logs, *validated, *without_load])
+    train = [library.open(log, choice) for log in logs]
+    held_out = [library.open(log, held_out_choice) for log in validated]
+    unloaded = [library.open(log, choice) for log in without_load]
     read = [*train, *held_out, *unloaded]
     for recording in read:
         say_recording(recording)
-    profile = choose_robot(request, train[0])
+    profile = chosen.load(train[0])
     found = identify(train, profile, task, held_out, unloaded[0] if unloaded else None)
     record = write_identification(output, found, read, command_line(), force)
     for note in found.notes:
         say(f"note: {note}")
     say(f"wrote {', '.join(str(file) for file in beside(output).values())}")
     typer.echo(record.rstrip("\n") if json else tables(found))
+
+
+def unloaded_logs(free: list[str] | None) -> tuple[Path, ...]:
+    """The logs of ``--free``: here the same motion without the load.
+
+    Raises:
+        ParameterError: If a span of the log is given, or more than one log.
+    """
+    from vftcli.repetition.choice import FreeChoice
+    from vftcli.signals.errors import ParameterError
+
+    chosen = FreeChoice.parsed(free=free)
+    if chosen.spans or len(chosen.logs) > 1:
+        raise ParameterError(
+            "a load is found from one pair of logs: give --free the log without it, once"
+        )
+    return chosen.logs
 
 
 def tables(found: "Identification") -> str:

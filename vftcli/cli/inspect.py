@@ -5,16 +5,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.bundles import taken_apart
 
 if TYPE_CHECKING:
     from vftcli.doctor import Examination
     from vftcli.signals.recording import Recording
 
 
+@taken_apart
 def inspect_log(
     log: opt.Log,
-    format_: opt.Format = None,
-    columns: opt.Columns = None,
+    reading: opt.ReadOptions,
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit with 1 if there is any warning, for CI.")
     ] = False,
@@ -29,8 +30,9 @@ def inspect_log(
     from vftcli.doctor import examine
     from vftcli.readers import read_first_recording
 
-    recording = read_first_recording(log, format=format_, columns=columns)
-    examination = examine(recording)
+    choice = reading.choice()
+    recording = read_first_recording(log, format=choice.format, columns=choice.columns)
+    examination = examine(choice.within(recording))
     if json:
         typer.echo(json_module.dumps(report_of(examination), indent=2))
     else:

@@ -1,25 +1,32 @@
 """`vftcli tune`: gains from the log itself, for a stated goal."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.bundles import taken_apart
 
 if TYPE_CHECKING:
     from vftcli.refinement.tuning import Tuned, TuningGoal
 
 
+@taken_apart
 def tune_gains(
     log: opt.Log,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE.toml", help="The gains file.")
     ],
-    robot: opt.RobotName = None,
+    reading: opt.ReadOptions,
+    robot: opt.RobotOptions,
+    free: opt.FreeOptions,
+    bias: opt.BiasOptions,
     goal: Annotated[
         str,
         typer.Option(
+            "--goal",
             metavar="rmse|delay=S|bandwidth=HZ|false-alarms=PER_HOUR",
             help="What the gains are for.",
         ),
@@ -27,18 +34,11 @@ def tune_gains(
     threshold: Annotated[
         str | None,
         typer.Option(
-            metavar="NUMBER(S)", help="Torque that raises an alarm [N·m], one or one a joint."
+            "--threshold",
+            metavar="NUMBER(S)",
+            help="Torque that raises an alarm [N·m], one or one a joint.",
         ),
     ] = None,
-    free_part: opt.FreePart = None,
-    free: opt.Free = None,
-    period: opt.Period = None,
-    free_cycles: opt.FreeCycles = None,
-    format_: opt.Format = None,
-    columns: opt.Columns = None,
-    interval: opt.Interval = None,
-    friction: opt.Friction = "profile",
-    payload: opt.PayloadName = None,
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
@@ -53,30 +53,23 @@ def tune_gains(
     from vftcli.cli.console import command_line, say, say_recording
     from vftcli.outputs.files import refuse_existing, write_text
     from vftcli.outputs.log.run_record import plain
-    from vftcli.pipeline import AnalysisChoice, choose_robot, look_over, open_log
+    from vftcli.pipeline import AnalysisChoice, look_over
     from vftcli.refinement.tuning import gains_document, parse_goal, tune_all
-    from vftcli.repetition.choice import FreeChoice
     from vftcli.robots.terms import dynamics_terms
     from vftcli.robots.writing import lines_of
     from vftcli.signals.errors import ParameterError
 
     wanted = parse_goal(goal, threshold)
     refuse_existing(output, force)
-    request = AnalysisChoice(
-        format=format_,
-        columns=columns,
-        robot=robot,
-        interval=interval,
-        friction=friction,
-        payload=payload,
-        free=FreeChoice.parsed(
-            free=free, free_part=free_part, period=period, free_cycles=free_cycles
-        ),
-        bands=True,
+    choice = AnalysisChoice(
+        read=reading.choice(),
+        robot=robot.choice(),
+        free=free.choice(),
+        refinement=replace(bias.choice(), bands=True),
     )
-    recording = open_log(log, request)
-    arm = choose_robot(request, recording)
-    found = look_over(recording, arm, dynamics_terms(recording, arm), request)
+    recording = choice.library.open(log, choice.read)
+    arm = choice.robot.load(recording)
+    found = look_over(recording, arm, dynamics_terms(recording, arm), choice)
     notes = found.notes if found is not None else ()
     if found is None or found.spectra is None:
         raise ParameterError(f"nothing to tune on: {notes[-1] if notes else 'no free part'}")

@@ -25,6 +25,7 @@ class ReferenceChoice:
     Attributes:
         name: A key of `REFERENCES`, or ``file:PATH``.
         columns: The column description of a reference file, None to recognise its columns.
+        contacts: Whether each observer's contacts are judged by the reference's too.
 
     Raises:
         ReferenceTorqueError: If there is no such reference.
@@ -32,11 +33,19 @@ class ReferenceChoice:
 
     name: str
     columns: str | None = None
+    contacts: bool = False
 
     def __post_init__(self) -> None:
         if self.path is None and self.name not in REFERENCES:
             there = ", ".join((*REFERENCES, f"{FILE}PATH"))
             raise ReferenceTorqueError(f"no reference {self.name!r}; there is {there}")
+
+    @classmethod
+    def parsed(
+        cls, *, reference: str, reference_columns: str | None = None, contacts: bool = False
+    ) -> "ReferenceChoice":
+        """The choice that ``--reference``, ``--reference-columns`` and ``--contacts`` state."""
+        return cls(name=reference, columns=reference_columns, contacts=contacts)
 
     @property
     def path(self) -> Path | None:

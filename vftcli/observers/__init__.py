@@ -231,6 +231,17 @@ def leftover_rate(setup: Setup) -> tuple[Array, str]:
     return per_joint(FALLBACK_RATE, setup.joints), "the default, as the robot file gives no gains"
 
 
+def check_observer(name: str) -> str:
+    """An observer's name as it is.
+
+    Raises:
+        ParameterError: If there is no such observer.
+    """
+    if name not in OBSERVERS:
+        raise ParameterError(f"no observer {name!r}; there is {', '.join(OBSERVERS)}")
+    return name
+
+
 def build_observers(
     names: Sequence[str], setup: Setup
 ) -> tuple[tuple[Observer, ...], tuple[str, ...]]:
@@ -242,8 +253,7 @@ def build_observers(
     observers: list[Observer] = []
     notes: list[str] = []
     for name in dict.fromkeys(names):
-        if name not in OBSERVERS:
-            raise ParameterError(f"no observer {name!r}; there is {', '.join(OBSERVERS)}")
+        check_observer(name)
         observer, remarks = OBSERVERS[name].build(setup)
         observers.append(observer)
         notes.extend(remarks)
@@ -261,5 +271,7 @@ __all__ = [
     "Setup",
     "Tuning",
     "build_observers",
+    "check_observer",
     "observer_settings",
+    "sections",
 ]

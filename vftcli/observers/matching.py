@@ -30,7 +30,7 @@ class MatchTarget(NamedTuple):
     value: float
 
 
-def parse_goal(text: str) -> MatchTarget:
+def parse_target(text: str) -> MatchTarget:
     """Read ``delay=S`` or ``bandwidth=HZ``.
 
     Raises:
@@ -49,7 +49,7 @@ def parse_goal(text: str) -> MatchTarget:
 
 
 def matched(
-    observers: Sequence[Observer], text: str, setup: Setup
+    observers: Sequence[Observer], goal: MatchTarget, setup: Setup
 ) -> tuple[tuple[Observer, ...], tuple[str, ...]]:
     """Re-tune observers to one delay or −3 dB bandwidth per joint, with notes on their gains.
 
@@ -59,13 +59,12 @@ def matched(
 
     Args:
         observers: As built from profile and settings.
-        text: ``delay=S`` or ``bandwidth=HZ``.
+        goal: Which quantity is to be alike, and its value.
         setup: Joints, sample time, and whether the printed formulas run.
 
     Raises:
         ParameterError: If the goal is out of reach at the sample time, or an observer has neither.
     """
-    goal = parse_goal(text)
     if setup.as_printed:
         raise ParameterError(
             "--match tunes the corrected observers; the printed ones have another response. Leave "

@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers.labels import absolute, labelled
+from vftcli.readers.reader import ReadChoice
+from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.recording import Recording
 
 
@@ -54,3 +56,18 @@ class Library:
             recording = read(path, format=format, columns=columns, signals=signals, label=label)
             self._recordings[reading] = recording
         return self._recordings[reading]
+
+    def open(self, path: str | Path, choice: ReadChoice) -> Recording:
+        """Read a log as it is chosen, and take the part of it that is."""
+        read = self.read(path, format=choice.format, columns=choice.columns, signals=choice.signals)
+        return choice.within(read)
+
+    def open_logs(self, paths: Iterable[str | Path], choice: ReadChoice) -> tuple[Recording, ...]:
+        """Read the logs of a command.
+
+        Raises:
+            ParameterError: If two of them are the same run.
+        """
+        logs = tuple(self.open(path, choice) for path in paths)
+        refuse_repeated_logs(logs)
+        return logs

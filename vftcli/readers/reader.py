@@ -1,12 +1,14 @@
 """Reader: what a log format is to this package, and the file a reader is handed."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
+from vftcli.signals import parsing
 from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,15 +114,44 @@ class RawLog:
 
 @dataclass(frozen=True, kw_only=True)
 class ReadChoice:
-    """What the caller asked of a reader.
+    """How a log is read, and which part of it is used.
 
     Attributes:
+        format: Name of a format in `vftcli.readers.READERS`, None to recognise it by its content.
         columns: The text of ``--columns``, or None.
         signals: The signals that are wanted; None for all. Others may be left unread.
+        interval: The span that is used, from the first sample, None for all of it. [s]
     """
 
+    format: str | None = None
     columns: str | None = None
     signals: frozenset[str] | None = None
+    interval: tuple[float, float] | None = None
+
+    @classmethod
+    def parsed(
+        cls, *, format: str | None = None, columns: str | None = None, interval: str | None = None
+    ) -> "ReadChoice":
+        """The choice that ``--format``, ``--columns`` and ``--interval A:B`` state.
+
+        Raises:
+            ParameterError: If the interval is malformed.
+        """
+        span = parsing.interval(interval) if interval is not None else None
+        return cls(format=format, columns=columns, interval=span)
+
+    @property
+    def whole(self) -> "ReadChoice":
+        """The same without its interval: a free run is read whole."""
+        return replace(self, interval=None)
+
+    def within(self, recording: Recording) -> Recording:
+        """The part of a recording that lies in the interval.
+
+        Raises:
+            ClockError: If no sample does.
+        """
+        return recording if self.interval is None else recording.between(*self.interval)
 
     def wants(self, signal: str) -> bool:
         """Whether a signal has to be read; the clock and the positions always are."""

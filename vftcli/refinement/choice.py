@@ -1,0 +1,39 @@
+"""What a user may choose of what only a complete log allows: bands, and bias removal."""
+
+from dataclasses import dataclass
+
+NOTHING = "none"
+"""The word for a bias that stays; any other word is a key of `vftcli.refinement.bias.REMOVALS`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RefinementChoice:
+    """What is done with the estimates once the whole log is known.
+
+    Attributes:
+        bands: Whether to measure on the free part how far the estimates may be off.
+        remove_bias: "none", "free-cycle" or "model".
+
+    Raises:
+        ParameterError: If there is no such way to remove a bias.
+    """
+
+    bands: bool = False
+    remove_bias: str = NOTHING
+
+    def __post_init__(self) -> None:
+        if self.remove_bias != NOTHING:
+            # A plain estimate removes nothing: it need not load what could.
+            from vftcli.refinement.bias import check_removal
+
+            check_removal(self.remove_bias)
+
+    @classmethod
+    def parsed(cls, *, bands: bool = False, remove_bias: str | None = None) -> "RefinementChoice":
+        """The choice that ``--bands`` and ``--remove-bias`` state."""
+        return cls(bands=bands, remove_bias=remove_bias or NOTHING)
+
+    @property
+    def looks_back(self) -> bool:
+        """Whether it needs the log's free part."""
+        return self.bands or self.remove_bias != NOTHING
