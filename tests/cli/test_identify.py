@@ -45,7 +45,7 @@ def test_json_is_all_there_is_on_stdout(excitation, tmp_path):
     record = json.loads(result.stdout)
     assert {row["role"] for row in record["residuals"]} == {"train", "held-out"}
     assert {"joint", "parameter", "value", "sd", "unit"} <= set(record["parameters"][0])
-    assert any("repeats the trajectory" in note for note in record["notes"])
+    assert "repeated-trajectory" in {remark["code"] for remark in record["remarks"]}
 
 
 def test_a_refusal_leaves_no_file(excitation, tmp_path):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.identification.base_parameters import structure
+from vftcli.identification.base_parameters import group_parameters
 from vftcli.identification.consistent import (
     Problem,
     fit_at,
@@ -11,10 +11,10 @@ from vftcli.identification.consistent import (
     pseudo_inertias,
     solve,
     starting_point,
-    thickened,
+    thicken_links,
 )
 from vftcli.identification.friction_shapes import Shape
-from vftcli.identification.stacking import ParameterColumns, Triangles, nearest, triangle
+from vftcli.identification.stacking import ParameterColumns, Triangles, least_change, triangle
 from vftcli.robots import load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor, with_parameters
 
@@ -25,13 +25,13 @@ from vftcli.robots.regressor import chain_parameters, torque_regressor, with_par
 )
 def test_ranks_are_the_published_ones(name, rotor, rank):
     """UR5 36 of 60 inertial, 58 of 84 with 18 friction numbers; Panda 43 of 70, 69 of 98."""
-    assert len(structure(load_robot(name).chain, rotor).independent) == rank
+    assert len(group_parameters(load_robot(name).chain, rotor).independent) == rank
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda"])
 def test_rotors_of_joints_one_and_two_are_never_separate(name):
     chain = load_robot(name).chain
-    grouping = structure(chain, True)
+    grouping = group_parameters(chain, True)
     n = chain.joints
     for j in (0, 1):
         alone = 10 * n + j
@@ -42,7 +42,7 @@ def test_rotors_of_joints_one_and_two_are_never_separate(name):
 
 def test_equal_base_parameters_mean_equal_torque():
     chain = load_robot("panda").chain
-    grouping = structure(chain, False)
+    grouping = group_parameters(chain, False)
     phi = chain_parameters(chain)
     other = phi.copy()
     rng = np.random.default_rng(0)
@@ -59,7 +59,7 @@ def test_equal_base_parameters_mean_equal_torque():
 def test_names_say_what_is_summed():
     chain = load_robot("ur5").chain
     layout = ParameterColumns(chain, True, (Shape(("coulomb",)),) * 6)
-    names = structure(chain, True).named(layout.names)
+    names = group_parameters(chain, True).sums(layout.names)
     assert len(set(names)) == 40
     assert any(" + " in name for name in names)
 
@@ -150,15 +150,15 @@ def test_the_gradient_is_the_cost_s():
 def test_a_point_mass_is_thickened_and_the_physical_stays():
     chain = load_robot("ur10e").chain
     phi = chain_parameters(chain)
-    assert is_physical(thickened(phi))
+    assert is_physical(thicken_links(phi))
     flat = phi.copy()
     flat[14:20] = 0.0  # a tensor of nothing about the origin, with mass away from it
     assert not is_physical(flat)
-    assert is_physical(thickened(flat))
+    assert is_physical(thicken_links(flat))
     healthy = load_robot("panda").chain
     # already physical: only rounding of an eigendecomposition
     np.testing.assert_allclose(
-        thickened(chain_parameters(healthy)), chain_parameters(healthy), atol=1e-12
+        thicken_links(chain_parameters(healthy)), chain_parameters(healthy), atol=1e-12
     )
 
 
@@ -187,7 +187,7 @@ def test_least_squares_leaves_the_start_where_there_is_no_data():
     phi = chain_parameters(perturbed(chain, 8))
     triangles, state = stacked(chain, phi, noise=0.1)
     start = chain_parameters(chain)
-    x = nearest(triangles, start)
+    x = least_change(triangles, start)
     # the first link's mass moves nothing: no motion tells it
     assert x[0] == pytest.approx(start[0], rel=1e-12)
     Y = torque_regressor(chain, *state)

@@ -117,8 +117,8 @@ def identify_robot(
     profile = chosen.load(train[0])
     found = identify(train, profile, task, held_out, unloaded[0] if unloaded else None)
     record = write_identification(output, found, read, command_line(), force)
-    for note in found.notes:
-        say(f"note: {note}")
+    for remark in found.remarks:
+        say(f"note: {remark}")
     say(f"wrote {', '.join(str(file) for file in beside(output).values())}")
     typer.echo(record.rstrip("\n") if json else tables(found))
 
@@ -147,8 +147,8 @@ def tables(found: "Identification") -> str:
     if not found.residuals.is_empty():
         head = "".join(f"{f'J{j}':>8}" for j in joints)
         lines.append(f"{'residual rms [N·m]':<44}{head}{'mean':>8}")
-        for (log, role, model), part in found.residuals.group_by(
-            ["log", "role", "model"], maintain_order=True
+        for (_, log, role, model), part in found.residuals.group_by(
+            ["log_index", "log", "role", "model"], maintain_order=True
         ):
             values = part["rms_Nm"].to_list()
             numbers = "".join(f"{v:>8.3f}" for v in (*values, sum(values) / len(values)))

@@ -37,7 +37,7 @@ class Grouping(NamedTuple):
         base: Array = x[list(self.independent)] + self.carried @ x[list(self.dependent)]
         return base
 
-    def named(self, names: tuple[str, ...]) -> list[str]:
+    def sums(self, names: tuple[str, ...]) -> list[str]:
         """Each base parameter written out as a sum, as "Izz1 + 0.25 m2 + Iyy2"."""
         out = []
         for k, row in zip(self.independent, self.carried, strict=True):
@@ -50,7 +50,7 @@ class Grouping(NamedTuple):
         return out
 
 
-def structure(chain: Chain, rotor: bool) -> Grouping:
+def group_parameters(chain: Chain, rotor: bool) -> Grouping:
     """Group an arm's inertial parameters and rotor inertias by rank-revealing QR.
 
     The regressor of random states, seeded, is decomposed with column pivoting; R = [R₁ R₂] gives
@@ -78,7 +78,7 @@ def structure(chain: Chain, rotor: bool) -> Grouping:
     return Grouping(tuple(order[:rank][first].tolist()), tuple(order[rank:].tolist()), beta[first])
 
 
-def extended(grouping: Grouping, layout: ParameterColumns) -> Grouping:
+def with_friction(grouping: Grouping, layout: ParameterColumns) -> Grouping:
     """The grouping of all unknowns: friction coefficients stand for themselves."""
     own = tuple(range(layout.inertial + layout.rotors, layout.size))
     carried = np.vstack([grouping.carried, np.zeros((len(own), grouping.carried.shape[1]))])
@@ -112,7 +112,7 @@ def base_parameters(triangles: Triangles, start: Array) -> BaseParameters:
         start: The profile's parameters. (size,)
     """
     layout = triangles.layout
-    grouping = extended(structure(layout.chain, layout.rotor), layout)
+    grouping = with_friction(group_parameters(layout.chain, layout.rotor), layout)
     places = list(grouping.independent)
     R, z = triangles.joined()
     R = R[:, places]
@@ -131,7 +131,7 @@ def base_parameters(triangles: Triangles, start: Array) -> BaseParameters:
     full = start.copy()
     full[places] = values - grouping.carried @ start[list(grouping.dependent)]
     return BaseParameters(
-        names=tuple(grouping.named(layout.names)),
+        names=tuple(grouping.sums(layout.names)),
         values=values,
         sd=sd,
         determined=tuple((sd <= DOUBTFUL * size).tolist()),

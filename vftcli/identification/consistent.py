@@ -70,7 +70,7 @@ def is_physical(phi: Array) -> bool:
     return True
 
 
-def thickened(phi: Array) -> Array:
+def thicken_links(phi: Array) -> Array:
     """The nearest parameters whose every link has some mass and some thickness. (10n,)
 
     Profiles from rounded tables, or with point masses, touch the edge of what is physical.
@@ -184,7 +184,7 @@ class ConsistentFit(NamedTuple):
 def starting_point(layout: ParameterColumns, x: Array) -> Array:
     """Physical parameters near x to measure the distance from. (size,)"""
     start = x.copy()
-    start[: layout.inertial] = thickened(x[: layout.inertial])
+    start[: layout.inertial] = thicken_links(x[: layout.inertial])
     spots = slice(layout.inertial, layout.inertial + layout.rotors)
     start[spots] = np.maximum(x[spots], 1e-3)
     return start

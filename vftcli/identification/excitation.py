@@ -9,6 +9,7 @@ from vftcli.identification.least_squares import robust_sd
 from vftcli.identification.processing import PreparedLog
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.remarks import Remark, Where, warning
 from vftcli.signals.series import median_step, runs_of
 
 SLOW = 0.02
@@ -20,7 +21,7 @@ ENOUGH = 1.0
 TOUCH = 7.0
 """Residual that counts as contact, in robust standard deviations of its joint."""
 
-STICKING = 0.05
+STICTION_SPEED = 0.05
 """Speed near which a joint may stick. [rad/s]"""
 
 TOUCH_TIME = 0.15
@@ -46,7 +47,7 @@ class Excitation(NamedTuple):
     reverses: Mask
 
 
-def excitation(motions: Sequence[PreparedLog]) -> Excitation:
+def find_excitation(motions: Sequence[PreparedLog]) -> Excitation:
     """Find which joints move, and which both ways.
 
     Raises:
@@ -86,7 +87,7 @@ class ContactSpan(NamedTuple):
     size: float
 
 
-def contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSpan]:
+def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSpan]:
     """Find stretches whose residual is far outside what the rest of the log shows.
 
     Near a reversal a joint may stick, and the residual be as large as its dry friction: only what
@@ -99,7 +100,7 @@ def contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSp
     """
     usable = motion.usable
     sd = np.array([robust_sd(r[u]) for r, u in zip(residual.T, usable.T, strict=True)])
-    excess = np.maximum(np.abs(residual) - np.abs(dry) * sticking(motion), 0.0)
+    excess = np.maximum(np.abs(residual) - np.abs(dry) * near_standstill(motion), 0.0)
     z = excess * usable / np.maximum(sd, 1e-9)
     worst = z.max(axis=1)
     found = []
@@ -114,16 +115,17 @@ def contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSp
                     float(residual[start + k, j]),
                 )
             )
-    return merged(found)
+    return join_neighbours(found)
 
 
-def sticking(motion: PreparedLog) -> Mask:
-    """Whether a joint is slower than `STICKING` within a filter's length of a sample. (M, n)"""
-    slow = np.abs(motion.dq) < STICKING
+def near_standstill(motion: PreparedLog) -> Mask:
+    """Whether a joint is slow enough to stick within a filter's length of a sample. (M, n)"""
+    slow = np.abs(motion.dq) < STICTION_SPEED
     if motion.samples < 2:
         return slow
     step = median_step(motion.t)
     reach = max(1, round(1.0 / (motion.processing.cutoff * step)))
+    # The zero-phase filter spreads what happens at standstill over about a period of its cutoff.
     spread = slow.copy()
     for k in range(1, min(reach, motion.samples - 1) + 1):
         spread[k:] |= slow[:-k]
@@ -131,7 +133,7 @@ def sticking(motion: PreparedLog) -> Mask:
     return spread
 
 
-def merged(found: Sequence[ContactSpan]) -> list[ContactSpan]:
+def join_neighbours(found: Sequence[ContactSpan]) -> list[ContactSpan]:
     """Join contacts that lie closer together than twice the margin."""
     out: list[ContactSpan] = []
     for contact in found:
@@ -143,8 +145,8 @@ def merged(found: Sequence[ContactSpan]) -> list[ContactSpan]:
     return out
 
 
-def without(motion: PreparedLog, found: Sequence[ContactSpan]) -> Mask:
-    """Samples outside all contacts and their margins. (M,)"""
+def outside_contacts(motion: PreparedLog, found: Sequence[ContactSpan]) -> Mask:
+    """Mask outside all contacts and their margins. (M,)"""
     free = np.ones(motion.samples, dtype=bool)
     for contact in found:
         inside = motion.t > contact.start - TOUCH_MARGIN
@@ -152,8 +154,10 @@ def without(motion: PreparedLog, found: Sequence[ContactSpan]) -> Mask:
     return free
 
 
-def doubt(name: str, robot: str, torque: Array, residual: Array, heavy: Mask) -> str:
-    """Say which joint that carries weight the model explains worst, or "" if it does well.
+def unexplained_torque(
+    name: str, robot: str, torque: Array, residual: Array, heavy: Mask
+) -> Remark | None:
+    """A remark on the joint that carries weight and is explained worst; None if all are well.
 
     Args:
         name: The log's name.
@@ -164,15 +168,12 @@ def doubt(name: str, robot: str, torque: Array, residual: Array, heavy: Mask) ->
     """
     places = np.flatnonzero(heavy)
     if not places.size:
-        return ""
+        return None
     spread = np.maximum(np.var(torque[:, places], axis=0), 1e-12)
     explained = 1.0 - np.mean(residual[:, places] ** 2, axis=0) / spread
     worst = int(np.argmin(explained))
     if explained[worst] >= WRONG:
-        return ""
-    return (
-        f"{name}: with the links of {robot!r} the model explains only "
-        f"{100 * max(float(explained[worst]), 0.0):.0f} % of the torque's variation in joint "
-        f"{places[worst] + 1}: this is another robot, it carries an unknown load, or its effort "
-        "has another sign or unit"
-    )
+        return None
+    share = 100.0 * max(float(explained[worst]), 0.0)
+    where = Where(name, (int(places[worst]) + 1,))
+    return warning("unexplained-torque", where, robot=robot, share_percent=share)

@@ -53,7 +53,7 @@ class ShapeChoice(NamedTuple):
     chosen: bool = False
 
 
-class Given(NamedTuple):
+class JointData(NamedTuple):
     """What one joint's fit is made from, over all training logs.
 
     Attributes:
@@ -62,7 +62,7 @@ class Given(NamedTuple):
             where the drive constant is. (M, f)
         weights: 0 where nothing is told, 1 elsewhere. (M,)
         sources: Friction columns of each log.
-        loads: Spread of the gravity torque. [N·m]
+        load_spread: Spread of the gravity torque. [N·m]
         reverses: Whether the joint moves both ways.
     """
 
@@ -70,7 +70,7 @@ class Given(NamedTuple):
     fixed: Array
     weights: Array
     sources: Sequence[FrictionColumns]
-    loads: float
+    load_spread: float
     reverses: bool
 
     def columns(self, j: int, shape: Shape) -> Array:
@@ -79,41 +79,41 @@ class Given(NamedTuple):
         return np.hstack([friction, self.fixed])
 
 
-def choose_shape(j: int, given: Given) -> tuple[Shape, list[ShapeChoice]]:
+def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
     """Choose a joint's friction model by cross-validation, simplest of the nearly best.
 
     First the smoothing is chosen with the richest plain model, then the terms.
 
     Args:
         j: Joint, from 0.
-        given: Its data.
+        data: Its equations.
     """
-    rich = allowed(RICHEST, given)
-    start = fit_column(given.columns(j, Shape(rich)), given.y, given.weights)
+    rich = tellable_terms(RICHEST, data)
+    start = fit_column(data.columns(j, Shape(rich)), data.y, data.weights)
 
     def error(smoothing: float) -> float:
-        return cross_validated(given.columns(j, Shape(rich, smoothing)), given.y, start.weights)
+        return cross_validated(data.columns(j, Shape(rich, smoothing)), data.y, start.weights)
 
     smoothing = min(SMOOTHINGS, key=error)
-    contests = []
-    for shape in candidates(smoothing, given):
-        A = given.columns(j, shape)
-        fit = fit_column(A, given.y, given.weights)
-        if physical(shape, fit):
-            contests.append(ShapeChoice(j + 1, shape, cross_validated(A, given.y, start.weights)))
-    if not contests:
-        return Shape(allowed(PLAIN, given), smoothing), []
-    limit = MARGIN * min(contest.error for contest in contests)
-    near = [c for c in contests if c.error <= limit]
+    choices = []
+    for shape in candidate_shapes(smoothing, data):
+        A = data.columns(j, shape)
+        fit = fit_column(A, data.y, data.weights)
+        if is_dissipative(shape, fit):
+            choices.append(ShapeChoice(j + 1, shape, cross_validated(A, data.y, start.weights)))
+    if not choices:
+        return Shape(tellable_terms(PLAIN, data), smoothing), []
+    limit = MARGIN * min(c.error for c in choices)
+    near = [c for c in choices if c.error <= limit]
     chosen = min(near, key=lambda c: (len(c.shape.terms), c.error))
-    return chosen.shape, [c._replace(chosen=c is chosen) for c in contests]
+    return chosen.shape, [c._replace(chosen=c is chosen) for c in choices]
 
 
-def candidates(smoothing: float, given: Given) -> Iterator[Shape]:
+def candidate_shapes(smoothing: float, data: JointData) -> Iterator[Shape]:
     """The shapes that compete, each once."""
     shapes: dict[Shape, None] = {}
     for terms in CANDIDATES:
-        kept = allowed(terms, given)
+        kept = tellable_terms(terms, data)
         if "stribeck" not in kept:
             shapes[Shape(kept, smoothing)] = None
             continue
@@ -123,13 +123,13 @@ def candidates(smoothing: float, given: Given) -> Iterator[Shape]:
     yield from shapes
 
 
-def allowed(terms: tuple[str, ...], given: Given) -> tuple[str, ...]:
+def tellable_terms(terms: tuple[str, ...], data: JointData) -> tuple[str, ...]:
     """Drop what the motion cannot tell: growth with a load there is none of, offset one-way."""
-    out = tuple(t for t in terms if t != "load_coulomb" or given.loads >= LIGHT)
-    return out if given.reverses else tuple(t for t in out if t != "offset")
+    out = tuple(t for t in terms if t != "load_coulomb" or data.load_spread >= LIGHT)
+    return out if data.reverses else tuple(t for t in out if t != "offset")
 
 
-def physical(shape: Shape, fit: ColumnFit) -> bool:
+def is_dissipative(shape: Shape, fit: ColumnFit) -> bool:
     """Whether no dry-friction term came out negative."""
     return all(
         value >= 0.0

@@ -53,19 +53,19 @@ class Shape(NamedTuple):
 
     def friction(self, values: Array, confidence: str = "") -> JointFriction:
         """The joint's friction with these coefficients, one a term."""
-        parameters = {k: rounded(float(v)) for k, v in zip(self.terms, values, strict=True)}
+        parameters = {k: round_digits(float(v)) for k, v in zip(self.terms, values, strict=True)}
         parameters["smoothing"] = self.smoothing
         if "stribeck" in self.terms:
             parameters["stribeck_velocity"] = self.stribeck_velocity
         return JointFriction(model=self.model, parameters=parameters, confidence=confidence)
 
 
-def rounded(value: float, digits: int = 7) -> float:
+def round_digits(value: float, digits: int = 7) -> float:
     """A number with as many digits as an identification can possibly mean."""
     return float(f"{value:.{digits}g}")
 
 
-def shape_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
+def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
     """One term of a friction shape at every sample. Like `dq`
 
     Args:
@@ -100,18 +100,18 @@ class FrictionColumns:
     def __init__(self, motion: PreparedLog, load: Array) -> None:
         self.motion = motion
         self.load = load
-        self.made: dict[tuple[str, int, float, float], Array] = {}
+        self.cache: dict[tuple[str, int, float, float], Array] = {}
 
     def column(self, term: str, j: int, shape: Shape) -> Array:
         """One term of joint j. (M,)"""
         steep = shape.smoothing if term in {"coulomb", "load_coulomb", "stribeck"} else 0.0
         fades = shape.stribeck_velocity if term == "stribeck" else 0.0
         key = (term, j, steep, fades)
-        if key not in self.made:
+        if key not in self.cache:
             dq = self.motion.recording.require("dq")[:, j]
-            values = shape_values(term, shape, dq, self.load[:, j])
-            self.made[key] = self.motion.filtered(values[:, None])[:, 0]
-        return self.made[key]
+            values = term_values(term, shape, dq, self.load[:, j])
+            self.cache[key] = self.motion.filtered(values[:, None])[:, 0]
+        return self.cache[key]
 
     def joint(self, j: int, shape: Shape) -> Array:
         """All terms of joint j. (M, k)"""

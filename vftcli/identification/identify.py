@@ -1,35 +1,58 @@
 """Logs in, a robot out: the whole way of `vftcli identify`, in the order the data flows."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import polars as pl
 
 from vftcli.identification.base_parameters import BaseParameters
 from vftcli.identification.friction_fit import ShapeChoice
+from vftcli.identification.friction_method import friction_method
 from vftcli.identification.method_result import MethodResult
-from vftcli.identification.methods import METHODS
-from vftcli.identification.payload import LoadFit, payload_from_pair, payload_from_poses
+from vftcli.identification.payload import (
+    LoadFit,
+    NotSameMotionError,
+    payload_from_pair,
+    payload_from_poses,
+)
 from vftcli.identification.processing import PreparedLog, Processing, prepare
-from vftcli.identification.provenance import Provenance, documented
-from vftcli.identification.repeats import repeated_share, repeats
+from vftcli.identification.provenance import Provenance, with_provenance
 from vftcli.identification.result import (
     BASE,
-    CONTESTS,
     PARAMETERS,
     RESIDUALS,
+    SHAPE_CHOICES,
     Identification,
     Number,
     Trace,
+    number,
 )
-from vftcli.identification.scoring import diagnosis, mean_text, predicted_torque, rms
-from vftcli.identification.training import training
+from vftcli.identification.scoring import (
+    REPEATED,
+    held_out_remarks,
+    predicted_torque,
+    repeated_share,
+    rms,
+)
+from vftcli.identification.target_method import targets_method
+from vftcli.identification.training import Training, prepare_training
+from vftcli.identification.whole_arm import base_method, consistent_method
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError, ParameterError
 from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, Where, caution, fact
+
+METHODS: dict[str, Callable[[Training], MethodResult]] = {
+    "friction": friction_method,
+    "base": base_method,
+    "consistent": consistent_method,
+    "targets": targets_method,
+}
+"""Name at the command line → method."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,45 +108,46 @@ def identify(
     load = find_load(logs, robot, free) if task.find_payload else None
     train = free_logs(logs, free, load)
     if load is not None and (task.method is None or not train):
-        method, outcome = "payload", MethodResult(robot, [], [], None, [])
+        method, result = "payload", MethodResult(robot, [], [], None, [])
     else:
         method = task.method or "payload"
-        data = training(train, robot, task.processing, task.fit_constants)
-        outcome = METHODS[method](data)
-    new, numbers, notes = outcome.robot, [*outcome.numbers], [*outcome.notes]
-    scored = [prepare(r, robot, task.processing) for r in (train or ())]
-    others = [prepare(r, robot, task.processing) for r in held_out]
-    rows, traces = residual_rows(scored, "train", robot, new)
-    more, tested = residual_rows(others, "held-out", robot, new)
-    notes += remarks(new, scored, others, traces, tested)
+        data = prepare_training(train, robot, task.processing, task.fit_constants)
+        result = METHODS[method](data)
+    new, numbers, remarks = result.robot, [*result.numbers], [*result.remarks]
+    scored = [
+        ScoredLog.of(log, role, robot, new, task.processing)
+        for role, some in (("train", train), ("held-out", held_out))
+        for log in some
+    ]
+    remarks += score_remarks(new, scored)
     if load is not None:
-        new, numbers, notes = with_load(new, load, numbers, notes)
-    processing = task.processing.described(logs[0].median_step)
-    table = pl.DataFrame([*rows, *more], schema=RESIDUALS, orient="row")
-    sources = tuple(logs) if free is None else (*logs, free)
-    story = Provenance(
+        new, numbers = with_load(new, load, numbers)
+        remarks.append(load.origin)
+    processing = task.processing.settings_record(logs[0].median_step)
+    rows = [row for k, log in enumerate(scored, start=1) for row in log.rows(k)]
+    residuals = pl.DataFrame(rows, schema=RESIDUALS, orient="row")
+    made = Provenance(
         profile=robot,
         name=task.name,
         method=method,
-        logs=sources,
-        trained=[r.name for r in train],
+        logs=tuple(logs) if free is None else (*logs, free),
+        trained=train,
         processing=processing,
-        residuals=table,
-        outcome=outcome,
+        residuals=residuals,
+        result=result,
         load=load,
     )
-    new = documented(new, story)
     return Identification(
-        robot=new,
+        robot=with_provenance(new, made),
         profile=robot,
         method=method,
-        residuals=table,
-        parameters=pl.DataFrame([n.row for n in numbers], schema=PARAMETERS, orient="row"),
-        contests=contest_table(outcome.contests),
-        base=base_table(outcome.base),
-        traces=(*traces, *tested),
+        residuals=residuals,
+        parameters=pl.DataFrame(numbers, schema=PARAMETERS, orient="row"),
+        shape_choices=shape_choice_table(result.shape_choices),
+        base=base_table(result.base),
+        traces=tuple(log.trace for log in scored if log.trace is not None),
         processing=processing,
-        notes=tuple(dict.fromkeys(notes)),
+        remarks=tuple(remarks),
     )
 
 
@@ -132,22 +156,21 @@ def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -
     bare = robot.with_payload(None)
     if free is not None:
         fit = payload_from_pair(logs[0], free, bare)
-        if fit.loaded[0] is free:
+        if fit.carried_by(free):
             raise IdentificationError(
                 f"{free.name}, given as free of load, is the heavier one; swap the two logs"
             )
         return fit
-    if len(logs) == 2 and all(moves(r) for r in logs):
+    if len(logs) == 2 and all(joints_travel(r) for r in logs):
         try:
             return payload_from_pair(logs[0], logs[1], bare)
-        except IdentificationError as error:
-            if "not the same motion" not in str(error):
-                raise
+        except NotSameMotionError:
+            pass  # two different motions with the load: their poses at rest may still tell it
     return payload_from_poses(logs, bare)
 
 
-def moves(recording: Recording) -> bool:
-    """Whether some joint travels."""
+def joints_travel(recording: Recording) -> bool:
+    """Whether some joint travels further than it would at rest."""
     return bool(np.max(np.ptp(recording.q, axis=0)) > 0.05)
 
 
@@ -159,28 +182,48 @@ def free_logs(
         return tuple(logs)
     if free is not None:
         return (free,)
-    return tuple(log for log in logs if not any(log is loaded for loaded in load.loaded))
+    return tuple(log for log in logs if not load.carried_by(log))
 
 
-def residual_rows(
-    motions: Sequence[PreparedLog], role: str, profile: Robot, robot: Robot
-) -> tuple[list[tuple[str, str, str, int, float, int]], list[Trace]]:
-    """Score logs under the profile and the identified robot."""
-    rows, traces = [], []
-    for motion in motions:
+class ScoredLog(NamedTuple):
+    """A log scored under the profile and under the identified robot.
+
+    Attributes:
+        motion: The prepared log.
+        role: "train" or "held-out".
+        trace: Measured and predicted torque; None where nothing moves.
+        before: RMS under the profile. (n,) [N·m]
+    """
+
+    motion: PreparedLog
+    role: str
+    trace: Trace | None
+    before: Array
+
+    @classmethod
+    def of(
+        cls, log: Recording, role: str, profile: Robot, robot: Robot, processing: Processing
+    ) -> "ScoredLog":
+        """Score a log."""
+        motion = prepare(log, profile, processing)
         if motion.samples < 2:
-            continue
-        name = motion.recording.name
+            return cls(motion, role, None, np.zeros(motion.joints))
         expected = predicted_torque(robot, motion)
         measured = motion.tau * constant_ratio(profile, robot, motion)
-        for model, left in (
-            ("identified", measured - expected),
-            ("profile", motion.tau - predicted_torque(profile, motion)),
-        ):
-            for j, value in enumerate(rms(left), start=1):
-                rows.append((name, role, model, j, float(value), motion.samples))
-        traces.append(Trace(motion.recording, role, motion.t, motion.dq, measured, expected))
-    return rows, traces
+        trace = Trace(log, role, motion.t, motion.dq, measured, expected)
+        return cls(motion, role, trace, rms(motion.tau - predicted_torque(profile, motion)))
+
+    def rows(self, index: int) -> list[tuple[str, int, str, str, int, float, int]]:
+        """Rows of `RESIDUALS`; none where nothing moves."""
+        if self.trace is None:
+            return []
+        sizes = {"identified": rms(self.trace.residual), "profile": self.before}
+        name, samples = self.trace.recording.name, self.motion.samples
+        return [
+            (name, index, self.role, model, j, float(value), samples)
+            for model, values in sizes.items()
+            for j, value in enumerate(values, start=1)
+        ]
 
 
 def constant_ratio(profile: Robot, robot: Robot, motion: PreparedLog) -> Array | float:
@@ -194,55 +237,45 @@ def constant_ratio(profile: Robot, robot: Robot, motion: PreparedLog) -> Array |
     return ratio if uses_current(motion.recording, profile) else 1.0
 
 
-def remarks(
-    robot: Robot,
-    train: Sequence[PreparedLog],
-    test: Sequence[PreparedLog],
-    trained: Sequence[Trace],
-    tested: Sequence[Trace],
-) -> list[str]:
+def score_remarks(robot: Robot, scored: Sequence[ScoredLog]) -> list[Remark]:
     """What the scores mean: repeated trajectories, and joints that are much worse elsewhere."""
-    notes = []
-    for motion in test:
+    train = [log for log in scored if log.role == "train"]
+    held_out = [log for log in scored if log.role == "held-out"]
+    remarks = []
+    for test in held_out:
         for other in train:
-            if repeats(other, motion):
-                share = 100.0 * repeated_share(other, motion)
-                notes.append(
-                    f"{motion.recording.name} repeats the trajectory of {other.recording.name} "
-                    f"({share:.0f} % of it): its score says nothing about other motions"
-                )
-    if trained and tested:
-        level = np.mean([rms(trace.residual) for trace in trained], axis=0)
-        for motion, trace in zip([m for m in test if m.samples > 1], tested, strict=True):
-            notes += diagnosis(robot, motion, trace.residual, level)
-    if trained:
-        mean = mean_text(np.mean([rms(trace.residual) for trace in trained], axis=0))
-        notes.append(f"training residual {mean}, mean of the joints, contacts if any included")
-    return notes
+            if (share := repeated_share(other.motion, test.motion)) >= REPEATED:
+                where, name = Where(test.motion.recording.name), other.motion.recording.name
+                values = {"training_log": name, "share_percent": 100.0 * share}
+                remarks.append(caution("repeated-trajectory", where, **values))
+    levels = [rms(log.trace.residual) for log in train if log.trace is not None]
+    if not levels:
+        return remarks
+    level = np.mean(levels, axis=0)
+    for test in held_out:
+        if test.trace is not None:
+            remarks += held_out_remarks(robot, test.motion, test.trace.residual, level)
+    return [*remarks, fact("training-residual", mean_Nm=float(np.mean(level)))]
 
 
-def with_load(
-    robot: Robot, load: LoadFit, numbers: list[Number], notes: list[str]
-) -> tuple[Robot, list[Number], list[str]]:
-    """The robot with the found load mounted, and its numbers."""
-    known = load.mass_sd < 0.2 * load.payload.mass
-    nothing = float("nan")
-    values = zip(("com_x", "com_y", "com_z"), load.payload.com, load.com_sd, strict=True)
-    found = [
-        Number(robot.joints, "mass", load.payload.mass, load.mass_sd, nothing, known),
-        *(Number(robot.joints, k, float(v), float(sd), nothing, sd < 0.05) for k, v, sd in values),
-    ]
-    return robot.with_payload(load.payload), [*numbers, *found], [*notes, *load.notes]
+def with_load(robot: Robot, load: LoadFit, numbers: list[Number]) -> tuple[Robot, list[Number]]:
+    """The robot with the found load mounted, and its numbers beside the others."""
+    last, nothing, found = robot.joints - 1, float("nan"), load.payload
+    known = load.mass_sd < 0.2 * found.mass
+    more = [number(last, "mass", found.mass, load.mass_sd, nothing, known)]
+    for key, value, sd in zip(("com_x", "com_y", "com_z"), found.com, load.com_sd, strict=True):
+        more.append(number(last, key, value, sd, nothing, bool(sd < 0.05)))
+    return robot.with_payload(found), [*numbers, *more]
 
 
-def contest_table(contests: Sequence[ShapeChoice]) -> pl.DataFrame:
-    """The friction candidates as a table."""
-    rows = [(c.joint, c.shape.words, c.error, c.chosen) for c in contests]
-    return pl.DataFrame(rows, schema=CONTESTS, orient="row")
+def shape_choice_table(choices: Sequence[ShapeChoice]) -> pl.DataFrame:
+    """The friction candidates and their errors, by `SHAPE_CHOICES`."""
+    rows = [(c.joint, c.shape.words, c.error, c.chosen) for c in choices]
+    return pl.DataFrame(rows, schema=SHAPE_CHOICES, orient="row")
 
 
 def base_table(base: BaseParameters | None) -> pl.DataFrame | None:
-    """Base parameters as a table."""
+    """Base parameters by `BASE`; None for a method that has none."""
     if base is None:
         return None
     rows = zip(base.names, base.values.tolist(), base.sd.tolist(), base.determined, strict=True)

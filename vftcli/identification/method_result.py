@@ -1,4 +1,4 @@
-"""What every method hands back, and the words it has for its numbers."""
+"""What every method of identification hands back, and the remarks that several of them make."""
 
 from typing import NamedTuple
 
@@ -8,11 +8,15 @@ from vftcli.identification.base_parameters import BaseParameters
 from vftcli.identification.friction_fit import ShapeChoice
 from vftcli.identification.friction_shapes import Shape
 from vftcli.identification.least_squares import robust_sd
-from vftcli.identification.result import Number
+from vftcli.identification.result import Number, number
 from vftcli.identification.training import Training
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.remarks import Remark, Where, caution, fact
+
+DETERMINED = 0.3
+"""Standard deviation over value up to which a number counts as determined by the logs."""
 
 
 class MethodResult(NamedTuple):
@@ -21,37 +25,38 @@ class MethodResult(NamedTuple):
     Attributes:
         robot: The identified robot.
         numbers: Its identified numbers.
-        contests: Friction candidates.
+        shape_choices: Friction candidates.
         base: Base parameters, if the method has them.
-        notes: Remarks.
+        remarks: What the reader of the numbers should know.
     """
 
     robot: Robot
     numbers: list[Number]
-    contests: list[ShapeChoice]
+    shape_choices: list[ShapeChoice]
     base: BaseParameters | None
-    notes: list[str]
+    remarks: list[Remark]
+
+
+def at_joint(j: int) -> Where:
+    """The place of a remark about joint j, counted from 0."""
+    return Where(joints=(j + 1,))
 
 
 def friction_numbers(
     j: int, shape: Shape, values: Array, sd: Array, before: JointFriction
 ) -> list[Number]:
-    """Friction coefficients as numbers."""
+    """Friction coefficients of joint j (from 0) beside those of the profile, one a term."""
+    known = before.parameters
     return [
-        Number(
-            j + 1,
-            term,
-            float(value),
-            float(error),
-            float(before.parameters.get(term, np.nan)),
-            bool(error < 0.3 * abs(value)),
+        number(
+            j, term, value, error, known.get(term, np.nan), bool(error < DETERMINED * abs(value))
         )
         for term, value, error in zip(shape.terms, values, sd, strict=False)
     ]
 
 
-def odd_friction(j: int, friction: JointFriction, data: Training) -> list[str]:
-    """A remark where friction would push at some speed of the log.
+def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
+    """A remark if the friction found would push joint j (from 0) at some speed of the log.
 
     Raises:
         IdentificationError: If it pushes at all speeds: sign or unit are wrong.
@@ -61,6 +66,7 @@ def odd_friction(j: int, friction: JointFriction, data: Training) -> list[str]:
     v = np.linspace(0.1 * speed, speed, 10)
     torque = values["coulomb"] + values["viscous"] * v + values.get("quadratic", 0.0) * v**2
     noise = max(robust_sd(m.tau[:, j]) for m in data.motions)
+    # A hundredth of the torque's spread: friction of nothing comes out on either side of zero.
     if np.all(torque < -0.01 * noise):
         raise IdentificationError(
             f"{data.recordings[0].name}: friction of joint {j + 1} comes out as {torque[0]:.2g} to "
@@ -68,29 +74,23 @@ def odd_friction(j: int, friction: JointFriction, data: Training) -> list[str]:
             "is another robot; check --columns and --robot"
         )
     if np.any(torque < 0):
-        return [
-            f"joint {j + 1}: friction is below zero at some speeds ({torque.min():.2g} N·m); "
-            "it is small against the model's error there"
-        ]
+        return [caution("negative-friction", at_joint(j), least_Nm=float(torque.min()))]
     return []
 
 
-def held(data: Training) -> list[str]:
-    """Remarks on joints that do not move or never reverse."""
-    notes = []
+def held_joints(data: Training) -> list[Remark]:
+    """Remarks on joints that do not move, or never both ways."""
+    remarks = []
     for j in range(data.robot.joints):
         if not data.excited.moves[j]:
-            notes.append(f"joint {j + 1} does not move: the profile's numbers stay")
+            remarks.append(fact("static-joint", at_joint(j)))
         elif not data.excited.reverses[j]:
-            notes.append(
-                f"joint {j + 1} never reverses: Coulomb friction and an offset cannot be told "
-                "apart; no offset is fitted, so that gravity errors may hide in the Coulomb torque"
-            )
-    return notes
+            remarks.append(caution("one-way-joint", at_joint(j)))
+    return remarks
 
 
-def confidence(data: Training, method: str, sd: Array) -> str:
-    """Where a joint's friction comes from, in words."""
+def friction_source(data: Training, method: str, sd: Array) -> str:
+    """Where a joint's friction comes from, in words for the robot file."""
     errors = ", ".join(f"{value:.2g}" for value in sd)
     return f"identified ({method}) from {data.source}; standard deviations {errors}"
 

@@ -20,6 +20,7 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import resampled, runs_of
 
 STATIC = 4
@@ -34,11 +35,23 @@ COARSE, FINE = 0.05, 5e-4
 DWELL = 0.5
 """Shortest rest that counts as a pose. [s]"""
 
-WINDOW, HELD = 0.2, 1e-3
-"""A pose is held while no joint moves further than `HELD` [rad] within `WINDOW` [s]."""
+WINDOW, STILL = 0.2, 1e-3
+"""A pose is held while no joint moves further than `STILL` [rad] within `WINDOW` [s]."""
 
 POSES = 4
 """Fewest different poses for mass and centre of mass."""
+
+REACH = 1.0
+"""A load's centre of mass further than this from the flange cannot be. [m]"""
+
+
+def names_of(recordings: Sequence[Recording]) -> str:
+    """Names of logs as one text."""
+    return ", ".join(recording.name for recording in recordings)
+
+
+class NotSameMotionError(IdentificationError):
+    """Two logs that were taken for a pair do not repeat one motion."""
 
 
 class LoadFit(NamedTuple):
@@ -47,10 +60,10 @@ class LoadFit(NamedTuple):
     Attributes:
         payload: The load on the flange, as a point mass.
         mass_sd: Standard deviation of the mass. [kg]
-        com_sd: Standard deviations of the centre of mass. (3,) [m]
+        com_sd: Standard deviations of the centre of mass in flange axes. (3,) [m]
         residual: RMS torque left in each joint. (n,) [N·m]
         loaded: The logs that carry it.
-        notes: How it was found.
+        origin: How it was found.
     """
 
     payload: Payload
@@ -58,12 +71,54 @@ class LoadFit(NamedTuple):
     com_sd: Array
     residual: Array
     loaded: tuple[Recording, ...]
-    notes: tuple[str, ...]
+    origin: Remark
 
-    @property
-    def names(self) -> str:
-        """The logs that carry it, by name."""
-        return names_of(self.loaded)
+    def carried_by(self, recording: Recording) -> bool:
+        """Whether a log carries it. Logs are told apart as objects: their names may be equal."""
+        return any(log is recording for log in self.loaded)
+
+
+class LoadSolution(NamedTuple):
+    """The equations' solution before it is known whether it can be a load.
+
+    Attributes:
+        x: Mass and first moments in the last link's frame. (4,) [kg, kg·m]
+        sd: Standard deviations. (4,)
+        residual: RMS left in each joint. (n,) [N·m]
+        loaded: The logs with the load.
+        origin: How it was found.
+    """
+
+    x: Array
+    sd: Array
+    residual: Array
+    loaded: tuple[Recording, ...]
+    origin: Remark
+
+    def at_flange(self, robot: Robot) -> LoadFit:
+        """The load in flange axes.
+
+        Raises:
+            IdentificationError: If the mass is not positive, uncertain, or lies out of reach.
+        """
+        names = names_of(self.loaded)
+        mass, sd = float(self.x[0]), float(self.sd[0])
+        if mass <= 0 or sd > 0.5 * mass:
+            raise IdentificationError(
+                f"{names}: no load can be told: mass {mass:.3g} ± {sd:.2g} kg; "
+                "use poses or motions in which gravity loads several joints differently"
+            )
+        chain = robot.chain
+        R = chain.flange_rotation
+        com = R.T @ (self.x[1:STATIC] / mass - chain.flange_translation)
+        spread = np.sqrt(np.diag(R.T @ np.diag((self.sd[1:STATIC] / mass) ** 2) @ R))
+        if (away := float(np.linalg.norm(com))) > REACH:
+            raise IdentificationError(
+                f"{names}: the load's centre of mass comes out {away:.2g}"
+                " m from the flange; the logs do not fit this robot"
+            )
+        load = Payload(mass=mass, com=com, inertia=np.zeros((3, 3)))
+        return LoadFit(load, sd, spread, self.residual, self.loaded, self.origin)
 
 
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
@@ -73,68 +128,20 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
     alike in both, but for friction that grows with the load: that is fitted along.
 
     Raises:
-        IdentificationError: If the logs are not the same motion, or differ by no load.
+        NotSameMotionError: If the logs are not the same motion.
+        IdentificationError: If they differ by no load.
     """
-    fit = pair_fit(second, first, robot)
-    if fit.payload_mass < 0:
-        fit = pair_fit(first, second, robot)
-    return fit.finished(robot)
+    solution = solve_pair(second, first, robot)
+    if solution.x[0] < 0:
+        solution = solve_pair(first, second, robot)
+    return solution.at_flange(robot)
 
 
-class PairFit(NamedTuple):
-    """The equations' solution before it is judged.
-
-    Attributes:
-        x: Mass and first moments in the last link's frame. (4,)
-        sd: Standard deviations. (4,)
-        residual: RMS left in each joint. (n,) [N·m]
-        loaded: The logs with the load.
-        notes: How it was found.
-    """
-
-    x: Array
-    sd: Array
-    residual: Array
-    loaded: tuple[Recording, ...]
-    notes: tuple[str, ...]
-
-    @property
-    def payload_mass(self) -> float:
-        """Mass. [kg]"""
-        return float(self.x[0])
-
-    def finished(self, robot: Robot) -> LoadFit:
-        """Move the load to flange axes and check that it can be one.
-
-        Raises:
-            IdentificationError: If the mass is not positive, uncertain, or lies out of reach.
-        """
-        mass, sd = self.payload_mass, float(self.sd[0])
-        if mass <= 0 or sd > 0.5 * mass:
-            raise IdentificationError(
-                f"{names_of(self.loaded)}: no load can be told: mass {mass:.3g} ± {sd:.2g} kg; "
-                "use poses or motions in which gravity loads several joints differently"
-            )
-        chain = robot.chain
-        com = self.x[1:STATIC] / mass
-        at_flange = chain.flange_rotation.T @ (com - chain.flange_translation)
-        com_sd = chain.flange_rotation.T @ np.diag((self.sd[1:STATIC] / mass) ** 2)
-        spread = np.sqrt(np.diag(com_sd @ chain.flange_rotation))
-        if np.linalg.norm(at_flange) > 1.0:
-            away = float(np.linalg.norm(at_flange))
-            raise IdentificationError(
-                f"{names_of(self.loaded)}: the load's centre of mass comes out {away:.2g}"
-                " m from the flange; the logs do not fit this robot"
-            )
-        load = Payload(mass=mass, com=at_flange, inertia=np.zeros((3, 3)))
-        return LoadFit(load, sd, spread, self.residual, self.loaded, self.notes)
-
-
-def pair_fit(loaded: Recording, free: Recording, robot: Robot) -> PairFit:
+def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> LoadSolution:
     """Fit what the loaded log's torque has beyond the free one's at the same phase."""
     processing = Processing()
     motion = prepare(loaded, robot, processing)
-    shift, distance = time_shift(motion, free)
+    shift, distance = find_time_shift(motion, free)
     torque = zero_phase(free.t, drive_torque(free, robot), processing.cutoff)
     at = motion.t + shift
     inside = (at >= free.t[0]) & (at <= free.t[-1])
@@ -143,20 +150,22 @@ def pair_fit(loaded: Recording, free: Recording, robot: Robot) -> PairFit:
     q, dq, ddq = motion.q[inside], motion.dq[inside], motion.ddq[inside]
     Y = torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK:][:, :, :STATIC]
     usable = motion.usable[inside].astype(float)
-    x = weighted(Y, extra, usable)
+    x = fit_all_joints(Y, extra, usable)
+    # How friction grows depends on the load that is sought: a few rounds settle it.
     for _ in range(4):
         A = np.concatenate([Y, load_friction(robot, q, sign, x)], axis=2)
-        solution = weighted(A, extra, usable)
+        solution = fit_all_joints(A, extra, usable)
         x = solution[:STATIC]
     left = extra - np.einsum("knp,p->kn", A, solution)
-    sd = column_sd(A, left, usable)[:STATIC]
-    note = (
-        f"load from the pair {loaded.name} − {free.name}: same motion, "
-        f"shifted by {round(-shift, 3) + 0.0:.3f} s, "
-        f"positions {1e3 * distance:.2g} mrad rms apart; Coulomb friction that grows with the load "
-        "fitted along; the load is taken as a point mass"
+    sd = parameter_sd(A, left, usable)[:STATIC]
+    origin = fact(
+        "load-from-pair",
+        loaded=loaded.name,
+        free=free.name,
+        shift_s=round(-shift, 3) + 0.0,
+        distance_mrad=1e3 * distance,
     )
-    return PairFit(x, sd, np.sqrt(np.mean(left**2, axis=0)), (loaded,), (note,))
+    return LoadSolution(x, sd, np.sqrt(np.mean(left**2, axis=0)), (loaded,), origin)
 
 
 def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
@@ -172,7 +181,7 @@ def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
     return out
 
 
-def weighted(A: Array, y: Array, usable: Array, passes: int = 3) -> Array:
+def fit_all_joints(A: Array, y: Array, usable: Array, passes: int = 3) -> Array:
     """Least squares over all joints, each divided by its own residual. (k,)"""
     scale = np.maximum(np.std(y, axis=0), 1e-9)
     for _ in range(passes):
@@ -183,7 +192,7 @@ def weighted(A: Array, y: Array, usable: Array, passes: int = 3) -> Array:
     return x
 
 
-def column_sd(A: Array, left: Array, usable: Array) -> Array:
+def parameter_sd(A: Array, left: Array, usable: Array) -> Array:
     """Standard deviations, the residuals' correlation along time counted. (k,)"""
     scale = np.maximum(np.sqrt(np.mean(left**2, axis=0)), 1e-9)
     w = np.sqrt(usable) / scale
@@ -194,11 +203,11 @@ def column_sd(A: Array, left: Array, usable: Array) -> Array:
     return fit.sd
 
 
-def time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:
-    """Shift [s] to add to the motion's clock for the other log's, and what is left. [rad rms]
+def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:
+    """Shift [s] that turns the motion's clock into the other log's, and what is left. [rad rms]
 
     Raises:
-        IdentificationError: If the two are not the same motion.
+        NotSameMotionError: If positions differ by more than `SAME_MOTION`.
     """
 
     def distance(shift: float) -> float:
@@ -215,7 +224,7 @@ def time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:
         best = min(best + step * np.arange(-6, 7), key=distance)
     left = distance(float(best))
     if left > SAME_MOTION:
-        raise IdentificationError(
+        raise NotSameMotionError(
             f"{motion.recording.name} and {other.name} are not the same motion: positions differ "
             f"by {1e3 * left:.3g} mrad rms at best; a pair must repeat one trajectory"
         )
@@ -230,7 +239,7 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     Raises:
         IdentificationError: If there are too few different poses.
     """
-    q, torque = poses(recordings, robot)
+    q, torque = resting_poses(recordings, robot)
     if len(q) < POSES or np.max(np.ptp(q, axis=0), initial=0.0) < 0.1:
         raise IdentificationError(
             f"{names_of(recordings)}: {len(q)} poses at rest of at least {DWELL:g} s; a load needs "
@@ -240,25 +249,19 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     Y = torque_regressor(robot.chain, q, zero, zero)[:, :, -LINK:][:, :, :STATIC]
     extra = torque - gravity_torque(robot, q)
     usable = np.ones_like(extra)
-    x = weighted(Y, extra, usable)
+    x = fit_all_joints(Y, extra, usable)
     left = extra - np.einsum("knp,p->kn", Y, x)
-    note = f"load from {len(q)} poses at rest; stiction is part of the residual; a point mass"
-    loaded = tuple(recordings)
-    fit = PairFit(x, column_sd(Y, left, usable), np.std(left, axis=0), loaded, (note,))
-    return fit.finished(robot)
+    sd, origin = parameter_sd(Y, left, usable), fact("load-from-poses", poses=len(q))
+    solution = LoadSolution(x, sd, np.std(left, axis=0), tuple(recordings), origin)
+    return solution.at_flange(robot)
 
 
-def names_of(recordings: Sequence[Recording]) -> str:
-    """The recordings' names as one text."""
-    return ", ".join(recording.name for recording in recordings)
-
-
-def poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:
+def resting_poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:
     """Mean position and torque of every rest. (P, n) [rad], (P, n) [N·m]"""
     q, torque = [], []
     for recording in recordings:
         effort = drive_torque(recording, robot)
-        for start, stop in runs_of(holds(recording)):
+        for start, stop in runs_of(standing(recording)):
             if recording.t[stop - 1] - recording.t[start] >= DWELL:
                 edge = (stop - start) // 5
                 span = slice(start + edge, stop - edge)
@@ -268,11 +271,11 @@ def poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:
     return np.reshape(q, (-1, n)), np.reshape(torque, (-1, n))
 
 
-def holds(recording: Recording) -> Mask:
-    """Whether no joint travels further than `HELD` around a sample. (T,)"""
+def standing(recording: Recording) -> Mask:
+    """Whether no joint travels further than `STILL` around a sample. (T,)"""
     reach = max(1, round(0.5 * WINDOW / recording.median_step))
     held = np.zeros(recording.samples, dtype=bool)
     if recording.samples > 2 * reach:
         travel = np.abs(recording.q[2 * reach :] - recording.q[: -2 * reach])
-        held[reach:-reach] = np.all(travel <= HELD, axis=1)
+        held[reach:-reach] = np.all(travel <= STILL, axis=1)
     return held

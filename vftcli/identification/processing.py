@@ -39,7 +39,7 @@ class Processing:
         if not 0.0 < self.cutoff < 1e4:
             raise ParameterError(f"cutoff is {self.cutoff:g} Hz; it must be positive")
 
-    def described(self, step: float) -> dict[str, str | float]:
+    def settings_record(self, step: float) -> dict[str, str | float]:
         """The settings in words, for the robot file and `run.json`.
 
         Args:
@@ -132,7 +132,7 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
         columns["ddq"].append(derivative(t, velocity)[kept])
         for name, signal in (("q", recording.q), ("tau", torque)):
             columns[name].append(zero_phase(t, signal[:, j : j + 1], processing.cutoff)[kept])
-    usable = told(t, dq, processing)[kept]
+    usable = usable_samples(t, dq, processing)[kept]
     return PreparedLog(
         recording=recording,
         processing=processing,
@@ -143,7 +143,7 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
     )
 
 
-def told(t: Array, dq: Array, processing: Processing) -> Mask:
+def usable_samples(t: Array, dq: Array, processing: Processing) -> Mask:
     """Whether each sample of each joint tells anything: no long stop, no gap beside it. (T, n)"""
     usable = np.ones(dq.shape, dtype=bool)
     for j, column in enumerate(np.abs(dq).T):

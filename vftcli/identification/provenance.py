@@ -8,10 +8,13 @@ import polars as pl
 
 from vftcli.identification.base_parameters import BaseParameters
 from vftcli.identification.method_result import MethodResult
-from vftcli.identification.payload import LoadFit
+from vftcli.identification.payload import LoadFit, names_of
 from vftcli.robots.robot import Robot
 from vftcli.robots.writing import robot_document
 from vftcli.signals.recording import Recording
+
+LINK_METHODS = frozenset({"base", "consistent"})
+"""Methods that identify the links too."""
 
 
 class Provenance(NamedTuple):
@@ -22,10 +25,10 @@ class Provenance(NamedTuple):
         name: Its own name, or "".
         method: Name of the method.
         logs: Every log that was used.
-        trained: Names of those the arm was identified from.
+        trained: Those the arm was identified from.
         processing: Filters and decimation.
-        residuals: RMS per log and joint.
-        outcome: What the method found.
+        residuals: RMS per log and joint (`RESIDUALS`).
+        result: What the method found.
         load: The load that was found, or None.
     """
 
@@ -33,52 +36,54 @@ class Provenance(NamedTuple):
     name: str
     method: str
     logs: Sequence[Recording]
-    trained: Sequence[str]
+    trained: Sequence[Recording]
     processing: Mapping[str, Any]
     residuals: pl.DataFrame
-    outcome: MethodResult
+    result: MethodResult
     load: LoadFit | None
 
 
-def documented(robot: Robot, story: Provenance) -> Robot:
+def with_provenance(robot: Robot, made: Provenance) -> Robot:
     """The robot under its own name, its document telling where every number comes from."""
-    profile, method, logs, load = story.profile, story.method, story.logs, story.load
+    profile, load = made.profile, made.load
     named = replace(
         robot,
-        name=story.name or f"{profile.name}-identified",
+        name=made.name or f"{profile.name}-identified",
         title=f"{profile.title or profile.name}, identified",
         path=None,
     )
     document = robot_document(named)
-    words = f"identified ({method}) from " + ", ".join(story.trained)
-    changed = {(n.joint, n.parameter) for n in story.outcome.numbers if n.determined}
+    new = f"identified ({made.method}) from {', '.join(r.name for r in made.trained)}"
+    old = f"profile {profile.name}"
+    determined = {(n.joint, n.parameter) for n in made.result.numbers if n.determined}
+    links = made.method in LINK_METHODS
     for j, table in enumerate(document["joints"], start=1):
-        links = method in {"base", "consistent"}
-        table["inertial_source"] = words if links else f"profile {profile.name}"
+        table["inertial_source"] = new if links else old
         for key in ("rotor_inertia", "torque_constant"):
             if key in table:
-                new = (j, key) in changed or (links and key == "rotor_inertia")
-                table[f"{key}_source"] = words if new else f"profile {profile.name}"
-    sources = [*document.get("sources", ()), *(source_table(k, r) for k, r in enumerate(logs, 1))]
+                changed = (j, key) in determined or (links and key == "rotor_inertia")
+                table[f"{key}_source"] = new if changed else old
     account: dict[str, Any] = {
-        "method": method,
+        "method": made.method,
         "profile": profile.name,
-        "logs": [log.name for log in logs],
-        "sha256": [log.source.sha256 or "unknown" for log in logs],
-        "processing": dict(story.processing),
-        "residuals": residual_tables(story.residuals),
+        "logs": [log.name for log in made.logs],
+        "sha256": [log.source.sha256 or "unknown" for log in made.logs],
+        "processing": dict(made.processing),
+        "residuals": residual_tables(made.residuals),
     }
     if load is not None:
-        document["payload"]["source"] = load.notes[0]
+        document["payload"]["source"] = str(load.origin)
         account["payload"] = {
-            "loaded": load.names,
+            "loaded": names_of(load.loaded),
             "mass_sd": load.mass_sd,
             "com_sd": load.com_sd.tolist(),
             "residual_Nm": load.residual.tolist(),
         }
-    if story.outcome.base is not None:
-        account["base_parameters"] = base_tables(story.outcome.base)
-    return replace(named, document={**document, "sources": sources, "identification": account})
+    if made.result.base is not None:
+        account["base_parameters"] = base_tables(made.result.base)
+    sources = [source_table(k, log) for k, log in enumerate(made.logs, start=1)]
+    tables = {"sources": [*document.get("sources", ()), *sources], "identification": account}
+    return replace(named, document={**document, **tables})
 
 
 def source_table(index: int, recording: Recording) -> dict[str, Any]:
@@ -92,13 +97,13 @@ def source_table(index: int, recording: Recording) -> dict[str, Any]:
 
 
 def residual_tables(residuals: pl.DataFrame) -> list[dict[str, Any]]:
-    """RMS per joint of each log under the identified robot."""
+    """RMS per joint of each log under the identified robot, one table a log. [N·m]"""
     tables = []
-    for (log, role), rows in residuals.filter(pl.col("model") == "identified").group_by(
-        ["log", "role"], maintain_order=True
-    ):
-        values = [round(v, 4) for v in rows["rms_Nm"].to_list()]
-        tables.append({"log": log, "role": role, "rms_Nm": values})
+    # By index, not by name: two files called log.csv are two logs.
+    identified = residuals.filter(pl.col("model") == "identified")
+    for _, rows in identified.group_by("log_index", maintain_order=True):
+        log, role = rows.row(0, named=True)["log"], rows.row(0, named=True)["role"]
+        tables.append({"log": log, "role": role, "rms_Nm": [round(v, 4) for v in rows["rms_Nm"]]})
     return tables
 
 

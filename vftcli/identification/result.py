@@ -4,15 +4,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import numpy as np
 import polars as pl
 
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark
 
 RESIDUALS = pl.Schema(
     {
         "log": pl.String,
+        "log_index": pl.Int64,
         "role": pl.String,
         "model": pl.String,
         "joint": pl.Int64,
@@ -20,7 +23,8 @@ RESIDUALS = pl.Schema(
         "samples": pl.Int64,
     }
 )
-"""One row a log, model and joint: RMS of measured less predicted torque, in motion."""
+"""One row a log, model and joint: RMS of measured less predicted torque, in motion. `log_index`
+counts the logs from 1, training first: two files of one name stay two logs."""
 
 PARAMETERS = pl.Schema(
     {
@@ -35,7 +39,7 @@ PARAMETERS = pl.Schema(
 )
 """One row a number: its value, standard deviation, and what the profile said."""
 
-CONTESTS = pl.Schema(
+SHAPE_CHOICES = pl.Schema(
     {"joint": pl.Int64, "friction": pl.String, "cv_rms_Nm": pl.Float64, "chosen": pl.Boolean}
 )
 """One row a friction candidate: its cross-validated error."""
@@ -55,26 +59,41 @@ UNITS = {
     "load_coulomb": "1",
     "stribeck": "N·m",
     "mass": "kg",
-    "com": "m",
+    "com_x": "m",
+    "com_y": "m",
+    "com_z": "m",
 }
-"""Unit of each kind of number."""
+"""Parameter → its unit."""
 
 
 class Number(NamedTuple):
-    """One identified number; a row of `PARAMETERS`."""
+    """One identified number; a row of `PARAMETERS`.
+
+    Attributes:
+        joint: Joint, from 1; the last one for a load on the flange.
+        parameter: Its key in the robot file, one of `UNITS`.
+        value: The estimate.
+        sd: Its standard deviation.
+        unit: Unit of value, sd and profile.
+        profile: What the profile says, nan where it says nothing.
+        determined: Whether the logs determine it; a value that they do not is not written.
+    """
 
     joint: int
     parameter: str
     value: float
     sd: float
+    unit: str
     profile: float
     determined: bool
 
-    @property
-    def row(self) -> tuple[int, str, float, float, str, float, bool]:
-        """The row with its unit."""
-        unit = UNITS.get(self.parameter.split("_")[0], UNITS.get(self.parameter, ""))
-        return (*self[:4], UNITS.get(self.parameter, unit), *self[4:])
+
+def number(
+    j: int, parameter: str, value: float, sd: float, profile: float, determined: bool
+) -> Number:
+    """An identified number of joint j (from 0), with its parameter's unit."""
+    unit = UNITS[parameter]
+    return Number(j + 1, parameter, float(value), float(sd), unit, float(profile), determined)
 
 
 class Trace(NamedTuple):
@@ -102,6 +121,11 @@ class Trace(NamedTuple):
         difference: Array = self.measured - self.predicted
         return difference
 
+    @property
+    def mean_rms(self) -> float:
+        """Mean over the joints of the residual's RMS. [N·m]"""
+        return float(np.mean(np.sqrt(np.mean(self.residual**2, axis=0))))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Identification:
@@ -113,11 +137,11 @@ class Identification:
         method: Name of the method.
         residuals: RMS per log, model and joint (`RESIDUALS`).
         parameters: Identified numbers (`PARAMETERS`).
-        contests: Friction candidates (`CONTESTS`), empty where none competed.
+        shape_choices: Friction candidates (`SHAPE_CHOICES`), empty where none competed.
         base: Base parameters (`BASE`), None for methods that have none.
         traces: Measured and predicted torque of every log.
         processing: Filters, differentiation, decimation and band, by name.
-        notes: What the reader should know, one sentence each.
+        remarks: What the reader should know.
     """
 
     robot: Robot
@@ -125,11 +149,11 @@ class Identification:
     method: str
     residuals: pl.DataFrame
     parameters: pl.DataFrame
-    contests: pl.DataFrame
+    shape_choices: pl.DataFrame
     base: pl.DataFrame | None
     traces: tuple[Trace, ...]
     processing: Mapping[str, Any] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
 
     def mean_rms(self, log: str, model: str = "identified") -> float:
         """Mean over the joints of one log's RMS under one model. [N·m]"""

@@ -1,7 +1,5 @@
 """How well a robot predicts a log's torque, scored as in the docs: filtered, in motion."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from vftcli.identification.excitation import SLOW
@@ -11,6 +9,8 @@ from vftcli.robots.friction import friction_torque
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.series import resampled
 
 EXPLAINS = 0.4
 """Share of a residual that a cause must explain to be named."""
@@ -18,11 +18,20 @@ EXPLAINS = 0.4
 HEAVY = 0.3
 """Smallest load that is remarked on. [kg]"""
 
-TOLD = 50
+ENOUGH = 50
 """Samples in motion that a remark on friction needs."""
 
 WORSE = 1.5
 """A held-out joint whose residual is this many times the training's is remarked on."""
+
+NEAR = 0.01
+"""Largest joint distance at which two samples are the same place. [rad]"""
+
+SLOWNESS = 0.1
+"""Velocity difference that counts as much as that distance, as a time. [s]"""
+
+REPEATED = 0.8
+"""Share of a log's samples on another's trajectory from which on it repeats that trajectory."""
 
 
 def rigid_torque(robot: Robot, motion: PreparedLog) -> Array:
@@ -53,8 +62,13 @@ def rms(residual: Array) -> Array:
     return value
 
 
-def diagnosis(robot: Robot, motion: PreparedLog, residual: Array, trained: Array) -> list[str]:
+def held_out_remarks(
+    robot: Robot, motion: PreparedLog, residual: Array, trained: Array
+) -> list[Remark]:
     """What a held-out log's residual looks like where it is much larger than in training.
+
+    A load on the flange explains all joints at once and is looked for first; what is left is
+    looked at joint by joint.
 
     Args:
         robot: The identified robot.
@@ -63,26 +77,26 @@ def diagnosis(robot: Robot, motion: PreparedLog, residual: Array, trained: Array
         trained: RMS of the training logs. (n,) [N·m]
     """
     sizes, name = rms(residual), motion.recording.name
-    worse = np.flatnonzero(sizes > WORSE * trained)
-    if not worse.size:
+    worse = np.flatnonzero(sizes > WORSE * trained).tolist()
+    if not worse:
         return []
     mass, explained = apparent_load(robot, motion, residual)
     if explained > EXPLAINS and abs(mass) > HEAVY:
-        return [
-            f"{name}: the residual looks like {mass:+.2f} kg on the flange "
-            f"({100 * explained:.0f} % of it); find the load with --find-payload"
-        ]
-    resting = [int(j) for j in worse if np.count_nonzero(in_motion(motion, int(j))) < TOLD]
-    moving = [int(j) for j in worse if int(j) not in resting]
-    remarks = [rubbing(motion, residual, j, float(sizes[j]), float(trained[j])) for j in moving]
+        share = 100.0 * explained
+        return [caution("apparent-load", Where(name), mass_kg=mass, share_percent=share)]
+    resting = [j for j in worse if np.count_nonzero(in_motion(motion, j)) < ENOUGH]
+    remarks = [
+        joint_remark(motion, residual, j, float(sizes[j]), float(trained[j]))
+        for j in worse
+        if j not in resting
+    ]
     if resting:
-        names = ", ".join(str(j + 1) for j in resting)
-        remarks.append(f"joints that rest ({names}) keep what stiction holds; they say nothing")
-    return [f"{name}: {text}" for text in remarks]
+        remarks.append(fact("resting-joints", Where(name, tuple(j + 1 for j in resting))))
+    return remarks
 
 
 def in_motion(motion: PreparedLog, j: int) -> Mask:
-    """Where a joint moves fast enough to tell its friction. (M,)"""
+    """Where joint j (from 0) moves fast enough to tell its friction. (M,)"""
     moving: Mask = motion.usable[:, j] & (np.abs(motion.dq[:, j]) > SLOW)
     return moving
 
@@ -99,9 +113,23 @@ def apparent_load(robot: Robot, motion: PreparedLog, residual: Array) -> tuple[f
     return float(x[0]), 1.0 - float(np.sum((y - A @ x) ** 2) / max(np.sum(y**2), 1e-12))
 
 
-def rubbing(motion: PreparedLog, residual: Array, j: int, size: float, trained: float) -> str:
-    """How a moving joint's residual differs from the training's: by friction, or unexplained."""
-    text = f"joint {j + 1} leaves {size:.2f} N·m, {size / trained:.1f} × the training's"
+def joint_remark(
+    motion: PreparedLog, residual: Array, j: int, size: float, trained: float
+) -> Remark:
+    """How the residual of joint j (from 0) differs from the training's: by friction, or not.
+
+    Coulomb and viscous friction and an offset are fitted to the residual (M, n) [N·m]; where they
+    explain `EXPLAINS` of it, friction is named as its cause.
+
+    Args:
+        motion: The held-out log.
+        residual: Measured less predicted. (M, n) [N·m]
+        j: Joint, from 0.
+        size: RMS of its residual. [N·m]
+        trained: The same in the training logs. [N·m]
+    """
+    where = Where(motion.recording.name, (j + 1,))
+    values = {"rms_Nm": size, "ratio": size / trained}
     dq = motion.recording.require("dq")[:, j]
     used = in_motion(motion, j)
     sign = np.tanh(dq / 0.01)
@@ -110,16 +138,26 @@ def rubbing(motion: PreparedLog, residual: Array, j: int, size: float, trained: 
     left = float(np.mean(fit.residual[used] ** 2))
     explained = 1.0 - left / max(float(np.mean(residual[used, j] ** 2)), 1e-12)
     if explained < EXPLAINS:
-        return text
+        return caution("larger-residual", where, **values)
     speed = float(np.sqrt(np.mean(motion.dq[used, j] ** 2)))
-    more = fit.values[0] + fit.values[1] * speed
-    return (
-        f"{text}; it rubs {abs(more):.1f} N·m {'more' if more > 0 else 'less'} there at "
-        f"{speed:.1f} rad/s ({100 * explained:.0f} % of the residual): "
-        "identify friction on the day, with the arm warm"
-    )
+    more = float(fit.values[0] + fit.values[1] * speed)
+    values |= {"friction_Nm": abs(more), "speed_rad_s": speed, "share_percent": 100.0 * explained}
+    return caution("more-friction" if more > 0 else "less-friction", where, **values)
 
 
-def mean_text(values: Sequence[float] | Array) -> str:
-    """Mean of the joints, for remarks."""
-    return f"{float(np.mean(values)):.3f} N·m"
+def repeated_share(train: PreparedLog, test: PreparedLog) -> float:
+    """Share of the test's moving samples that lie on the training log's path through (q, q̇).
+
+    A log that repeats the training's trajectory is no test of a model made from it: whatever error
+    the model has along that path, it has fitted.
+    """
+    from scipy.spatial import cKDTree
+
+    if train.samples == 0 or test.samples == 0:
+        return 0.0
+    path, points = (np.hstack([log.q, SLOWNESS * log.dq]) for log in (train, test))
+    # Between samples the path is interpolated, so that its points lie nearer than `NEAR`.
+    index = np.arange(0, len(path) - 1 + 1e-9, 0.25)
+    tree = cKDTree(resampled(index, np.arange(float(len(path))), path))
+    distance, _ = tree.query(points, p=np.inf, distance_upper_bound=NEAR)
+    return float(np.mean(np.isfinite(distance)))

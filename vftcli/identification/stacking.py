@@ -81,7 +81,7 @@ class ParameterColumns(NamedTuple):
         return A
 
 
-class Data(NamedTuple):
+class WeightedLog(NamedTuple):
     """One training log, ready to be stacked.
 
     Attributes:
@@ -134,7 +134,7 @@ REWEIGHTINGS = 3
 """Passes of reweighting; each evaluates the regressor twice."""
 
 
-def residuals(layout: ParameterColumns, data: Data, x: Array) -> Array:
+def residuals(layout: ParameterColumns, data: WeightedLog, x: Array) -> Array:
     """Torque that x does not explain. (M, n) [N·m]"""
     motion = data.motion
     out = np.empty(motion.q.shape)
@@ -143,7 +143,7 @@ def residuals(layout: ParameterColumns, data: Data, x: Array) -> Array:
     return out
 
 
-def stack(layout: ParameterColumns, logs: Sequence[Data], start: Array) -> Triangles:
+def stack(layout: ParameterColumns, logs: Sequence[WeightedLog], start: Array) -> Triangles:
     """Weigh and stack all logs, down-weighting outliers by what the last solution leaves.
 
     Args:
@@ -155,12 +155,12 @@ def stack(layout: ParameterColumns, logs: Sequence[Data], start: Array) -> Trian
     for _ in range(REWEIGHTINGS):
         left = [residuals(layout, data, x) for data in logs]
         sigma = joint_sigma(logs, left)
-        triangles = reduced(layout, logs, left, sigma)
-        x = nearest(triangles, start)
+        triangles = triangulate(layout, logs, left, sigma)
+        x = least_change(triangles, start)
     return triangles
 
 
-def joint_sigma(logs: Sequence[Data], left: Sequence[Array]) -> Array:
+def joint_sigma(logs: Sequence[WeightedLog], left: Sequence[Array]) -> Array:
     """Robust standard deviation of each joint's residual where it tells anything. (n,) [N·m]"""
     n = left[0].shape[1]
     sigma = np.empty(n)
@@ -170,8 +170,8 @@ def joint_sigma(logs: Sequence[Data], left: Sequence[Array]) -> Array:
     return sigma
 
 
-def reduced(
-    layout: ParameterColumns, logs: Sequence[Data], left: Sequence[Array], sigma: Array
+def triangulate(
+    layout: ParameterColumns, logs: Sequence[WeightedLog], left: Sequence[Array], sigma: Array
 ) -> Triangles:
     """QR updates over all chunks of all logs, one triangle a cross-validation stretch."""
     parts = [np.zeros((0, layout.size + 1)) for _ in range(FOLDS)]
@@ -190,7 +190,7 @@ def reduced(
 
 
 def weighted_rows(
-    layout: ParameterColumns, data: Data, scale: Array, fold: slice, size: int = 512
+    layout: ParameterColumns, data: WeightedLog, scale: Array, fold: slice, size: int = 512
 ) -> Iterator[Array]:
     """Rows [A y] times their weights, a chunk at a time; rows of no weight are dropped."""
     for start in range(fold.start, fold.stop, size):
@@ -206,7 +206,7 @@ TRUNCATION = 1e-3
 """Singular values below this share of the largest are left at the start (columns scaled)."""
 
 
-def nearest(triangles: Triangles, start: Array, truncation: float = TRUNCATION) -> Array:
+def least_change(triangles: Triangles, start: Array, truncation: float = TRUNCATION) -> Array:
     """Least squares that leaves the start only where the data says so (truncated SVD). (size,)"""
     R, z = triangles.joined()
     scale = np.linalg.norm(R, axis=0)

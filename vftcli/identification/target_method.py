@@ -5,17 +5,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.identification.friction_shapes import rounded
+from vftcli.identification.friction_shapes import round_digits
 from vftcli.identification.method_result import (
     MethodResult,
-    confidence,
+    at_joint,
     friction_numbers,
+    friction_source,
     profile_friction,
 )
-from vftcli.identification.result import Number
+from vftcli.identification.result import Number, number
 from vftcli.identification.targets import SHAPES, ControllerModel, controller_models
 from vftcli.identification.training import Training
 from vftcli.robots.robot import Robot
+from vftcli.signals.remarks import Remark, caution, fact
+
+SAME_GRAVITY = 3e-4
+"""Relative difference of gravity that is not remarked on: a third of that of 9.82 to 9.81 m/s²."""
 
 
 def targets_method(data: Training) -> MethodResult:
@@ -25,31 +30,34 @@ def targets_method(data: Training) -> MethodResult:
     rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
     constants = np.array(robot.torque_constant, dtype=float)
     numbers: list[Number] = []
-    notes: list[str] = []
+    remarks: list[Remark] = []
     for j, model in enumerate(models):
         numbers += target_numbers(j, model, robot)
-        notes += target_notes(j, model, robot)
+        remarks += target_remarks(j, model, robot)
         if model.constant.known:
-            constants[j] = rounded(model.constant.value)
+            constants[j] = round_digits(model.constant.value)
         if model.rotor.known:
-            rotor[j] = rounded(model.rotor.value)
+            rotor[j] = round_digits(model.rotor.value)
         if model.friction is not None and model.friction_sd is not None:
-            words = confidence(data, "targets", model.friction_sd)
+            words = friction_source(data, "targets", model.friction_sd)
             frictions[j] = SHAPES[0].friction(model.friction, words)
-    notes += gravity_note(models)
+    remarks += gravity_remarks(models)
     chain = replace(robot.chain, rotor_inertia=rotor)
     new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
-    return MethodResult(new, numbers, [], None, notes)
+    return MethodResult(new, numbers, [], None, remarks)
+
+
+def profile_constant(robot: Robot, j: int) -> float:
+    """The profile's drive constant of joint j (from 0), nan if it has none. [N·m/A]"""
+    return float(robot.torque_constant[j]) if robot.torque_constant is not None else float("nan")
 
 
 def target_numbers(j: int, model: ControllerModel, robot: Robot) -> list[Number]:
-    """What the controller believes of one joint, as numbers."""
-    constants = robot.torque_constant
-    K = float(constants[j]) if constants is not None else float("nan")
-    J = float(robot.chain.rotor_inertia[j])
+    """What the controller believes of joint j (from 0), as numbers."""
+    K, J = profile_constant(robot, j), float(robot.chain.rotor_inertia[j])
     numbers = [
-        Number(j + 1, "torque_constant", *model.constant[:2], K, model.constant.known),
-        Number(j + 1, "rotor_inertia", *model.rotor[:2], J, model.rotor.known),
+        number(j, "torque_constant", *model.constant[:2], K, model.constant.known),
+        number(j, "rotor_inertia", *model.rotor[:2], J, model.rotor.known),
     ]
     if model.friction is not None and model.friction_sd is not None:
         before = profile_friction(robot)[j]
@@ -57,37 +65,30 @@ def target_numbers(j: int, model: ControllerModel, robot: Robot) -> list[Number]
     return numbers
 
 
-def target_notes(j: int, model: ControllerModel, robot: Robot) -> list[str]:
-    """What the targets leave open in one joint."""
-    notes = []
-    K = float(robot.torque_constant[j]) if robot.torque_constant is not None else float("nan")
+def target_remarks(j: int, model: ControllerModel, robot: Robot) -> list[Remark]:
+    """What the targets leave open in joint j (from 0), so that the profile's numbers stay."""
+    remarks, where = [], at_joint(j)
     if not model.constant.known:
-        found = (
-            f"{model.constant.value:.4g} ± {model.constant.sd:.2g} N·m/A"
-            if np.isfinite(model.constant.sd)
-            else "no load and no motion"
-        )
-        notes.append(
-            f"joint {j + 1}: the drive constant is not determined ({found}); "
-            f"the profile's {K:g} stays"
-        )
+        found = {"profile_NmA": profile_constant(robot, j)}
+        if np.isfinite(model.constant.sd):
+            found |= {"found_NmA": model.constant.value, "sd_NmA": model.constant.sd}
+            remarks.append(caution("undetermined-drive-constant", where, **found))
+        else:
+            remarks.append(caution("unexcited-drive-constant", where, **found))
     if not model.rotor.known:
-        notes.append(
-            f"joint {j + 1} is not accelerated enough: rotor inertia "
-            f"{robot.chain.rotor_inertia[j]:g} kg·m² stays"
-        )
+        J = float(robot.chain.rotor_inertia[j])
+        remarks.append(caution("unaccelerated-joint", where, profile_kgm2=J))
     if model.friction is None:
-        notes.append(f"joint {j + 1} is not excited: the profile's friction stays")
-    return notes
+        remarks.append(caution("unexcited-friction", where))
+    return remarks
 
 
-def gravity_note(models: Sequence[ControllerModel]) -> list[str]:
+def gravity_remarks(models: Sequence[ControllerModel]) -> list[Remark]:
     """A remark if the controller computes with another gravity than the profile."""
     scales = [m.gravity for m in models if m.gravity.known]
     if not scales:
         return []
+    # All joints feel one gravity: their ratios are averaged by the inverse of their variances.
     weights = np.array([1.0 / max(s.sd, 1e-9) ** 2 for s in scales])
-    scale = float(weights @ np.array([s.value for s in scales]) / weights.sum())
-    if abs(scale - 1.0) < 3e-4:
-        return []
-    return [f"the controller's gravity torque is {scale:.4f} × the profile's (9.82 m/s² is 1.0010)"]
+    ratio = float(weights @ np.array([s.value for s in scales]) / weights.sum())
+    return [fact("controller-gravity", ratio=ratio)] if abs(ratio - 1.0) >= SAME_GRAVITY else []

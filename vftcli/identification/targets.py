@@ -147,7 +147,7 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[Co
 def joint_model(j: int, logs: Sequence[Targets], before: float) -> ControllerModel:
     """Read one joint's model; K first, since friction needs it."""
     still, moving = constant_at_rest(j, logs), constant_in_motion(j, logs)
-    constant = min((still, moving), key=relative)
+    constant = min((still, moving), key=relative_sd)
     K = constant.value if constant.known else before
     rotor, gravity = rotor_inertia(j, logs)
     friction = controller_friction(j, logs, K)
@@ -155,7 +155,7 @@ def joint_model(j: int, logs: Sequence[Targets], before: float) -> ControllerMod
     return ControllerModel(constant, rotor, values, sd, gravity)
 
 
-def relative(estimate: Estimate) -> float:
+def relative_sd(estimate: Estimate) -> float:
     """Standard deviation over value; infinite where there is none."""
     return estimate.sd / abs(estimate.value) if np.isfinite(estimate.sd) else float("inf")
 

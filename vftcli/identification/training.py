@@ -1,15 +1,21 @@
 """Training data: logs prepared, joints fitted one by one, contacts left out."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification import excitation as exciting
-from vftcli.identification.excitation import Excitation
-from vftcli.identification.friction_fit import LIGHT, Given, ShapeChoice, choose_shape
+from vftcli.identification.excitation import (
+    ContactSpan,
+    Excitation,
+    find_contacts,
+    find_excitation,
+    outside_contacts,
+    unexplained_torque,
+)
+from vftcli.identification.friction_fit import LIGHT, JointData, ShapeChoice, choose_shape
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.least_squares import ColumnFit, fit_column
 from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
@@ -19,6 +25,7 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 
 LOAD_EXPLAINS = 0.8
 """Share of what the profile misses that a load must explain to be suspected."""
@@ -63,7 +70,7 @@ class Training:
         return self.robot.torque_source != "link_torque"
 
 
-def training(
+def prepare_training(
     recordings: Sequence[Recording], robot: Robot, processing: Processing, fit_constants: bool
 ) -> Training:
     """Prepare the training logs.
@@ -80,7 +87,7 @@ def training(
         raise IdentificationError(
             "--fit-constants needs motor currents; the logs have torques. Leave it out"
         )
-    excited = exciting.excitation(motions)
+    excited = find_excitation(motions)
     moved = tuple(m for m in motions if m.samples > 1)
     columns = tuple(FrictionColumns(m, np.abs(gravity_torque(robot, m.recording.q))) for m in moved)
     digests = ", ".join(f"{r.name} (sha256 {r.source.sha256 or 'unknown'})" for r in recordings)
@@ -97,23 +104,23 @@ def training(
 
 
 class JointFit(NamedTuple):
-    """Friction of one joint, with what was fitted beside it; None for a joint that is held.
+    """Friction of one joint, with what was fitted beside it.
 
     Attributes:
         shape: The chosen structure.
         fit: Friction coefficients, then q̈'s, then the rigid torque's.
-        contests: The candidates.
+        choices: The candidates and their errors.
         constant: Whether the drive constant was fitted too.
     """
 
     shape: Shape
     fit: ColumnFit
-    contests: list[ShapeChoice]
+    choices: list[ShapeChoice]
     constant: bool
 
 
 def fit_frictions(data: Training, weights: Sequence[Array]) -> list[JointFit | None]:
-    """Fit every joint that moves, the links held at the profile."""
+    """Fit every joint that moves, the links held at the profile; None for the others."""
     fits: list[JointFit | None] = []
     for j in range(data.robot.joints):
         if not data.excited.moves[j]:
@@ -128,10 +135,10 @@ def fit_frictions(data: Training, weights: Sequence[Array]) -> list[JointFit | N
 
 def fit_joint(data: Training, j: int, weights: Sequence[Array], constant: bool) -> JointFit:
     """Choose and fit one joint's model, with its drive constant or without."""
-    given = joint_data(data, j, weights, constant)
-    shape, contests = choose_shape(j, given)
+    given = data_of_joint(data, j, weights, constant)
+    shape, choices = choose_shape(j, given)
     fit = fit_column(given.columns(j, shape), given.y, given.weights)
-    return JointFit(shape, fit, contests, constant)
+    return JointFit(shape, fit, choices, constant)
 
 
 def constant_known(fit: ColumnFit) -> bool:
@@ -139,8 +146,12 @@ def constant_known(fit: ColumnFit) -> bool:
     return bool(fit.sd[-1] < CONSTANT_KNOWN * abs(fit.values[-1]))
 
 
-def joint_data(data: Training, j: int, weights: Sequence[Array], constant: bool) -> Given:
-    """The data of one joint over all logs."""
+def data_of_joint(data: Training, j: int, weights: Sequence[Array], constant: bool) -> JointData:
+    """The equations of joint j (from 0) over all logs.
+
+    With a drive constant to be found the rigid body's torque is a column whose coefficient would
+    be 1 if the profile's constant were right; without, it is subtracted.
+    """
     motions = data.motions
     torque = np.concatenate([m.tau[:, j] for m in motions])
     rigid = np.concatenate([r[:, j] for r in data.rigid])
@@ -150,12 +161,12 @@ def joint_data(data: Training, j: int, weights: Sequence[Array], constant: bool)
     if constant:
         fixed.append(rigid)
     load = np.concatenate([c.load[:, j] for c in data.columns])
-    return Given(
+    return JointData(
         y=torque if constant else torque - rigid,
         fixed=np.stack(fixed, axis=1) if fixed else np.zeros((len(torque), 0)),
         weights=np.concatenate([w[:, j] for w in weights]),
         sources=data.columns,
-        loads=float(np.std(load)),
+        load_spread=float(np.std(load)),
         reverses=bool(data.excited.reverses[j]),
     )
 
@@ -170,7 +181,9 @@ def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array
     return [whole[a:b] for a, b in itertools.pairwise(edges)]
 
 
-def fitted(data: Training, strict: bool) -> tuple[list[JointFit | None], list[Array], list[str]]:
+def fit_without_contacts(
+    data: Training, strict: bool
+) -> tuple[list[JointFit | None], list[Array], list[Remark]]:
     """Fit friction, leave out contacts, and fit again without them.
 
     Args:
@@ -185,58 +198,61 @@ def fitted(data: Training, strict: bool) -> tuple[list[JointFit | None], list[Ar
     """
     weights = [m.usable.astype(float) for m in data.motions]
     fits = fit_frictions(data, weights)
-    left, notes, touched = all_residuals(data, fits), [], False
+    left, remarks = all_residuals(data, fits), list[Remark]()
     for k, (motion, residual) in enumerate(zip(data.motions, left, strict=True)):
-        dry = dry_friction(data, k, fits)
-        found = exciting.contacts(motion, residual, dry)
-        if not found:
-            continue
-        touched = True
-        weights[k] = weights[k] * exciting.without(motion, found)[:, None]
-        spans = ", ".join(
-            f"{c.start:.1f}–{c.stop:.1f} s (joint {c.joint}, {c.size:+.0f} N·m)" for c in found[:6]
-        )
-        more = f" and {len(found) - 6} more" if len(found) > 6 else ""
-        notes.append(
-            f"{motion.recording.name}: something seems to touch the arm at {spans}{more}; "
-            "left out of the fit"
-        )
-    if touched:
+        if found := find_contacts(motion, residual, dry_friction(data, k, fits)):
+            weights[k] = weights[k] * outside_contacts(motion, found)[:, None]
+            remarks.append(contacts_remark(motion, found))
+    if remarks:
         fits = fit_frictions(data, weights)
         left = all_residuals(data, fits)
-    for remark in doubts(data, left, weights):
+    for remark in model_doubts(data, left, weights):
         if strict:
             raise IdentificationError(
                 f"{remark}. Choose another --robot, find the load with --find-payload, or let "
                 "--method base identify the links too"
             )
-        notes.append(f"{remark}; the links that come out stand for that too")
-    return fits, weights, notes
+        remarks += [remark, fact("absorbed-doubt", Where(remark.where.about))]
+    return fits, weights, remarks
 
 
-def doubts(data: Training, left: Sequence[Array], weights: Sequence[Array]) -> list[str]:
-    """Remarks on logs whose torque the profile's links do not explain."""
+def contacts_remark(motion: PreparedLog, found: Sequence[ContactSpan]) -> Remark:
+    """A remark on the stretches of a log that are left out of the fit."""
+    return caution(
+        "suspected-contacts",
+        Where(motion.recording.name),
+        count=len(found),
+        total_s=sum(c.stop - c.start for c in found),
+        starts_s=[c.start for c in found],
+        stops_s=[c.stop for c in found],
+        worst_joints=[c.joint for c in found],
+        residuals_Nm=[c.size for c in found],
+    )
+
+
+def model_doubts(
+    data: Training, left: Sequence[Array], weights: Sequence[Array]
+) -> Iterator[Remark]:
+    """Remarks on logs whose torque the profile's links do not explain.
+
+    Args:
+        data: The training logs.
+        left: What the friction fits leave of each log. (M, n) each [N·m]
+        weights: Weight of every sample, 0 where it tells nothing. (M, n) each
+    """
     spread = np.std(np.concatenate([c.load for c in data.columns]), axis=0)
     heavy = (spread > HEAVY * spread.max()) & (spread > LIGHT) & data.excited.moves
-    remarks = []
     for motion, residual, w in zip(data.motions, left, weights, strict=True):
-        told = np.where(w > 0, residual, 0.0)
-        name = motion.recording.name
-        remarks.append(unknown_load(data, motion))
-        remarks.append(exciting.doubt(name, data.robot.name, motion.tau, told, heavy))
-    return [remark for remark in remarks if remark]
-
-
-def unknown_load(data: Training, motion: PreparedLog) -> str:
-    """Say if a log's torque looks like a load on the flange that the robot has not, or ""."""
-    before = motion.tau - predicted_torque(data.robot, motion)
-    mass, explained = apparent_load(data.robot, motion, before)
-    if explained < LOAD_EXPLAINS or abs(mass) < UNKNOWN_LOAD:
-        return ""
-    return (
-        f"{motion.recording.name}: the torque looks like {mass:+.2f} kg on the flange of "
-        f"{data.robot.name!r} ({100 * explained:.0f} % of what the profile does not explain)"
-    )
+        used, name = np.where(w > 0, residual, 0.0), motion.recording.name
+        # A load is looked for in what the profile leaves before friction is fitted: Coulomb
+        # friction would take some of it up.
+        before = motion.tau - predicted_torque(data.robot, motion)
+        mass, explained = apparent_load(data.robot, motion, before)
+        if explained >= LOAD_EXPLAINS and abs(mass) >= UNKNOWN_LOAD:
+            load = {"mass_kg": mass, "robot": data.robot.name, "share_percent": 100.0 * explained}
+            yield warning("unknown-load", Where(name), **load)
+        if remark := unexplained_torque(name, data.robot.name, motion.tau, used, heavy):
+            yield remark
 
 
 def dry_friction(data: Training, log: int, fits: Sequence[JointFit | None]) -> Array:

@@ -17,6 +17,7 @@ from vftcli.outputs.log.run_record import (
 from vftcli.robots.writing import robot_toml
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import as_record
 
 
 def beside(path: Path) -> dict[str, Path]:
@@ -85,10 +86,10 @@ def identification_record(
         "processing": dict(found.processing),
         "residuals": found.residuals.to_dicts(),
         "parameters": found.parameters.to_dicts(),
-        "friction_models": found.contests.to_dicts(),
+        "friction_models": found.shape_choices.to_dicts(),
         "base_parameters": found.base.to_dicts() if found.base is not None else [],
         "conventions": CONVENTIONS,
         "repairs": [note for log in logs for note in log.source.repairs],
         "warnings": [note for log in logs for note in log.source.warnings],
-        "notes": list(found.notes),
+        "remarks": [as_record(remark) for remark in found.remarks],
     }

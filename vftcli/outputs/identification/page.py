@@ -13,6 +13,7 @@ from vftcli.outputs.page.page import asset, document, headline
 from vftcli.outputs.page.payload import Chart, ChartLine, packed
 from vftcli.outputs.page.sections import bullets, html_table, number_text, pairs, remarks
 from vftcli.outputs.palette import SPARE
+from vftcli.signals.remarks import explanation
 
 DOTS = 600
 """Samples drawn in a residual-over-velocity plot."""
@@ -27,11 +28,11 @@ def render_identification(found: Identification, record: Mapping[str, Any]) -> s
     text = f"{found.robot.title}: method {found.method}, from {logs}"
     body = [
         headline(found.robot.name, text),
-        remarks(found.notes),
+        remarks([explanation(remark) for remark in found.remarks]),
         residual_section(found),
         velocity_section(found),
         parameter_section(found),
-        contest_section(found.contests),
+        shape_choice_section(found.shape_choices),
         base_section(found.base),
         series_section(found),
         "<h2>Signal processing</h2>",
@@ -50,8 +51,8 @@ def residual_section(found: Identification) -> str:
         return ""
     joints = found.robot.joints
     rows = []
-    for (log, role, model), part in found.residuals.group_by(
-        ["log", "role", "model"], maintain_order=True
+    for (_, log, role, model), part in found.residuals.group_by(
+        ["log_index", "log", "role", "model"], maintain_order=True
     ):
         values = part["rms_Nm"].to_list()
         cells = "".join(f"<td>{number_text(v)}</td>" for v in (*values, float(np.mean(values))))
@@ -134,14 +135,14 @@ def parameter_section(found: Identification) -> str:
     return f"<h2>Identified numbers</h2>{html_table('One row a number', header, rows)}"
 
 
-def contest_section(contests: pl.DataFrame) -> str:
+def shape_choice_section(choices: pl.DataFrame) -> str:
     """How the friction models competed, folded away."""
-    if contests.is_empty():
+    if choices.is_empty():
         return ""
     rows = [
         f'<tr><th scope="row">{escape(r["friction"])}</th><td>J{r["joint"]}</td>'
         f"<td>{number_text(r['cv_rms_Nm'])}</td><td>{'chosen' if r['chosen'] else ''}</td></tr>"
-        for r in contests.iter_rows(named=True)
+        for r in choices.iter_rows(named=True)
     ]
     caption = "RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen"
     table = html_table(caption, ["Friction", "Joint", "RMS [N·m]", ""], rows)

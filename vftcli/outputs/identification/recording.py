@@ -17,6 +17,7 @@ from vftcli.outputs.log.rerun_recording import Lines, plot_of, send_lines
 from vftcli.outputs.log.rerun_text import drawable
 from vftcli.outputs.log.tables import escape_markdown
 from vftcli.outputs.palette import REFERENCE, SPARE
+from vftcli.signals.remarks import explanation
 
 
 def write_identification_rrd(path: Path, found: Identification) -> None:
@@ -98,9 +99,9 @@ def summary(found: Identification) -> str:
     logs = [
         f"- {escape_markdown(t.recording.name)} ({t.role}): sha256 "
         f"{t.recording.source.sha256 or 'unknown'}, mean RMS "
-        f"{found.mean_rms(t.recording.name):.3f} N·m"
+        f"{t.mean_rms:.3f} N·m"
         for t in found.traces
     ]
-    notes = [f"- {escape_markdown(note)}" for note in found.notes]
+    notes = [f"- {escape_markdown(explanation(remark))}" for remark in found.remarks]
     head = f"# {escape_markdown(found.robot.name)}\n\nMethod {found.method}."
     return "\n".join([head, "", *logs, "", "## Notes", *notes]) + "\n"

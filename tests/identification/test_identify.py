@@ -1,6 +1,7 @@
-"""Methods on recordings made here: planted numbers come back, bad logs are refused in words."""
+"""Identification of logs made here: planted numbers come back, bad logs are refused."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from vftcli.identification import Task, identify
 from vftcli.identification.payload import payload_from_pair, payload_from_poses
 from vftcli.identification.processing import Processing, gravity_torque, prepare
-from vftcli.identification.repeats import repeated_share
+from vftcli.identification.scoring import repeated_share
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.regressor import chain_parameters, torque_regressor
@@ -85,7 +86,7 @@ def test_a_plain_model_is_chosen_where_nothing_more_is_there():
     true = rubbed(UR5, "coulomb-viscous-offset")
     found = identify([log(true)], UR5, Task())
     assert {f.model for f in found.robot.friction} == {"coulomb-viscous-offset"}
-    chosen = found.contests.filter(found.contests["chosen"])
+    chosen = found.shape_choices.filter(found.shape_choices["chosen"])
     assert len(chosen) == 6
 
 
@@ -163,7 +164,8 @@ def test_different_motions_are_no_pair():
 def test_a_repeated_trajectory_is_told():
     first, again, other = log(UR5, 1), log(UR5, 1, noise=0.4), log(UR5, 2)
     found = identify([first], UR5, Task(), [again, other])
-    assert sum("repeats the trajectory" in note for note in found.notes) == 1
+    (told,) = [r for r in found.remarks if r.code == "repeated-trajectory"]
+    assert told.values["share_percent"] == 100.0
     motions = [prepare(r, UR5, Processing()) for r in (first, again, other)]
     assert repeated_share(motions[0], motions[1]) == 1.0
     assert repeated_share(motions[0], motions[2]) < 0.2
@@ -175,8 +177,10 @@ def test_a_contact_is_found_and_left_out():
     t = motion(0)[0]
     push = np.where((t > 12) & (t < 13), 40.0, 0.0)[:, None] * np.array([1, 1, 0, 0, 0, 0])
     touched = identify([log(true, extra=push)], UR5, Task())
-    note = next(note for note in touched.notes if "touch the arm" in note)
-    assert "12.0–13.0 s" in note or "11.9–13.1 s" in note
+    (told,) = [r for r in touched.remarks if r.code == "suspected-contacts"]
+    # the 8 Hz filter spreads the edges by less than a period of 0.125 s
+    assert told.values["starts_s"] == pytest.approx([12.0], abs=0.125)
+    assert told.values["stops_s"] == pytest.approx([13.0], abs=0.125)
     for j in (0, 1):
         a, b = (r.friction[j].parameters["coulomb"] for r in (clean, touched.robot))
         assert a == pytest.approx(b, rel=0.03)
@@ -196,7 +200,7 @@ def test_a_joint_that_rests_keeps_its_numbers():
     torque = drive(rubbed(UR5), q, dq, ddq)
     recording = Recording(t=t, q=q, dq=dq, current=torque / UR5.torque_constant)
     found = identify([recording], UR5, Task())
-    assert "joint 4 does not move: the profile's numbers stay" in found.notes
+    assert [r.where.joints for r in found.remarks if r.code == "static-joint"] == [(4,)]
     assert found.robot.friction[3] == UR5.friction[3]
     assert found.robot.chain.rotor_inertia[3] == UR5.chain.rotor_inertia[3]
 
@@ -209,7 +213,7 @@ def test_a_joint_that_never_reverses_is_told():
     torque = drive(true, q, dq, ddq)
     recording = Recording(t=t, q=q, dq=dq, current=torque / UR5.torque_constant)
     found = identify([recording], UR5, Task())
-    assert any("joint 6 never reverses" in note for note in found.notes)
+    assert [r.where.joints for r in found.remarks if r.code == "one-way-joint"] == [(6,)]
     assert "offset" not in found.robot.friction[5].parameters
 
 
@@ -290,3 +294,40 @@ def test_the_controllers_own_model_is_read_off():
     np.testing.assert_allclose(
         friction_torque(found.robot.friction, v), friction_torque(true.friction, v), rtol=0.1
     )
+
+
+def two_folders(*logs):
+    """The logs as `a/log.csv`, `b/log.csv` …: one file name, another folder each."""
+    return [
+        replace(r, source=replace(r.source, path=Path(f"{folder}/log.csv"), sha256=folder))
+        for folder, r in zip("abcd", logs, strict=False)
+    ]
+
+
+def test_two_logs_of_one_file_name_stay_two_logs():
+    """Their rows were pooled: 12 residuals for 6 joints, in the terminal and the robot file."""
+    true = rubbed(UR5, "coulomb-viscous-offset")
+    found = identify(two_folders(log(true, 1), log(true, 2)), UR5, Task())
+    tables = found.robot.document["identification"]["residuals"]
+    assert [len(table["rms_Nm"]) for table in tables] == [6, 6]
+    assert tables[0] != tables[1]
+    assert found.residuals["log_index"].unique().sort().to_list() == [1, 2]
+
+
+def test_a_pair_of_one_file_name_identifies_the_arm_too():
+    """The loaded log was told by its file name: with equal names no friction was identified."""
+    true = rubbed(UR5, "coulomb-viscous-offset")
+    load = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3, 3)))
+    logs = log(true, 1), log(true.with_payload(load), 1)
+    named = identify(two_folders(*logs), UR5, Task(find_payload=True))
+    plain = identify(logs, UR5, Task(find_payload=True))
+    assert named.method == "friction"
+    assert named.parameters.equals(plain.parameters)
+    assert len(named.traces) == 1  # the log without the load
+
+
+def test_the_heavier_log_is_refused_as_the_free_one_whatever_its_name():
+    load = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3, 3)))
+    free, loaded = two_folders(log(UR5, 1), log(UR5.with_payload(load), 1))
+    with pytest.raises(IdentificationError, match="swap the two logs"):
+        identify([free], UR5, Task(find_payload=True), free=loaded)
