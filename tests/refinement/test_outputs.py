@@ -30,7 +30,7 @@ def test_the_parquet_holds_the_band_beside_the_covariance(worked_up: Analysis) -
 
 
 def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -> None:
-    data = json.loads(payload(worked_up))
+    data = payload(worked_up)
     tau, error = data["charts"][:2]
     halves = {s["name"]: s["half"] for s in tau["series"]}
     band = worked_up.estimates[-1].error_sd

@@ -7,7 +7,6 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.zero import (
     change,
-    drift_table,
     loaded_zero,
     unloaded_start,
     without_drift,
@@ -35,15 +34,6 @@ def test_the_drift_is_the_mean_of_the_span_and_its_removal_leaves_the_load() -> 
     clean = without_drift(wrench, drift)
     assert clean.force[wrench.t > 5.5, 2].mean() == pytest.approx(-9.2, rel=0.002)
     assert "zero drift over 1 to 4.5 s in base axes, removed" in clean.remarks[-1]
-
-
-def test_the_table_prints_five_decimals_as_the_paper_does() -> None:
-    wrench = hung(noise=0.0)
-    table = drift_table([zero_drift(wrench, (1.0, 4.5))])
-    assert table.split() == [
-        "observer", "fx", "fy", "fz", "mx", "my", "mz",
-        "kfo-fe", "-0.43166", "-0.53348", "0.83768", "-0.16294", "0.13407", "0.09103",
-    ]  # fmt: skip
 
 
 def test_the_change_between_two_spans_is_told() -> None:

@@ -231,7 +231,7 @@ def admit(
 def show(result: "Replay", run: "ClosedLoop | None", json: bool) -> None:
     """The comparison on stdout, remarks on stderr."""
     from vftcli.cli.console import say
-    from vftcli.outputs.admittance.files import (
+    from vftcli.outputs.admittance.tables import (
         comparison_json,
         comparison_text,
         latency_text,
@@ -239,7 +239,7 @@ def show(result: "Replay", run: "ClosedLoop | None", json: bool) -> None:
     )
 
     if json:
-        typer.echo(comparison_json(result.rows))
+        typer.echo(comparison_json(result.rows).rstrip("\n"))
         return
     say(f"{result.robot.title or result.robot.name}: {result.source}")
     say(parameter_text(result))

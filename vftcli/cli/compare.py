@@ -49,14 +49,15 @@ def compare(
     import polars as pl
 
     from vftcli.cli.console import say_notes, say_recording
+    from vftcli.evaluation import paired_significance
     from vftcli.evaluation.pooling import ScoredLog, pooled_rows
     from vftcli.outputs.log import tables
-    from vftcli.outputs.log.significance import pairs_text
+    from vftcli.outputs.log.wrench_tables import paper_bounds
     from vftcli.pipeline import analyse
     from vftcli.readers.library import Library
 
     show = {
-        "terminal": tables.terminal,
+        "terminal": tables.to_terminal,
         "json": tables.to_json,
         "csv": tables.to_csv,
         "markdown": tables.to_markdown,
@@ -72,8 +73,14 @@ def compare(
             say_notes(made)
         analyses.append(made)
     if significance:
-        typer.echo(pairs_text(analyses, as_json=table.json))
+        pairs = [
+            paired_significance(a.recording.name, a.estimates, a.reference)
+            for a in analyses
+            if a.reference is not None
+        ]
+        typer.echo(tables.pairs_text(pl.concat(pairs), as_json=table.json))
         return
     errors = [a.errors for a in analyses if a.errors is not None]
     runs = [ScoredLog(a.estimates, a.reference) for a in analyses if a.reference is not None]
-    typer.echo(show(pl.concat([*errors, *pooled_rows(runs)], how="diagonal")))
+    together = pl.concat([*errors, *pooled_rows(runs)], how="diagonal")
+    typer.echo(show(together, paper_bounds(analyses)))

@@ -47,12 +47,13 @@ def say_notes(analysis: "Analysis") -> None:
 
 def say_wrenches(sensed: "SensorReading") -> None:
     """Frame, zero drift and remarks of the virtual sensor."""
+    from vftcli.outputs.grid import terminal
+    from vftcli.outputs.log.wrench_tables import drift_grid
     from vftcli.virtual_sensor.frames import FRAMES
-    from vftcli.virtual_sensor.zero import drift_table
 
     say(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.sensor.solver}")
     if sensed.drifts:
-        say(drift_table(sensed.drifts).rstrip())
+        say(terminal(drift_grid(sensed.drifts)).rstrip())
     for note in sensed.notes:
         say(f"note: {note}")
     for warning in sensed.warnings:

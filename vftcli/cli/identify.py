@@ -10,7 +10,7 @@ from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
 
 if TYPE_CHECKING:
-    from vftcli.identification import Identification, Task
+    from vftcli.identification import Task
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,6 +99,7 @@ def identify_robot(
     from vftcli.identification import identify
     from vftcli.outputs.files import refuse_existing
     from vftcli.outputs.identification.files import beside, write_identification
+    from vftcli.outputs.identification.tables import tables_text
     from vftcli.readers.library import Library
 
     task = asked.task(output.stem)
@@ -120,7 +121,7 @@ def identify_robot(
     for remark in found.remarks:
         say(f"note: {remark}")
     say(f"wrote {', '.join(str(file) for file in beside(output).values())}")
-    typer.echo(record.rstrip("\n") if json else tables(found))
+    typer.echo(record.rstrip("\n") if json else tables_text(found))
 
 
 def unloaded_logs(free: list[str] | None) -> tuple[Path, ...]:
@@ -138,28 +139,3 @@ def unloaded_logs(free: list[str] | None) -> tuple[Path, ...]:
             "a load is found from one pair of logs: give --free the log without it, once"
         )
     return chosen.logs
-
-
-def tables(found: "Identification") -> str:
-    """Residuals and identified numbers as text."""
-    lines = []
-    joints = range(1, found.robot.joints + 1)
-    if not found.residuals.is_empty():
-        head = "".join(f"{f'J{j}':>8}" for j in joints)
-        lines.append(f"{'residual rms [N·m]':<44}{head}{'mean':>8}")
-        for (_, log, role, model), part in found.residuals.group_by(
-            ["log_index", "log", "role", "model"], maintain_order=True
-        ):
-            values = part["rms_Nm"].to_list()
-            numbers = "".join(f"{v:>8.3f}" for v in (*values, sum(values) / len(values)))
-            lines.append(f"{f'{log}, {role}, {model}':<44}{numbers}")
-        lines.append("")
-    if not found.parameters.is_empty():
-        lines.append(f"{'number':<20}{'joint':>6}{'value':>12}{'sd':>10}{'profile':>12}  unit")
-        for row in found.parameters.iter_rows(named=True):
-            doubt = "" if row["determined"] else "  (not determined)"
-            lines.append(
-                f"{row['parameter']:<20}{row['joint']:>6}{row['value']:>12.5g}{row['sd']:>10.2g}"
-                f"{row['profile']:>12.5g}  {row['unit']}{doubt}"
-            )
-    return "\n".join(lines)

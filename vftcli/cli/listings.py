@@ -19,6 +19,8 @@ def robots(
     """
     import json as json_module
 
+    from vftcli.outputs.grid import terminal
+    from vftcli.outputs.listings import robots_grid
     from vftcli.robots import PROFILES, load_robot
 
     if name is None:
@@ -26,11 +28,7 @@ def robots(
         if json:
             typer.echo(json_module.dumps(rows, indent=2))
             return
-        for row in rows:
-            typer.echo(
-                f"{row['name']:<7} {row['title']:<28} {row['joints']} joints  "
-                f"{row['torque_source']:<12} {row['friction']}"
-            )
+        typer.echo(terminal(robots_grid(rows)).rstrip("\n"))
         return
     robot = load_robot(name)
     if json:
@@ -56,24 +54,14 @@ def robot_row(robot: Any) -> dict[str, Any]:  # noqa: ANN401 - avoids importing 
 
 def robot_lines(robot: Any) -> list[str]:  # noqa: ANN401
     """One robot in full: joints, drives, friction, gains, sources."""
-    chain = robot.chain
+    from vftcli.outputs.grid import terminal
+    from vftcli.outputs.listings import joints_grid
+
     lines = [
         f"{robot.title} ({robot.name}): {robot.joints} joints, torque from {robot.torque_source}",
         "",
-        f"{'joint':<16} {'mass':>8} {'rotor':>8} {'K':>9} {'tau_max':>8}  friction",
-        f"{'':<16} {'kg':>8} {'kg·m²':>8} {'N·m/A':>9} {'N·m':>8}",
+        *terminal(joints_grid(robot)).splitlines(),
     ]
-    for j, joint in enumerate(chain.names):
-        constant = f"{robot.torque_constant[j]:9.4f}" if robot.torque_constant is not None else "-"
-        friction = robot.friction[j] if robot.friction else None
-        words = "none"
-        if friction is not None and friction.model != "none":
-            numbers = ", ".join(f"{k} {v:g}" for k, v in friction.parameters.items())
-            words = f"{friction.model} ({numbers}); {friction.confidence or 'no confidence stated'}"
-        lines.append(
-            f"{joint:<16} {chain.mass[j]:8.3f} {chain.rotor_inertia[j]:8.3f} {constant:>9} "
-            f"{robot.limits.tau_max[j]:8.1f}  {words}"
-        )
     for observer, gains in robot.gains.items():
         lines.append("")
         lines.extend(f"{observer}.{key} = {value}" for key, value in gains.items())

@@ -33,9 +33,9 @@ def report(
     """
     from vftcli.cli.console import command_line, say, say_notes, say_recording
     from vftcli.evaluation.print_table import check_published, compare_with
-    from vftcli.outputs.log.published import terminal_published
     from vftcli.outputs.log.report import write_report, write_reports
-    from vftcli.outputs.log.tables import terminal
+    from vftcli.outputs.log.tables import print_text, to_terminal
+    from vftcli.outputs.log.wrench_tables import paper_bounds
     from vftcli.pipeline import analyse
     from vftcli.readers.library import Library
 
@@ -63,7 +63,7 @@ def report(
         return
     for made in analyses:
         if made.errors is not None:
-            typer.echo(terminal(made.errors))
+            typer.echo(to_terminal(made.errors, paper_bounds([made])))
         if made.published is not None:
-            typer.echo(terminal_published(made.published))
+            typer.echo(print_text(made.published))
     say(f"wrote {output}: open {output / 'index.html'}; rerun {output / 'recording.rrd'}")

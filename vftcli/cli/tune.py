@@ -2,15 +2,12 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
-
-if TYPE_CHECKING:
-    from vftcli.refinement.tuning import Tuned, TuningGoal
 
 
 @taken_apart
@@ -52,6 +49,8 @@ def tune_gains(
 
     from vftcli.cli.console import command_line, say, say_recording
     from vftcli.outputs.files import refuse_existing, write_text
+    from vftcli.outputs.grid import terminal
+    from vftcli.outputs.listings import tuned_grid
     from vftcli.outputs.log.run_record import plain
     from vftcli.pipeline import AnalysisChoice, look_over
     from vftcli.refinement.tuning import gains_document, parse_goal, tune_all
@@ -84,24 +83,5 @@ def tune_gains(
     say_recording(recording)
     for note in notes:
         say(f"note: {note}")
-    typer.echo(table(tuned, wanted))
+    typer.echo(terminal(tuned_grid(tuned, wanted.threshold is not None)).rstrip("\n"))
     say(f"wrote {output}: use it with --set-file {output}")
-
-
-def table(tuned: "tuple[Tuned, ...]", goal: "TuningGoal") -> str:
-    """What was chosen and what to expect of it, joint by joint."""
-    joints = len(tuned[0].rate)
-    head = "".join(f"{f'J{j + 1}':>9}" for j in range(joints))
-    lines = [f"{'observer':<10}{'':<22}{head}"]
-    for line in tuned:
-        rows = [
-            ("ω [rad/s]", line.rate),
-            ("delay [ms]", 1e3 * line.delay),
-            ("expected rmse [N·m]", line.rmse),
-        ]
-        if goal.threshold is not None and line.alarms is not None:
-            rows.append(("false alarms [1/h]", line.alarms.round(3)))
-        for k, (what, values) in enumerate(rows):
-            numbers = "".join(f"{value:>9.3g}" for value in values)
-            lines.append(f"{line.observer if k == 0 else '':<10}{what:<22}{numbers}")
-    return "\n".join(lines)

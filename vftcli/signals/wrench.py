@@ -11,6 +11,12 @@ AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 """Names of the six components, force first, as in column names and tables."""
 
 
+def unit_of(axis: str | int) -> str:
+    """The unit of one axis of a wrench, told by its name or its number from 0: N or N·m."""
+    number = AXES.index(axis) if isinstance(axis, str) else axis
+    return "N" if number < 3 else "N·m"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Wrench:
     """Force and moment that the environment exerts on the robot.

@@ -18,9 +18,6 @@ LEAST_DIRECTIONS = 0.02
 LEAST_TURN = 0.1
 """Spread of the gravity direction (rms, each axis) below which poses cannot weigh a tool."""
 
-PAPER_FORCE, PAPER_MOMENT = 6.0, 0.65
-"""RMSE that the paper reports for the UR5 against its sensor, an upper bound. [N], [N·m]"""
-
 
 @dataclass(frozen=True, kw_only=True)
 class PoseFit:

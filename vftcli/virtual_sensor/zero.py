@@ -1,6 +1,5 @@
 """Zero drift: what the virtual sensor reads unloaded, reported per axis and removed."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from vftcli.signals.arrays import Array, Mask, frozen
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.series import runs_of
-from vftcli.signals.wrench import AXES, Wrench
+from vftcli.signals.wrench import AXES, Wrench, unit_of
 
 SETTLING = 1.0
 """Start of a log that is left out of an unloaded start: observers rise from zero. [s]"""
@@ -175,13 +174,4 @@ def exceeded(value: Array, limit: Array) -> str:
     if not np.any(share > 1.0):
         return ""
     k = int(np.argmax(share))
-    return f"{AXES[k]} is {value[k]:.3g} {'N' if k < 3 else 'N·m'}"
-
-
-def drift_table(drifts: Sequence[Drift]) -> str:
-    """Zero drift per observer and axis, with five decimals as the paper prints it."""
-    lines = ["observer  " + "".join(f"{axis:>11}" for axis in AXES)]
-    lines += [
-        f"{drift.name:<10}" + "".join(f"{value:11.5f}" for value in drift.mean) for drift in drifts
-    ]
-    return "\n".join(lines) + "\n"
+    return f"{AXES[k]} is {value[k]:.3g} {unit_of(k)}"

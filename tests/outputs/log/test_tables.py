@@ -1,6 +1,7 @@
 import csv
 import io
 import json
+from collections.abc import Callable
 
 import polars as pl
 import pytest
@@ -32,28 +33,9 @@ def errors() -> pl.DataFrame:
     )
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (0.42649, "0.426"),
-        (12.346, "12.3"),
-        (1234.5, "1234"),
-        (0.0027812, "0.00278"),
-        (0.9996, "1.00"),
-        (9.996, "10.0"),
-        (0.0, "0"),
-        (-1.234, "-1.23"),
-        (1.5e-7, "1.50e-07"),
-        (float("nan"), "–"),
-    ],
-)
-def test_three_significant_digits(value: float, text: str) -> None:
-    assert tables.significant(value) == text
-
-
 def test_terminal_table(errors: pl.DataFrame) -> None:
     """0.55 is within 1.2 × 0.5: a star; the mean is over the joints that are known."""
-    assert tables.terminal(errors) == (
+    assert tables.to_terminal(errors) == (
         "a_b.csv against two-cycle, 100 samples, RMSE in N·m\n"
         "observer     J1     J2    mean\n"
         "fdo       0.550*  12.3    6.45\n"
@@ -68,18 +50,68 @@ def test_terminal_table(errors: pl.DataFrame) -> None:
 
 def test_one_block_a_recording(errors: pl.DataFrame) -> None:
     other = errors.with_columns(recording=pl.lit("b.csv"))
-    text = tables.terminal(pl.concat([errors, other]))
+    text = tables.to_terminal(pl.concat([errors, other]))
     assert text.count("observer ") == 2
     assert text.index("a_b.csv") < text.index("b.csv against")
 
 
+@pytest.mark.parametrize("show", [tables.to_terminal, tables.to_markdown, tables.to_latex])
+def test_two_logs_of_one_label_stay_two_tables(errors: pl.DataFrame, show: Callable) -> None:
+    """The second log's numbers took the place of the first's."""
+    other = errors.with_columns(rmse_Nm=pl.col("rmse_Nm") * 10.0)
+    text = show(pl.concat([errors, other]))
+    assert text.count("12.3") == 1
+    assert text.count("123") == 1
+    assert text.count("a_b.csv against") + text.count(r"a\_b.csv against") == 2
+
+
+def test_pairs_name_the_better_first() -> None:
+    rows = pl.DataFrame(
+        {
+            "recording": ["a.csv"] * 2,
+            "joint": [1, 2],
+            "observer": ["fdo", "fdo"],
+            "other": ["gmo", "gmo"],
+            "difference_Nm": [0.5, -0.25],
+            "low_Nm": [0.1, -0.5],
+            "high_Nm": [0.9, 0.1],
+            "p": [0.01, 0.2],
+        }
+    )
+    lines = tables.pairs_text(rows).splitlines()
+    assert lines[1].split() == [
+        "a.csv",
+        "J1",
+        "gmo",
+        "fdo",
+        "0.500",
+        "0.100",
+        "to",
+        "0.900",
+        "0.010*",
+    ]
+    assert lines[2].split() == [
+        "a.csv",
+        "J2",
+        "fdo",
+        "gmo",
+        "0.250",
+        "-0.100",
+        "to",
+        "0.500",
+        "0.200",
+    ]
+    assert lines[3] == "*: p below 0.05"
+    assert json.loads(tables.pairs_text(rows, as_json=True)) == rows.to_dicts()
+
+
 def test_no_errors_are_said() -> None:
-    assert "no errors to show" in tables.terminal(pl.DataFrame(schema=SCHEMA))
+    assert "no errors to show" in tables.to_terminal(pl.DataFrame(schema=SCHEMA))
 
 
 def test_a_floor_nobody_knows_is_left_out(errors: pl.DataFrame) -> None:
     unknown = errors.with_columns(reference_floor_Nm=pl.lit(None, dtype=pl.Float64))
-    assert "floor" not in tables.terminal(unknown)
+    assert "floor" not in tables.to_terminal(unknown)
 
 
 def test_json_has_null_for_unknown(errors: pl.DataFrame) -> None:

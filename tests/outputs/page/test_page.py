@@ -11,6 +11,9 @@ from vftcli.analysis import Analysis
 from vftcli.outputs.page import render, render_index
 from vftcli.outputs.page.payload import payload
 from vftcli.outputs.page.sections import joint_values
+from vftcli.outputs.page.shell import script_json
+
+HOSTILE = "</script><script>alert(1)</script>\u2028"
 
 
 class Page(HTMLParser):
@@ -140,7 +143,7 @@ def test_a_first_order_response_is_3_db_down_at_its_cutoff(html: str) -> None:
 
 
 def test_data_cannot_end_the_script(analysis: Analysis) -> None:
-    assert "<" not in payload(analysis)
+    assert "<" not in script_json({**payload(analysis), "hostile": HOSTILE})
 
 
 def test_without_a_reference_the_page_says_so(without_reference: Analysis) -> None:

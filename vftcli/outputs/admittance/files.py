@@ -1,23 +1,22 @@
-"""What `vftcli admit` shows and writes: tables, motion.parquet, the page, run.json."""
+"""What `vftcli admit` writes: the page, motion.parquet, the comparison, run.json."""
 
-import csv
-import io
-import json
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vftcli.admittance.closed_loop import ClosedLoop
-from vftcli.admittance.latency import latencies
 from vftcli.admittance.parameters import AXES, PER_AXIS
 from vftcli.admittance.replay import Replay
 from vftcli.admittance.stability import Verdict
+from vftcli.outputs.admittance.page import render_admittance
+from vftcli.outputs.admittance.recording import write_ghosts
+from vftcli.outputs.admittance.tables import comparison_csv, comparison_json, latency_rows
 from vftcli.outputs.files import OutputFolder
-from vftcli.outputs.log.run_record import input_record, plain, robot_record, to_json, versions
+from vftcli.outputs.log.run_record import input_record, robot_record, to_json, versions
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import AXES as FORCES
 
 if TYPE_CHECKING:
     import polars as pl
@@ -31,8 +30,6 @@ FILES = (
     "run.json",
 )
 
-FORCES = ("fx", "fy", "fz", "mx", "my", "mz")
-
 CONVENTIONS = {
     "deviation": "X̃ of the flange point from the target pose X_d, base axes; rotation as the "
     "vector log(R R_dᵀ)",
@@ -40,101 +37,6 @@ CONVENTIONS = {
     "row": "a deviation follows from the force of the row before it",
     "units": "s, m, rad, N, N·m, J",
 }
-
-COLUMNS = (
-    ("controller", "controller", "{}"),
-    ("alpha", "α", "{:g}"),
-    ("xi", "ξ", "{:.3g}"),
-    ("axis", "axis", "{}"),
-    ("drag", "drag", "{}"),
-    ("start_s", "start [s]", "{:.3f}"),
-    ("release_s", "release [s]", "{:.3f}"),
-    ("peak", "peak [m, rad]", "{:.4f}"),
-    ("time_to_peak_s", "to peak [s]", "{:.3f}"),
-    ("peak_advance_s", "advance [s]", "{:.3f}"),
-    ("overshoot", "overshoot [%]", "{:.1f}"),
-    ("return_10_s", "back to 10 % [s]", "{:.3f}"),
-    ("return_2_s", "back to 2 % [s]", "{:.3f}"),
-    ("idle_s", "idle [s]", "{:.3f}"),
-    ("work_J", "work [J]", "{:.3f}"),
-)
-"""Key of a row, its heading, and how its number is printed."""
-
-
-def comparison_json(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The comparison as a JSON array of rows."""
-    return json.dumps(plain(list(rows)), indent=2, ensure_ascii=False, allow_nan=False)
-
-
-def comparison_csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The comparison as CSV; what is not known is empty."""
-    if not rows:
-        return ",".join(key for key, _, _ in COLUMNS) + "\n"
-    text = io.StringIO()
-    writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
-
-
-def cells(row: Mapping[str, Any]) -> list[str]:
-    """One row's entries as text; an overshoot in per cent."""
-    shown = []
-    for key, _, form in COLUMNS:
-        value = row[key]
-        if value is None:
-            shown.append("–")
-        else:
-            scaled = 100.0 * value if key == "overshoot" else value
-            shown.append(form.format(scaled).replace("-", "−"))
-    return shown
-
-
-def comparison_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The comparison for a terminal."""
-    if not rows:
-        return "no axis was dragged"
-    table = [[heading for _, heading, _ in COLUMNS], *(cells(row) for row in ordered(rows))]
-    widths = [max(len(line[k]) for line in table) for k in range(len(COLUMNS))]
-    lines = [
-        "  ".join(
-            cell.ljust(width) if k == 0 else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(line, widths, strict=True))
-        )
-        for line in table
-    ]
-    return "\n".join(lines)
-
-
-def ordered(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Rows by axis and drag, so that controllers stand under each other."""
-    return sorted(rows, key=lambda row: (AXES.index(row["axis"]), row["drag"]))
-
-
-def parameter_text(replay: Replay) -> str:
-    """The parameters in use, one line."""
-    p = replay.parameters
-    words = [
-        f"{label} {short(getattr(p, name))}"
-        for label, name in (
-            ("M", "mass"),
-            ("B", "damping"),
-            ("K", "stiffness"),
-            ("ξ", "damping_ratio"),
-            ("F_tsd", "threshold"),
-            ("limit", "speed_limit"),
-        )
-    ]
-    return f"{', '.join(words)}; Ts {1e3 * p.period:g} ms, {p.threshold_mode} threshold"
-
-
-def short(values: Array) -> str:
-    """Six numbers, those of equal neighbours once: position / rotation."""
-    halves = [list(dict.fromkeys(f"{v:.3g}" for v in part)) for part in (values[:3], values[3:])]
-    return " / ".join(
-        half[0] if len(half) == 1 else ",".join(f"{v:.3g}" for v in part)
-        for half, part in zip(halves, (values[:3], values[3:]), strict=True)
-    )
 
 
 def motion_table(replay: Replay) -> "pl.DataFrame":
@@ -172,40 +74,6 @@ def title_of(recording: Recording | None, run: ClosedLoop | None) -> str:
     if run is not None and run.simulation is not None:
         return f"{run.simulation.scenario.name}, closed loop"
     return recording.name if recording is not None else "release"
-
-
-def latency_rows(run: ClosedLoop) -> list[dict[str, Any]]:
-    """The latencies of a closed loop as rows, None where something did not happen."""
-    return [
-        {
-            "axis": AXES[entry.axis],
-            "force_s": entry.force,
-            "detection_s": entry.detection,
-            "motion_s": entry.motion,
-            "withdrawal_s": entry.withdrawal,
-            "at_rest_before": entry.rested,
-        }
-        for entry in latencies(run)
-    ]
-
-
-def latency_text(run: ClosedLoop) -> str:
-    """The latencies of a closed loop in words, one line a contact."""
-    if not run.stable:
-        return f"closed loop: the arm ran away at {run.t[-1]:.2f} s"
-    lines = []
-    for row in latency_rows(run):
-        detection, motion, withdrawal = (
-            "never" if row[name] is None else f"{row[name]:.3f} s"
-            for name in ("detection_s", "motion_s", "withdrawal_s")
-        )
-        moving = "" if row["at_rest_before"] else " (the arm was moving already)"
-        lines.append(
-            f"closed loop: force past the threshold of {row['axis']} at {row['force_s']:.2f} s, "
-            f"detected after {detection}, moved after {motion}{moving}, "
-            f"withdrawal seen after {withdrawal}"
-        )
-    return "\n".join(lines) or "closed loop: no force passed a threshold"
 
 
 def admittance_record(
@@ -284,15 +152,12 @@ def write_admittance(
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
-    from vftcli.outputs.admittance.page import render_admittance
-    from vftcli.outputs.admittance.recording import write_ghosts
-
     record = admittance_record(replay, recording, run, command)
     title = title_of(recording, run)
     texts = {
         "index.html": render_admittance(replay, record, title, run),
         "comparison.csv": comparison_csv(replay.rows),
-        "comparison.json": comparison_json(replay.rows) + "\n",
+        "comparison.json": comparison_json(replay.rows),
         "run.json": to_json(record),
     }
     with OutputFolder(path, force, FILES) as folder:

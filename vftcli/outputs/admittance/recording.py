@@ -8,7 +8,7 @@ import numpy as np
 
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.admittance.files import comparison_text, parameter_text
+from vftcli.outputs.admittance.tables import comparison_text, parameter_text
 from vftcli.outputs.arm import ArmPoses, Capsule, capsules, motion
 from vftcli.outputs.log.rerun_blueprint import Scene, Tab, grid
 from vftcli.outputs.log.rerun_recording import (
@@ -23,6 +23,7 @@ from vftcli.outputs.log.rerun_recording import (
 from vftcli.outputs.log.rerun_text import drawable
 from vftcli.outputs.palette import REFERENCE, SPARE, rgb
 from vftcli.signals.arrays import Array
+from vftcli.signals.wrench import unit_of
 
 GHOST = 150
 """Opacity of a ghost arm, of 255."""
@@ -91,7 +92,7 @@ def line_groups(replay: Replay, paint: list[str]) -> dict[str, list[Lines]]:
         force.append(
             Lines(
                 f"/force/{axis}",
-                f"{axis} force on the robot [{'N' if k < 3 else 'N·m'}]",
+                f"{axis} force on the robot [{unit_of(k)}]",
                 ["force", "threshold", "− threshold"],
                 [FORCE, REFERENCE, REFERENCE],
                 [1.5, 1.0, 1.0],

@@ -1,7 +1,6 @@
 """The page of an identification: residuals, numbers with their spread, residual over velocity."""
 
-import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -9,9 +8,18 @@ import numpy as np
 import polars as pl
 
 from vftcli.identification.result import Identification, Trace
-from vftcli.outputs.page.page import asset, document, headline
-from vftcli.outputs.page.payload import Chart, ChartLine, packed
-from vftcli.outputs.page.sections import bullets, html_table, number_text, pairs, remarks
+from vftcli.outputs.grid import Column, Entry, Grid, html, joint_columns, signed
+from vftcli.outputs.identification.tables import residual_rows
+from vftcli.outputs.page.charts import Chart, ChartLine, packed
+from vftcli.outputs.page.shell import (
+    bullets,
+    chart_places,
+    document,
+    folded,
+    headline,
+    pairs,
+    remarks,
+)
 from vftcli.outputs.palette import SPARE
 from vftcli.signals.remarks import explanation
 
@@ -26,7 +34,7 @@ def render_identification(found: Identification, record: Mapping[str, Any]) -> s
     """The page as text: self-contained, nothing is loaded from anywhere."""
     logs = ", ".join(dict.fromkeys(t.recording.name for t in found.traces)) or found.robot.name
     text = f"{found.robot.title}: method {found.method}, from {logs}"
-    body = [
+    parts = (
         headline(found.robot.name, text),
         remarks([explanation(remark) for remark in found.remarks]),
         residual_section(found),
@@ -37,32 +45,31 @@ def render_identification(found: Identification, record: Mapping[str, Any]) -> s
         series_section(found),
         "<h2>Signal processing</h2>",
         pairs(found.processing),
-        provenance(record),
-    ]
-    if found.traces:
-        body.append(f'<script type="application/json" id="data">{chart_data(found)}</script>')
-        body.append(f"<script>{asset('page.js')}</script>")
-    return document(f"{found.robot.name}: identification", "".join(body))
+        provenance_section(record),
+    )
+    data = payload(found) if found.traces else None
+    return document(f"{found.robot.name}: identification", "".join(parts), data)
 
 
 def residual_section(found: Identification) -> str:
     """RMS per joint of every log, identified beside profile."""
-    if found.residuals.is_empty():
+    rows: list[tuple[Entry, ...]] = [
+        (*names, *values, float(np.mean(values))) for names, values in residual_rows(found)
+    ]
+    if not rows:
         return ""
-    joints = found.robot.joints
-    rows = []
-    for (_, log, role, model), part in found.residuals.group_by(
-        ["log_index", "log", "role", "model"], maintain_order=True
-    ):
-        values = part["rms_Nm"].to_list()
-        cells = "".join(f"<td>{number_text(v)}</td>" for v in (*values, float(np.mean(values))))
-        words = (
-            f'<td class="text">{escape(str(role))}</td><td class="text">{escape(str(model))}</td>'
-        )
-        rows.append(f'<tr><th scope="row">{escape(str(log))}</th>{words}{cells}</tr>')
-    header = ["Log", "Role", "Model", *(f"J{j}" for j in range(1, joints + 1)), "mean"]
-    caption = "RMS of measured less predicted torque in N·m, from the first to the last movement"
-    return f"<h2>Residuals</h2>{html_table(caption, header, rows, words=3)}"
+    numbers = (*joint_columns(found.robot.joints, form=signed), Column("mean", form=signed))
+    grid = Grid(
+        title="RMS of measured less predicted torque in N·m, from the first to the last movement",
+        columns=(*words("Log", "Role", "Model"), *numbers),
+        rows=tuple(rows),
+    )
+    return f"<h2>Residuals</h2>{html(grid)}"
+
+
+def words(*heads: str) -> tuple[Column, ...]:
+    """Columns of words."""
+    return tuple(Column(head, words=True) for head in heads)
 
 
 def velocity_section(found: Identification) -> str:
@@ -122,50 +129,74 @@ def parameter_section(found: Identification) -> str:
     """The identified numbers."""
     if found.parameters.is_empty():
         return ""
-    header = ["Number", "Joint", "Value", "sd", "Unit", "Profile", "Determined"]
-    rows = []
-    for row in found.parameters.iter_rows(named=True):
-        cells = (
-            f"<td>J{row['joint']}</td><td>{number_text(row['value'])}</td>"
-            f"<td>{number_text(finite(row['sd']))}</td>"
-            f"<td>{escape(row['unit'])}</td><td>{number_text(finite(row['profile']))}</td>"
-            f"<td>{'yes' if row['determined'] else 'no'}</td>"
-        )
-        rows.append(f'<tr><th scope="row">{escape(row["parameter"])}</th>{cells}</tr>')
-    return f"<h2>Identified numbers</h2>{html_table('One row a number', header, rows)}"
+    numbers = {"value": "Value", "sd": "sd", "profile": "Profile"}
+    value, sd, profile = (Column(head, form=signed) for head in numbers.values())
+    grid = Grid(
+        title="One row a number",
+        columns=(
+            *words("Number"),
+            Column("Joint"),
+            value,
+            sd,
+            Column("Unit"),
+            profile,
+            Column("Determined"),
+        ),
+        rows=tuple(
+            (
+                row["parameter"],
+                f"J{row['joint']}",
+                row["value"],
+                row["sd"],
+                row["unit"],
+                row["profile"],
+                yes_or_no(row["determined"]),
+            )
+            for row in found.parameters.iter_rows(named=True)
+        ),
+    )
+    return f"<h2>Identified numbers</h2>{html(grid)}"
+
+
+def yes_or_no(truth: bool) -> str:
+    """A truth in words."""
+    return "yes" if truth else "no"
 
 
 def shape_choice_section(choices: pl.DataFrame) -> str:
     """How the friction models competed, folded away."""
     if choices.is_empty():
         return ""
-    rows = [
-        f'<tr><th scope="row">{escape(r["friction"])}</th><td>J{r["joint"]}</td>'
-        f"<td>{number_text(r['cv_rms_Nm'])}</td><td>{'chosen' if r['chosen'] else ''}</td></tr>"
-        for r in choices.iter_rows(named=True)
-    ]
-    caption = "RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen"
-    table = html_table(caption, ["Friction", "Joint", "RMS [N·m]", ""], rows)
-    return f"<details><summary>Friction models compared</summary>{table}</details>"
+    grid = Grid(
+        title="RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen",
+        columns=(
+            *words("Friction"),
+            Column("Joint"),
+            Column("RMS [N·m]", form=signed),
+            Column(""),
+        ),
+        rows=tuple(
+            (r["friction"], f"J{r['joint']}", r["cv_rms_Nm"], "chosen" if r["chosen"] else "")
+            for r in choices.iter_rows(named=True)
+        ),
+    )
+    return folded("Friction models compared", html(grid))
 
 
 def base_section(base: pl.DataFrame | None) -> str:
     """Base parameters, folded away."""
     if base is None:
         return ""
-    rows = [
-        f'<tr><th scope="row">{escape(r["parameter"])}</th><td>{number_text(r["value"])}</td>'
-        f"<td>{number_text(finite(r['sd']))}</td><td>{'yes' if r['determined'] else 'no'}</td></tr>"
-        for r in base.iter_rows(named=True)
-    ]
-    header = ["Parameter", "Value (SI)", "sd", "Determined"]
-    table = html_table("Weighted least squares, before physical consistency", header, rows)
-    return f"<details><summary>Base parameters ({len(rows)})</summary>{table}</details>"
-
-
-def finite(value: float | None) -> float | None:
-    """A number, None where it is not known."""
-    return value if value is not None and np.isfinite(value) else None
+    value, sd = (Column(head, form=signed) for head in ("Value (SI)", "sd"))
+    grid = Grid(
+        title="Weighted least squares, before physical consistency",
+        columns=(*words("Parameter"), value, sd, Column("Determined")),
+        rows=tuple(
+            (r["parameter"], r["value"], r["sd"], yes_or_no(r["determined"]))
+            for r in base.iter_rows(named=True)
+        ),
+    )
+    return folded(f"Base parameters ({len(base)})", html(grid))
 
 
 def series_section(found: Identification) -> str:
@@ -175,14 +206,7 @@ def series_section(found: Identification) -> str:
     name = escape(shown_trace(found).recording.name)
     return (
         f"<h2>Torques over time: {name}</h2>"
-        '<p class="soft help">Drag to zoom in, double-click to see all; the Rerun recording holds '
-        "every log.</p>"
-        '<div id="toolbar"><div class="buttons" id="joints" role="group" aria-label="Joint">'
-        '<span class="name">Joint</span></div>'
-        '<div id="legend" role="group" aria-label="Series"><span class="name">Series</span></div>'
-        '<div class="buttons"><button type="button" id="all">Whole span</button></div></div>'
-        '<div id="overview"></div><div id="detail"></div>'
-        "<noscript><p>The charts need JavaScript; the tables do not.</p></noscript>"
+        f'<p class="soft">The Rerun recording holds every log.</p>{chart_places()}'
     )
 
 
@@ -192,8 +216,8 @@ def shown_trace(found: Identification) -> Trace:
     return (held or list(found.traces))[0]
 
 
-def chart_data(found: Identification) -> str:
-    """JSON for the script: nothing in it can end the element."""
+def payload(found: Identification) -> dict[str, Any]:
+    """What the script draws: one log's torques, their difference, its velocities."""
     trace = shown_trace(found)
     measured = ChartLine("measured", trace.measured)
     predicted = ChartLine("predicted", trace.predicted, SPARE[1])
@@ -202,20 +226,16 @@ def chart_data(found: Identification) -> str:
         Chart("left", "Measured − predicted", "N·m", (ChartLine("residual", trace.residual),)),
         Chart("dq", "Velocity", "rad/s", (ChartLine("velocity", trace.dq),)),
     )
-    data = {
+    return {
         "joints": found.robot.joints,
         "span": [float(trace.t[0]), float(trace.t[-1])],
         "charts": [packed(chart, trace.t) for chart in charts],
         "responses": [],
     }
-    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
 
 
-def provenance(record: Mapping[str, Any]) -> str:
+def provenance_section(record: Mapping[str, Any]) -> str:
     """Command, versions and digests."""
-    logs: Iterable[Mapping[str, Any]] = record.get("inputs", ())
-    lines = [f"{log.get('path')}: sha256 {log.get('sha256')}" for log in logs]
+    lines = [f"{log.get('path')}: sha256 {log.get('sha256')}" for log in record.get("inputs", ())]
     command = f"<pre>{escape(str(record.get('command', '')))}</pre>"
-    versions = pairs(record.get("versions", {}))
-    return f"<h2>Provenance</h2>{command}{bullets(lines)}{versions}"
+    return f"<h2>Provenance</h2>{command}{bullets(lines)}{pairs(record.get('versions', {}))}"

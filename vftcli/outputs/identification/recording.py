@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from vftcli.identification.result import Identification, Trace
+from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.log.rerun_blueprint import Tab, grid
 from vftcli.outputs.log.rerun_recording import Lines, plot_of, send_lines
 from vftcli.outputs.log.rerun_text import drawable
-from vftcli.outputs.log.tables import escape_markdown
 from vftcli.outputs.palette import REFERENCE, SPARE
 from vftcli.signals.remarks import explanation
 

@@ -11,12 +11,13 @@ from vftcli.outputs.log import tables
 from vftcli.outputs.log.parquet import write_estimates
 from vftcli.outputs.log.rerun_recording import write_rrd
 from vftcli.outputs.log.run_record import run_record, to_json
+from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds
 from vftcli.outputs.page import render, render_index
 
 if TYPE_CHECKING:
     import polars as pl
 
-ERROR_TABLES: dict[str, Callable[["pl.DataFrame"], str]] = {
+ERROR_TABLES: dict[str, Callable[["pl.DataFrame", PaperBounds], str]] = {
     "errors.csv": tables.to_csv,
     "errors.json": tables.to_json,
     "errors.md": tables.to_markdown,
@@ -61,7 +62,7 @@ def write_reports(
         ]
         index = render_index(list(zip(places, analyses, strict=True)))
         put(folder / "index.html", index)
-        put_errors(folder, "", combined(places, analyses))
+        put_errors(folder, "", combined(analyses), paper_bounds(analyses))
         text = listed([to_json(record) for record in records])
         put(folder / "run.json", text)
         return text
@@ -74,7 +75,7 @@ def fill(folder: OutputFolder, place: str, analysis: Analysis, command: str) -> 
     put(folder / f"{place}index.html", render(analysis))
     write_rrd(folder / f"{place}recording.rrd", analysis)
     write_estimates(folder / f"{place}estimates.parquet", analysis)
-    put_errors(folder, place, analysis.errors)
+    put_errors(folder, place, analysis.errors, paper_bounds([analysis]))
     put(folder / f"{place}run.json", to_json(record))
     return record
 
@@ -84,12 +85,14 @@ def put(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
-def put_errors(folder: OutputFolder, place: str, errors: "pl.DataFrame | None") -> None:
+def put_errors(
+    folder: OutputFolder, place: str, errors: "pl.DataFrame | None", bounds: PaperBounds
+) -> None:
     """Write the error tables, if there are errors."""
     if errors is None:
         return
-    for name, write in ERROR_TABLES.items():
-        put(folder / f"{place}{name}", write(errors))
+    for name, text_of in ERROR_TABLES.items():
+        put(folder / f"{place}{name}", text_of(errors, bounds))
 
 
 def sub_folders(analyses: Sequence[Analysis]) -> list[str]:
@@ -104,17 +107,11 @@ def sub_folders(analyses: Sequence[Analysis]) -> list[str]:
     return found
 
 
-def combined(places: Sequence[str], analyses: Sequence[Analysis]) -> "pl.DataFrame | None":
-    """All errors in one table; logs of one name are told apart by their folders."""
+def combined(analyses: Sequence[Analysis]) -> "pl.DataFrame | None":
+    """All errors in one table, None where no log has any."""
     import polars as pl
 
-    names = [analysis.recording.name for analysis in analyses]
-    alike = len(set(names)) < len(names)
-    found = [
-        errors.with_columns(recording=pl.lit(place)) if alike else errors
-        for place, analysis in zip(places, analyses, strict=True)
-        if (errors := analysis.errors) is not None
-    ]
+    found = [a.errors for a in analyses if a.errors is not None]
     return pl.concat(found, how="diagonal") if found else None
 
 

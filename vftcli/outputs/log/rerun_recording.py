@@ -17,17 +17,19 @@ from numpy.typing import NDArray
 from vftcli.analysis import Analysis
 from vftcli.outputs.arm import ArmPoses, capsules, flange_force, motion
 from vftcli.outputs.files import one_line
+from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.log.rerun_blueprint import Plot, Scene, Tab, arrangement
 from vftcli.outputs.log.rerun_text import drawable
 from vftcli.outputs.log.run_record import CONVENTIONS, all_notes
-from vftcli.outputs.log.tables import escape_markdown, to_markdown
+from vftcli.outputs.log.tables import to_markdown
+from vftcli.outputs.log.wrench_tables import paper_bounds
 from vftcli.outputs.palette import REFERENCE, SPARE, colours_of, rgb
 from vftcli.robots.drive import drive_torque
 from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import OutputError
 from vftcli.signals.external_torque import COVERS, ExternalTorque
-from vftcli.signals.wrench import AXES
+from vftcli.signals.wrench import AXES, unit_of
 
 ARM_RATE = 50.0
 """Poses a second of the arm. [Hz]"""
@@ -181,7 +183,7 @@ def wrench_lines(analysis: Analysis, k: int) -> Lines:
     """One axis of every wrench, the reference first."""
     colours = colours_of(analysis.estimates)
     found = sorted(analysis.wrenches, key=lambda wrench: wrench.name != "reference")
-    title = f"{AXES[k]} in {found[0].frame} axes [{'N' if k < 3 else 'N·m'}]"
+    title = f"{AXES[k]} in {found[0].frame} axes [{unit_of(k)}]"
     return Lines(
         f"/wrench/{AXES[k]}",
         title,
@@ -250,7 +252,8 @@ def send_words(stream: Stream, analysis: Analysis) -> None:
         stream.log(path, rr.TextDocument(drawable(text), media_type="text/markdown"), static=True)
 
     document("/summary", summary(analysis))
-    table = to_markdown(analysis.errors) if analysis.errors is not None else ""
+    errors = analysis.errors
+    table = to_markdown(errors, paper_bounds([analysis])) if errors is not None else ""
     document("/errors", table or "No reference was given, so no errors can be told.")
 
 

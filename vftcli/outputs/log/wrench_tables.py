@@ -1,82 +1,63 @@
-"""Error tables of wrenches: axes across, newtons and newton-metres side by side."""
+"""Tables of wrenches: errors along six axes, newtons and newton-metres, and contacts found."""
 
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import polars as pl
 
-from vftcli.signals.wrench import AXES
-from vftcli.virtual_sensor.sensor import PAPER_FORCE, PAPER_MOMENT
+from vftcli.outputs.grid import Column, Grid
+from vftcli.outputs.log.rmse_tables import logs_of
+from vftcli.signals.wrench import AXES, unit_of
+from vftcli.virtual_sensor.zero import Drift
 
-DASH = "–"
+if TYPE_CHECKING:
+    from vftcli.analysis import Analysis
 
-
-class AxisBlock(NamedTuple):
-    """RMSE of one recording's wrenches, observers down, axes across.
-
-    Attributes:
-        recording: The log's name.
-        reference: What they are judged by.
-        rows: Observer and six numbers as text, [N] then [N·m].
-        samples: Samples in which both wrenches are known.
-    """
-
-    recording: str
-    reference: str
-    rows: tuple[tuple[str, ...], ...]
-    samples: int
-
-    @property
-    def title(self) -> str:
-        """Which log, which reference, how many samples."""
-        return f"{self.recording} against {self.reference}, wrench, {self.samples} unmasked samples"
+PaperBounds = Mapping[str, tuple[float, float]]
+"""Label of a log → bounds [N, N·m] that the paper gives for the RMSE of this log's arm."""
 
 
-def axis_blocks(errors: pl.DataFrame) -> tuple[AxisBlock, ...]:
-    """One block for each recording and reference that has wrench rows."""
-    if "axis" not in errors.columns:
-        return ()
-    rows = errors.filter(pl.col("axis").is_not_null())
-    groups = rows.group_by("recording", "reference", maintain_order=True)
-    return tuple(axis_block(str(key[0]), str(key[1]), group) for key, group in groups)
+def paper_bounds(analyses: "Iterable[Analysis]") -> PaperBounds:
+    """What the paper reports of the arms of these logs, from the arms' own profiles."""
+    found = {a.recording.name: a.robot.document.get("published", {}) for a in analyses}
+    return {
+        label: (published["wrench_rmse_N"], published["wrench_rmse_Nm"])
+        for label, published in found.items()
+        if published
+    }
 
 
-def axis_block(recording: str, reference: str, rows: pl.DataFrame) -> AxisBlock:
-    """The wrench rows of one recording as text."""
-    found: dict[str, dict[str, float | None]] = {}
-    for row in rows.iter_rows(named=True):
-        value = row["rmse_N"] if row["rmse_N"] is not None else row["rmse_Nm"]
-        found.setdefault(str(row["observer"]), {})[str(row["axis"])] = value
-    lines = [(name, *(text_of(values.get(a)) for a in AXES)) for name, values in found.items()]
-    if reference == "sensor":
-        paper = [f"< {PAPER_FORCE:g}"] * 3 + [f"< {PAPER_MOMENT:g}"] * 3
-        lines.append(("paper, UR5", *paper))
-    return AxisBlock(recording, reference, tuple(lines), int(rows["samples"].max() or 0))  # type: ignore[arg-type]
+def axis_columns() -> tuple[Column, ...]:
+    """One column an axis, in its unit."""
+    letters = ("F_x", "F_y", "F_z", "M_x", "M_y", "M_z")
+    return tuple(
+        Column(axis, unit_of(axis), symbol=f"${letter}$")
+        for axis, letter in zip(AXES, letters, strict=True)
+    )
 
 
-def text_of(value: float | None) -> str:
-    """A number with three significant digits, a dash where there is none."""
-    from vftcli.outputs.log.tables import significant
-
-    return DASH if value is None else significant(value)
-
-
-HEADER = ("observer", *(f"{axis} [{'N' if k < 3 else 'N·m'}]" for k, axis in enumerate(AXES)))
-
-
-def terminal_axes(errors: pl.DataFrame) -> str:
-    """The wrench tables for a terminal, "" where no wrench was compared."""
-    parts = []
-    for block in axis_blocks(errors):
-        widths = [max(len(r[c]) for r in (HEADER, *block.rows)) for c in range(len(HEADER))]
-        lines = [
-            row[0].ljust(widths[0])
-            + "".join(f"  {cell.rjust(w)}" for cell, w in zip(row[1:], widths[1:], strict=True))
-            for row in (HEADER, *block.rows)
+def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Iterator[Grid]:
+    """RMSE of the wrenches, one table for each recording and reference that has wrench rows."""
+    for group in logs_of(errors, "axis"):
+        recording, reference = str(group["recording"][0]), str(group["reference"][0])
+        found: dict[str, dict[str, float | None]] = {}
+        for row in group.iter_rows(named=True):
+            value = row["rmse_N"] if row["rmse_N"] is not None else row["rmse_Nm"]
+            found.setdefault(str(row["observer"]), {})[str(row["axis"])] = value
+        rows: list[tuple[str | float | None, ...]] = [
+            (name, *(values.get(axis) for axis in AXES)) for name, values in found.items()
         ]
-        parts.append("\n".join([f"{block.title}, RMSE", *lines, ""]))
-    if contacts := contact_lines(errors):
-        parts.append(contacts)
-    return "\n" + "\n".join(parts) if parts else ""
+        if reference == "sensor" and recording in (bounds or {}):
+            force, moment = (bounds or {})[recording]
+            rows.append(("paper, UR5", *[f"< {force:g}"] * 3, *[f"< {moment:g}"] * 3))
+        samples = max(group["samples"].drop_nulls().to_list() or [0])
+        yield Grid(
+            title=f"{recording} against {reference}, wrench, {samples} unmasked samples",
+            quantity="RMSE",
+            columns=(Column("observer", words=True), *axis_columns()),
+            rows=tuple(rows),
+            swatches=True,
+        )
 
 
 CONTACTS = {
@@ -92,68 +73,37 @@ CONTACTS = {
 """Columns of the contact table, and how they are headed."""
 
 
-def contact_rows(errors: pl.DataFrame) -> list[tuple[str, ...]]:
-    """What is told of contacts as text, one row a recording and observer; empty where not asked."""
+def contact_grids(errors: pl.DataFrame) -> Iterator[Grid]:
+    """How each observer tells contacts, one row a recording and observer; none if not asked."""
     if "contacts" not in errors.columns:
-        return []
+        return
     rows = errors.filter(pl.col("contacts").is_not_null())
-    return [
-        tuple(
-            text_of(row[key])
-            if isinstance(row[key], float)
-            else str(row[key] or 0)
-            if isinstance(row[key], int)
-            else str(row[key] or DASH)
-            for key in CONTACTS
+    if len(rows):
+        yield Grid(
+            title="contacts against the reference",
+            columns=tuple(Column(head, words=True) for head in CONTACTS.values()),
+            rows=tuple(tuple(row[key] for key in CONTACTS) for row in rows.iter_rows(named=True)),
         )
-        for row in rows.iter_rows(named=True)
-    ]
 
 
-def contact_lines(errors: pl.DataFrame) -> str:
-    """The contact table for a terminal, "" where contacts were not judged."""
-    rows = contact_rows(errors)
-    if not rows:
-        return ""
-    table = [tuple(CONTACTS.values()), *rows]
-    widths = [max(len(row[c]) for row in table) for c in range(len(CONTACTS))]
-    lines = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in table]
-    return "\n".join(["contacts against the reference", *(line.rstrip() for line in lines), ""])
+def drift_grid(drifts: Iterable[Drift], spans: bool = False) -> Grid:
+    """Zero drift per observer and axis, with five decimals as the paper prints it.
 
-
-def markdown_axes(errors: pl.DataFrame) -> str:
-    """The wrench tables as GitHub Markdown, "" where no wrench was compared."""
-    from vftcli.outputs.log.tables import escape_markdown
-
-    parts = []
-    for block in axis_blocks(errors):
-        lines = [
-            f"**{escape_markdown(block.title)}, RMSE**",
-            "",
-            f"| {' | '.join(HEADER)} |",
-            f"| {' | '.join(['---', *['---:'] * 6])} |",
-        ]
-        lines += [f"| {' | '.join(map(escape_markdown, row))} |" for row in block.rows]
-        parts.append("\n".join([*lines, ""]))
-    return "\n" + "\n".join(parts) if parts else ""
-
-
-def latex_axes(errors: pl.DataFrame) -> str:
-    """The wrench tables as LaTeX tabulars (needs ``booktabs``), "" where none was compared."""
-    from vftcli.outputs.log.tables import escape_latex, latex_row
-
-    letters = ("F_x", "F_y", "F_z", "M_x", "M_y", "M_z")
-    names = ["Observer", *(f"${letter}$" for letter in letters)]
-    units = ["", *[r"[N]"] * 3, *[r"[N\,m]"] * 3]
-    parts = []
-    for block in axis_blocks(errors):
-        body = [latex_row([escape_latex(row[0]), *map(latex_cell, row[1:])]) for row in block.rows]
-        head = [latex_row(names), latex_row(units), r"\midrule"]
-        lines = [f"% {block.title}, RMSE", r"\begin{tabular}{lrrrrrr}", r"\toprule", *head, *body]
-        parts.append("\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""]))
-    return "\n" + "\n".join(parts) if parts else ""
-
-
-def latex_cell(text: str) -> str:
-    """A number as LaTeX prints it."""
-    return text.replace(DASH, "--").replace("< ", r"$<$\,")
+    Args:
+        drifts: What to show, one row each.
+        spans: Whether to show the span of each, and units: the page does, where they fit.
+    """
+    span = (Column("span [s]"),) if spans else ()
+    axes = (
+        Column(axis, unit_of(axis) if spans else "", ".5f", width=0 if spans else 9)
+        for axis in AXES
+    )
+    return Grid(
+        columns=(Column("observer", words=True), *span, *axes),
+        rows=tuple(
+            (d.name, *((f"{d.span[0]:g}–{d.span[1]:g}",) if spans else ()), *map(float, d.mean))
+            for d in drifts
+        ),
+        title="Zero drift; the first span's is removed" if spans else "",
+        swatches=True,
+    )

@@ -5,11 +5,10 @@ from html import escape
 from vftcli.analysis import Analysis
 from vftcli.evaluation.print_table import Comparison
 from vftcli.evaluation.selection import Facts, advice, facts
-from vftcli.outputs.log.tables import significant
-from vftcli.outputs.page.sections import bullets, html_table, number_cell, observer_head
+from vftcli.outputs.grid import DASH, Column, Grid, html
+from vftcli.outputs.page.shell import bullets, soft
 
-HEADER = (
-    "Observer",
+HEADS = (
     "90 % of a step [ms]",
     "delay [ms]",
     "noise [N·m]",
@@ -18,6 +17,7 @@ HEADER = (
     "time a sample [µs]",
     "to tune",
 )
+"""Headings of the table of what was computed on the log."""
 
 
 def selection_guide(analysis: Analysis) -> str:
@@ -25,53 +25,49 @@ def selection_guide(analysis: Analysis) -> str:
     found = facts(analysis.observers, analysis.tunings, analysis.terms, analysis.errors)
     if not found:
         return ""
-    table = html_table("Computed on this log", HEADER, [facts_row(f) for f in found])
-    rows = [
-        f'<tr><th scope="row">{escape(a.purpose)}</th><td class="text">{escape(a.criterion)}</td>'
-        f'<td class="text">{escape(", ".join(a.best) or "–")}</td>'
-        f'<td class="text">{escape(a.paper)}</td></tr>'
-        for a in advice(found)
-    ]
-    header = ["For", "what decides", "best here", "the paper advises"]
-    guide = html_table("Which observer for what (Sec. IV-A)", header, rows, words=4)
-    return (
-        "<h2>Selection guide</h2>"
-        '<p class="soft">These follow from the gains more than from the method: '
-        "<code>--match delay=S</code> or <code>--match bandwidth=HZ</code> puts all observers on "
-        f"the same footing first.</p>{guide}{table}"
+    computed = Grid(
+        title="Computed on this log",
+        columns=(Column("observer", words=True), *map(Column, HEADS)),
+        rows=tuple(map(facts_row, found)),
+        swatches=True,
     )
-
-
-def facts_row(found: Facts) -> str:
-    """One observer's facts."""
-    values = (
-        significant(1e3 * found.response),
-        significant(1e3 * found.delay),
-        significant(found.noise),
-        significant(found.passed),
-        significant(found.rmse),
-        significant(1e6 * found.time),
-        str(found.numbers),
+    heads = ("For", "what decides", "best here", "the paper advises")
+    rows = ((a.purpose, a.criterion, ", ".join(a.best) or DASH, a.paper) for a in advice(found))
+    guide = Grid(
+        title="Which observer for what (Sec. IV-A)",
+        columns=tuple(Column(head, words=True) for head in heads),
+        rows=tuple(rows),
     )
-    return f"<tr>{observer_head(found.name)}{''.join(map(number_cell, values))}</tr>"
+    words = (
+        "These follow from the gains more than from the method: <code>--match delay=S</code> or "
+        "<code>--match bandwidth=HZ</code> puts all observers on the same footing first."
+    )
+    return f"<h2>Selection guide</h2>{soft(words)}{html(guide)}{html(computed)}"
 
 
-def published(comparison: Comparison | None) -> str:
+def facts_row(found: Facts) -> tuple[str | float, ...]:
+    """One observer's facts in the order and the units of the headings."""
+    times = (1e3 * found.response, 1e3 * found.delay)
+    rest = (found.noise, found.passed, found.rmse, 1e6 * found.time)
+    return (found.name, *map(float, (*times, *rest)), found.numbers)
+
+
+def beside_print(comparison: Comparison | None) -> str:
     """Printed and computed errors side by side, with the reasons for the difference."""
     if comparison is None:
         return ""
-    joints = len(comparison.floor)
-    rows = []
+    columns = [Column("observer", words=True)]
+    for j in range(1, len(comparison.floor) + 1):
+        columns += [Column(f"J{j} print", form=".2f"), Column("here")]
+    rows: list[tuple[str | float, ...]] = []
     for name in comparison.names:
-        printed, ours = comparison.printed(name), comparison.ours[name]
-        cells = "".join(
-            number_cell(f"{p:.2f}") + number_cell(significant(o))
-            for p, o in zip(printed, ours, strict=True)
-        )
-        rows.append(f"<tr>{observer_head(name)}{cells}</tr>")
-    header = ["Observer"]
-    for j in range(1, joints + 1):
-        header += [f"J{j} print", "here"]
-    table = html_table(f"RMSE in N·m: {comparison.published.title}", header, rows)
-    source = f'<p class="soft">{escape(comparison.published.source)}</p>'
-    return f"<h2>Beside the paper</h2>{table}{source}{bullets(comparison.remarks)}"
+        both = zip(comparison.printed(name), comparison.ours[name], strict=True)
+        rows.append((name, *(float(value) for pair in both for value in pair)))
+    grid = Grid(
+        title=f"RMSE in N·m: {comparison.published.title}",
+        columns=tuple(columns),
+        rows=tuple(rows),
+        swatches=True,
+    )
+    source = soft(escape(comparison.published.source))
+    return f"<h2>Beside the paper</h2>{html(grid)}{source}{bullets(comparison.remarks)}"

@@ -1,23 +1,20 @@
-"""What the page's script draws: charts and their lines, as JSON with base64 float32 arrays."""
+"""What the script draws on the page of one log: charts over time, and over frequency."""
 
-import base64
-import json
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.decimation import Line, decimated
-from vftcli.outputs.log.tables import blocks, joint_heads
+from vftcli.outputs.log.rmse_tables import blocks
+from vftcli.outputs.page.charts import STRETCHES, Chart, ChartLine, packed, packed_over_frequency
+from vftcli.outputs.page.refinement_part import spectra_chart, tuning_chart
+from vftcli.outputs.page.wrench_part import condition_charts
 from vftcli.outputs.palette import DASHED, colours_of
 from vftcli.robots.drive import drive_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS, ExternalTorque
-from vftcli.signals.wrench import AXES
-
-STRETCHES = 2000
-"""Stretches a long log is cut into: two samples a stretch are about what a wide screen can show."""
+from vftcli.signals.wrench import AXES, unit_of
 
 RESTING = "#c2410c"
 """Colour of a reference that is not to be trusted."""
@@ -25,60 +22,22 @@ RESTING = "#c2410c"
 FREQUENCIES = 240
 """Points of a frequency response."""
 
-
-class ChartLine(NamedTuple):
-    """One line of a chart, for every joint.
-
-    Attributes:
-        name: What the legend calls it.
-        values: One column a joint. (T, n)
-        colour: ``#rrggbb``, or "ink" for the page's own text colour.
-        dashed: Whether the line is dashed.
-        half: Half the width of a ribbon about the line, one a joint, or None. (n,)
-    """
-
-    name: str
-    values: Array
-    colour: str = "ink"
-    dashed: bool = False
-    half: Array | None = None
+QUIETEST = 1e-12
+"""Gain below which a response is drawn as -240 dB, so that its logarithm is finite."""
 
 
-class Chart(NamedTuple):
-    """One chart, for the joint that is chosen.
-
-    Attributes:
-        key: Its name on the page.
-        title: What it shows, in words.
-        unit: Unit of its vertical axis.
-        series: Its lines.
-        band: Half the width of a band about zero, one a joint, or None. (n,)
-        band_label: What the band is.
-        height: Relative height.
-    """
-
-    key: str
-    title: str
-    unit: str
-    series: tuple[ChartLine, ...]
-    band: Array | None = None
-    band_label: str = ""
-    height: float = 1.0
-
-
-def payload(analysis: Analysis) -> str:
-    """JSON for a ``<script type="application/json">``: nothing in it can end the element."""
+def payload(analysis: Analysis) -> dict[str, Any]:
+    """Everything the script is given."""
     t = analysis.t
-    data = {
+    wrenches = [*wrench_charts(analysis), *condition_charts(analysis)]
+    return {
         "joints": analysis.recording.joints,
         "labels": joint_labels(analysis),
         "span": [float(t[0]), float(t[-1])],
         "charts": [packed(chart, t) for chart in time_charts(analysis)],
-        "wrenches": [{**packed(chart, t), "at": 0} for chart in all_wrench_charts(analysis)],
-        "responses": responses(analysis),
+        "wrenches": [{**packed(chart, t), "at": 0} for chart in wrenches],
+        "responses": [*responses(analysis), *refinement_charts(analysis)],
     }
-    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
 
 
 def is_decimated(analysis: Analysis) -> bool:
@@ -132,7 +91,7 @@ def joint_labels(analysis: Analysis) -> list[str]:
     """J1, J2, …; a dagger where the reference is not to be trusted, as in the tables."""
     n, errors = analysis.recording.joints, analysis.errors
     found = blocks(errors) if errors is not None else ()
-    return joint_heads(found[0]) if found else [f"J{j}" for j in range(1, n + 1)]
+    return found[0].joint_heads if found else [f"J{j}" for j in range(1, n + 1)]
 
 
 def motion_charts(analysis: Analysis) -> Iterator[Chart]:
@@ -150,7 +109,7 @@ def wrench_charts(analysis: Analysis) -> Iterator[Chart]:
     colours = colours_of(analysis.estimates)
     found = sorted(analysis.wrenches, key=lambda wrench: wrench.name != "reference")
     for k, axis in enumerate(AXES if found else ()):
-        series = tuple(
+        lines = tuple(
             ChartLine(
                 legend_name(analysis, w.name),
                 w.known[:, k : k + 1],
@@ -159,15 +118,7 @@ def wrench_charts(analysis: Analysis) -> Iterator[Chart]:
             )
             for w in found
         )
-        yield Chart(axis, f"{axis} in {found[0].frame} axes", "N" if k < 3 else "N·m", series)
-
-
-def all_wrench_charts(analysis: Analysis) -> Iterator[Chart]:
-    """The wrenches axis by axis, then what the pose and the null space say of them."""
-    from vftcli.outputs.page.wrench_part import condition_charts
-
-    yield from wrench_charts(analysis)
-    yield from condition_charts(analysis)
+        yield Chart(axis, f"{axis} in {found[0].frame} axes", unit_of(axis), lines)
 
 
 def legend_name(analysis: Analysis, name: str) -> str:
@@ -177,108 +128,42 @@ def legend_name(analysis: Analysis, name: str) -> str:
     return name
 
 
-def packed(chart: Chart, t: Array) -> dict[str, Any]:
-    """A chart as JSON can hold it."""
-    return {
-        "key": chart.key,
-        "title": chart.title,
-        "unit": chart.unit,
-        "height": chart.height,
-        "band": known(chart.band),
-        "bandLabel": chart.band_label,
-        "series": [
-            {
-                "name": series.name,
-                "colour": series.colour,
-                "dashed": series.dashed,
-                "half": known(series.half),
-                "lines": [packed_line(line) for line in decimated(t, series.values, STRETCHES)],
-            }
-            for series in chart.series
-        ],
-    }
-
-
-def packed_line(line: Line) -> dict[str, str]:
-    """A line's times and values."""
-    return {"x": base64_float32(line.t), "y": base64_float32(line.y)}
-
-
-def base64_float32(values: Array) -> str:
-    """Little-endian float32 as base64: seven digits are more than a screen can show."""
-    return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
-
-
-def known(values: Array | None) -> list[float | None] | None:
-    """Numbers for JSON, None where they are not known."""
-    if values is None or not np.any(np.isfinite(values)):
-        return None
-    return [float(value) if np.isfinite(value) else None for value in values]
-
-
 def responses(analysis: Analysis) -> list[dict[str, Any]]:
     """Gain, phase and delay of every observer over frequency, up to half the sample rate."""
     step, n = analysis.recording.median_step, analysis.recording.joints
     frequency = np.geomspace(1e-2, 0.5 / step, FREQUENCIES)
-    gains, phases, delays = [], [], []
     colours = colours_of(analysis.estimates)
+    gains, phases, delays = [], [], []
     for observer in analysis.observers:
         response = observer.frequency_response(frequency, step, n)
-        style = {
-            "name": observer.name,
-            "colour": colours[observer.name],
-            "dashed": observer.name in DASHED,
-        }
-        decibel = 20.0 * np.log10(np.maximum(np.abs(response), 1e-12))
         phase = np.degrees(np.unwrap(np.angle(response), axis=0))
-        gains.append({**style, "lines": lines_over(frequency, decibel)})
-        phases.append({**style, "lines": lines_over(frequency, phase)})
-        delay = -1e3 * phase / (360.0 * frequency[:, None])
-        delays.append({**style, "lines": lines_over(frequency, delay)})
-    shape = {"band": None, "bandLabel": "", "height": 1.0, "log": True}
-    return [
-        {
-            "key": "gain",
-            "lowest": -80,
-            "title": "Gain from torque to estimate",
-            "unit": "dB",
-            **shape,
-            "series": gains,
-        },
-        {"key": "phase", "title": "Phase of the estimate", "unit": "°", **shape, "series": phases},
-        {"key": "delay", "title": "Delay of the estimate", "unit": "ms", **shape, "series": delays},
-        *tuning_curves(analysis, shape),
-    ]
+        style = (colours[observer.name], observer.name in DASHED)
+        decibel = 20.0 * np.log10(np.maximum(np.abs(response), QUIETEST))
+        gains.append(ChartLine(observer.name, decibel, *style))
+        phases.append(ChartLine(observer.name, phase, *style))
+        # A phase of −φ degrees at f is a delay of φ / (360 f).
+        delays.append(ChartLine(observer.name, -1e3 * phase / (360.0 * frequency[:, None]), *style))
+    charts = (
+        Chart("gain", "Gain from torque to estimate", "dB", tuple(gains)),
+        Chart("phase", "Phase of the estimate", "°", tuple(phases)),
+        Chart("delay", "Delay of the estimate", "ms", tuple(delays)),
+    )
+    over = [frequency] * len(gains)
+    lowest = {"gain": {"lowest": -80}}
+    return [packed_over_frequency(chart, over, lowest.get(chart.key)) for chart in charts]
 
 
-def tuning_curves(analysis: Analysis, shape: dict[str, Any]) -> list[dict[str, Any]]:
+def refinement_charts(analysis: Analysis) -> list[dict[str, Any]]:
     """What was minimised for every observer that the log tuned, and the spectra behind it."""
-    from vftcli.outputs.page.refinement_part import curves
-
-    colours = colours_of(analysis.estimates)
-    series = [
-        {"name": name, "colour": colours[name], "dashed": False, "lines": lines_over(hertz, rmse)}
-        for name, hertz, rmse in curves(analysis)
-    ]
-    title = "Expected error against natural frequency ω_n/2π"
-    chart = {"key": "curve", "title": title, "unit": "N·m", **shape, "series": series}
-    return [*([chart] if series else []), *spectra_charts(analysis, shape)]
-
-
-def spectra_charts(analysis: Analysis, shape: dict[str, Any]) -> list[dict[str, Any]]:
-    """The spectra of the raw disturbance over the free and the loaded part, if they are known."""
-    from vftcli.outputs.page.refinement_part import spectra
-
-    series = [
-        {"name": name, "colour": colour, "dashed": False, "lines": lines_over(frequency, level)}
-        for name, colour, frequency, level in spectra(analysis)
-    ]
-    title = "Spectrum of d: free part (blue), loaded part (orange)"
-    unit = "dB, 1 (N·m)²/Hz"
-    chart = {"key": "spectra", "title": title, "unit": unit, **shape, "series": series}
-    return [chart] if series else []
-
-
-def lines_over(frequency: Array, values: Array) -> list[dict[str, str]]:
-    """One line a joint over frequency. (F, n)"""
-    return [packed_line(Line(frequency, column)) for column in values.T]
+    found = analysis.workup
+    if found is None:
+        return []
+    shown = []
+    if found.curves:
+        over = [curve.omega_n / (2.0 * np.pi) for curve in found.curves.values()]
+        colours = colours_of(analysis.estimates)
+        shown.append(packed_over_frequency(tuning_chart(found, colours), over))
+    if (spectra := found.survey.spectra) is not None:
+        chart = spectra_chart(spectra)
+        shown.append(packed_over_frequency(chart, [spectra.frequency[1:]] * len(chart.series)))
+    return shown

@@ -1,16 +1,17 @@
 """The virtual sensor on the page: drift, what the pose can tell, contacts and their trade-off."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from html import escape
 
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.log.tables import significant
-from vftcli.outputs.page.payload import Chart, ChartLine
+from vftcli.outputs.grid import Column, Entry, Grid, html, significant
+from vftcli.outputs.log.wrench_tables import drift_grid
+from vftcli.outputs.page.charts import Chart, ChartLine
+from vftcli.outputs.page.shell import soft
 from vftcli.outputs.palette import DASHED, colours_of
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.detection import ContactScore
 from vftcli.virtual_sensor.frames import FRAMES
 from vftcli.virtual_sensor.sensor_reading import SensorReading
@@ -59,20 +60,26 @@ def masked_force(values: Array, hidden: Mask) -> Array:
     return column(np.where(hidden, norm, np.nan))
 
 
-def story(analysis: Analysis) -> str:
-    """Words and tables of the virtual sensor, where it was asked for."""
+def wrench_section(analysis: Analysis) -> str:
+    """Words, tables and the place of the charts, "" where no wrench was asked for."""
     sensed = analysis.virtual_sensor
-    if sensed is None:
+    if sensed is None or not analysis.wrenches:
         return ""
-    frame = escape(FRAMES[sensed.sensor.frame])
+    grids = [drift_grid(sensed.drifts, spans=True)] if sensed.drifts else []
+    if analysis.contacts:
+        grids += [contact_grid(analysis.contacts), trade_off_grid(analysis.contacts)]
+    meaning = f"Force and moment ON the robot in {escape(FRAMES[sensed.sensor.frame])}; "
     return "".join(
         (
-            f'<p class="soft">Force and moment ON the robot in {frame}; '
-            f"solver {escape(sensed.sensor.solver)}.</p>",
+            "<h2>Wrench over time</h2>",
+            soft(
+                "Force and moment on the robot, as the virtual sensor tells them; the line breaks "
+                "where the pose cannot."
+            ),
+            soft(f"{meaning}solver {escape(sensed.sensor.solver)}."),
             masked_words(sensed),
-            drift_table(sensed),
-            contact_table(analysis.contacts),
-            trade_off(analysis.contacts),
+            *map(html, grids),
+            '<div class="responses" id="wrenches"></div>',
         )
     )
 
@@ -91,56 +98,34 @@ def masked_words(sensed: SensorReading) -> str:
     )
 
 
-def table(caption: str, header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    """A table whose first column is words."""
-    from vftcli.outputs.page.sections import html_table, number_cell, observer_head
-
-    body = [f"<tr>{observer_head(row[0])}{''.join(map(number_cell, row[1:]))}</tr>" for row in rows]
-    return html_table(caption, header, body)
-
-
-def drift_table(sensed: SensorReading) -> str:
-    """Zero drift per observer and axis, one row a span."""
-    if not sensed.drifts:
-        return ""
-    units = ["N"] * 3 + ["N·m"] * 3
-    header = ("Observer", "span [s]", *(f"{a} [{u}]" for a, u in zip(AXES, units, strict=True)))
-    rows = [
-        (d.name, f"{d.span[0]:g}–{d.span[1]:g}", *(f"{value:.5f}" for value in d.mean))
-        for d in sensed.drifts
-    ]
-    return table("Zero drift; the first span's is removed", header, rows)
-
-
-def contact_table(contacts: tuple[ContactScore, ...]) -> str:
+def contact_grid(contacts: tuple[ContactScore, ...]) -> Grid:
     """How each observer tells contacts."""
-    if not contacts:
-        return ""
-    header = ("Observer", "contacts", "missed", "false alarms/h", "mean delay [s]", "longest [s]")
-    rows = [
-        (
-            told.name,
-            str(told.detection.contacts),
-            str(told.detection.missed),
-            significant(told.detection.false_alarms_per_h),
-            significant(told.detection.mean_delay),
-            significant(told.detection.longest_delay),
-        )
-        for told in contacts
-    ]
-    return table("Contacts against the reference, told at the free band", header, rows)
+    heads = ("contacts", "missed", "false alarms/h", "mean delay [s]", "longest [s]")
+    rows: list[tuple[Entry, ...]] = []
+    for score in contacts:
+        found = score.detection
+        times = (found.false_alarms_per_h, found.mean_delay, found.longest_delay)
+        rows.append((score.name, found.contacts, found.missed, *map(float, times)))
+    return Grid(
+        title="Contacts against the reference, told at the free band",
+        columns=(Column("observer", words=True), *map(Column, heads)),
+        rows=tuple(rows),
+        swatches=True,
+    )
 
 
-def trade_off(contacts: tuple[ContactScore, ...]) -> str:
+def trade_off_grid(contacts: tuple[ContactScore, ...]) -> Grid:
     """The operating curve (ROC): contacts found against false alarms, by threshold."""
-    if not contacts:
-        return ""
-    header = ("Observer", *(f"× {threshold:g}" for threshold in SHOWN))
     rows = []
-    for told in contacts:
-        marks = np.array([point.threshold for point in told.curve])
-        points = [told.curve[int(np.argmin(np.abs(np.log(marks / at))))] for at in SHOWN]
+    for score in contacts:
+        marks = np.array([point.threshold for point in score.curve])
+        # The nearest threshold that was tried, as a ratio: the curve's steps are geometric.
+        points = [score.curve[int(np.argmin(np.abs(np.log(marks / at))))] for at in SHOWN]
         cells = (f"{p.found:.0%} at {significant(p.false_alarms_per_h)}/h" for p in points)
-        rows.append((told.name, *cells))
-    caption = "Contacts found, and false alarms per hour, over the threshold in free bands (ROC)"
-    return table(caption, header, rows)
+        rows.append((score.name, *cells))
+    return Grid(
+        title="Contacts found, and false alarms per hour, over the threshold in free bands (ROC)",
+        columns=(Column("observer", words=True), *(Column(f"× {at:g}") for at in SHOWN)),
+        rows=tuple(rows),
+        swatches=True,
+    )

@@ -1,0 +1,195 @@
+"""Tables and lines on an admittance replay: the comparison, latencies, parameters."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from vftcli.admittance.closed_loop import ClosedLoop
+from vftcli.admittance.latency import latencies
+from vftcli.admittance.parameters import AXES
+from vftcli.admittance.replay import Replay
+from vftcli.outputs.grid import Column, Grid, csv_rows, json_rows, terminal
+from vftcli.signals.arrays import Array
+
+
+def number_form(form: str) -> Callable[[float], str]:
+    """How a number is printed with a true minus sign."""
+    return lambda value: format(value, form).replace("-", "−")
+
+
+COLUMNS = {
+    "controller": Column("controller", words=True),
+    "alpha": Column("α", form=number_form("g")),
+    "xi": Column("ξ", form=number_form(".3g")),
+    "axis": Column("axis"),
+    "drag": Column("drag"),
+    "start_s": Column("start [s]", form=number_form(".3f")),
+    "release_s": Column("release [s]", form=number_form(".3f")),
+    "peak": Column("peak [m, rad]", form=number_form(".4f")),
+    "time_to_peak_s": Column("to peak [s]", form=number_form(".3f")),
+    "peak_advance_s": Column("advance [s]", form=number_form(".3f")),
+    "overshoot": Column("overshoot [%]", form=lambda share: number_form(".1f")(100.0 * share)),
+    "return_10_s": Column("back to 10 % [s]", form=number_form(".3f")),
+    "return_2_s": Column("back to 2 % [s]", form=number_form(".3f")),
+    "idle_s": Column("idle [s]", form=number_form(".3f")),
+    "work_J": Column("work [J]", form=number_form(".3f")),
+}
+"""Key of a row → its column."""
+
+
+def comparison_json(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The comparison as a JSON array of rows."""
+    return json_rows(rows)
+
+
+def comparison_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The comparison as CSV; what is not known is empty."""
+    return csv_rows(rows, list(rows[0]) if rows else list(COLUMNS))
+
+
+def comparison_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The comparison for a terminal."""
+    return terminal(comparison_grid(rows)).rstrip("\n") if rows else "no axis was dragged"
+
+
+def comparison_grid(
+    rows: Sequence[Mapping[str, Any]],
+    name_of: Callable[[Mapping[str, Any]], str] = lambda row: str(row["controller"]),
+    title: str = "",
+) -> Grid:
+    """Every controller on the same force; by axis and drag, so that they stand under each other.
+
+    Args:
+        rows: As the replay made them.
+        name_of: What a row's controller is called.
+        title: Of the table.
+    """
+    ordered = sorted(rows, key=lambda row: (AXES.index(row["axis"]), row["drag"]))
+    keys = list(COLUMNS)[1:]
+    return Grid(
+        title=title,
+        columns=tuple(COLUMNS.values()),
+        rows=tuple((name_of(row), *(row[key] for key in keys)) for row in ordered),
+        swatches=True,
+    )
+
+
+def latency_rows(run: ClosedLoop) -> list[dict[str, Any]]:
+    """The latencies of a closed loop as rows, None where something did not happen."""
+    return [
+        {
+            "axis": AXES[entry.axis],
+            "force_s": entry.force,
+            "detection_s": entry.detection,
+            "motion_s": entry.motion,
+            "withdrawal_s": entry.withdrawal,
+            "at_rest_before": entry.rested,
+        }
+        for entry in latencies(run)
+    ]
+
+
+def latency_grid(run: ClosedLoop) -> Grid:
+    """The latencies of a closed loop, as the paper reports them."""
+    heads = ("force [s]", "detected [s]", "moved [s]", "withdrawal [s]")
+    keys = ("force_s", "detection_s", "motion_s", "withdrawal_s")
+    return Grid(
+        title="From the true force past its threshold to the estimate's, to 5 mm (0.02 rad) of "
+        "the flange; from its fall below to the estimate's",
+        columns=(
+            Column("axis", words=True),
+            *(Column(head, form=".3f") for head in heads),
+            Column("at rest before"),
+        ),
+        rows=tuple(
+            (row["axis"], *(row[k] for k in keys), "yes" if row["at_rest_before"] else "no")
+            for row in latency_rows(run)
+        ),
+    )
+
+
+def latency_text(run: ClosedLoop) -> str:
+    """The latencies of a closed loop in words, one line a contact."""
+    if not run.stable:
+        return f"closed loop: the arm ran away at {run.t[-1]:.2f} s"
+    lines = []
+    for row in latency_rows(run):
+        detection, motion, withdrawal = (
+            "never" if row[name] is None else f"{row[name]:.3f} s"
+            for name in ("detection_s", "motion_s", "withdrawal_s")
+        )
+        moving = "" if row["at_rest_before"] else " (the arm was moving already)"
+        lines.append(
+            f"closed loop: force past the threshold of {row['axis']} at {row['force_s']:.2f} s, "
+            f"detected after {detection}, moved after {motion}{moving}, "
+            f"withdrawal seen after {withdrawal}"
+        )
+    return "\n".join(lines) or "closed loop: no force passed a threshold"
+
+
+def parameter_text(replay: Replay) -> str:
+    """The parameters in use, one line."""
+    p = replay.parameters
+    named = {
+        "M": p.mass,
+        "B": p.damping,
+        "K": p.stiffness,
+        "ξ": p.damping_ratio,
+        "F_tsd": p.threshold,
+        "limit": p.speed_limit,
+    }
+    words = ", ".join(f"{label} {position_rotation(values)}" for label, values in named.items())
+    return f"{words}; Ts {1e3 * p.period:g} ms, {p.threshold_mode} threshold"
+
+
+def position_rotation(values: Array | float) -> str:
+    """Six numbers as position / rotation, three equal ones told once."""
+    texts = [f"{value:.3g}" for value in np.broadcast_to(values, 6)]
+    halves = (texts[:3], texts[3:])
+    return " / ".join(half[0] if len(set(half)) == 1 else ",".join(half) for half in halves)
+
+
+def parameter_grid(replay: Replay) -> Grid:
+    """Tables III and IV of the paper with the values used."""
+    p = replay.parameters
+    rows: list[tuple[str | float, ...]] = []
+    for k, axis in enumerate(AXES):
+        force, speed = ("N", "m/s") if k < 3 else ("N·m", "rad/s")
+        limit = float(np.broadcast_to(p.speed_limit, 6)[k])
+        numbers = (float(v[k]) for v in (p.mass, p.damping, p.stiffness, p.alpha))
+        bound = f"{limit:g} {speed}" if np.isfinite(limit) else "none"
+        tail = (f"{p.threshold[k]:g} {force}", bound)
+        rows.append((axis, *numbers, f"{p.damping_ratio[k]:.3g}", *tail))
+    heads = ("M_d", "B_d", "K_d", "α", "ξ", "F_tsd", "Ẋ_tsd")
+    return Grid(
+        title=f"Values used; {p.source or 'the command line'}",
+        columns=(Column("coordinates", words=True), *(Column(h, form="g") for h in heads)),
+        rows=tuple(rows),
+    )
+
+
+def stability_grid(replay: Replay) -> Grid:
+    """The numbers that decide before anything moves: the worst of the axes of each kind."""
+    rows: list[tuple[str | float, ...]] = []
+    for verdict in replay.verdicts:
+        for axes, part, unit in (
+            ("position", slice(0, 3), "m"),
+            ("rotation", slice(3, 6), "rad"),
+        ):
+            bound = float(np.min(verdict.escape[part]))
+            numbers = (float(np.max(values[part])) for values in (verdict.drag, verdict.recovery))
+            escape = f"{bound:.3g} {unit}" if np.isfinite(bound) else "none"
+            rows.append((verdict.controller.name, axes, *numbers, escape))
+    return Grid(
+        title="2TsB/M + Ts²K/M, stable below 4",
+        columns=(
+            Column("controller", words=True),
+            Column("axes", words=True),
+            Column("drag phase", form=".3g"),
+            Column("recovery, at the limit", form=".3g"),
+            Column("escape bound"),
+        ),
+        rows=tuple(rows),
+        swatches=True,
+    )

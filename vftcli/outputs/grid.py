@@ -1,0 +1,309 @@
+"""Grid: one table of results, shown on the terminal, in Markdown, in LaTeX or in HTML.
+
+Whoever has a table to show makes a Grid of it; how a table looks is decided here alone, and so is
+what must be escaped: names and words come from files, and may hold any letter. Rows for machines,
+whose values are not rounded, are written by `csv_rows` and `json_rows`.
+"""
+
+import csv
+import io
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any, NamedTuple
+
+import numpy as np
+
+DASH = "–"
+"""What stands where nothing is known."""
+
+LATEX_LETTERS = {
+    "\\": r"\textbackslash{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "–": "--",
+    "†": r"\dag",
+    "<": r"$<$",
+    "·": r"\,",
+}
+"""What LaTeX would not print as it stands, or not in every font encoding."""
+
+
+BEST = ' class="best"'
+"""What the style sheet makes bold."""
+
+
+class Cell(NamedTuple):
+    """An entry that stands out, or that the page shows otherwise than the terminal.
+
+    Attributes:
+        text: Its text.
+        best: Whether it is the best of its column: bold wherever type can be bold.
+        mark: What follows it on the terminal, as a star.
+        html: What the page shows instead of `text`, escaped already; "" for the text itself.
+    """
+
+    text: str
+    best: bool = False
+    mark: str = ""
+    html: str = ""
+
+
+Entry = Cell | str | float | None
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """A number with three significant digits and no exponent where one can do without."""
+    if not np.isfinite(value):
+        return DASH
+    if value == 0.0:
+        return "0"
+    # Rounding comes first: 9.996 has its three digits as 10.0.
+    exponent = int(np.floor(np.log10(abs(float(f"{value:.{digits - 1}e}")))))
+    if exponent < -4:
+        return f"{value:.{digits - 1}e}"
+    return f"{value:.{max(digits - 1 - exponent, 0)}f}"
+
+
+def signed(value: float) -> str:
+    """Three significant digits with a true minus sign, for the page."""
+    return significant(value).replace("-", "−")
+
+
+class Column(NamedTuple):
+    """One column.
+
+    Attributes:
+        head: Its heading.
+        unit: Unit of its numbers, in brackets behind the heading; "" where the heading says it.
+        form: How a float is printed: a format as ``.3f``, or a function.
+        words: Whether it holds words, which stand to the left; numbers stand to the right.
+        width: Least width on the terminal.
+        symbol: The heading in LaTeX where it is a formula.
+    """
+
+    head: str
+    unit: str = ""
+    form: str | Callable[[float], str] = significant
+    words: bool = False
+    width: int = 0
+    symbol: str = ""
+
+    @property
+    def heading(self) -> str:
+        """The heading with its unit."""
+        return f"{self.head} [{self.unit}]" if self.unit else self.head
+
+    def cell(self, entry: Entry) -> Cell:
+        """An entry as text; a dash where it is not known."""
+        if isinstance(entry, Cell):
+            return entry
+        if entry is None or (isinstance(entry, float) and np.isnan(entry)):
+            return Cell(DASH)
+        if isinstance(entry, float):
+            form = self.form
+            return Cell(format(entry, form) if isinstance(form, str) else form(entry))
+        return Cell(str(entry))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grid:
+    """A table.
+
+    Attributes:
+        columns: What stands in each column.
+        rows: One entry a column.
+        title: What the table is about, "" for none.
+        quantity: What all of its numbers are, as RMSE, where they are one thing.
+        unit: Their unit, where it is one.
+        summaries: How many rows at the end sum up those above, below a rule.
+        marked: Whether numbers may bear a mark: the terminal then keeps a place for it, so that
+            digits stand below digits.
+        notes: Lines on what the marks mean, comments in LaTeX.
+        swatches: Whether the page shows the colour of the observer that heads a row.
+    """
+
+    columns: tuple[Column, ...]
+    rows: tuple[Sequence[Entry], ...]
+    title: str = ""
+    quantity: str = ""
+    unit: str = ""
+    summaries: int = 0
+    marked: bool = False
+    notes: tuple[str, ...] = ()
+    swatches: bool = False
+
+    @property
+    def caption(self) -> str:
+        """The title with what all of its numbers are, "" where there is neither."""
+        quantity = f"{self.quantity} in {self.unit}" if self.unit else self.quantity
+        return ", ".join(text for text in (self.title, quantity) if text)
+
+    @property
+    def cells(self) -> list[list[Cell]]:
+        """Every entry as text."""
+        return [[c.cell(x) for c, x in zip(self.columns, row, strict=True)] for row in self.rows]
+
+
+def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ...]:  # noqa: ANN401
+    """Columns J1, J2, …: joints by number from 1, or how many there are."""
+    numbers = range(1, joints + 1) if isinstance(joints, int) else joints
+    return tuple(Column(f"J{j}", symbol=f"$J_{{{j}}}$", **shape) for j in numbers)
+
+
+def terminal(grid: Grid) -> str:
+    """A table as text, two blanks between columns, each line ended."""
+    heads = [column.heading for column in grid.columns]
+    table = [[cell.text + cell.mark for cell in row] for row in grid.cells]
+    if grid.marked:
+        heads = [h if c.words else f"{h} " for h, c in zip(heads, grid.columns, strict=True)]
+        for texts, row in zip(table, grid.cells, strict=True):
+            for k, (cell, column) in enumerate(zip(row, grid.columns, strict=True)):
+                texts[k] += "" if column.words or cell.mark else " "
+    if any(heads):
+        table.insert(0, heads)
+    widths = [
+        max(column.width, *(len(texts[k]) for texts in table), 0)
+        for k, column in enumerate(grid.columns)
+    ]
+    lines = [terminal_line(texts, grid.columns, widths) for texts in table]
+    if grid.summaries:
+        lines.insert(-grid.summaries, "-" * len(lines[0]))
+    return "".join(f"{line}\n" for line in ([grid.caption] if grid.caption else []) + lines)
+
+
+def terminal_line(texts: Sequence[str], columns: Sequence[Column], widths: Sequence[int]) -> str:
+    """One row with words to the left and numbers to the right of their columns."""
+    placed = [
+        text.ljust(width) if column.words else text.rjust(width)
+        for text, column, width in zip(texts, columns, widths, strict=True)
+    ]
+    return "  ".join(placed).rstrip()
+
+
+def markdown(grid: Grid) -> str:
+    """A table in GitHub's Markdown with its title above, the best of each column bold."""
+    heads = [escape_markdown(column.heading) for column in grid.columns]
+    marks = ["---" if column.words else "---:" for column in grid.columns]
+    body = [[bold(escape_markdown(c.text), c.best, "**{}**") for c in row] for row in grid.cells]
+    lines = [f"| {' | '.join(texts)} |" for texts in (heads, marks, *body)]
+    above = [f"**{escape_markdown(grid.caption)}**", ""] if grid.caption else []
+    return "".join(f"{line}\n" for line in (*above, *lines))
+
+
+def latex(grid: Grid) -> str:
+    r"""A table as a ``tabular`` of the package booktabs, its title as a comment above."""
+    comments = [", ".join(text for text in (grid.title, grid.quantity) if text), *grid.notes]
+    count = sum(not column.words for column in grid.columns)
+    spec = "".join("l" if column.words else "r" for column in grid.columns)
+    heads = [column.symbol or escape_latex(column.head) for column in grid.columns]
+    heads[0] = heads[0][:1].upper() + heads[0][1:]
+    parts = [f"% {text}".replace("\n", " ") for text in comments if text]
+    parts += [rf"\begin{{tabular}}{{{spec}}}", r"\toprule"]
+    if grid.unit:
+        unit = escape_latex(grid.unit)
+        spanning = rf"\multicolumn{{{count}}}{{c}}{{{grid.quantity} [{unit}]}}"
+        parts.append(latex_line(["", spanning]))
+    parts.append(latex_line(heads))
+    if any(column.unit for column in grid.columns):
+        units = [f"[{escape_latex(c.unit)}]" if c.unit else "" for c in grid.columns]
+        parts.append(latex_line(units))
+    rows = [
+        latex_line([bold(escape_latex(c.text), c.best, r"\textbf{{{}}}") for c in row])
+        for row in grid.cells
+    ]
+    if grid.summaries:
+        rows.insert(-grid.summaries, r"\midrule")
+    parts += [r"\midrule", *rows, r"\bottomrule", r"\end{tabular}"]
+    return "".join(f"{line}\n" for line in parts)
+
+
+def latex_line(texts: Sequence[str]) -> str:
+    """One row of a tabular."""
+    return rf"{' & '.join(texts)} \\"
+
+
+def bold(text: str, best: bool, form: str) -> str:
+    """A text as it is, or put into a form for bold type."""
+    return form.format(text) if best else text
+
+
+def html(grid: Grid) -> str:
+    """A table for the page, which scrolls by itself where the page is narrow."""
+    heads = [column.heading for column in grid.columns]
+    heads[0] = heads[0][:1].upper() + heads[0][1:]
+    head = "".join(
+        f'<th scope="col"{words_class(column)}>{escape(text)}</th>'
+        for column, text in zip(grid.columns, heads, strict=True)
+    )
+    first_summary = len(grid.rows) - grid.summaries
+    rows = "".join(
+        html_line(grid, row, ' class="floor"' if k >= first_summary else "")
+        for k, row in enumerate(grid.cells)
+    )
+    caption = f"<caption>{escape(grid.caption)}</caption>" if grid.caption else ""
+    return (
+        f'<div class="scroll"><table>{caption}<thead><tr>{head}</tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>"
+    )
+
+
+def html_line(grid: Grid, row: Sequence[Cell], kind: str) -> str:
+    """One row of a table: its head, then its entries."""
+    first, *rest = row
+    # The page's script paints the observer's colour before every head that names one.
+    swatch = f' data-swatch="{escape(first.text)}"' if grid.swatches and not kind else ""
+    head = f'<th scope="row"{swatch}>{first.html or escape(first.text)}</th>'
+    entries = "".join(
+        f"<td{BEST if cell.best else words_class(column)}>{cell.html or escape(cell.text)}</td>"
+        for cell, column in zip(rest, grid.columns[1:], strict=True)
+    )
+    return f"<tr{kind}>{head}{entries}</tr>"
+
+
+def words_class(column: Column) -> str:
+    """The class of a column of words, which the style sheet sets to the left."""
+    return ' class="text"' if column.words else ""
+
+
+def escape_markdown(text: str) -> str:
+    """Text that Markdown shows as it is."""
+    for mark in "\\|*_`<>[]":
+        text = text.replace(mark, f"\\{mark}")
+    return text.replace("\n", " ")
+
+
+def escape_latex(text: str) -> str:
+    """Text that LaTeX prints as it is."""
+    # A blank behind the sign of a bound is a thin one: "< 6" is one number.
+    return "".join(LATEX_LETTERS.get(letter, letter) for letter in text).replace("$<$ ", r"$<$\,")
+
+
+def json_rows(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Rows as a JSON array of objects; what is not known is null."""
+    known = [{k: known_or_none(v) for k, v in row.items()} for row in rows]
+    return json.dumps(known, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def csv_rows(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:
+    """Rows as CSV under a line of keys; what is not known is empty, truth in small letters."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(keys)
+    for row in rows:
+        values = (known_or_none(row[key]) for key in keys)
+        writer.writerow(str(v).lower() if isinstance(v, bool) else v for v in values)
+    return text.getvalue()
+
+
+def known_or_none(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
+    """A value, None for a number that is not finite."""
+    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -1,0 +1,76 @@
+"""Tables that a command prints and no file holds: robot profiles, gains that were found."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from vftcli.outputs.grid import Column, Grid, joint_columns
+
+if TYPE_CHECKING:
+    from vftcli.refinement.tuning import Tuned
+    from vftcli.robots.robot import Robot
+
+
+def robots_grid(rows: Sequence[dict[str, Any]]) -> Grid:
+    """The robot profiles, one row each, without a heading."""
+    return Grid(
+        # The widths keep the columns of one release where they were in the one before.
+        columns=tuple(Column("", words=True, width=width) for width in (6, 27, 9, 11, 0)),
+        rows=tuple(
+            (r["name"], r["title"], f"{r['joints']} joints", r["torque_source"], r["friction"])
+            for r in rows
+        ),
+    )
+
+
+def joints_grid(robot: "Robot") -> Grid:
+    """One robot joint by joint: masses, drives, limits, friction; units in the first row."""
+    chain = robot.chain
+    rows: list[tuple[str | float, ...]] = [("", "kg", "kg·m²", "N·m/A", "N·m", "")]
+    for j, joint in enumerate(chain.names):
+        constant = float(robot.torque_constant[j]) if robot.torque_constant is not None else "-"
+        numbers = (float(chain.mass[j]), float(chain.rotor_inertia[j]), constant)
+        rows.append((joint, *numbers, float(robot.limits.tau_max[j]), friction_words(robot, j)))
+    return Grid(
+        columns=(
+            Column("joint", words=True, width=16),
+            Column("mass", form=".3f", width=7),
+            Column("rotor", form=".3f", width=7),
+            Column("K", form=".4f", width=8),
+            Column("tau_max", form=".1f", width=7),
+            Column("friction", words=True),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def friction_words(robot: "Robot", j: int) -> str:
+    """One joint's friction model with its numbers, and how far they are to be trusted."""
+    friction = robot.friction[j] if robot.friction else None
+    if friction is None or friction.model == "none":
+        return "none"
+    numbers = ", ".join(f"{k} {v:g}" for k, v in friction.parameters.items())
+    return f"{friction.model} ({numbers}); {friction.confidence or 'no confidence stated'}"
+
+
+def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
+    """Gains that were found and what to expect of them, joint by joint.
+
+    Args:
+        tuned: One an observer.
+        with_alarms: Whether a threshold was given, so that false alarms can be told.
+    """
+    rows: list[tuple[str | float, ...]] = []
+    for line in tuned:
+        values = {
+            "ω [rad/s]": line.rate,
+            "delay [ms]": 1e3 * line.delay,
+            "expected rmse [N·m]": line.rmse,
+        }
+        if with_alarms and line.alarms is not None:
+            values["false alarms [1/h]"] = line.alarms.round(3)
+        for what, numbers in values.items():
+            name = line.observer if what == "ω [rad/s]" else ""
+            rows.append((name, what, *map(float, numbers)))
+    joints = joint_columns(len(tuned[0].rate), form=".3g", width=7)
+    words = (Column("observer", words=True), Column("", words=True, width=22))
+    return Grid(columns=(*words, *joints), rows=tuple(rows))

@@ -1,0 +1,210 @@
+"""RMSE of joint torques as grids: observers down, joints across, and how sure each number is."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import polars as pl
+
+from vftcli.outputs.grid import DASH, Cell, Column, Grid, joint_columns, significant
+
+AT_FLOOR = 1.2
+"""An RMSE within this factor of the reference's floor cannot be told from the reference's own."""
+
+DAGGER, LATEX_DAGGER = "†", r"\dag"
+RESTS = "the joint rests most of the time; the reference keeps its stiction: do not trust it"
+
+ON_PAGE = '<span class="mark">at the floor</span>'
+"""What the page writes behind a number where the terminal has a star."""
+
+
+class Block(NamedTuple):
+    """RMSE of one recording, observers down, joints across.
+
+    Attributes:
+        recording: The log's label, unique in the command.
+        reference: What the estimates are judged by.
+        joints: Joint numbers, from 1.
+        observers: Names, in the order in which they ran.
+        rmse: NaN where it is not known. (observers, joints) [N·m]
+        floor: The reference's own error, NaN where it is not known. (joints,) [N·m]
+        samples: Fewest and most samples an entry is made of.
+        untrusted: Joints whose reference is not to be trusted, because they rest.
+    """
+
+    recording: str
+    reference: str
+    joints: tuple[int, ...]
+    observers: tuple[str, ...]
+    rmse: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+    floor: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+    samples: tuple[int, int]
+    untrusted: tuple[int, ...] = ()
+
+    @property
+    def at_floor(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+        """Where the reference cannot tell the error from its own. (observers, joints)"""
+        return np.asarray(self.rmse <= AT_FLOOR * self.floor)
+
+    @property
+    def best(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+        """The smallest RMSE of each joint, and what prints the same. (observers, joints)"""
+        least = np.where(np.isfinite(self.rmse), self.rmse, np.inf).min(axis=0)
+        shown = [[significant(value) for value in row] for row in self.rmse]
+        best = np.array([significant(value) for value in least])
+        return np.asarray(np.array(shown) == best) & np.isfinite(self.rmse)
+
+    @property
+    def has_floor(self) -> bool:
+        """Whether the reference's own error is known for any joint."""
+        return bool(np.any(np.isfinite(self.floor)))
+
+    @property
+    def title(self) -> str:
+        """Which log, which reference, how many samples."""
+        low, high = self.samples
+        samples = f"{high}" if low == high else f"{low} to {high}"
+        return f"{self.recording} against {self.reference}, {samples} samples"
+
+    @property
+    def joint_heads(self) -> list[str]:
+        """J1, J2, …; a dagger where the reference is not to be trusted."""
+        return [f"J{j}{DAGGER if j in self.untrusted else ''}" for j in self.joints]
+
+
+def blocks(errors: pl.DataFrame) -> tuple[Block, ...]:
+    """One block for each recording and reference, in the table's order."""
+    return tuple(block(group) for group in logs_of(errors, "joint"))
+
+
+def logs_of(errors: pl.DataFrame, place: str) -> Iterator[pl.DataFrame]:
+    """The rows of each log and reference that have a place: a ``joint`` or an ``axis``.
+
+    Rows of two logs stay two tables even if the caller gave both one label.
+    """
+    if place not in errors.columns:
+        return
+    rows = errors.filter(pl.col(place).is_not_null())
+    # The second time that an observer comes with the same joint, the rows are another log's.
+    again = pl.int_range(pl.len()).over("recording", "reference", "observer", place)
+    groups = rows.group_by("recording", "reference", again.alias("again"), maintain_order=True)
+    yield from (group for _, group in groups)
+
+
+def block(rows: pl.DataFrame) -> Block:
+    """The rows of one recording as a matrix."""
+    joints = tuple(int(j) for j in rows["joint"].unique().sort())
+    observers = tuple(str(name) for name in rows["observer"].unique(maintain_order=True))
+    rmse = np.full((len(observers), len(joints)), np.nan)
+    floor = np.full(len(joints), np.nan)
+    for row in rows.iter_rows(named=True):
+        at = joints.index(row["joint"])
+        rmse[observers.index(row["observer"]), at] = nan_or(row["rmse_Nm"])
+        floor[at] = nan_or(row["reference_floor_Nm"])
+    counts = rows["samples"].drop_nulls().to_list() or [0]
+    doubtful = rows.filter(~pl.col("reference_trusted").fill_null(True))["joint"].unique().sort()
+    return Block(
+        recording=str(rows["recording"][0]),
+        reference=str(rows["reference"][0]),
+        joints=joints,
+        observers=observers,
+        rmse=rmse,
+        floor=floor,
+        samples=(int(min(counts)), int(max(counts))),
+        untrusted=tuple(int(j) for j in doubtful),
+    )
+
+
+def nan_or(value: float | None) -> float:
+    """A number, NaN for null."""
+    return float("nan") if value is None else float(value)
+
+
+def mean_of(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
+    """The mean over the joints that are known, NaN if none is."""
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else float("nan")
+
+
+def rmse_grid(table: Block) -> Grid:
+    """One recording's RMSE: observers down, joints and their mean across, the floor last."""
+    rows: list[tuple[Cell | str | float, ...]] = []
+    for name, values, bests, floors in zip(
+        table.observers, table.rmse, table.best, table.at_floor, strict=True
+    ):
+        cells = (rmse_cell(*entry) for entry in zip(values, bests, floors, strict=True))
+        rows.append((name, *cells, mean_of(values)))
+    if table.has_floor:
+        rows.append(("floor", *map(float, table.floor), mean_of(table.floor)))
+    joints = tuple(
+        Column(head, symbol=f"$J_{{{j}}}${LATEX_DAGGER * (j in table.untrusted)}")
+        for j, head in zip(table.joints, table.joint_heads, strict=True)
+    )
+    return Grid(
+        title=table.title,
+        quantity="RMSE",
+        unit="N·m",
+        columns=(Column("observer", words=True), *joints, Column("mean")),
+        rows=tuple(rows),
+        summaries=int(table.has_floor),
+        marked=True,
+        notes=(f"{LATEX_DAGGER}: {RESTS}",) if table.untrusted else (),
+        swatches=True,
+    )
+
+
+def rmse_cell(value: float, best: bool, at_floor: bool) -> Cell:
+    """One RMSE, with a star where the reference can tell no more."""
+    text = significant(value)
+    return Cell(text, bool(best), "*" if at_floor else "", text + ON_PAGE if at_floor else "")
+
+
+def interval_text(row: dict[str, Any]) -> str:
+    """The RMSE's 95 % interval."""
+    low, high = row["rmse_low_Nm"], row["rmse_high_Nm"]
+    return DASH if low is None or high is None else f"{significant(low)}–{significant(high)}"
+
+
+def lag_text(row: dict[str, Any]) -> str:
+    """The best-fitting delay in milliseconds."""
+    return DASH if row["lag_s"] is None else f"{1e3 * row['lag_s']:.0f}"
+
+
+def coverage_text(row: dict[str, Any]) -> str:
+    """The share of samples within the estimate's own 95 % band."""
+    share = row.get("coverage_95")
+    return DASH if share is None else f"{100 * share:.0f} %"
+
+
+def chance_text(row: dict[str, Any]) -> str:
+    """The chance that it is no worse than the best, or that it is the best."""
+    p = row["p_vs_best"]
+    if p is None:
+        return DASH
+    return "best" if p >= 1.0 else f"{p:.3f}"
+
+
+DETAILS: dict[str, Callable[[dict[str, Any]], str]] = {
+    "95 % interval of the RMSE, moving-block bootstrap [N·m]": interval_text,
+    "lag of the estimate behind the reference, best fit [ms]": lag_text,
+    "samples within the estimate's 95 % band, while the joint moves": coverage_text,
+    "p of being no worse than the best, paired bootstrap": chance_text,
+}
+"""The tables below the RMSE table in order: title → what a row of the tidy table says as text."""
+
+
+def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
+    """Every further table of the RMSE table's shape that has something to say."""
+    for group in logs_of(errors.filter(pl.col("p_vs_best").is_not_null()), "joint"):
+        joints = joint_columns([int(j) for j in group["joint"].unique().sort()])
+        for title, text_of in DETAILS.items():
+            rows: dict[str, list[str]] = {}
+            for row in group.iter_rows(named=True):
+                rows.setdefault(row["observer"], []).append(text_of(row))
+            if any(text != DASH for texts in rows.values() for text in texts):
+                yield Grid(
+                    title=f"{group['recording'][0]}: {title}",
+                    columns=(Column("observer", words=True), *joints),
+                    rows=tuple((name, *texts) for name, texts in rows.items()),
+                    swatches=True,
+                )
