@@ -151,19 +151,19 @@ def sense(
     """What the virtual sensor measures, where things sit, and the log with its sensor relieved."""
     if choice.wrench is None:
         return None, None, recording
-    from vftcli.virtual_sensor.mounting import placed, weighed
+    from vftcli.virtual_sensor.mounting import find_mounting, without_tool_weight
     from vftcli.virtual_sensor.sensor_reading import measure
     from vftcli.virtual_sensor.torque_error import Disturbance
 
-    mounting, notes = placed(recording, robot, estimates, choice.wrench)
+    mounting, notes = find_mounting(recording, robot, estimates, choice.wrench)
     unloaded = unloaded_run(recording, robot, choice, observers)
     free = unloaded.terms if unloaded is not None else None
     raw = Disturbance(terms=terms, observers=observers, free=free)
     measured = measure(recording, robot, estimates, choice.wrench, unloaded, mounting, raw)
     if choice.wrench.sensor_weight:
-        recording, found = weighed(recording, robot.chain, mounting, measured.free)
+        recording, found = without_tool_weight(recording, robot.chain, mounting, measured.free)
         notes += found
-    return replace(measured, notes=(*notes, *measured.notes)), mounting, recording
+    return replace(measured, notes=(*map(str, notes), *measured.notes)), mounting, recording
 
 
 def unloaded_run(

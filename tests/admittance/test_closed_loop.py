@@ -20,6 +20,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import fact
 from vftcli.simulation import load_scenario
 
 WINDOWS = {"literal": (0.45, 0.85), "density": (0.2, 0.45), "discrete": (0.1, 0.3)}
@@ -101,10 +102,13 @@ def test_the_loop_s_record_replays_the_loop() -> None:
     assert np.all(loop.reached)  # at a wall the loop waits, and the replay does not
     robot = load_robot("ur5")
     p = loop.controller.parameters
-    found = replay(loop.record, robot, p, controllers(p))
+    source = fact("force-of-loop")
+    found = replay(loop.wrench, loop.q, robot, p, controllers(p), source=source)
     # row k of the loop is written after the force of row k: row k + 1 of the replay
     np.testing.assert_allclose(found.motion.x[1:, 1], loop.commanded, atol=1e-9)
-    assert not any("α = 1.6" in note and "cannot be reached" in note for note in found.notes)
+    assert not any(
+        "α = 1.6" in note and "cannot be reached" in note for note in map(str, found.notes)
+    )
 
 
 def test_the_controller_rests_while_the_zero_is_taken() -> None:

@@ -3,27 +3,19 @@
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
-from vftcli.admittance.force import (
-    ForceRecord,
-    from_sensor,
-    from_torque,
-    from_truth,
-    on_control_clock,
-)
 from vftcli.admittance.joints import FlangeSolver, follow
 from vftcli.admittance.law import controllers, variable
 from vftcli.admittance.parameters import from_document, parse_settings
-from vftcli.admittance.replay import Replay, replay, replay_release
+from vftcli.admittance.replay import Replay, on_control_clock, replay, replay_release
 from vftcli.admittance.stability import UnstableError
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import flange_jacobian, link_poses
-from vftcli.signals.errors import MissingSignalError, ParameterError
-from vftcli.signals.external_torque import ExternalTorque
+from vftcli.robots.kinematics import link_poses
+from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix
-from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.wrench import Wrench
 
 UR5 = load_robot("ur5")
 START = np.array([0.0, -1.35, 1.9, -2.1208, -1.5708, 0.0])
@@ -34,18 +26,23 @@ def parameters(*assignments: str):
     return from_document(UR5.document, "ur5", parse_settings(assignments))
 
 
-def push(force: float = 24.0, axis: int = 1, length: float = 14.0) -> ForceRecord:
+Force = tuple[Wrench, np.ndarray]
+"""A wrench and the joint positions along it."""
+
+
+def push(force: float = 24.0, axis: int = 1, length: float = 14.0) -> Force:
     """A constant force from 1 s to 3 s on an arm at rest."""
     t = np.arange(round(length / 0.008)) * 0.008
     wrench = np.zeros((len(t), 6))
     wrench[(t >= 1.0) & (t < 3.0), axis] = force
-    return ForceRecord(t=t, wrench=wrench, q=np.tile(START, (len(t), 1)), source="a push")
+    return Wrench(name="push", t=t, values=wrench, frame="base"), np.tile(START, (len(t), 1))
 
 
-def run(record: ForceRecord, *assignments: str, alphas: tuple[float, ...] = ()) -> Replay:
+def run(force: Force, *assignments: str, alphas: tuple[float, ...] = ()) -> Replay:
     """Replay on the UR5."""
     p = parameters(*assignments)
-    return replay(record, UR5, p, controllers(p, alphas=alphas))
+    source = fact("force-of-sensor", frame="a push")
+    return replay(*force, UR5, p, controllers(p, alphas=alphas), source=source)
 
 
 def test_soft_travel_is_plausible_and_hard_is_said_not_to_be() -> None:
@@ -54,9 +51,11 @@ def test_soft_travel_is_plausible_and_hard_is_said_not_to_be() -> None:
     hard = run(push(), alphas=(1.0, 1.9))
     assert np.abs(soft.motion.x[:, :, 1]).max() < 0.65
     assert np.all(soft.path.reached)
-    assert not any("implausible" in note for note in soft.notes)
+    assert not any("implausible" in note for note in map(str, soft.notes))
     assert 1.4 < np.abs(hard.motion.x[:, :, 1]).max() < 2.5  # the science: 1.6–2.2 m above 20 N
-    assert any("implausible" in note and "--threshold-mode soft" in note for note in hard.notes)
+    assert any(
+        "implausible" in note and "--threshold-mode soft" in note for note in map(str, hard.notes)
+    )
 
 
 def test_rows_say_what_happened() -> None:
@@ -92,10 +91,10 @@ def test_work_of_a_constant_force_is_force_times_way() -> None:
 
 def test_joints_follow_the_flange() -> None:
     """The joint positions put the flange where the deviation says, rotation included."""
-    record = push(21.0)
-    wrench = record.wrench.copy()
+    record, q = push(21.0)
+    wrench = record.values.copy()
     wrench[:, 3:] = 0.30 * wrench[:, 1:2] * np.array([1.0, 0.0, -0.99])
-    found = run(replace(record, wrench=wrench), "threshold_mode=soft", alphas=(1.6,))
+    found = run((replace(record, values=wrench), q), "threshold_mode=soft", alphas=(1.6,))
     R, p = FlangeSolver(UR5).pose(START)
     for n in range(2):
         poses = link_poses(UR5.chain, found.path.q[:, n])
@@ -125,11 +124,10 @@ def test_redundant_arm_stays_inside_its_limits() -> None:
 
 
 def test_start_outside_the_limits_is_refused() -> None:
-    record = push()
-    q = record.q.copy()
+    record, q = push()
     q[:, 5] = 7.0
     with pytest.raises(ParameterError, match=r"joint 6 is at 7 rad and may be -6\.283 to 6\.283"):
-        run(replace(record, q=q))
+        run((record, q))
     p = parameters()
     with pytest.raises(ParameterError, match=r"the start pose has 5 joints; ur5 has 6"):
         replay_release(np.array([0.3, 0, 0, 0, 0, 0]), UR5, p, controllers(p), start=np.zeros(5))
@@ -140,23 +138,24 @@ def test_quiet_log_moves_nothing_and_says_so() -> None:
     assert found.rows == ()
     np.testing.assert_array_equal(found.motion.x, 0.0)
     assert any(
-        "no axis ever passes its threshold" in note and "95 %" in note for note in found.notes
+        "no axis ever passes its threshold" in note and "95 %" in note
+        for note in map(str, found.notes)
     )
 
 
 def test_force_at_rest_for_long_is_told() -> None:
-    record = push(length=10.0)
-    wrench = record.wrench.copy()
+    record, q = push(length=10.0)
+    wrench = record.values.copy()
     wrench[record.t > 4.0, 0] = 21.0
-    found = run(replace(record, wrench=wrench))
-    assert any("log's arm stands still" in note for note in found.notes)
+    found = run((replace(record, values=wrench), q))
+    assert any("log's arm stands still" in note for note in map(str, found.notes))
 
 
 def test_w_never_rises_in_a_replay() -> None:
-    record = push(30.0)
-    wrench = record.wrench.copy()
+    record, q = push(30.0)
+    wrench = record.values.copy()
     wrench[:, 4] = 0.3 * wrench[:, 1]
-    found = run(replace(record, wrench=wrench), "threshold_mode=soft", alphas=(1.0, 1.9))
+    found = run((replace(record, values=wrench), q), "threshold_mode=soft", alphas=(1.0, 1.9))
     np.testing.assert_array_equal(found.lyapunov.rises, 0)
     dragged = found.phases.dragged
     assert np.all(np.isnan(found.lyapunov.corrected[1:][dragged[:, None].repeat(3, axis=1)]))
@@ -171,7 +170,7 @@ def test_release_without_a_limit_inside_the_bound_is_let_pass() -> None:
         replay_release(2.0 * x, UR5, p, controllers(p), start=START)
     studied = replay_release(3.0 * x, UR5, p, controllers(p), start=START, force_unstable=True)
     assert studied.motion.escaped[1]
-    assert any("escaped in finite time" in note for note in studied.notes)
+    assert any("escaped in finite time" in note for note in map(str, studied.notes))
 
 
 def test_release_needs_a_deviation() -> None:
@@ -180,67 +179,13 @@ def test_release_needs_a_deviation() -> None:
         replay_release(np.zeros(6), UR5, p, controllers(p), start=START)
 
 
-def test_wrench_from_joint_torques() -> None:
-    rng = np.random.default_rng(4)
-    q = START + rng.normal(0.0, 0.2, (40, 6))
-    wrench = rng.normal(0.0, 10.0, (40, 6))
-    tau = np.einsum("tij,ti->tj", flange_jacobian(UR5.chain, q), wrench)
-    estimate = ExternalTorque(name="kfo-fe", t=np.arange(40) * 0.008, tau=tau)
-    found = from_torque(estimate, q, UR5)
-    np.testing.assert_allclose(found.wrench, wrench, atol=1e-8)  # κ(J) ≈ 50 times 1e-14·κ²
-    q[7, 4] = 0.0  # the wrist's singularity: not told, not zero
-    assert np.all(np.isnan(from_torque(estimate, q, UR5).wrench[7]))
-
-
-def sensed(frame: str | None, wrench: np.ndarray, q: np.ndarray) -> Recording:
-    """A log with a wrench."""
-    return Recording(t=np.arange(len(q)) * 0.008, q=q, wrench=wrench, wrench_frame=frame)
-
-
-def test_sensor_frames() -> None:
-    q = START + np.random.default_rng(6).normal(0.0, 0.3, (5, 6))
-    wrench = np.random.default_rng(8).normal(0.0, 10.0, (5, 6))
-    base = from_sensor(sensed("base", wrench, q), UR5)
-    np.testing.assert_array_equal(base.wrench, wrench)
-    turned = from_sensor(sensed("flange axes, force on the robot", wrench, q), UR5)
-    solver = FlangeSolver(UR5)
-    for k in range(5):
-        R = solver.pose(q[k])[0]
-        expected = pin.SE3(R, np.zeros(3)).act(pin.Force(wrench[k])).vector
-        np.testing.assert_allclose(turned.wrench[k], expected, atol=1e-12)  # ulp of 30 N
-    by = from_sensor(sensed("base axes, as force BY the robot ON the environment", wrench, q), UR5)
-    np.testing.assert_array_equal(by.wrench, -wrench)
-
-
-def test_a_wrench_in_no_named_frame_is_refused() -> None:
-    q, wrench = np.tile(START, (3, 1)), np.zeros((3, 6))
-    with pytest.raises(
-        ParameterError, match=r"the frame of the wrench is not named.*--frame flange"
-    ):
-        from_sensor(sensed(None, wrench, q), UR5)
-    with pytest.raises(ParameterError, match="there is flange"):
-        from_sensor(sensed(None, wrench, q), UR5, "world")
-    assert np.all(from_sensor(sensed(None, wrench, q), UR5, "base").wrench == 0.0)
-    with pytest.raises(MissingSignalError, match="no wrenches"):
-        from_sensor(Recording(t=np.arange(3.0), q=q), UR5)
-
-
-def test_truth_is_brought_to_the_log_s_clock() -> None:
-    recording = Recording(t=np.array([0.0, 0.01, 0.02]), q=np.tile(START, (3, 1)))
-    wrench = np.outer([0.0, 1.0, 2.0], np.ones(6))
-    found = from_truth(recording, np.array([0.0, 0.005, 0.01]), wrench, "truth")
-    np.testing.assert_allclose(found.wrench[:2, 0], [0.0, 2.0], atol=1e-12)
-    assert np.all(np.isnan(found.wrench[2]))
-
-
-def test_zero_is_removed_and_told() -> None:
-    record = push()
-    shifted = replace(record, wrench=record.wrench + 2.5)
-    clean = shifted.zeroed(0.0, 0.9)
-    np.testing.assert_allclose(clean.wrench, record.wrench, atol=1e-12)
-    assert "2.5, 2.5" in clean.notes[-1]
-    with pytest.raises(ParameterError, match="holds no known sample"):
-        record.zeroed(90.0, 99.0)
+def test_a_force_that_is_not_known_counts_as_none_and_is_told() -> None:
+    wrench, q = push()
+    hidden = (wrench.t > 1.5) & (wrench.t < 1.7)
+    found = run((replace(wrench, masked=hidden), q), "threshold_mode=soft")
+    (remark,) = [n for n in found.notes if isinstance(n, Remark) and n.code == "force-unknown"]
+    assert remark.values["samples"] == np.count_nonzero(hidden)
+    assert not found.phases.dragged[hidden].any()
 
 
 def test_control_clock_takes_the_newest_sample() -> None:

@@ -19,6 +19,7 @@ from seed_logs import (
 from vftcli.readers import read
 from vftcli.signals.errors import LogError
 from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import WrenchFrame
 
 STORAGES = [
     ("mcap", "", ""), ("sqlite3", "", ""), ("mcap", "FILE", "ZSTD"), ("sqlite3", "FILE", "ZSTD"),
@@ -221,8 +222,7 @@ def test_a_wrench_of_another_rate_is_interpolated(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         recording.wrench[inner, 0], 0.001 * 8 * np.arange(50)[inner], atol=1e-9
     )
-    assert recording.wrench_frame is not None
-    assert "tool0" in recording.wrench_frame
+    assert recording.wrench_frame == WrenchFrame("tool0", "tool0")
     assert any("interpolated wrench of /wrench (1000 Hz)" in r for r in recording.source.repairs)
 
 

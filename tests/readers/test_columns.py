@@ -9,6 +9,7 @@ from seed_logs import ROWS, headerless_csv, matrix_npy, motion, parquet, table_c
 from vftcli.readers import read
 from vftcli.readers.columns import parse_columns
 from vftcli.signals.errors import ClockError, LogError
+from vftcli.signals.wrench import WrenchFrame
 
 DEGREE = np.pi / 180
 
@@ -74,7 +75,7 @@ def test_wrench_by_names_carries_its_frame(tmp_path: Path) -> None:
     recording = read(
         write(tmp_path / "x", head + rows), columns="t=t,q=q{i},wrench[base]=Fx|Fy|Fz|Mx|My|Mz"
     )
-    assert recording.wrench_frame == "base"
+    assert recording.wrench_frame == WrenchFrame("base", "flange")
     assert recording.wrench is not None
     np.testing.assert_array_equal(recording.wrench[3], [1, 2, 3, 4, 5, 3])
 

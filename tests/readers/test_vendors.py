@@ -26,6 +26,7 @@ from seed_logs import (
 
 from vftcli.readers import read
 from vftcli.signals.errors import LogError
+from vftcli.signals.wrench import WrenchFrame
 
 SIX_DIGITS = 1e-5
 """libfranka prints six significant digits; the largest value of the motion is below ten."""
@@ -110,8 +111,7 @@ def test_states_as_json_lines(tmp_path: Path) -> None:
     path = libfranka_json(tmp_path / "x")
     recording = read(path)
     np.testing.assert_array_equal(recording.q, motion(7)["q"])
-    assert recording.wrench_frame is not None
-    assert "BY the robot" in recording.wrench_frame
+    assert recording.wrench_frame == WrenchFrame("base", "stiffness", "by-robot")
     lines = path.read_text().splitlines()
     lines[50] = lines[50].replace('"q": [', '"q": [nan, ', 1)
     path.write_text("\n".join(lines))

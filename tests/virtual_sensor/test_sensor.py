@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 
-from vftcli.evaluation.reference_sensor import sensor_reference
 from vftcli.robots import load_robot
-from vftcli.signals.errors import MissingSignalError, ParameterError
+from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import Pose, adjoint, inverse, rpy_matrix
 from vftcli.signals.recording import Recording
-from vftcli.signals.wrench import Wrench
+from vftcli.signals.wrench import Wrench, WrenchFrame
 from vftcli.virtual_sensor.frames import Mounting
-from vftcli.virtual_sensor.log_wrench import in_sensor_axes, logged_wrench, stated
 from vftcli.virtual_sensor.sensor import fit_pose, time_offset, weigh_tool
 from vftcli.virtual_sensor.vendor import axes_words, check_vendor, fit_axes
 
@@ -93,7 +91,7 @@ def test_any_order_and_sign_of_axes_is_recognised(seed: int) -> None:
     assert fit_axes(ours, 2.0 * ours @ P.T).derived
 
 
-def log(wrench: np.ndarray, frame: str | None, samples: int = 400) -> Recording:
+def log(wrench: np.ndarray, frame: WrenchFrame | None, samples: int = 400) -> Recording:
     t = np.linspace(0, 10, samples)
     rng = np.random.default_rng(5)
     q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.3 * np.sin(
@@ -125,7 +123,9 @@ def test_a_vendors_frame_and_sign_are_told(axes: str, sign: float, words: str) -
     rng = np.random.default_rng(0)
     theirs = sign * (flange if axes == "flange" else ours.values)
     theirs = theirs + 0.5 * rng.standard_normal(theirs.shape)
-    check = check_vendor(log(theirs, "as the vendor says"), ours, load_robot("ur5").chain)
+    check = check_vendor(
+        log(theirs, WrenchFrame("vendor", "vendor")), ours, load_robot("ur5").chain
+    )
     assert check is not None
     assert words in check.sentences()[-1]
 
@@ -136,35 +136,3 @@ def test_a_vendors_zeros_are_called_that() -> None:
     check = check_vendor(log(np.zeros_like(flange), None), ours, load_robot("ur5").chain)
     assert check is not None
     assert "exactly zero in every sample" in check.sentences()[0]
-
-
-def test_a_logged_wrench_goes_through_its_frame_to_the_joints() -> None:
-    """The same contact, logged by a sensor on the flange, in base and in flange axes."""
-    chain, mounting = load_robot("ur5").chain, Mounting(sensor=POSE)
-    flange = pushes()
-    base = ours_in_base(log(flange, None), flange)
-    reading = in_sensor_axes(base, chain, log(flange, None).q, mounting)
-    logs = {
-        "sensor": reading,
-        "flange": flange,
-        "base": base.values,
-        "base axes, force BY the robot ON the environment": -base.values,
-    }
-    torques = [
-        sensor_reference(log(values, words), load_robot("ur5"), mounting).torque.tau
-        for words, values in logs.items()
-    ]
-    for tau in torques[1:]:
-        np.testing.assert_allclose(tau, torques[0], atol=1e-9)
-
-
-def test_what_is_not_said_is_assumed_aloud() -> None:
-    assert "does not say the frame" in stated(None, Mounting()).notes[0]
-    assert "tool's pose is not known" in stated("base axes at the TCP", Mounting()).notes[0]
-    with pytest.raises(ParameterError, match=r"'world'.*no frame.*flange, base, tool, sensor"):
-        stated("world", Mounting())
-
-
-def test_a_wrench_of_zeros_is_no_reference() -> None:
-    with pytest.raises(MissingSignalError, match="zero in every sample"):
-        logged_wrench(log(np.zeros((400, 6)), "base"), load_robot("ur5").chain, Mounting())

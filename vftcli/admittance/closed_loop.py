@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vftcli.admittance.force import ForceRecord
 from vftcli.admittance.joints import FlangeSolver
 from vftcli.admittance.law import Controller
 from vftcli.admittance.motion import Recursion
@@ -21,6 +20,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix
 from vftcli.signals.series import resampled
+from vftcli.signals.wrench import Wrench
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.experiment import Progress, Simulation, observe
 from vftcli.simulation.motion import Reference
@@ -67,14 +67,9 @@ class ClosedLoop:
         return self.simulation is not None
 
     @property
-    def record(self) -> ForceRecord:
+    def wrench(self) -> Wrench:
         """The wrench the controller acted on, to be replayed: the paper's way to Figs 7 and 10."""
-        return ForceRecord(
-            t=self.t,
-            wrench=self.estimate,
-            q=self.q,
-            source="the wrench that the controller in the loop acted on, base axes",
-        )
+        return Wrench(name="controller", t=self.t, values=self.estimate, frame="base")
 
 
 @dataclass(kw_only=True)

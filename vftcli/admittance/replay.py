@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.admittance.force import ForceRecord, on_control_clock
 from vftcli.admittance.joints import FlangeSolver, JointPath, follow
 from vftcli.admittance.law import Controller, energy, printed_energy
 from vftcli.admittance.metrics import drags_of, releases_of, rows_of
@@ -18,12 +17,15 @@ from vftcli.admittance.replay_checks import (
     quiet_note,
     resting_note,
     travel_note,
+    unknown_remark,
 )
 from vftcli.admittance.stability import Verdict, check_stable
 from vftcli.admittance.thresholds import Phases, phases
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.remarks import Note, Remark, fact
+from vftcli.signals.wrench import Wrench
 
 RISE = 1e-12
 """A step in which W rises by more than this share of its value at the phase's start is told."""
@@ -57,7 +59,7 @@ class Replay:
         parameters: The admittance parameters.
         controllers: The controllers.
         verdicts: Their stability, in the same order.
-        source: Where the force comes from, in words.
+        source: Where the force comes from.
         start: Joint positions of the target pose X_d. (n,) [rad]
         wrench: Force and moment on the robot at each control period, base axes. (T, 6) [N, N·m]
         phases: Algorithm 1's phases, the same for all controllers.
@@ -73,7 +75,7 @@ class Replay:
     parameters: Admittance
     controllers: tuple[Controller, ...]
     verdicts: tuple[Verdict, ...]
-    source: str
+    source: Remark
     start: Array
     wrench: Array
     phases: Phases
@@ -82,24 +84,29 @@ class Replay:
     logged: Array | None
     lyapunov: Lyapunov
     rows: tuple[dict[str, Any], ...]
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
 
 
 def replay(
-    record: ForceRecord,
+    wrench: Wrench,
+    q: Array,
     robot: Robot,
     parameters: Admittance,
     controllers: Sequence[Controller],
     *,
+    source: Remark,
     force_unstable: bool = False,
 ) -> Replay:
-    """Run a force record through controllers that hold the arm at the log's first pose.
+    """Run a log's wrench through controllers that hold the arm at the log's first pose.
 
     Args:
-        record: Force on the flange along a log.
+        wrench: Force on the robot and moment about the flange point, in base axes; samples in which
+            it is not known count as no force.
+        q: Joint positions of the log's arm, on the wrench's clock. (T, n) [rad]
         robot: The arm.
         parameters: Thresholds and control period, shared by the controllers.
         controllers: The controllers.
+        source: Where the wrench comes from.
         force_unstable: Run unstable settings too.
 
     Raises:
@@ -108,19 +115,19 @@ def replay(
     """
     verdicts, complaints = check_stable(controllers, force_unstable=force_unstable)
     solver = FlangeSolver(robot)
-    clock, (wrench, q) = on_control_clock(record.t, (record.wrench, record.q), parameters.period)
+    clock, (force, q) = on_control_clock(wrench.t, (wrench.known, q), parameters.period)
     start = solver.check_start(q[0])
-    split = phases(wrench, parameters)
+    split = phases(force, parameters)
     motion = shifted(run(controllers, split.force, split.dragged), float(clock[0]))
     path = follow(solver, start, motion.x, parameters.period)
     drags = drags_of(split, parameters.period)
     logged = deviation_of(solver, start, q)
-    rows = rows_of(controllers, motion, drags, np.nan_to_num(wrench))
+    rows = rows_of(controllers, motion, drags, np.nan_to_num(force))
     lyapunov = lyapunov_along(controllers, motion, split.dragged)
-    notes = (
-        *record.notes,
+    notes: tuple[Note, ...] = (
+        *unknown_remark(wrench),
         *complaints,
-        *quiet_note(wrench, parameters, bool(drags)),
+        *quiet_note(force, parameters, bool(drags)),
         *resting_note(drags, logged, parameters.period),
         *motion_notes(controllers, motion, path, lyapunov.rises),
         *travel_note(parameters, controllers, motion, path),
@@ -131,9 +138,9 @@ def replay(
         parameters=parameters,
         controllers=tuple(controllers),
         verdicts=verdicts,
-        source=record.source,
+        source=source,
         start=start,
-        wrench=wrench,
+        wrench=force,
         phases=split,
         motion=motion,
         path=path,
@@ -189,7 +196,7 @@ def replay_release(
         parameters=parameters,
         controllers=tuple(controllers),
         verdicts=verdicts,
-        source="a release from rest, no force",
+        source=fact("force-of-release"),
         start=q,
         wrench=force,
         phases=Phases(dragged, force),
@@ -231,6 +238,24 @@ def settling(controllers: Sequence[Controller], x: Array) -> float:
         rate = omega * np.where(xi > 1.0, xi - np.sqrt(np.maximum(xi**2 - 1.0, 0.0)), xi)
         slowest = min(slowest, float(np.min(rate[x != 0.0])))
     return float(min(max(6.0 / slowest, 1.0), LONGEST))
+
+
+def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[Array, list[Array]]:
+    """Sample columns as a controller does: the newest sample at each control period.
+
+    Args:
+        t: Times of the log. (T,) [s]
+        values: Columns. (T, …)
+        period: Control period. [s]
+
+    Returns:
+        Times from the log's first sample on (S,) [s], and the columns then. (S, …)
+    """
+    count = int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1
+    clock = t[0] + np.arange(count) * period
+    # Half a microsecond of slack: a log's stamps are printed, and equal clocks must stay in step.
+    newest = np.clip(np.searchsorted(t, clock + 5e-7 + 1e-3 * period, side="right") - 1, 0, None)
+    return clock, [column[newest] for column in values]
 
 
 def shifted(motion: AxisMotion, begin: float) -> AxisMotion:

@@ -11,11 +11,19 @@ from vftcli.admittance.metrics import Drag
 from vftcli.admittance.motion import AxisMotion
 from vftcli.admittance.parameters import AXES, Admittance
 from vftcli.signals.arrays import Array
+from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.wrench import Wrench
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
 
 RESTING = (2.0, 0.01)
 """A drag in which the log's arm stays within this distance for so long is told. [s, m]"""
+
+
+def unknown_remark(wrench: Wrench) -> tuple[Remark, ...]:
+    """Say so if some samples of the wrench are not known, so that they count as no force."""
+    count = int(np.count_nonzero(~np.all(np.isfinite(wrench.known), axis=1)))
+    return (caution("force-unknown", samples=count),) if count else ()
 
 
 def quiet_note(wrench: Array, parameters: Admittance, dragged: bool) -> tuple[str, ...]:

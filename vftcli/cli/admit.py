@@ -139,15 +139,13 @@ class ForceOptions(opt.Bundle):
             help="Take the wrench of a truth file, flange, base axes.",
         ),
     ] = None
-    frame: Annotated[
-        str | None,
-        typer.Option(
-            "--frame", metavar="NAME", help="Frame of the log's own wrench: base, flange."
-        ),
-    ] = None
     zero: Annotated[
-        str | None,
-        typer.Option("--zero", metavar="A:B", help="Remove the mean wrench of this unloaded span."),
+        list[str] | None,
+        typer.Option(
+            "--zero",
+            metavar="A:B|start|LOG",
+            help="The wrench's zero: an unloaded span, the unloaded start, or a free run.",
+        ),
     ] = None
 
 
@@ -176,6 +174,7 @@ def admit(
     from vftcli.cli.console import say
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.estimates import estimates_columns
+    from vftcli.virtual_sensor.choice import ZeroChoice
 
     if sum((log is not None, bool(release.release), loop.closed_loop is not None)) != 1:
         raise typer.BadParameter("give one of LOG, --release AXIS=VALUE, --closed-loop SCENARIO")
@@ -205,8 +204,7 @@ def admit(
         force_unstable=controllers.force_unstable,
         sensor=force_from.sensor,
         truth=force_from.truth,
-        frame=force_from.frame,
-        zero=force_from.zero,
+        zero=ZeroChoice.parsed(force_from.zero or ()),
         release=tuple(release.release or ()),
         start=release.start,
         duration=release.duration,

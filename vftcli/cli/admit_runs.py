@@ -2,18 +2,20 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
 if TYPE_CHECKING:
     from vftcli.admittance.closed_loop import ClosedLoop
-    from vftcli.admittance.force import ForceRecord
     from vftcli.admittance.parameters import Admittance
     from vftcli.admittance.replay import Replay
     from vftcli.pipeline import AnalysisChoice
     from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
+    from vftcli.signals.remarks import Note, Remark
+    from vftcli.signals.wrench import Wrench
+    from vftcli.virtual_sensor.choice import ZeroChoice
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,8 +28,7 @@ class Choice:
         force_unstable: Run unstable settings too.
         sensor: Take the log's own wrench.
         truth: A truth file, or None.
-        frame: Frame of the log's own wrench, or None.
-        zero: Span whose mean wrench is removed, or None.
+        zero: What is taken as the zero of the wrench.
         release: ``axis=value`` of a release; empty for a log.
         start: Start pose of a release, or None.
         duration: Its length, or None. [s]
@@ -40,8 +41,7 @@ class Choice:
     force_unstable: bool = False
     sensor: bool = False
     truth: Path | None = None
-    frame: str | None = None
-    zero: str | None = None
+    zero: "ZeroChoice"
     release: tuple[str, ...] = ()
     start: str | None = None
     duration: float | None = None
@@ -100,19 +100,26 @@ def replayed(
         parameters: A file of their parameters, or None.
         estimated: The observer whose torque the log itself holds, None if it is to be estimated.
     """
+    from dataclasses import replace
+
     from vftcli.admittance.law import controllers
     from vftcli.admittance.replay import replay
-    from vftcli.signals.parsing import interval
 
     recording = request.library.open(log, request.read)
     arm = request.robot.load(recording)
     settings = read_parameters(arm, own, parameters)
     chosen = controllers(settings, choice.kinds, numbers(choice.alpha, "--alpha"))
-    record = force_of(recording, arm, request, choice, estimated)
-    if choice.zero is not None:
-        record = record.zeroed(*interval(choice.zero))
-    result = replay(record, arm, settings, chosen, force_unstable=choice.force_unstable)
-    return result, recording
+    force = force_of(recording, arm, request, choice, estimated)
+    result = replay(
+        force.wrench,
+        recording.q,
+        arm,
+        settings,
+        chosen,
+        source=force.source,
+        force_unstable=choice.force_unstable,
+    )
+    return replace(result, notes=(*force.notes, *result.notes)), recording
 
 
 def looped(
@@ -126,10 +133,13 @@ def looped(
     from vftcli.observers import KalmanObserver
     from vftcli.robots import load_robot
     from vftcli.signals.errors import ParameterError
-    from vftcli.signals.parsing import interval
+    from vftcli.signals.remarks import fact
     from vftcli.simulation import load_scenario
     from vftcli.simulation.sensing import log_rate
 
+    if choice.zero.start or choice.zero.log is not None:
+        raise ParameterError("--closed-loop holds still over a span: give it as --zero A:B")
+    zero = choice.zero.spans[0] if choice.zero.spans else UNLOADED
     scenario = load_scenario(name, ())
     arm = load_robot(scenario.robot)
     settings = read_parameters(arm, own, parameters)
@@ -143,16 +153,38 @@ def looped(
         observer,
         seed=choice.seed,
         torque=choice.torque,
-        zero=interval(choice.zero) if choice.zero is not None else UNLOADED,
+        zero=zero,
         force_unstable=choice.force_unstable,
         progress=progress_bar(),
     )
-    result = replay(run.record, arm, settings, chosen, force_unstable=choice.force_unstable)
+    result = replay(
+        run.wrench,
+        run.q,
+        arm,
+        settings,
+        chosen,
+        source=fact("force-of-loop"),
+        force_unstable=choice.force_unstable,
+    )
     return result, run
 
 
 UNLOADED = (0.5, 3.0)
 """In all built-in closed-loop scenarios nothing touches the arm in this span. [s]"""
+
+
+class DrivingForce(NamedTuple):
+    """The wrench that drives a replay.
+
+    Attributes:
+        wrench: Force on the robot, base axes, about the flange point.
+        source: Where it comes from.
+        notes: What a reader should know of it.
+    """
+
+    wrench: "Wrench"
+    source: "Remark"
+    notes: "tuple[Note, ...]"
 
 
 def force_of(
@@ -161,45 +193,58 @@ def force_of(
     request: "AnalysisChoice",
     choice: Choice,
     estimated: str | None,
-) -> "ForceRecord":
-    """The wrench that drives the replay: truth, sensor, or an observer's."""
-    from vftcli.admittance.force import from_sensor, from_torque
+) -> DrivingForce:
+    """The wrench that drives the replay: truth, sensor, or an observer's, its zero removed."""
+    from dataclasses import replace
+
     from vftcli.signals.external_torque import ExternalTorque
+    from vftcli.signals.remarks import fact
+    from vftcli.virtual_sensor.choice import WrenchChoice
+    from vftcli.virtual_sensor.log_wrench import logged_wrench
+    from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+    from vftcli.virtual_sensor.zero import zeroed
 
     if choice.sensor and choice.truth is not None:
         raise typer.BadParameter("choose one of --sensor and --truth")
+    asked = WrenchChoice(frame="base", zero=choice.zero)
     if choice.truth is not None:
-        return truth_of(recording, choice.truth)
-    if choice.sensor:
-        return from_sensor(recording, robot, choice.frame)
-    if estimated is not None:
+        wrench = truth_of(recording, robot, choice.truth)
+        source = fact("force-of-truth", file=choice.truth.name)
+    elif choice.sensor:
+        wrench = logged_wrench(recording, robot.chain, asked.mounting(robot))
+        frame = recording.wrench_frame
+        source = fact("force-of-sensor", frame=str(frame) if frame else "frame not stated")
+    elif estimated is not None:
         tau = recording.require("tau_ext")
         estimate = ExternalTorque(name=estimated, t=recording.t, tau=tau)
+        seen = VirtualSensor(frame="base").wrench(estimate, recording.q, robot.chain)
+        # What it says of its band does not matter here.
+        wrench = replace(seen, remarks=())
+        source = fact("force-of-observer", observer=estimated)
     else:
         from vftcli.pipeline import analyse
 
-        estimate = analyse(recording, robot, request).estimates[0]
-    return from_torque(estimate, recording.q, robot)
+        reading = analyse(recording, robot, replace(request, wrench=asked)).virtual_sensor
+        assert reading is not None
+        wrench = reading.wrenches[0]
+        source = fact("force-of-observer", observer=wrench.name)
+        return DrivingForce(wrench, source, (*reading.notes, *reading.warnings))
+    wrench, notes = zeroed(wrench, choice.zero)
+    return DrivingForce(wrench, source, (*wrench.remarks, *notes))
 
 
-def truth_of(recording: "Recording", path: Path) -> "ForceRecord":
+def truth_of(recording: "Recording", robot: "Robot", path: Path) -> "Wrench":
     """The wrench of a truth file, on the log's own clock, base axes."""
-    from vftcli.admittance.force import from_truth
-    from vftcli.readers.references import read_reference
+    from vftcli.evaluation.reference_file import file_reference
     from vftcli.signals.errors import ReferenceTorqueError
+    from vftcli.virtual_sensor.frames import Mounting
 
-    table = read_reference(path)
-    if table.wrench is None:
+    wrench = file_reference(path, recording, robot, Mounting()).wrench
+    if wrench is None:
         raise ReferenceTorqueError(
             f"{path}: it has no wrench; a truth file has wrench/fx … wrench/mz at the flange"
         )
-    t = table.t - recording.source.t0
-    if t[-1] < recording.t[0] or t[0] > recording.t[-1]:
-        raise ReferenceTorqueError(
-            f"{path}: its clock ({table.t[0]:g} to {table.t[-1]:g} s) does not overlap the log's; "
-            "both must be the log's own clock"
-        )
-    return from_truth(recording, t, table.wrench, f"truth of {path.name}, base axes")
+    return wrench
 
 
 def read_parameters(robot: "Robot", own: list[str], path: Path | None) -> "Admittance":

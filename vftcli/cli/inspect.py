@@ -69,7 +69,7 @@ def report_of(examination: "Examination") -> dict[str, Any]:
         "t0_s": source.t0,
         "joint_names": list(recording.joint_names),
         "robot": recording.robot_hint,
-        "wrench_frame": recording.wrench_frame,
+        "wrench_frame": None if recording.wrench_frame is None else str(recording.wrench_frame),
         "payload_kg": recording.payload_mass,
         "sha256": source.sha256,
         "robots": [asdict(fit) for fit in examination.robots],

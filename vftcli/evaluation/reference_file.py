@@ -15,6 +15,7 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution
 from vftcli.signals.series import resampled
+from vftcli.signals.wrench import WrenchFrame
 from vftcli.virtual_sensor.frames import Mounting
 from vftcli.virtual_sensor.log_wrench import logged_wrench
 
@@ -49,7 +50,7 @@ def file_reference(
     wrench = None
     if table.wrench is not None:
         values = on_the_logs_clock(t, table.wrench, recording, path)
-        frame = table.wrench_frame or "base"
+        frame = table.wrench_frame or WrenchFrame("base", "flange")
         given = replace(recording, wrench=values, wrench_frame=frame)
         wrench = logged_wrench(given, robot.chain, mounting)
     if table.tau is None:

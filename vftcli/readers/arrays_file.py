@@ -14,6 +14,7 @@ from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Cell, Column, Pick, Picks, checked, picked
 from vftcli.readers.tables import ArrayTable, from_table, numpy_array
 from vftcli.signals.errors import LogError
+from vftcli.signals.wrench import STIFFNESS_FRAME
 
 PANDA_PY = {
     "q": "q",
@@ -23,8 +24,6 @@ PANDA_PY = {
     "wrench": "O_F_ext_hat_K",
 }
 """Field of Recording → key of panda-py's get_log()."""
-
-WRENCH_FRAME = "base axes at the stiffness frame K, as force BY the robot ON the environment"
 
 
 def read_npz(file: LogFile, request: ReadChoice) -> RawLog:
@@ -127,7 +126,7 @@ def _read_panda_py(table: ArrayTable, request: ReadChoice) -> RawLog:
         picks,
         request,
         clock_name="robot clock (milliseconds since start)",
-        wrench_frame=WRENCH_FRAME,
+        wrench_frame=STIFFNESS_FRAME,
     )
 
 

@@ -12,6 +12,7 @@ from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Cell, Pick, Picks, checked, picked
 from vftcli.readers.tables import ArrayTable
 from vftcli.signals.errors import LogError
+from vftcli.signals.wrench import STIFFNESS_FRAME
 
 JOINTS = 7
 CLOCK = "robot clock (milliseconds since start)"
@@ -31,8 +32,6 @@ FIELDS = {
     "tau_ext_hat_filtered": "tau_ext",
 }
 """libfranka's name → field of Recording."""
-
-WRENCH_FRAME = "base axes at the stiffness frame K, as force BY the robot ON the environment"
 
 
 def _pick(name: str, cells: tuple[Cell, ...]) -> Pick:
@@ -152,7 +151,7 @@ def _read_states(
         picks,
         request,
         clock_name=CLOCK,
-        wrench_frame=WRENCH_FRAME,
+        wrench_frame=STIFFNESS_FRAME,
         payload_mass=float(mass) if isinstance(mass, int | float) else None,
     )
 

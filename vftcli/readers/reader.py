@@ -9,6 +9,7 @@ from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import WrenchFrame
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +84,7 @@ class RawLog:
         segment: Which of several recordings in the file is wanted, from 1; None for all.
         signals: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
         first_row: Number in the file of the first sample, counted from 1, for messages.
-        wrench_frame: Frame, axes and sign of the wrench, in words.
+        wrench_frame: What the log states of its wrench.
         joint_names: The joints' names, base to tip, or empty.
         robot_hint: Name of the profile that the log itself settles, or None.
         degrees_possible: Whether nothing says that the positions are in radians.
@@ -101,7 +102,7 @@ class RawLog:
     segment: int | None = None
     signals: Mapping[str, Array]
     first_row: int = 1
-    wrench_frame: str | None = None
+    wrench_frame: WrenchFrame | None = None
     joint_names: tuple[str, ...] = ()
     robot_hint: str | None = None
     degrees_possible: bool = False

@@ -13,6 +13,7 @@ from vftcli.readers.reader import LogFile, ReadChoice, open_log
 from vftcli.readers.table import Pick, Picks, Table, listed, picked, picks_of
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import LogError
+from vftcli.signals.wrench import WrenchFrame
 
 TORQUE = "tau_ext"
 
@@ -31,7 +32,7 @@ class ReferenceTable:
     t: Array
     tau: Array | None
     wrench: Array | None
-    wrench_frame: str | None
+    wrench_frame: WrenchFrame | None
 
 
 def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:

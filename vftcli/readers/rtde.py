@@ -10,6 +10,7 @@ from vftcli.readers.delimited import TextTable
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Cell, Pick, Picks, Table, checked, picked
 from vftcli.signals.errors import LogError
+from vftcli.signals.wrench import WrenchFrame
 
 JOINT_COLUMNS = {
     "q": "actual_q",
@@ -25,10 +26,8 @@ JOINT_COLUMNS = {
 """Field of Recording → RTDE's name; all have six elements, name_0 to name_5."""
 
 CLOCK = "controller clock (timestamp, seconds since power-on)"
-WRENCH_FRAME = (
-    "base axes at the TCP, as force on the robot; estimated from currents on CB3, measured on "
-    "e-Series"
-)
+WRENCH_FRAME = WrenchFrame("base", "tool")
+"""Of actual_TCP_force: estimated from currents on CB3, measured on e-Series."""
 
 PAYLOAD = ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2")
 """The payload that the controller was told of; its last value counts."""

@@ -14,6 +14,7 @@ from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.series import median_step
+from vftcli.signals.wrench import WrenchFrame
 
 Column = NDArray[Any]
 """One column as it is stored: (T,) numbers, or (T, k) for a column of lists."""
@@ -70,7 +71,7 @@ class Pick:
     cells: tuple[Cell, ...]
     factor: float = 1.0
     unit: str | None = None
-    frame: str | None = None
+    frame: WrenchFrame | None = None
     note: str = ""
 
 
@@ -258,7 +259,7 @@ def _pick(item: Item, cells: tuple[Cell, ...]) -> Pick:
         cells=cells,
         factor=item.factor,
         unit=item.unit,
-        frame=item.unit if wrench else None,
+        frame=WrenchFrame.parsed(item.unit) if wrench and item.unit else None,
         note=f"turned the sign of {item.signal} (--columns)" if item.factor < 0 else "",
     )
 

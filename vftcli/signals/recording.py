@@ -9,6 +9,7 @@ import numpy as np
 from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
 from vftcli.signals.series import median_step
+from vftcli.signals.wrench import WrenchFrame
 
 JOINT_SIGNALS = (
     "q",
@@ -115,7 +116,7 @@ class Recording:
         tau_ext: The vendor's estimate of the external torque ON the robot. (T, n) [N·m]
         temperature: Joint temperatures. (T, n) [°C]
         wrench: Force then moment, in the sign and axes that `wrench_frame` names. (T, 6) [N, N·m]
-        wrench_frame: Frame, axes and sign of `wrench`, in words; None where unknown.
+        wrench_frame: What the log states of `wrench`; None where it states nothing.
         joint_names: The joints' names in the log's order, or empty.
         robot_hint: Name of the profile the log itself settles, or None.
         payload_mass: Mass of the payload the controller was told of, None if not logged. [kg]
@@ -135,7 +136,7 @@ class Recording:
     tau_ext: Array | None = None
     temperature: Array | None = None
     wrench: Array | None = None
-    wrench_frame: str | None = None
+    wrench_frame: WrenchFrame | None = None
     joint_names: tuple[str, ...] = ()
     robot_hint: str | None = None
     payload_mass: float | None = None

@@ -1,14 +1,85 @@
-"""Wrench: force and moment ON the robot along a log, in a named frame."""
+"""Wrench: force and moment ON the robot along a log; WrenchFrame: what a log states of its own."""
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 
 from vftcli.signals.arrays import Array, Mask, check_clock, check_shape, frozen, frozen_mask
+from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Note
 
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 """Names of the six components, force first, as in column names and tables."""
+
+POINTS = {
+    "flange": "the flange point",
+    "tool": "the tool's point",
+    "stiffness": "the stiffness frame K",
+    "sensor": "the sensor's origin",
+}
+"""Point that a moment refers to → its words; a log may name another, as a link of its own."""
+
+OWN_POINT = {"base": "flange"}
+"""Axes → the point their moments refer to where nothing else is said, if not their own origin."""
+
+Sign = Literal["on-robot", "by-robot"]
+"""Whether a force is the environment's on the robot, or the robot's on the environment."""
+
+
+@dataclass(frozen=True)
+class WrenchFrame:
+    """What a log states of its own wrench.
+
+    Attributes:
+        axes: Whose axes: base, flange, tool or sensor; or the log's own name of a frame, of which
+            nothing is known here.
+        point: What its moment refers to: a key of `POINTS`, or again the log's own name.
+        sign: Whose force it is.
+    """
+
+    axes: str
+    point: str
+    sign: Sign = "on-robot"
+
+    @classmethod
+    def parsed(cls, text: str) -> "WrenchFrame":
+        """The frame that ``AXES[@POINT][,by-robot]`` states, as ``--columns wrench[base]=…``.
+
+        Raises:
+            ParameterError: If it is anything else.
+        """
+        place, _, sign = text.strip().partition(",")
+        axes, at, point = place.strip().partition("@")
+        sign = sign.strip() or "on-robot"
+        wrong = not axes or (at and not point) or len(place.split()) != 1
+        if wrong or sign not in get_args(Sign):
+            raise ParameterError(
+                f"the frame of a wrench {text!r} is not AXES[@POINT][,by-robot], as base, "
+                "base@tool or sensor,by-robot"
+            )
+        # get_args has checked the sign, which the type checker cannot see.
+        return cls(axes, point or OWN_POINT.get(axes, axes), sign)  # type: ignore[arg-type]
+
+    @property
+    def notation(self) -> str:
+        """The frame as `parsed` reads it."""
+        return f"{self.axes}@{self.point}" + (",by-robot" if self.sign == "by-robot" else "")
+
+    @property
+    def factor(self) -> float:
+        """What turns the values into force on the robot: 1 or −1."""
+        return -1.0 if self.sign == "by-robot" else 1.0
+
+    def __str__(self) -> str:
+        """The frame in words."""
+        point = POINTS.get(self.point, self.point)
+        whose = "BY the robot ON the environment" if self.sign == "by-robot" else "on the robot"
+        return f"{self.axes} axes at {point}, as force {whose}"
+
+
+STIFFNESS_FRAME = WrenchFrame("base", "stiffness", "by-robot")
+"""O_F_ext_hat_K of libfranka and what is built on it."""
 
 
 def unit_of(axis: str | int) -> str:

@@ -9,6 +9,7 @@ from vftcli.robots import Robot, load_robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording, Source
+from vftcli.signals.wrench import WrenchFrame
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.force_sensor import read_force_sensor
 from vftcli.simulation.motion import Reference
@@ -77,7 +78,7 @@ class Simulation:
             tau_ext=None if in_current else self.vendor.tau_ext[rows],
             temperature=seen.temperature[rows] if in_current else None,
             wrench=None if self.force_sensor is None else self.force_sensor[rows],
-            wrench_frame=None if self.force_sensor is None else "sensor axes, force on the robot",
+            wrench_frame=None if self.force_sensor is None else WrenchFrame("sensor", "sensor"),
             joint_names=self.robot.chain.names,
             robot_hint=self.robot.name,
             source=Source(

@@ -1,4 +1,8 @@
-"""The wrench column of a log: what its reader said of axes, point and sign, in numbers."""
+"""The wrench column of a log, turned into the form all wrenches here have: base axes, flange point.
+
+A log may state its wrench's axes, the point of its moment and its sign (`WrenchFrame`); what it
+leaves open is assumed, and the assumption is a remark.
+"""
 
 from typing import NamedTuple
 
@@ -8,71 +12,58 @@ from vftcli.robots.chain import Chain
 from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, ParameterError
-from vftcli.signals.pose import IDENTITY, adjoint
+from vftcli.signals.pose import IDENTITY
 from vftcli.signals.recording import Recording
-from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.frames import FRAMES, Mounting, to_base
+from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.wrench import Wrench, WrenchFrame
+from vftcli.virtual_sensor.frames import FRAMES, Mounting
+
+UNSTATED = WrenchFrame("sensor", "sensor")
+"""What is assumed of a log that states nothing: a sensor's own reading, force on the robot."""
 
 
-class Stated(NamedTuple):
-    """How a log's wrench is given.
+class Placement(NamedTuple):
+    """Where a log's wrench is measured, in the flange frame.
 
     Attributes:
-        axes: Whose axes: a key of `FRAMES`.
-        point: What its moment refers to: "flange", "tool" or "sensor".
-        sign: +1 for force on the robot, −1 for force by the robot on the environment.
-        notes: What was assumed, one sentence each.
+        frame: Its axes, point and sign.
+        axes: Orientation of its axes in the flange frame, None for the base's axes. (3, 3)
+        point: The point of its moment. (3,) [m]
+        remarks: What had to be assumed.
     """
 
-    axes: str
-    point: str
-    sign: float
-    notes: tuple[str, ...]
+    frame: WrenchFrame
+    axes: Array | None
+    point: Array
+    remarks: tuple[Remark, ...]
 
 
-TOOL_POINTS = ("TCP", "frame K", "tool")
-"""Words of a reader that mean the tool's point."""
-
-
-def stated(words: str | None, mounting: Mounting) -> Stated:
-    """Understand what a reader, or ``--columns wrench[FRAME]=…``, says of a log's wrench.
+def placement(frame: WrenchFrame | None, mounting: Mounting) -> Placement:
+    """Where a log's wrench is measured; the flange stands for a tool or sensor of unknown pose.
 
     Args:
-        words: `Recording.wrench_frame`.
-        mounting: Where tool and sensor sit; without the tool's pose the flange stands for it.
+        frame: What the log states, or None.
+        mounting: Where tool and sensor sit.
 
     Raises:
-        ParameterError: If the words name no frame.
+        ParameterError: If its axes or its point are none of those that are known here.
     """
-    if words is None:
-        note = (
-            "the log does not say the frame of its wrench: taken as force on the robot in sensor "
-            "axes; say it with --columns wrench[base]=…, and the sensor's pose with --sensor-pose"
-        )
-        return Stated("sensor", "sensor", 1.0, (note, *unknown_pose(mounting)))
-    axes = words.split()[0].strip(",").lower()
-    if axes not in FRAMES:
+    remarks = [caution("wrench-frame-unstated")] if frame is None else []
+    frame = frame or UNSTATED
+    # The stiffness frame of libfranka is the tool's unless the user moved it, which no log tells.
+    tool, sensor = mounting.tool or IDENTITY, mounting.sensor or IDENTITY
+    poses = {"flange": IDENTITY, "tool": tool, "stiffness": tool, "sensor": sensor}
+    if frame.axes not in FRAMES or frame.point not in poses:
         raise ParameterError(
-            f"the log's wrench is said to be in {words!r}, which is no frame; there is "
+            f"the log's wrench is in {frame}, which is no frame known here; there is "
             f"{', '.join(FRAMES)}, as in --columns wrench[base]=…"
         )
-    sign = -1.0 if "BY the robot" in words else 1.0
-    if axes == "sensor":
-        return Stated("sensor", "sensor", sign, unknown_pose(mounting))
-    at_tool = axes == "tool" or any(word in words for word in TOOL_POINTS)
-    if at_tool and mounting.tool is None:
-        note = (
-            f"the log's wrench is {words}; the tool's pose is not known: the flange stands for it"
-        )
-        return Stated("flange" if axes == "tool" else axes, "flange", sign, (note,))
-    return Stated(axes, "tool" if at_tool else "flange", sign, ())
-
-
-def unknown_pose(mounting: Mounting) -> tuple[str, ...]:
-    """A note where the sensor's pose has to be assumed."""
-    if mounting.sensor is not None:
-        return ()
-    return ("the sensor's pose is not known: taken as the flange itself; give --sensor-pose",)
+    if mounting.sensor is None and "sensor" in (frame.axes, frame.point):
+        remarks.append(caution("sensor-pose-unstated"))
+    if mounting.tool is None and {"tool", "stiffness"} & {frame.axes, frame.point}:
+        remarks.append(caution("tool-pose-unstated", frame=str(frame)))
+    axes = None if frame.axes == "base" else np.asarray(poses[frame.axes].rotation)
+    return Placement(frame, axes, np.asarray(poses[frame.point].translation), tuple(remarks))
 
 
 def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wrench:
@@ -80,39 +71,50 @@ def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wre
 
     Raises:
         MissingSignalError: If the log has none, or one that is zero throughout.
-        ParameterError: If its frame is not one there is.
+        ParameterError: If its frame is not one that is known here.
     """
     values = recording.require("wrench")
     if not np.any(values):
         raise MissingSignalError(
             f"{recording.name}: the log's wrench is zero in every sample, so it measures nothing"
         )
-    how = stated(recording.wrench_frame, mounting)
+    where = placement(recording.wrench_frame, mounting)
     flange = link_poses(chain, recording.q).rotation[:, -1]
-    turned = how.sign * values
-    if how.axes == "base":
-        lever = lever_of(how.point, mounting)
-        there = np.einsum("tij,j->ti", flange, lever)
-        moment = turned[:, 3:] + np.cross(there, turned[:, :3])
-        moved: Array = np.concatenate([turned[:, :3], moment], axis=1)
-    else:
-        known = mounting if mounting.sensor is not None else mounting._replace(sensor=IDENTITY)
-        moved = np.einsum("tij,tj->ti", to_base(how.axes, flange, known), turned)
-    return Wrench(name="log", t=recording.t, values=moved, frame="base", remarks=how.notes)
+    force, moment = where.frame.factor * values[:, :3], where.frame.factor * values[:, 3:]
+    if where.axes is not None:
+        turn = flange @ where.axes
+        force, moment = (np.einsum("tij,tj->ti", turn, part) for part in (force, moment))
+    # The force acts at the point, so about the flange it has the moment of its lever besides.
+    moment = moment + np.cross(flange @ where.point, force)
+    return Wrench(
+        name="log",
+        t=recording.t,
+        values=np.concatenate([force, moment], axis=1),
+        frame="base",
+        remarks=where.remarks,
+    )
 
 
-def lever_of(point: str, mounting: Mounting) -> Array:
-    """Position of a reference point in the flange frame. (3,) [m]"""
-    pose = {"tool": mounting.tool, "sensor": mounting.sensor}.get(point)
-    return np.zeros(3) if pose is None else np.asarray(pose.translation)
+def sensor_reading_of(recording: Recording, option: str) -> Array:
+    """The log's wrench as force on the robot in sensor axes, for what only a sensor's axes tell.
 
+    Args:
+        recording: The log.
+        option: The option that needs it, for the message.
 
-def in_sensor_axes(wrench: Wrench, chain: Chain, q: Array, mounting: Mounting) -> Array:
-    """A wrench in base axes about the flange, as a sensor in its place reads it. (T, 6)"""
-    sensor = mounting.sensor if mounting.sensor is not None else IDENTITY
-    flange = link_poses(chain, q).rotation[:, -1]
-    force = np.einsum("tji,tj->ti", flange, wrench.values[:, :3])
-    moment = np.einsum("tji,tj->ti", flange, wrench.values[:, 3:])
-    back = np.linalg.inv(adjoint(sensor))
-    read: Array = np.concatenate([force, moment], axis=1) @ back.T
-    return read
+    Returns:
+        Force, then moment. (T, 6) [N, N·m]
+
+    Raises:
+        MissingSignalError: If the log has no wrench.
+        ParameterError: If the log states other axes than a sensor's.
+    """
+    values = recording.require("wrench")
+    frame = recording.wrench_frame or UNSTATED
+    if frame.axes != "sensor":
+        raise ParameterError(
+            f"{option}: the log's wrench is in {frame}, not in sensor axes; name it with --columns "
+            "wrench[sensor]=…, or leave the option out"
+        )
+    reading: Array = frame.factor * values
+    return reading

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from vftcli.signals.arrays import Array, frozen, is_uniform
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import Pose, rpy_angles, skew
+from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import bridged, median_step, resampled
 from vftcli.virtual_sensor.solvers import SCALE
 
@@ -212,24 +213,26 @@ def comparable(series: Array) -> Array:
     return centred / SCALE if series.shape[1] == len(SCALE) else centred
 
 
-def described(fit: PoseFit) -> str:
-    """A fitted pose in words."""
-    x, y, z = fit.pose.translation * 1e3
-    roll, pitch, yaw = np.degrees(rpy_angles(fit.pose.rotation))
-    sx, sy, sz = fit.position_sd * 1e3
-    return (
-        f"sensor pose found from the log: x, y, z = {x:.1f} ± {sx:.1f}, {y:.1f} ± {sy:.1f}, "
-        f"{z:.1f} ± {sz:.1f} mm; roll, pitch, yaw = {roll:.1f}, {pitch:.1f}, {yaw:.1f}°; "
-        f"{fit.force_rms:.3g} N and {fit.moment_rms:.3g} N·m rms stay unexplained"
+def pose_remark(fit: PoseFit) -> Remark:
+    """A fitted pose as a remark."""
+    return fact(
+        "sensor-pose-fitted",
+        position_mm=(fit.pose.translation * 1e3).tolist(),
+        position_sd_mm=(fit.position_sd * 1e3).tolist(),
+        angles_deg=np.degrees(rpy_angles(fit.pose.rotation)).tolist(),
+        force_rms_N=fit.force_rms,
+        moment_rms_Nm=fit.moment_rms,
     )
 
 
-def tool_words(weight: ToolWeight) -> str:
-    """An identified tool in words."""
-    com = ", ".join(f"{value * 1e3:.1f}" for value in weight.com)
-    return (
-        f"the sensor weighs {weight.mass:.3f} ± {weight.mass_sd:.3f} kg at ({com}) mm in its own "
-        f"axes; weight and zero are removed ({weight.force_rms:.3g} N rms stay over the poses)"
+def tool_remark(weight: ToolWeight) -> Remark:
+    """An identified tool as a remark."""
+    return fact(
+        "sensor-tool-weighed",
+        mass_kg=weight.mass,
+        mass_sd_kg=weight.mass_sd,
+        com_mm=(weight.com * 1e3).tolist(),
+        force_rms_N=weight.force_rms,
     )
 
 

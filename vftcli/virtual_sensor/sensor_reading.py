@@ -28,6 +28,7 @@ from vftcli.virtual_sensor.torque_error import (
 from vftcli.virtual_sensor.vendor import VendorCheck, check_vendor
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 from vftcli.virtual_sensor.zero import (
+    NO_START,
     SETTLING,
     Drift,
     change,
@@ -283,10 +284,7 @@ def zero_spans(request: WrenchChoice, wrenches: Sequence[Wrench]) -> tuple[Spans
     if not request.zero.start:
         return (), () if start is None else (start,)
     if start is None:
-        raise ParameterError(
-            "--zero start: the log has no unloaded start of half a second in a regular pose; give "
-            "the unloaded span as --zero A:B, or a free run as --zero LOG"
-        )
+        raise ParameterError(NO_START)
     return (start,), ()
 
 

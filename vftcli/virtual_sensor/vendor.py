@@ -163,7 +163,7 @@ def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorChec
     theirs = recording.wrench
     if theirs is None:
         return None
-    said = recording.wrench_frame or "frame not stated"
+    said = str(recording.wrench_frame or "frame not stated")
     empty = ~np.any(theirs, axis=1)
     zeros = float(np.mean(empty))
     norm = np.linalg.norm(ours.force[empty & ~ours.hidden], axis=1)

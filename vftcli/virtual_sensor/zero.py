@@ -6,8 +6,10 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask, frozen
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.remarks import Note
 from vftcli.signals.series import runs_of
 from vftcli.signals.wrench import AXES, Wrench, unit_of
+from vftcli.virtual_sensor.choice import ZeroChoice
 
 SETTLING = 1.0
 """Start of a log that is left out of an unloaded start: observers rise from zero. [s]"""
@@ -20,6 +22,11 @@ FORCE_STEP, MOMENT_STEP = 3.0, 0.6
 
 BACK = 0.3
 """An unloaded start ends this long before the load shows: it began to rise earlier. [s]"""
+
+NO_START = (
+    "--zero start: the log has no unloaded start of half a second in a regular pose; give "
+    "the unloaded span as --zero A:B, or a free run as --zero LOG"
+)
 
 SPREADS = 6.0
 """A departure of so many robust standard deviations counts as load."""
@@ -97,6 +104,28 @@ def without_drift(wrench: Wrench, drift: Drift) -> Wrench:
     return replace(
         wrench, values=wrench.values - drift.mean, remarks=(*wrench.remarks, removed.sentence())
     )
+
+
+def zeroed(wrench: Wrench, choice: ZeroChoice) -> tuple[Wrench, tuple[Note, ...]]:
+    """A wrench less its mean over the first span of a choice, or over its own unloaded start.
+
+    For a wrench that no observer made, as a sensor's: a free run tells nothing of its zero.
+
+    Raises:
+        ParameterError: If the zero is to be a log, or the span holds no known samples.
+    """
+    if choice.log is not None:
+        raise ParameterError(
+            "--zero LOG removes what an observer reads in a free run; for this wrench give the "
+            "unloaded span as --zero A:B, or --zero start"
+        )
+    if not choice.of_log:
+        return wrench, ()
+    span = choice.spans[0] if choice.spans else unloaded_start(wrench)
+    if span is None:
+        raise ParameterError(NO_START)
+    drift = replace(zero_drift(wrench, span), removed=True)
+    return replace(wrench, values=wrench.values - drift.mean), (drift.sentence(),)
 
 
 def change(first: Drift, last: Drift) -> str:

@@ -9,6 +9,7 @@ from vftcli.outputs.log.conversion import WRITERS, convert
 from vftcli.readers import read
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import JOINT_SIGNALS, Recording, Source
+from vftcli.signals.wrench import WrenchFrame
 
 NANOSECOND = 1e-9
 
@@ -21,7 +22,7 @@ def full(joints: int = 7, *, names: tuple[str, ...] = ()) -> Recording:
         t=0.004 * np.arange(samples),
         **signals,
         wrench=rng.normal(size=(samples, 6)),
-        wrench_frame="base axes at the flange",
+        wrench_frame=WrenchFrame("base", "tool", "by-robot"),
         joint_names=names,
         source=Source(t0=1_700_000_000.25, t0_ns=1_700_000_000_250_000_000),
     )

@@ -64,11 +64,12 @@ def write_parquet(recording: Recording, path: Path) -> None:
     import polars as pl
 
     table = pl.DataFrame(dict(columns_of(recording)))
+    frame = recording.wrench_frame
     told = {
         "format": recording.source.format,
         "sha256": recording.source.sha256,
         "joint_names": recording.joint_names,
-        "wrench_frame": recording.wrench_frame,
+        "wrench_frame": frame.notation if frame is not None else None,
         "robot": recording.robot_hint,
         "repairs": recording.source.repairs,
     }
@@ -119,8 +120,9 @@ def messages_of(recording: Recording, times: Any) -> Iterator[tuple[str, Any]]: 
             topic = f"/vftcli/{COLUMN_NAMES.get(name, name)}"
             yield topic, joint_states(times, names, None, None, value)
     if recording.wrench is not None:
-        frame = recording.wrench_frame or "unknown"
-        yield "/vftcli/wrench", wrenches(times, frame, recording.wrench)
+        frame = recording.wrench_frame
+        notation = frame.notation if frame is not None else ""
+        yield "/vftcli/wrench", wrenches(times, notation, recording.wrench)
 
 
 def joint_states(

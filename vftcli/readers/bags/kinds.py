@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from vftcli.signals.wrench import STIFFNESS_FRAME, WrenchFrame
+
 VECTORS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
 
@@ -19,7 +21,7 @@ class Kind:
         constants: Name → path of a number of which the last value counts.
         rank: Which type is preferred as the clock when two run at one rate; the larger.
         turned: Signals whose sign has to be turned.
-        wrench_frame: Meaning of the wrench in words.
+        wrench_frame: What is known of its wrench.
     """
 
     signals: Mapping[str, tuple[str, ...]]
@@ -29,10 +31,8 @@ class Kind:
     constants: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     rank: int = 0
     turned: frozenset[str] = frozenset()
-    wrench_frame: str | None = None
+    wrench_frame: WrenchFrame | None = None
 
-
-BY_ROBOT = "base axes at the stiffness frame K, as force BY the robot ON the environment"
 
 KINDS: dict[str, Kind] = {
     "sensor_msgs/JointState": Kind(
@@ -56,7 +56,7 @@ KINDS: dict[str, Kind] = {
         },
         rank=2,
         turned=frozenset({"tau_ext"}),
-        wrench_frame=BY_ROBOT,
+        wrench_frame=STIFFNESS_FRAME,
     ),
     "franka_msgs/FrankaRobotState": Kind(
         signals={
@@ -72,7 +72,7 @@ KINDS: dict[str, Kind] = {
         constants={"mass": ("inertia_load.inertia.m", "m_load"), "com": ("f_x_cload",)},
         rank=2,
         turned=frozenset({"tau_ext"}),
-        wrench_frame=BY_ROBOT,
+        wrench_frame=STIFFNESS_FRAME,
     ),
     "geometry_msgs/WrenchStamped": Kind(signals={"wrench": ("wrench",)}, frame="header.frame_id"),
 }

@@ -17,6 +17,7 @@ from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.series import median_step, resampled
+from vftcli.signals.wrench import WrenchFrame
 
 TARGETS = re.compile(r"desired|command|target|goal|reference", re.IGNORECASE)
 VENDOR_WRENCH = re.compile(r"franka|F_ext$|external_wrench", re.IGNORECASE)
@@ -85,19 +86,20 @@ def _take_wrench(
     times: Integers,
     notes: Notes,
     request: ReadChoice,
-) -> str | None:
-    """Put a sensor's wrench in place of the vendor's estimate; return its frame in words."""
+) -> WrenchFrame | None:
+    """Put a sensor's wrench in place of the vendor's estimate; return what is stated of it."""
     frame = lead.kind.wrench_frame
     sensor = _sensor(streams, lead)
     if sensor is None or "wrench" in _chosen(request):
         return frame
     if sensor.channel.topic.startswith(OWN):
-        return sensor.frame
+        return WrenchFrame.parsed(sensor.frame) if sensor.frame else None
     values = interpolated(sensor, "wrench", lead, times, notes)
     if values is None:
         return frame
     signals["wrench"] = values
-    return f"axes {sensor.frame or 'unknown'}, as force on the robot ({sensor.channel.topic})"
+    # A frame_id is a link's name, of which the moment's point is the origin.
+    return WrenchFrame(sensor.frame, sensor.frame) if sensor.frame else None
 
 
 def _tell_left(streams: Sequence[Stream], lead: Stream, notes: Notes) -> None:

@@ -1,0 +1,67 @@
+"""The wrench of a log: what it states of its frame, and what is known of its samples."""
+
+import numpy as np
+import pytest
+
+from vftcli.signals.errors import ParameterError, ShapeError
+from vftcli.signals.wrench import STIFFNESS_FRAME, Wrench, WrenchFrame
+
+
+@pytest.mark.parametrize(
+    ("text", "frame"),
+    [
+        ("base", WrenchFrame("base", "flange")),
+        ("sensor", WrenchFrame("sensor", "sensor")),
+        ("tool", WrenchFrame("tool", "tool")),
+        ("base@tool", WrenchFrame("base", "tool")),
+        (" base@stiffness , by-robot ", STIFFNESS_FRAME),
+        ("ft_link,on-robot", WrenchFrame("ft_link", "ft_link")),
+    ],
+)
+def test_a_frame_is_read_and_written(text: str, frame: WrenchFrame) -> None:
+    assert WrenchFrame.parsed(text) == frame
+    assert WrenchFrame.parsed(frame.notation) == frame
+
+
+@pytest.mark.parametrize("text", ["", "base@", "@tool", "base axes", "base,turned", "base@a b"])
+def test_what_is_no_frame(text: str) -> None:
+    with pytest.raises(ParameterError, match=r"not AXES\[@POINT\]"):
+        WrenchFrame.parsed(text)
+
+
+def test_a_frame_in_words() -> None:
+    assert str(STIFFNESS_FRAME) == (
+        "base axes at the stiffness frame K, as force BY the robot ON the environment"
+    )
+    assert (
+        str(WrenchFrame("base", "tool")) == "base axes at the tool's point, as force on the robot"
+    )
+
+
+def test_the_factor_turns_to_force_on_the_robot() -> None:
+    assert STIFFNESS_FRAME.factor == -1.0
+    assert WrenchFrame("base", "flange").factor == 1.0
+
+
+def wrench(masked: np.ndarray | None = None) -> Wrench:
+    values = np.arange(24.0).reshape(4, 6)
+    return Wrench(name="x", t=np.arange(4.0), values=values, frame="base", sd=values, masked=masked)
+
+
+def test_hidden_samples_are_not_known() -> None:
+    found = wrench(np.array([False, True, False, False]))
+    assert np.isnan(found.known[1]).all()
+    assert np.isnan(found.force[1]).all()
+    assert found.known_sd is not None
+    assert np.isnan(found.known_sd[1]).all()
+    np.testing.assert_array_equal(found.moment[2], [15, 16, 17])
+    np.testing.assert_array_equal(found.between(0.5, 2.0), [found.values[2]])
+
+
+def test_without_a_mask_all_is_known() -> None:
+    assert not wrench().hidden.any()
+
+
+def test_a_mask_has_one_entry_a_sample() -> None:
+    with pytest.raises(ShapeError, match="mask of x"):
+        wrench(np.zeros(3, dtype=bool))

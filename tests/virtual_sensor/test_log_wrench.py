@@ -1,0 +1,127 @@
+"""A log's own wrench: its axes, point and sign, and what is assumed where it states none."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from vftcli.evaluation.reference_sensor import sensor_reference
+from vftcli.robots import load_robot
+from vftcli.robots.kinematics import link_poses
+from vftcli.signals.errors import MissingSignalError, ParameterError
+from vftcli.signals.pose import Pose, rpy_matrix
+from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import WrenchFrame
+from vftcli.virtual_sensor.frames import Mounting
+from vftcli.virtual_sensor.log_wrench import logged_wrench, placement, sensor_reading_of
+
+UR5 = load_robot("ur5")
+SENSOR = Pose(rpy_matrix((0.1, -0.2, 0.8)), np.array([0.01, -0.02, 0.04]))
+TOOL = Pose(rpy_matrix((-0.4, 0.3, 1.1)), np.array([0.05, 0.0, 0.15]))
+MOUNTED = Mounting(tool=TOOL, sensor=SENSOR)
+ROUNDING = 1e-12  # products of rotations and levers with forces of up to 30 N
+
+rng = np.random.default_rng(4)
+Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + rng.normal(0.0, 0.3, (30, 6))
+READ = rng.normal(0.0, 10.0, (30, 6))
+FLANGE = link_poses(UR5.chain, Q).rotation[:, -1]
+
+
+def log(frame: WrenchFrame | None, wrench: np.ndarray = READ) -> Recording:
+    """A log of 30 poses."""
+    return Recording(t=np.arange(30.0), q=Q, wrench=wrench, wrench_frame=frame)
+
+
+def in_base(frame: WrenchFrame | None, mounting: Mounting = MOUNTED) -> np.ndarray:
+    """The log's wrench in base axes about the flange point."""
+    return logged_wrench(log(frame), UR5.chain, mounting).values
+
+
+@pytest.mark.parametrize(
+    ("frame", "pose"),
+    [
+        (WrenchFrame("flange", "flange"), Pose(np.eye(3), np.zeros(3))),
+        (WrenchFrame("tool", "tool"), TOOL),
+        (WrenchFrame("sensor", "sensor"), SENSOR),
+        (WrenchFrame("flange", "tool"), Pose(np.eye(3), TOOL.translation)),
+        (WrenchFrame("tool", "sensor"), Pose(TOOL.rotation, SENSOR.translation)),
+    ],
+)
+def test_axes_and_point_of_the_flange_are_pinocchios_action(frame, pose) -> None:
+    there = pin.SE3(pose.rotation, pose.translation)
+    for found, R, read in zip(in_base(frame), FLANGE, READ, strict=True):
+        expected = (pin.SE3(R, np.zeros(3)) * there).act(pin.Force(read[:3], read[3:])).vector
+        np.testing.assert_allclose(found, expected, atol=ROUNDING)
+
+
+@pytest.mark.parametrize(
+    ("point", "lever"),
+    [
+        ("flange", np.zeros(3)),
+        ("tool", TOOL.translation),
+        ("stiffness", TOOL.translation),
+        ("sensor", SENSOR.translation),
+    ],
+)
+def test_in_base_axes_only_the_moment_moves(point: str, lever: np.ndarray) -> None:
+    found = in_base(WrenchFrame("base", point))
+    np.testing.assert_array_equal(found[:, :3], READ[:, :3])
+    moment = READ[:, 3:] + np.cross(FLANGE @ lever, READ[:, :3])
+    np.testing.assert_allclose(found[:, 3:], moment, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("axes", ["base", "sensor"])
+def test_a_force_by_the_robot_is_turned(axes: str) -> None:
+    by = in_base(WrenchFrame(axes, axes if axes == "sensor" else "flange", "by-robot"))
+    on = in_base(WrenchFrame(axes, axes if axes == "sensor" else "flange"))
+    np.testing.assert_array_equal(by, -on)
+
+
+def test_one_contact_in_every_frame_is_one_joint_torque() -> None:
+    base = in_base(WrenchFrame("sensor", "sensor"))
+    sensor = sensor_reference(log(WrenchFrame("sensor", "sensor")), UR5, MOUNTED).torque.tau
+    frame = WrenchFrame("base", "flange", "by-robot")
+    same = sensor_reference(log(frame, -base), UR5, Mounting()).torque.tau
+    np.testing.assert_allclose(same, sensor, atol=1e-11)
+
+
+def codes(frame: WrenchFrame | None, mounting: Mounting) -> list[str]:
+    """The codes of what had to be assumed."""
+    return [remark.code for remark in placement(frame, mounting).remarks]
+
+
+def test_what_is_not_stated_is_assumed_aloud() -> None:
+    assert codes(None, MOUNTED) == ["wrench-frame-unstated"]
+    assert codes(None, Mounting()) == ["wrench-frame-unstated", "sensor-pose-unstated"]
+    assert codes(WrenchFrame("base", "stiffness"), Mounting()) == ["tool-pose-unstated"]
+    assert codes(WrenchFrame("tool", "tool"), Mounting(sensor=SENSOR)) == ["tool-pose-unstated"]
+    assert codes(WrenchFrame("base", "flange"), Mounting()) == []
+    assert codes(WrenchFrame("tool", "sensor"), MOUNTED) == []
+    np.testing.assert_array_equal(in_base(None), in_base(WrenchFrame("sensor", "sensor")))
+
+
+def test_the_flange_stands_for_a_tool_that_is_not_known() -> None:
+    flange = in_base(WrenchFrame("flange", "flange"), Mounting())
+    np.testing.assert_array_equal(in_base(WrenchFrame("tool", "tool"), Mounting()), flange)
+
+
+@pytest.mark.parametrize("frame", [WrenchFrame("world", "flange"), WrenchFrame("base", "wrist")])
+def test_a_frame_that_is_not_known_is_refused(frame: WrenchFrame) -> None:
+    with pytest.raises(ParameterError, match=r"no frame known here.*flange, base, tool, sensor"):
+        placement(frame, MOUNTED)
+
+
+def test_a_wrench_of_zeros_is_no_reference() -> None:
+    with pytest.raises(MissingSignalError, match="zero in every sample"):
+        logged_wrench(log(None, np.zeros((30, 6))), UR5.chain, Mounting())
+    with pytest.raises(MissingSignalError, match="no wrenches"):
+        logged_wrench(Recording(t=np.arange(30.0), q=Q), UR5.chain, Mounting())
+
+
+def test_only_sensor_axes_tell_a_sensors_pose_and_weight() -> None:
+    by = WrenchFrame("sensor", "sensor", "by-robot")
+    np.testing.assert_array_equal(sensor_reading_of(log(by), "--sensor-weight"), -READ)
+    np.testing.assert_array_equal(sensor_reading_of(log(None), "--sensor-weight"), READ)
+    with pytest.raises(
+        ParameterError, match=r"--sensor-weight: .* in base axes .*wrench\[sensor\]"
+    ):
+        sensor_reading_of(log(WrenchFrame("base", "flange")), "--sensor-weight")
