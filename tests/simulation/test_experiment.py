@@ -11,8 +11,8 @@ from vftcli.robots import load_robot
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.simulation import Arm, Simulation, load_scenario, observe, prepare, simulate
+from vftcli.simulation.experiment import simulate_pair
 from vftcli.simulation.mismatch import build_arm
-from vftcli.simulation.pairs import simulate_pair
 from vftcli.simulation.saving import save
 from vftcli.simulation.writers.flange import flange_signals, force_estimate
 

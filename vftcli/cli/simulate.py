@@ -61,8 +61,8 @@ def simulate_log(
     import json as json_module
 
     from vftcli.simulation import load_scenario
+    from vftcli.simulation.experiment import simulate_pair
     from vftcli.simulation.load import listing
-    from vftcli.simulation.pairs import simulate_pair
     from vftcli.simulation.saving import check_target, free_path, save
 
     if scenario == "list":

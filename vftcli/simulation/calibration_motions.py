@@ -1,7 +1,9 @@
 """Motions for identification: poses at rest, single-joint sweeps, optimised excitation."""
 
+import tomllib
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -11,6 +13,10 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.kinematics import check_start, flange_pose
 from vftcli.simulation.motion import Command, Periodic, Stretches
+from vftcli.simulation.schema import unknown
+
+EXCITATIONS = Path(__file__).parent / "scenarios" / "excitation"
+"""Optimised trajectories, a file a robot."""
 
 TABLE = 0.15
 """Least height of the flange in poses that are drawn. [m]"""
@@ -133,17 +139,7 @@ class ExcitationSpec:
     def motion(self, robot: Robot) -> Command:
         """The stated series, or the one optimised for `robot`."""
         if not self.mean:
-            from vftcli.simulation.excitation import optimised
-
-            best = optimised(robot.name)
-            period = self.period or best.period
-            return Periodic(
-                period=period,
-                cycles=self.cycles,
-                mean=best.mean,
-                cosine=best.cosine,
-                sine=best.sine,
-            )
+            return optimised_excitation(robot.name, self.period, self.cycles)
         check_start(robot, self.mean)
         shape = (len(self.cosine), robot.joints)
         cosine, sine = np.array(self.cosine), np.array(self.sine)
@@ -159,3 +155,32 @@ class ExcitationSpec:
             cosine=cosine,
             sine=sine,
         )
+
+
+def optimised_excitation(robot: str, period: float, cycles: float) -> Periodic:
+    """The trajectory optimised for a built-in robot.
+
+    The condition number of the base regressor was made small, inside the limits, as in J. Swevers
+    et al., "Optimal robot excitation and identification", IEEE Trans. Robotics and Automation 13
+    (1997).
+
+    Args:
+        robot: Name of the profile.
+        period: Time of one round; 0 takes the one it was optimised for. [s]
+        cycles: Rounds.
+
+    Raises:
+        ParameterError: If there is none for the robot.
+    """
+    path = EXCITATIONS / f"{robot}.toml"
+    if not path.is_file():
+        there = sorted(p.stem for p in EXCITATIONS.glob("*.toml"))
+        raise ParameterError(
+            unknown(f"optimised excitation for robot {robot!r}", robot, there)
+            + " Give trajectory.period, mean, cosine and sine yourself."
+        )
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    mean, cosine, sine = (np.array(table[key]) for key in ("mean", "cosine", "sine"))
+    return Periodic(
+        period=period or table["period"], cycles=cycles, mean=mean, cosine=cosine, sine=sine
+    )

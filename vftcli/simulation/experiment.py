@@ -1,7 +1,7 @@
 """One simulated experiment from scenario and seed to the log and its truth."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,9 @@ MOST_STEPS = 2_000_000
 """Most inner steps of a run: half an hour at 1 ms, a gigabyte of history."""
 REPORT_STEPS = 500
 """Inner steps between two reports of progress."""
+
+PAIR_SEED = 1_000_003
+"""Offset between the seeds of the two runs' sensors, so that their noise differs."""
 
 Progress = Callable[[int, int], None]
 """Called with the steps done and the steps in all."""
@@ -126,7 +129,7 @@ def simulate(
     Args:
         scenario: The experiment.
         seed: Seed of everything drawn; the scenario's own if not given.
-        progress: ContactScore how far the run is.
+        progress: Told now and then how far the run is.
         noise_seed: Seed of the sensors alone, for another log of the same arm and contacts.
 
     Raises:
@@ -161,3 +164,22 @@ def observe(arm: Arm) -> Simulation:
         force_sensor=read_force_sensor(arm, samples, truth),
         truth=truth,
     )
+
+
+def simulate_pair(
+    scenario: Scenario, seed: int | None = None, progress: Progress | None = None
+) -> list[Simulation]:
+    """Run an experiment, and if it is one of a pair also the free run of the same arm.
+
+    The free run has the same arm and motion, no payload and no contacts; its noise differs.
+
+    Raises:
+        ParameterError: If a pair has nothing to leave out, or the scenario is impossible.
+    """
+    run = simulate(scenario, seed, progress)
+    if not scenario.pair:
+        return [run]
+    if scenario.payload is None and not scenario.contacts:
+        raise ParameterError("pair = true needs a payload or contacts that the free run lacks")
+    free = replace(scenario, payload=None, contacts=(), pair=False)
+    return [run, simulate(free, run.seed, progress, noise_seed=run.seed + PAIR_SEED)]

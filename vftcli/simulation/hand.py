@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.contact import ORIGIN, Place, Vector
+from vftcli.simulation.pushes import ORIGIN, Place, Vector
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from vftcli.simulation.contacts import ContactSpec
+from vftcli.simulation.touch import ContactSpec
 from vftcli.simulation.trajectories import HoldSpec, TrajectorySpec
 
 Vector = tuple[float, float, float]

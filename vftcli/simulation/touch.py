@@ -1,6 +1,7 @@
 """Contacts mounted on the arm: where they act, what they exert, and the joint torque of it."""
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -8,8 +9,34 @@ from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import cross
-from vftcli.simulation.contact import Place, Touch
-from vftcli.simulation.contacts import ContactSpec, RandomWalkSpec, WrenchSpec
+from vftcli.simulation.hand import HandSpec
+from vftcli.simulation.hard_stop import StopSpec
+from vftcli.simulation.pushes import LoadSpec, Place, ProfileSpec, PushesSpec, Touch
+
+
+@dataclass(frozen=True, kw_only=True)
+class RandomWalkSpec:
+    """Joint torques that walk at random, the disturbance model of the Kalman observers.
+
+    Attributes:
+        name: Name of the contact.
+        intensity: Variance gained a second: Q_τ; one number or one a joint. [(N·m)²/s]
+        initial: Standard deviation at the start. [N·m]
+        begin: The walk is zero before this. [s]
+    """
+
+    KIND: ClassVar[str] = "random-walk"
+    name: str
+    intensity: tuple[float, ...]
+    initial: float = 0.0
+    begin: float = 0.0
+
+
+WrenchSpec = ProfileSpec | PushesSpec | HandSpec | LoadSpec | StopSpec
+"""Contacts that act with a wrench on a link, told apart by their `kind`."""
+
+ContactSpec = WrenchSpec | RandomWalkSpec
+"""Every kind of ``[[contacts]]`` a scenario can have."""
 
 
 class Mounted(NamedTuple):
