@@ -1,7 +1,6 @@
 """Conversion: any log as a flat Parquet or CSV table, or as an MCAP that ROS 2 viewers open."""
 
 import json
-import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -9,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from vftcli.outputs.files import atomic
+from vftcli.outputs.log.mcap_output import OutputTopic, joint_topic, stamps_of, write_topics
+from vftcli.readers.bags.ros_messages import Value, in_parts
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
-
-AXES = ("fx", "fy", "fz", "mx", "my", "mz")
+from vftcli.signals.wrench import AXES
 
 COLUMN_NAMES = {"torque": "tau"}
 """Signals whose columns are called otherwise than the field of a Recording."""
@@ -84,140 +84,32 @@ def write_csv(recording: Recording, path: Path) -> None:
 
 
 def write_mcap(recording: Recording, path: Path) -> None:
-    """Write a ros2-profile MCAP: /joint_states, and one /vftcli/… topic for each further signal.
+    """Write a ros2-profile MCAP: /joint_states, and one /vftcli/… topic for each further signal."""
+    write_topics(path, stamps_of(recording), topics(recording))
+
+
+def topics(recording: Recording) -> Iterator[OutputTopic]:
+    """The topics of a log.
 
     The effort of /joint_states is the torque, or the motor current of a log that has no torque, as
     UR's driver publishes it.
     """
-    from mcap.writer import CompressionType, Writer
-
-    times = source_stamps(recording)
-    times -= min(int(times[0]), 0)  # stamps of a message cannot lie before 1970
-    with path.open("wb") as file:
-        writer = Writer(file, compression=CompressionType.ZSTD)
-        writer.start(profile="ros2", library="vftcli")
-        joint_state = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", JOINT_STATE)
-        wrench = writer.register_schema("geometry_msgs/msg/WrenchStamped", "ros2msg", WRENCH)
-        topics = []
-        for topic, content in messages_of(recording, times):
-            schema = wrench if topic.endswith("/wrench") else joint_state
-            channel = writer.register_channel(topic, "cdr", schema)
-            topics.append((channel, content))
-        for k, time in enumerate(times.tolist()):
-            for channel, content in topics:
-                writer.add_message(channel, time, content[k].tobytes(), time, k)
-        writer.finish()
-
-
-def messages_of(recording: Recording, times: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
-    """Topic and serialised messages, one row of bytes each. (T, length)"""
     names = recording.joint_names or tuple(f"joint_{j + 1}" for j in range(recording.joints))
     effort = recording.torque if recording.torque is not None else recording.current
-    yield "/joint_states", joint_states(times, names, recording.q, recording.dq, effort)
+    yield joint_topic("/joint_states", names, recording.q, recording.dq, effort)
     for name in JOINT_SIGNALS:
         value = getattr(recording, name)
         if value is not None and name not in {"q", "dq"}:
-            topic = f"/vftcli/{COLUMN_NAMES.get(name, name)}"
-            yield topic, joint_states(times, names, None, None, value)
+            yield joint_topic(f"/vftcli/{COLUMN_NAMES.get(name, name)}", names, effort=value)
     if recording.wrench is not None:
         frame = recording.wrench_frame
-        notation = frame.notation if frame is not None else ""
-        yield "/vftcli/wrench", wrenches(times, notation, recording.wrench)
+        values: dict[str, Value] = {
+            "header.frame_id": frame.notation if frame is not None else "",
+            **in_parts("wrench.force", "xyz", recording.wrench[:, :3]),
+            **in_parts("wrench.torque", "xyz", recording.wrench[:, 3:]),
+        }
+        yield OutputTopic("/vftcli/wrench", "geometry_msgs/WrenchStamped", values)
 
-
-def joint_states(
-    times: Any,  # noqa: ANN401
-    names: tuple[str, ...],
-    position: Array | None,
-    velocity: Array | None,
-    effort: Array | None,
-) -> Any:  # noqa: ANN401
-    """Serialised JointState messages, all of one layout. (T, length)"""
-    head = header("") + text_list(names)
-    blocks: list[tuple[int, Array]] = []
-    for value in (position, velocity, effort):
-        head += padding(head, 4) + struct.pack("<I", 0 if value is None else value.shape[1])
-        if value is not None:
-            head += padding(head, 8)
-            blocks.append((len(head), value))
-            head += bytes(8 * value.shape[1])
-    return patched(head, times, blocks)
-
-
-def wrenches(times: Any, frame: str, wrench: Array) -> Any:  # noqa: ANN401
-    """Serialised WrenchStamped messages. (T, length)"""
-    head = header(frame)
-    head += padding(head, 8)
-    return patched(head + bytes(48), times, [(len(head), wrench)])
-
-
-def patched(template: bytes, times: Any, blocks: list[tuple[int, Array]]) -> Any:  # noqa: ANN401
-    """The template once a sample, with its stamp and numbers put in. (T, length)"""
-    rows = np.tile(np.frombuffer(template, dtype=np.uint8), (len(times), 1))
-    stamps = np.empty((len(times), 2), dtype="<i4")
-    stamps[:, 0], stamps[:, 1] = times // 10**9, times % 10**9
-    rows[:, 4:12] = stamps.view(np.uint8)
-    for start, value in blocks:
-        numbers = np.ascontiguousarray(value, dtype="<f8").view(np.uint8)
-        rows[:, start : start + 8 * value.shape[1]] = numbers
-    return rows
-
-
-def header(frame: str) -> bytes:
-    """Encapsulation (CDR, little endian), an empty stamp and the frame's name."""
-    return b"\0\1\0\0" + bytes(8) + text(frame)
-
-
-def text(value: str) -> bytes:
-    """A CDR string: its length with the closing zero, then its bytes."""
-    raw = value.encode()[:200] + b"\0"
-    return struct.pack("<I", len(raw)) + raw
-
-
-def text_list(values: tuple[str, ...]) -> bytes:
-    """A CDR sequence of strings; aligned after a header without a frame."""
-    content = header("")
-    start = len(content)
-    content += padding(content, 4) + struct.pack("<I", len(values))
-    for value in values:
-        content += padding(content, 4) + text(value)
-    return content[start:]
-
-
-def padding(content: bytes, size: int) -> bytes:
-    """Zeros up to the next multiple of `size`, counted after the encapsulation."""
-    return bytes(-(len(content) - 4) % size)
-
-
-SEPARATOR = "=" * 80
-HEADER = f"""{SEPARATOR}
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-{SEPARATOR}
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
-JOINT_STATE = f"""std_msgs/Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-{HEADER}""".encode()
-WRENCH = f"""std_msgs/Header header
-geometry_msgs/Wrench wrench
-{HEADER}{SEPARATOR}
-MSG: geometry_msgs/Wrench
-geometry_msgs/Vector3 force
-geometry_msgs/Vector3 torque
-{SEPARATOR}
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-""".encode()
-"""Definitions of the two message types, as a ros2-profile MCAP carries them."""
 
 WRITERS: dict[str, Callable[[Recording, Path], None]] = {
     ".parquet": write_parquet,
