@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from vftcli.outputs.arm import arm_length, capsules, flange_force, motion
+from vftcli.outputs.arm import arm_length, capsules, motion
 from vftcli.robots import PROFILES, load_robot
-from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.robots.kinematics import link_poses
 
 
 @pytest.mark.parametrize("name", PROFILES)
@@ -26,25 +26,3 @@ def test_motion_follows_the_log_at_its_rate() -> None:
     poses = motion(chain, t, q, 50.0)
     np.testing.assert_allclose(np.diff(poses.t), 0.02, atol=1e-9)
     np.testing.assert_array_equal(poses.translation, link_poses(chain, q[::20]).translation)
-
-
-@pytest.mark.parametrize("name", ["ur5", "panda"])
-def test_a_push_at_the_flange_is_found(name: str) -> None:
-    robot = load_robot(name)
-    q = np.random.default_rng(2).uniform(-1.5, -0.5, (50, robot.joints))
-    wrench = np.array([10.0, -20.0, 5.0, 0.5, 0.2, -0.1])
-    tau = np.einsum("sij,i->sj", flange_jacobian(robot.chain, q), wrench)
-    force = flange_force(robot.chain, q, tau)
-    told = np.all(np.isfinite(force), axis=1)
-    assert told.any()
-    # 1/σ_min ≤ 20 times rounding of torques of some 10 N·m
-    np.testing.assert_allclose(force[told], np.tile(wrench[:3], (told.sum(), 1)), atol=1e-10)
-
-
-def test_a_singular_pose_has_no_force() -> None:
-    """A UR5 stretched out straight (q₃ = 0) cannot feel a push along the arm."""
-    chain = load_robot("ur5").chain
-    q = np.array([[0.0, -1.0, 0.0, 0.3, 1.2, 0.0], [0.0, -1.0, 1.0, 0.3, 1.2, 0.0]])
-    force = flange_force(chain, q, np.ones((2, 6)))
-    assert np.all(np.isnan(force[0]))
-    assert np.all(np.isfinite(force[1]))

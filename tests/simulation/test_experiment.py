@@ -14,7 +14,8 @@ from vftcli.simulation import Arm, Simulation, load_scenario, observe, prepare, 
 from vftcli.simulation.experiment import simulate_pair
 from vftcli.simulation.mismatch import build_arm
 from vftcli.simulation.saving import save
-from vftcli.simulation.writers.flange import flange_signals, force_estimate
+from vftcli.simulation.writers.flange import flange_signals
+from vftcli.virtual_sensor.solvers import wrench_of
 
 EXACT = [
     *(f"mismatch.{k}=0" for k in ("mass", "com", "rotor_inertia", "friction", "torque_constant")),
@@ -228,7 +229,7 @@ def test_bearing_weighs_what_it_should_and_the_arm_does_not_chatter() -> None:
     log = run.recording
     tau = MomentumObserver(gain=30.0).estimate(dynamics_terms(log, run.robot)).tau
     flange = flange_signals(run.robot.model, log.q, log.require("dq"))
-    wrench, _ = force_estimate(flange.jacobian, tau)
+    wrench, _ = wrench_of(tau, flange.jacobian)
     moving, hung = (log.t > 0.6) & (log.t < 3.4), (log.t > 5.0) & (log.t < 8.5)
     assert rms(wrench[moving])[2] < 0.6
     # required 2 %; the noise of a mean over 3.5 s is 0.01 N

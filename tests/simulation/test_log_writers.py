@@ -12,7 +12,6 @@ from vftcli.signals.errors import OutputError, ParameterError
 from vftcli.simulation import Simulation, load_scenario, simulate
 from vftcli.simulation.saving import companions, save
 from vftcli.simulation.writers import WRITERS
-from vftcli.simulation.writers.flange import force_estimate
 
 LOSSY = ["duration=2.0", "sensing.repeated=0.02", "sensing.dropped=0.02"]
 
@@ -140,13 +139,3 @@ def test_a_robot_logs_only_in_its_own_formats(
 
 def test_every_writer_is_tried() -> None:
     assert {form for _, form, _, _ in CASES} == set(WRITERS)
-
-
-def test_force_estimate_inverts_the_jacobian_where_it_can() -> None:
-    rng = np.random.default_rng(2)
-    J, wrench = rng.standard_normal((20, 6, 7)), rng.standard_normal((20, 6))
-    tau = np.einsum("kij,ki->kj", J, wrench)
-    found, regular = force_estimate(J, tau)
-    # random matrices: condition below 1e3
-    np.testing.assert_allclose(found[regular], wrench[regular], atol=1e-10)
-    assert np.count_nonzero(regular) > 10

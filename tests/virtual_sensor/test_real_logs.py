@@ -109,7 +109,7 @@ def test_the_pandas_wrench_is_the_atis(logs: Path) -> None:
         for prefix in ("tau_ext_", "jacobian_", "ft_force_", "panda_wrench_force_")
     }
     jacobian = columns["jacobian_"].reshape(-1, 6, 7)
-    ours, _, _ = wrench_of(columns["tau_ext_"], jacobian)
+    ours, _ = wrench_of(columns["tau_ext_"], jacobian)
     ati = fit_axes(ours[:, :3], columns["ft_force_"])
     assert ati.words == "+x +z −y"
     turned, measured = ours[:, :3] @ ati.matrix.T, columns["ft_force_"]

@@ -16,6 +16,7 @@ from vftcli.virtual_sensor.solvers import (
     SOLVERS,
     decompose,
     null_space,
+    wrench_of,
 )
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
@@ -164,6 +165,39 @@ def test_a_tip_wrench_leaves_the_null_space_and_a_link_wrench_does_not(robot: st
     # a 44 N push on link 4; in some poses its torque happens to be that of some tip wrench
     assert np.median(moved) > 0.1
     assert np.max(moved) > 1.0
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_a_push_at_the_flange_is_found_from_a_given_jacobian(name: str) -> None:
+    robot = load_robot(name)
+    q = np.random.default_rng(2).uniform(-1.5, -0.5, (50, robot.joints))
+    wrench = np.array([10.0, -20.0, 5.0, 0.5, 0.2, -0.1])
+    J = flange_jacobian(robot.chain, q)
+    values, regular = wrench_of(np.einsum("sij,i->sj", J, wrench), J)
+    assert regular.any()
+    # λ = σ² ≥ .0025 m² of up to 3 m²: κ² times the rounding of torques of some 10 N·m
+    expected = np.tile(wrench, (np.count_nonzero(regular), 1))
+    np.testing.assert_allclose(values[regular], expected, atol=1e-10)
+
+
+def test_directions_that_are_left_out_read_nothing_and_the_others_stay() -> None:
+    """Against the SVD with its small singular values cut, the textbook's way to the same."""
+    rng = np.random.default_rng(5)
+    J, tau = rng.standard_normal((60, 6, 6)), rng.standard_normal((60, 6))
+    found = wrench_of(tau, J, left_out=0.3).values
+    U, s, Vt = np.linalg.svd(SCALE[:, None] * J)
+    cut = np.where(s > 0.3, 1.0 / s, 0.0)
+    expected = SCALE * np.einsum("kij,kj->ki", U, cut * np.einsum("kij,kj->ki", Vt, tau))
+    assert np.any(cut == 0.0)
+    np.testing.assert_allclose(found, expected, atol=1e-10)
+
+
+def test_a_stretched_arm_cannot_tell_a_push_along_itself() -> None:
+    """A UR5 with q₃ = 0; any torque is still answered, for the plots of a blow-up."""
+    q = np.array([[0.0, -1.0, 0.0, 0.3, 1.2, 0.0], [0.0, -1.0, 1.0, 0.3, 1.2, 0.0]])
+    found = wrench_of(np.ones((2, 6)), flange_jacobian(load_robot("ur5").chain, q))
+    np.testing.assert_array_equal(found.told, [False, True])
+    assert np.all(np.isfinite(found.values))
 
 
 def test_six_joints_have_no_null_space_channel() -> None:

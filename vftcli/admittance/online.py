@@ -8,7 +8,7 @@ from vftcli.observers.kalman import KalmanObserver
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
-from vftcli.virtual_sensor.solvers import LEAST_SIGMA, SCALE
+from vftcli.virtual_sensor.solvers import wrench_of
 
 
 class OnlineKalman:
@@ -80,7 +80,5 @@ class OnlineKalman:
         pin, model, data = self.pin, self.model, self.data
         frame = model.getFrameId("flange")
         J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
-        if np.linalg.svd(J * SCALE[:, None], compute_uv=False)[-1] < LEAST_SIGMA:
-            return np.zeros(6)
-        found: Array = np.linalg.pinv(J.T) @ self.tau
-        return found
+        found = wrench_of(self.tau[None], J[None])
+        return found.values[0] if found.told[0] else np.zeros(6)

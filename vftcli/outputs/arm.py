@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.robots.chain import Chain
-from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.pose import matrix_quaternion
 
@@ -14,12 +14,6 @@ THICKNESS = (0.048, 0.030)
 
 SHORTEST = 0.02
 """A link shorter than this share of the arm's length is not drawn: its joints are. """
-
-LEVER = 0.3
-"""Length that makes a moment comparable with a force when a pose is judged. [m]"""
-
-LEAST_SINGULAR = 0.05
-"""A pose whose smallest singular value is below this cannot tell the force at the flange."""
 
 
 class Capsule(NamedTuple):
@@ -84,19 +78,3 @@ def motion(chain: Chain, t: Array, q: Array, rate: float) -> ArmPoses:
     poses = link_poses(chain, q)
     scalar_last = np.roll(matrix_quaternion(poses.rotation), -1, axis=-1)
     return ArmPoses(t, poses.translation, scalar_last, q)
-
-
-def flange_force(chain: Chain, q: Array, tau: Array) -> Array:
-    """Force on the robot at the flange in base axes, by the pseudo-inverse of Jᵀ. (S, 3) [N]
-
-    NaN where the pose cannot tell it, or the torque is not known.
-    """
-    J = flange_jacobian(chain, q)
-    scaled = J * np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])[:, None]
-    told = np.linalg.svd(scaled, compute_uv=False)[:, -1] >= LEAST_SINGULAR
-    told &= np.all(np.isfinite(tau), axis=1)
-    force = np.full((len(q), 3), np.nan)
-    if chain.joints >= 6 and np.any(told):
-        inverse = np.linalg.pinv(J[told].transpose(0, 2, 1))
-        force[told] = np.einsum("sij,sj->si", inverse, tau[told])[:, :3]
-    return force

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, RobotError
 
 LENGTH = 0.3
@@ -89,13 +89,20 @@ def spectral_gain(parts: Decomposed, inverse: Array) -> Array:
     return gain
 
 
+def inverses(parts: Decomposed, left_out: float = 0.0) -> Array:
+    """1/λ, and 0 in directions whose singular value is at most `left_out` [m]. (T, 6) [1/m²]"""
+    # λ is a difference of larger numbers: below its rounding it may even be negative.
+    rounding = np.finfo(np.float64).eps * parts.squares[:, -1:]
+    safe = np.maximum(parts.squares, rounding)
+    return np.where(parts.squares > left_out**2, 1.0 / safe, 0.0) if left_out else 1.0 / safe
+
+
 def pinv(parts: Decomposed, sd: Array) -> Solution:
     """Least squares (46), the pseudo-inverse of Jᵀ: unbiased, and unbounded as σ_min → 0.
 
     Its covariance is that of the torque, seen through it.
     """
-    rounding = np.finfo(np.float64).eps * parts.squares[:, -1:]
-    gain = spectral_gain(parts, 1.0 / np.maximum(parts.squares, rounding))
+    gain = spectral_gain(parts, inverses(parts))
     return Solution(gain, gain * sd[:, None, :])
 
 
@@ -162,24 +169,32 @@ def null_space(parts: Decomposed, tau: Array) -> Array:
     return residual
 
 
-def wrench_of(
-    tau: Array, jacobian: Array, solver: str = "pinv", sd: Array | float = TORQUE_SD
-) -> tuple[Array, Array, Array]:
-    """Wrench, its standard deviation and σ_min from torques and given Jacobians.
+class FlangeWrench(NamedTuple):
+    """A wrench at the flange.
 
-    For logs that hold a Jacobian; `VirtualSensor` takes it from the robot.
+    Attributes:
+        values: Force, then moment, about the flange point in the Jacobian's axes. (T, 6) [N, N·m]
+        told: Whether the pose can tell it: σ_min is at least `LEAST_SIGMA`. (T,)
+    """
+
+    values: Array
+    told: Mask
+
+
+def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> FlangeWrench:
+    """Least squares (46) from torques and given Jacobians, for logs and loops that hold one.
+
+    `VirtualSensor` takes the Jacobian from the robot, and knows frames and bands besides.
 
     Args:
         tau: Joint torque on the robot. (T, n) [N·m]
-        jacobian: Jacobian; its frame is the wrench's. (T, 6, n)
-        solver: A key of `SOLVERS`.
-        sd: Joint torque error, one, one a joint or one a sample and joint. [N·m]
+        jacobian: Jacobian; its axes are the wrench's. (T, 6, n)
+        left_out: Singular values of S J up to this tell nothing of their direction. [m]
 
-    Returns:
-        Wrench (T, 6) and its standard deviation (T, 6) [N, N·m], and σ_min (T,) [m].
+    Raises:
+        RobotError: If the arm has fewer than six joints.
     """
     parts = decompose(jacobian)
-    deviation = np.broadcast_to(np.asarray(sd, dtype=np.float64), tau.shape)
-    gain, root = SOLVERS[check_solver(solver)](parts, deviation)
+    gain = spectral_gain(parts, inverses(parts, left_out))
     values = np.squeeze(gain @ tau[:, :, None], axis=2)
-    return values, np.sqrt(np.sum(root**2, axis=2)), parts.sigma_min
+    return FlangeWrench(values, parts.sigma_min >= LEAST_SIGMA)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -118,6 +119,33 @@ class VirtualSensor:
         gain, root = SOLVERS[self.solver](parts, sd)
         values = np.squeeze(X @ (gain @ tau[:, :, None]), axis=2)
         return values, np.sqrt(np.sum((X @ root) ** 2, axis=2))
+
+    def arrow(self, force: Array, q: Array, chain: Chain) -> "ForceArrow":
+        """Where a force of this sensor acts, and where it points, both seen from the base.
+
+        Args:
+            force: Forces in the sensor's frame, as of its wrenches. (S, 3) [N]
+            q: Joint positions then. (S, n) [rad]
+            chain: The arm.
+        """
+        poses = link_poses(chain, q)
+        flange, pose = poses.rotation[:, -1], mounted(self.frame, self.mounting)
+        origin = poses.translation[:, -1] + flange @ pose.translation
+        if self.frame == "base":
+            return ForceArrow(origin, force)
+        return ForceArrow(origin, np.einsum("tij,tj->ti", flange @ pose.rotation, force))
+
+
+class ForceArrow(NamedTuple):
+    """A force as an arrow in the base frame.
+
+    Attributes:
+        origin: The point that the wrench's moment refers to. (S, 3) [m]
+        force: Force on the robot in base axes, NaN where it is not known. (S, 3) [N]
+    """
+
+    origin: Array
+    force: Array
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,17 +8,27 @@ import pytest
 import rerun.chunk
 
 from vftcli.analysis import Analysis
+from vftcli.observers.choice import ObserverChoice
+from vftcli.outputs.arm import motion
 from vftcli.outputs.log.rerun_recording import (
     NEWTON_PER_METRE,
     finish,
-    flange_force,
+    force_arrow,
     line_groups,
     plot_of,
     write_rrd,
 )
 from vftcli.outputs.log.rerun_text import drawable
+from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.robots.choice import RobotChoice
+from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.signals.errors import OutputError
-from vftcli.signals.wrench import AXES, Wrench
+from vftcli.signals.wrench import AXES
+from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
+from vftcli.virtual_sensor.frames import mounted
+from vftcli.virtual_sensor.solvers import wrench_of
+
+CIRCLE = Path(__file__).parents[3] / "fixtures" / "ur5_circle.csv"
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +107,8 @@ def test_the_arrow_is_the_force_to_scale(
     """About 50 arrows a second: every second sample of this log at 125 Hz, first Kalman filter."""
     drawn = column(rows, "/robot/flange_force", "Arrows3D:vectors")
     q, tau = analysis.recording.q[::2], analysis.estimates[2].tau[::2]
-    expected = flange_force(analysis.robot.chain, q, tau)
+    found = wrench_of(tau, flange_jacobian(analysis.robot.chain, q))
+    expected = np.where(found.told[:, None], found.values[:, :3], np.nan)
     assert len(drawn) == len(expected)
     for arrow, force in zip(drawn, expected, strict=True):
         if np.all(np.isfinite(force)):
@@ -167,29 +178,36 @@ def test_a_recording_without_its_footer_is_no_recording(tmp_path: Path) -> None:
         finish(Stream(), tmp_path / "cut.rrd")
 
 
-def test_the_arrow_is_the_wrench_that_was_asked_for(with_wrench: Analysis) -> None:
-    from dataclasses import replace
+@pytest.mark.parametrize("frame", ["flange", "base", "tool", "sensor"])
+def test_the_arrow_is_the_tabled_force_at_its_own_point(frame: str) -> None:
+    """Also in the frame of a tool or sensor: zero removed, turned into base axes, nothing else.
 
-    from vftcli.outputs.arm import motion
-    from vftcli.outputs.log.rerun_recording import arrow_force, force_source
-
-    source = force_source(with_wrench.estimates)
-    assert source is not None
-    recording = with_wrench.recording
-    poses = motion(with_wrench.robot.chain, recording.t, recording.q, 50.0)
-    sampled = np.searchsorted(with_wrench.t, poses.t)
-    measured = with_wrench.virtual_sensor
-    assert measured is not None
-    base = replace(measured.wrenches[0], name=source.name, frame="base")
-
-    def arrow(wrench: Wrench) -> np.ndarray:
-        one = replace(with_wrench, virtual_sensor=replace(measured, wrenches=(wrench,)))
-        return arrow_force(one, source, poses, sampled)
-
-    shown = arrow(base)
-    np.testing.assert_array_equal(shown, base.known[sampled, :3])
-    turned = arrow(replace(base, frame="flange"))
-    # a rotation keeps lengths: rounding
-    np.testing.assert_allclose(
-        np.linalg.norm(turned, axis=1), np.linalg.norm(shown, axis=1), rtol=1e-12
+    In those frames the arrow was the raw torque's: (1.96, 2.45, −.94) N over a span whose mean the
+    table makes zero.
+    """
+    zero = ZeroChoice(spans=((1.0, 2.5),))
+    tool, sensor = "0.05,0,0.15,0.3,-0.2,0.8", "0,0,0.03"
+    choice = AnalysisChoice(
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=("kfo-fe",)),
+        wrench=WrenchChoice(frame=frame, tool=tool, sensor_pose=sensor, zero=zero),
     )
+    analysis = analyse_log(CIRCLE, choice)
+    poses = motion(analysis.robot.chain, analysis.t, analysis.recording.q, 50.0)
+    rows = np.searchsorted(analysis.t, poses.t)
+    arrow = force_arrow(analysis, poses, rows)
+    reading = analysis.virtual_sensor
+    assert arrow is not None
+    assert reading is not None
+    pose = mounted(frame, reading.sensor.mounting)
+    flange = link_poses(analysis.robot.chain, poses.q)
+    turn = np.eye(3) if frame == "base" else flange.rotation[:, -1] @ pose.rotation
+    tabled = reading.wrenches[0].force[rows]
+    expected = np.squeeze(turn @ tabled[:, :, None], axis=2)
+    # one rotation of some 20 N, rounding only
+    np.testing.assert_allclose(arrow.force, expected, atol=1e-12)
+    span = (poses.t >= 1.0) & (poses.t <= 2.5)
+    # of 75 drawn of the 188 samples whose mean is zero, turned by some 10° on the way
+    assert np.all(np.abs(np.nanmean(arrow.force[span], axis=0)) < 0.25)
+    point = flange.translation[:, -1] + flange.rotation[:, -1] @ pose.translation
+    np.testing.assert_allclose(arrow.origin, point, atol=1e-12)

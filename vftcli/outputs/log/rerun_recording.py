@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.arm import ArmPoses, capsules, flange_force, motion
+from vftcli.outputs.arm import ArmPoses, capsules, motion
 from vftcli.outputs.files import one_line
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.log.rerun_blueprint import Plot, Scene, Tab, arrangement
@@ -25,11 +25,11 @@ from vftcli.outputs.log.tables import to_markdown
 from vftcli.outputs.log.wrench_tables import paper_bounds
 from vftcli.outputs.palette import REFERENCE, SPARE, colours_of, rgb
 from vftcli.robots.drive import drive_torque
-from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import OutputError
 from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.wrench import AXES, unit_of
+from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
 
 ARM_RATE = 50.0
 """Poses a second of the arm. [Hz]"""
@@ -272,8 +272,9 @@ def summary(analysis: Analysis) -> str:
     ]
     if force is not None:
         lines.append(
-            f"- **orange arrow**: force on the robot at the flange from {force.name} by the "
-            f"pseudo-inverse of Jᵀ; 1 m is {NEWTON_PER_METRE:g} N; none where the pose cannot tell"
+            f"- **orange arrow**: force on the robot from {force.name}, as in the tables of the "
+            "wrench where one was asked for, else at the flange by the pseudo-inverse of Jᵀ; 1 m "
+            f"is {NEWTON_PER_METRE:g} N; none where the pose cannot tell"
         )
     remarks = [*source.repairs, *source.warnings, *all_notes(analysis)]
     lines += ["", "## Notes", *(f"- {escape_markdown(note)}" for note in remarks)]
@@ -303,34 +304,33 @@ def send_arm(stream: Stream, analysis: Analysis, poses: ArmPoses) -> None:
                 translation=poses.translation[:, j - 1], quaternion=poses.quat_xyzw[:, j - 1]
             )
             stream.send_columns(path, [time], columns)
-    force = force_source(analysis.estimates)
-    if force is not None and chain.joints >= 6:
-        sampled = np.searchsorted(analysis.t, poses.t)
-        send_force(
-            stream,
-            poses.t,
-            poses.translation[:, -1],
-            arrow_force(analysis, force, poses, sampled),
-        )
+    arrow = force_arrow(analysis, poses, np.searchsorted(analysis.t, poses.t))
+    if arrow is not None:
+        send_force(stream, poses.t, arrow)
 
 
-def arrow_force(
-    analysis: Analysis, source: ExternalTorque, poses: ArmPoses, sampled: NDArray[np.intp]
-) -> Array:
-    """Force on the robot in base axes at the drawn poses: the wrench that was asked for. (N, 3) [N]
+def force_arrow(
+    analysis: Analysis, poses: ArmPoses, sampled: NDArray[np.intp]
+) -> ForceArrow | None:
+    """The force of the virtual sensor at the drawn poses, None for an arm of less than six joints.
 
-    Where none was asked for, or in other axes than the base's or the flange's, it is the
-    pseudo-inverse of the torque as it stands.
+    It is that of the wrench that was asked for, its zero removed, as the tables have it; where none
+    was asked for, that of the estimate as it stands, at the flange.
+
+    Args:
+        analysis: What was found.
+        poses: The poses that are drawn.
+        sampled: Which samples of the log they are. (S,)
     """
-    asked = [w for w in analysis.wrenches if w.name == source.name]
-    if not asked or asked[0].frame not in {"base", "flange"}:
-        return flange_force(analysis.robot.chain, poses.q, source.tau[sampled])
-    force: Array = asked[0].known[sampled, :3]
-    if asked[0].frame == "base":
-        return force
-    rotation = link_poses(analysis.robot.chain, poses.q).rotation[:, -1]
-    turned: Array = np.einsum("tij,tj->ti", rotation, force)
-    return turned
+    source, chain = force_source(analysis.estimates), analysis.robot.chain
+    if source is None or chain.joints < 6:
+        return None
+    if analysis.virtual_sensor is not None:
+        (wrench,) = (w for w in analysis.virtual_sensor.wrenches if w.name == source.name)
+        return analysis.virtual_sensor.sensor.arrow(wrench.force[sampled], poses.q, chain)
+    sensor = VirtualSensor(frame="base")
+    drawn = ExternalTorque(name=source.name, t=poses.t, tau=source.tau[sampled])
+    return sensor.arrow(sensor.wrench(drawn, poses.q, chain).force, poses.q, chain)
 
 
 def capsule_batch(shapes: Sequence[Any]) -> Any:  # noqa: ANN401 - Rerun is untyped
@@ -358,13 +358,14 @@ def turn_from_z(unit: Array) -> Array:
     return turned
 
 
-def send_force(stream: Stream, t: Array, origin: Array, force: Array) -> None:
+def send_force(stream: Stream, t: Array, arrow: ForceArrow) -> None:
     """Send the arrow; where the force is not known there is none."""
     import rerun as rr
 
+    force = arrow.force
     told = np.all(np.isfinite(force), axis=1)
     columns = rr.Arrows3D.columns(
-        origins=origin[told],
+        origins=arrow.origin[told],
         vectors=force[told] / NEWTON_PER_METRE,
         radii=np.full(int(told.sum()), 0.012),
         colors=np.tile(np.array([*FORCE, 255], dtype=np.uint8), (int(told.sum()), 1)),

@@ -5,11 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask
-
-CUT = 0.05
-"""Singular values of J (lengths in units of 0.3 m) below which a direction is left out."""
-LENGTH = 0.3
+from vftcli.signals.arrays import Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,16 +39,3 @@ def flange_signals(model: Any, q: Array, dq: Array) -> FlangeSignals:  # noqa: A
         jacobian[k] = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
     twist = np.einsum("kij,kj->ki", jacobian, dq)
     return FlangeSignals(rotation=rotation, position=position, twist=twist, jacobian=jacobian)
-
-
-def force_estimate(jacobian: Array, tau_ext: Array) -> tuple[Array, Mask]:
-    """The wrench (M, 6) that explains joint torques (M, n), and where J is regular. (M,)
-
-    Least squares through Jᵀ with lengths scaled by 0.3 m.
-    """
-    scale = np.array([1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH])
-    U, s, Vt = np.linalg.svd(jacobian * scale[:, None], full_matrices=False)
-    inverse = np.where(s > CUT, 1.0 / np.maximum(s, CUT), 0.0)
-    parts = inverse * np.einsum("kij,kj->ki", Vt, tau_ext)
-    wrench: Array = np.einsum("kij,kj->ki", U, parts) * scale
-    return wrench, s[:, -1] > CUT

@@ -17,7 +17,8 @@ from vftcli.readers.bags.ros_messages import (
 )
 from vftcli.signals.arrays import Array
 from vftcli.simulation.experiment import Simulation
-from vftcli.simulation.writers.flange import flange_signals, force_estimate
+from vftcli.simulation.writers.flange import flange_signals
+from vftcli.virtual_sensor.solvers import wrench_of
 
 RECEIVED_LATER_NS = 400_000
 """How long after its stamp a message reaches the recorder. [ns]"""
@@ -177,7 +178,7 @@ def franka_values(simulation: Simulation) -> dict[str, Array]:
     samples, seen, model = simulation.samples, simulation.measured, simulation.nominal.model
     actual = flange_signals(model, seen.q, seen.dq)
     target = flange_signals(model, samples.target_q, samples.target_dq)
-    force, regular = force_estimate(actual.jacobian, -simulation.vendor.tau_ext)
+    force, regular = wrench_of(-simulation.vendor.tau_ext, actual.jacobian)
     force[~regular] = 0.0
     in_flange = [np.einsum("kji,kj->ki", actual.rotation, part) for part in np.hsplit(force, 2)]
     turn = np.array([pin.Quaternion(R).coeffs() for R in actual.rotation])

@@ -10,7 +10,8 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import log_matrix
 from vftcli.simulation.experiment import Simulation
-from vftcli.simulation.writers.flange import flange_signals, force_estimate
+from vftcli.simulation.writers.flange import flange_signals
+from vftcli.virtual_sensor.solvers import LEAST_SIGMA, wrench_of
 
 DIGITS = 9
 """Decimals kept; the client prints all seventeen digits, noise included."""
@@ -151,7 +152,8 @@ def tool_fields(simulation: Simulation) -> dict[str, Array]:
     samples, measured, model = simulation.samples, simulation.measured, simulation.nominal.model
     actual = flange_signals(model, measured.q, measured.dq)
     target = flange_signals(model, samples.target_q, samples.target_dq)
-    force, _ = force_estimate(actual.jacobian, simulation.vendor.tau_ext)
+    # A controller's estimate stays bounded: directions that the pose cannot tell read nothing.
+    force = wrench_of(simulation.vendor.tau_ext, actual.jacobian, left_out=LEAST_SIGMA).values
     pose = np.hstack([actual.position, log_matrix(actual.rotation)])
     target_pose = np.hstack([target.position, log_matrix(target.rotation)])
     weightless = np.gradient(samples.target_dq, samples.time, axis=0)
