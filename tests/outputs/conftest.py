@@ -14,6 +14,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
+from vftcli.signals.remarks import caution, fact
 from vftcli.virtual_sensor.choice import WrenchChoice
 
 HOSTILE = '<script>alert("x")</script>&_%.csv'
@@ -39,8 +40,10 @@ def recording() -> Recording:
             sha256="ab" * 32,
             t0=100.25,
             rows=600,
-            repairs=("turned <b>one</b> column",),
-            warnings=("looks & feels odd",),
+            remarks=(
+                fact("sign-turned", signal="<b>one</b>"),
+                caution("topic-too-short", signal="look & feel", topic="/odd"),
+            ),
         ),
     )
 

@@ -226,6 +226,18 @@ def test_a_wrench_of_another_rate_is_interpolated(tmp_path: Path) -> None:
     assert any("interpolated wrench of /wrench (1000 Hz)" in r for r in recording.source.repairs)
 
 
+def test_a_topic_that_is_taken_is_not_told_as_left_out(tmp_path: Path) -> None:
+    """Whatever its name: one with a hyphen was not found again in the sentence on its taking."""
+    messages = [ur_message(k) for k in range(50)]
+    for k in range(400):
+        force = {"time": START + k * 1_000_000, "force": (0.0, 0.0, 1.0)}
+        messages += [{"topic": "/ft-sensor/wrench", **force}]
+    messages.sort(key=lambda message: message["time"])
+    codes = {r.code for r in read(write_joint_states(tmp_path / "x", messages)).source.remarks}
+    assert "signal-interpolated" in codes
+    assert "topics-left-out" not in codes
+
+
 def test_a_wrench_that_does_not_cover_the_motion_is_left_out(tmp_path: Path) -> None:
     messages = [ur_message(k) for k in range(200)]
     for k in range(20):

@@ -73,7 +73,7 @@ def read(
         digest.start()  # its import takes longer than the hash and leaves a core idle
     with np.errstate(all="ignore"):  # whatever a damaged file holds is judged when it is cleaned
         raw = reader.read(file, request)
-        raw = replace(raw, repairs=(*file.repairs, *raw.repairs)) if file.repairs else raw
+        raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
     digest.start()
     return cleaned(raw, path, reader.name, digest.hexdigest, label)
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from vftcli.readers.joints import kinematic_order
 from vftcli.readers.table import Cell, Pick, Picks, Table, checked, listed
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import fact
 
 CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "seconds")
 """Names of the clock; a unit may follow, as in time_ms."""
@@ -61,10 +62,8 @@ JOINT_FIRST = re.compile(
 )
 """A joint's name before the signal's, as PlotJuggler exports JointState topics."""
 
-TURNED_NOTE = (
-    "turned the sign of tau_ext_hat_filtered: libfranka logs measured torque minus model, "
-    "the torque on the robot is its negative"
-)
+RESIDUAL_TURNED = fact("residual-turned")
+"""Said wherever libfranka's residual is taken."""
 
 
 class Group(NamedTuple):
@@ -147,7 +146,7 @@ def _pick_of(table: Table, signal: str, groups: dict[str, Group]) -> Pick | None
         signal=signal,
         cells=group.cells,
         factor=-1.0 if turned else 1.0,
-        note=TURNED_NOTE if turned else "",
+        remark=RESIDUAL_TURNED if turned else None,
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import TURNED_NOTE
+from vftcli.readers.aliases import RESIDUAL_TURNED
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
@@ -116,7 +116,7 @@ def _read_panda_py(table: ArrayTable, request: ReadChoice) -> RawLog:
                 signal=signal,
                 cells=tuple(Cell(names.index(name), j) for j in range(width)),
                 factor=-1.0 if turned else 1.0,
-                note=TURNED_NOTE if turned else "",
+                remark=RESIDUAL_TURNED if turned else None,
             )
         )
     clock = Pick(signal="t", cells=(Cell(names.index("time")),), factor=1e-3, unit="ms")

@@ -10,6 +10,7 @@ from vftcli.readers.reader import RawLog
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.recording import Recording, Source
+from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import gaps_of, median_step
 
 GARBAGE_ROWS = 100
@@ -37,8 +38,7 @@ SEGMENT_ROWS = 20
 class Findings:
     """What cleaning did and saw, gathered along the way."""
 
-    repairs: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    remarks: list[Remark] = field(default_factory=list)
     duplicates: int = 0
 
 
@@ -71,7 +71,7 @@ def _cleaned(
         raise ClockError(f"{path}: no samples; the log holds a header only.")
     if raw.segment is not None:
         raw = segment_of(raw, raw.segment, path)
-    findings = Findings(list(raw.repairs), list(raw.warnings))
+    findings = Findings(list(raw.remarks))
     raw = without_leading_garbage(raw, findings)
     refuse_unknown_numbers(raw, path)
     refuse_backward_steps(raw, path)
@@ -90,8 +90,7 @@ def _cleaned(
         t0_ns=_nanoseconds(raw),
         rows=rows,
         duplicates=findings.duplicates,
-        repairs=tuple(findings.repairs),
-        warnings=tuple(findings.warnings),
+        remarks=tuple(findings.remarks),
     )
     signals = {name: handed_over(np.ascontiguousarray(v)) for name, v in raw.signals.items()}
     return Recording(
@@ -146,10 +145,8 @@ def without_leading_garbage(raw: RawLog, findings: Findings) -> RawLog:
     count = max(int(np.flatnonzero(absurd)[-1]) + 1, jump)
     if count >= len(raw.stamps) - 1 or absurd[:count].mean() < 0.1:
         return raw
-    findings.repairs.append(
-        f"dropped {count} leading row{'s' if count > 1 else ''} of garbage "
-        "(absurd values or a jumping clock, as a misaligned packet leaves them)"
-    )
+    code = "leading-garbage" if count > 1 else "leading-garbage-row"
+    findings.remarks.append(fact(code, rows=count))
     return replace(kept(raw, slice(count, None)), first_row=raw.first_row + count)
 
 
@@ -236,9 +233,15 @@ def segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
     if not 1 <= number < len(edges):
         raise ClockError(f"{path}: there is no segment {number}; the file holds {len(edges) - 1}.")
     first, last = edges[number - 1], edges[number]
-    note = f"took recording {number} of {len(edges) - 1}, rows {first + 1} to {last} (segment)"
+    remark = fact(
+        "segment-taken",
+        number=number,
+        recordings=len(edges) - 1,
+        first_row=first + 1,
+        last_row=last,
+    )
     taken = kept(raw, slice(first, last))
-    return replace(taken, first_row=raw.first_row + first, repairs=(*raw.repairs, note))
+    return replace(taken, first_row=raw.first_row + first, remarks=(*raw.remarks, remark))
 
 
 def without_repeats(raw: RawLog, findings: Findings) -> RawLog:
@@ -252,14 +255,10 @@ def without_repeats(raw: RawLog, findings: Findings) -> RawLog:
     for value in raw.signals.values():
         changed |= (value[again] != value[again - 1]).any(axis=1)
     findings.duplicates = repeats
-    findings.repairs.append(
-        f"dropped {repeats} row{'s' if repeats > 1 else ''} whose stamp repeats the one before"
-    )
+    code = "repeated-stamps" if repeats > 1 else "repeated-stamp"
+    findings.remarks.append(fact(code, rows=repeats))
     if different := int(changed.sum()):
-        findings.warnings.append(
-            f"{different} of the {repeats} repeated stamps carried other values: the stamps are "
-            "coarser than the samples, or two sources share one file"
-        )
+        findings.remarks.append(caution("repeats-differ", changed=different, repeats=repeats))
     return kept(raw, fresh)
 
 
@@ -271,10 +270,14 @@ def report_gaps(t: Array, findings: Findings) -> None:
     gaps = gaps_of(t, GAP_STEPS)
     if gaps.size:
         k = int(gaps[np.argmax(steps[gaps])])
-        findings.warnings.append(
-            f"{gaps.size} gap{'s' if gaps.size > 1 else ''} of more than {GAP_STEPS:g} sample "
-            f"times, the longest {steps[k]:.4g} s at t = {t[k]:.4g} s; kept as they are"
+        remark = caution(
+            "gaps" if gaps.size > 1 else "gap",
+            gaps=int(gaps.size),
+            steps=GAP_STEPS,
+            longest_s=float(steps[k]),
+            at_s=float(t[k]),
         )
+        findings.remarks.append(remark)
 
 
 def refuse_degrees(q: Array, path: Path) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from vftcli.readers.reader import LogFile
 from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Remark, fact
 
 SEPARATORS = (",", ";", "\t", " ")
 TAIL_BYTES = 128 * 1024
@@ -53,7 +54,7 @@ class TextTable:
 
     file: LogFile
     lists: Mapping[int, int] = field(default_factory=dict)
-    _repairs: list[str] = field(default_factory=list)
+    _is_cut: bool = False
 
     @property
     def path(self) -> Path:
@@ -61,9 +62,9 @@ class TextTable:
         return self.file.path
 
     @property
-    def repairs(self) -> tuple[str, ...]:
-        """What loading dropped or mended."""
-        return tuple(self._repairs)
+    def remarks(self) -> tuple[Remark, ...]:
+        """What loading dropped."""
+        return (fact("row-cut"),) if self._is_cut else ()
 
     @cached_property
     def _sample(self) -> list[str]:
@@ -232,15 +233,13 @@ class TextTable:
         if len(rows) < 2:
             return None
         ended = len(stripped) < len(tail)
-        if not self._is_cut(rows, ended=ended):
+        if not self._ends_inside(rows, ended=ended):
             return None
-        note = "dropped the last row, which is cut"
-        if note not in self._repairs:
-            self._repairs.append(note)
+        self._is_cut = True
         start = len(stripped) - len(re.split(rb"[\r\n]+", stripped)[-1])
         return len(content) - len(tail) + start
 
-    def _is_cut(self, rows: list[bytes], *, ended: bool) -> bool:
+    def _ends_inside(self, rows: list[bytes], *, ended: bool) -> bool:
         """Whether the last row lacks cells, or may lack digits of its last number."""
         last = self._cells(decoded(rows[-1]))
         if len(last) < self.width:

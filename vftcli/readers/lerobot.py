@@ -10,6 +10,7 @@ from vftcli.readers.parquet import EPISODE, ParquetTable
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.tables import from_table
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import caution
 
 INFO_LIMIT = 16 * 1024 * 1024
 
@@ -32,13 +33,16 @@ def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
         first = int(numbers[0])
         rows = np.flatnonzero(numbers == numbers[0])
     table = ParquetTable(files[0], files[0], rows)
-    total = info.get("total_episodes", "an unknown number")
-    fps = info.get("fps", "unknown")
-    note = f"took episode {first} of {total!s:.20}; the dataset's rate is {fps!s:.20} Hz"
+    remark = caution(
+        "episode-taken",
+        episode=first,
+        episodes=str(info.get("total_episodes", "an unknown number"))[:20],
+        rate_Hz=str(info.get("fps", "unknown"))[:20],
+    )
     request = ReadChoice(
         columns=request.columns or default_columns(table, info), signals=request.signals
     )
-    return from_table(table, request, warnings=(note,))
+    return from_table(table, request, remarks=(remark,))
 
 
 def default_columns(table: ParquetTable, info: dict[str, Any]) -> str:

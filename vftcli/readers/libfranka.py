@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import TURNED_NOTE
+from vftcli.readers.aliases import RESIDUAL_TURNED
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Cell, Pick, Picks, checked, picked
 from vftcli.readers.tables import ArrayTable
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import STIFFNESS_FRAME
 
 JOINTS = 7
@@ -40,7 +41,7 @@ def _pick(name: str, cells: tuple[Cell, ...]) -> Pick:
         signal=FIELDS[name],
         cells=cells,
         factor=-1.0 if turned else 1.0,
-        note=TURNED_NOTE if turned else "",
+        remark=RESIDUAL_TURNED if turned else None,
     )
 
 
@@ -110,9 +111,9 @@ def read_states(file: LogFile, request: ReadChoice) -> RawLog:
         states.append(state)
     if not states:
         raise LogError(f"{file.path}: no robot state in any line.")
-    notes: tuple[str, ...] = (f"skipped {skipped} lines that hold no state",) if skipped else ()
-    notes += ("dropped the last line, which is cut",) if cut else ()
-    return _read_states(file, states, notes, request)
+    remarks = [fact("lines-skipped", lines=skipped)] if skipped else []
+    remarks += [fact("line-cut")] if cut else []
+    return _read_states(file, states, tuple(remarks), request)
 
 
 def _state(line: bytes) -> dict[str, Any] | None:
@@ -127,13 +128,13 @@ def _state(line: bytes) -> dict[str, Any] | None:
 
 
 def _read_states(
-    file: LogFile, states: list[dict[str, Any]], notes: tuple[str, ...], request: ReadChoice
+    file: LogFile, states: list[dict[str, Any]], remarks: tuple[Remark, ...], request: ReadChoice
 ) -> RawLog:
     columns = {name: _column(file, states, name, JOINTS) for name in FIELDS if name in states[0]}
     if "O_F_ext_hat_K" in states[0]:
         columns["O_F_ext_hat_K"] = _column(file, states, "O_F_ext_hat_K", 6)
     columns["time"] = _column(file, states, "time", None)
-    table = ArrayTable(path=file.path, columns=columns, notes=notes)
+    table = ArrayTable(path=file.path, columns=columns, remarks=remarks)
     names = list(columns)
     signals = [
         _pick(name, tuple(Cell(names.index(name), j) for j in range(JOINTS)))

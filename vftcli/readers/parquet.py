@@ -15,6 +15,7 @@ from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Column
 from vftcli.readers.tables import from_table
 from vftcli.signals.errors import LogError, ParameterError
+from vftcli.signals.remarks import Remark
 from vftcli.signals.wrench import WrenchFrame
 
 EPISODE = "episode_index"
@@ -49,7 +50,7 @@ class ParquetTable:
         return len(self._schema)
 
     @property
-    def repairs(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[Remark, ...]:
         """Nothing is ever mended here."""
         return ()
 

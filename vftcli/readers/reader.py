@@ -9,6 +9,7 @@ from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import WrenchFrame
 
 
@@ -48,11 +49,11 @@ class LogFile:
         return self._unwrapped[0]
 
     @property
-    def repairs(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[Remark, ...]:
         """What had to be left behind to open the file."""
         if self.wrapping is None or not self._unwrapped[1]:
             return ()
-        return (f"the {self.wrapping} file is cut: read what could be unpacked",)
+        return (fact("file-cut", wrapping=self.wrapping),)
 
     @cached_property
     def _unwrapped(self) -> tuple[memoryview, bool]:
@@ -88,8 +89,7 @@ class RawLog:
         joint_names: The joints' names, base to tip, or empty.
         robot_hint: Name of the profile that the log itself settles, or None.
         degrees_possible: Whether nothing says that the positions are in radians.
-        repairs: What the reader dropped, turned or derived.
-        warnings: What looks suspicious.
+        remarks: What the reader dropped, turned or derived, and what looks suspicious.
         constants: Last values of further columns that the reader asked for.
         payload_mass: Mass the controller was told of. [kg]
         payload_com: Its centre of mass in flange axes. (3,) [m]
@@ -106,8 +106,7 @@ class RawLog:
     joint_names: tuple[str, ...] = ()
     robot_hint: str | None = None
     degrees_possible: bool = False
-    repairs: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     constants: tuple[float, ...] = ()
     payload_mass: float | None = None
     payload_com: tuple[float, ...] | None = None

@@ -10,6 +10,7 @@ from vftcli.readers.delimited import TextTable
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Cell, Pick, Picks, Table, checked, picked
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import WrenchFrame
 
 JOINT_COLUMNS = {
@@ -89,18 +90,14 @@ class BinaryTable:
         fields = [(str(k), BINARY_TYPES[word]) for k, word in enumerate(types)]
         self._record = np.dtype(fields)
         self._body = file.content[self._start :]
-        self._repairs: list[str] = []
+        remarks = []
         size = self._record.itemsize
         if len(self._body) % size and len(self._body) % (size + 1) == 0:
             self._record = np.dtype([("id", "u1"), *fields])
-            self._repairs.append("skipped the leading byte of each record, a recipe id")
+            remarks.append(fact("recipe-byte-skipped"))
         if rest := len(self._body) % self._record.itemsize:
-            self._repairs.append(f"dropped {rest} bytes of a cut last record")
-
-    @property
-    def repairs(self) -> tuple[str, ...]:
-        """What was dropped."""
-        return tuple(self._repairs)
+            remarks.append(fact("record-cut", rest_bytes=rest))
+        self.remarks: tuple[Remark, ...] = tuple(remarks)
 
     def load(self, columns: Any, clock: int | None) -> dict[int, Any]:  # noqa: ANN401, ARG002
         """Return columns as float64 in the machine's byte order."""

@@ -13,6 +13,7 @@ from vftcli.readers.columns import ColumnSpec, Item
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import WrenchFrame
 
@@ -24,8 +25,8 @@ class Table(Protocol):
     """Columns of numbers that are loaded when they are asked for."""
 
     @property
-    def path(self) -> Path:
-        """The file, for messages."""
+    def path(self) -> Path | str:
+        """What messages call the table: the file, and in a bag the topic."""
 
     @property
     def names(self) -> tuple[str, ...] | None:
@@ -40,7 +41,7 @@ class Table(Protocol):
         """Column → length of its lists, for columns that hold lists."""
 
     @property
-    def repairs(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[Remark, ...]:
         """What loading dropped or mended."""
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
@@ -64,7 +65,7 @@ class Pick:
         factor: Factor to SI units and to our sign.
         unit: The unit if it was stated.
         frame: Frame of a wrench if it was stated.
-        note: Sentence for the repairs, if anything was turned.
+        remark: What was turned, if anything was.
     """
 
     signal: str
@@ -72,7 +73,7 @@ class Pick:
     factor: float = 1.0
     unit: str | None = None
     frame: WrenchFrame | None = None
-    note: str = ""
+    remark: Remark | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,8 +122,7 @@ def picked(
     stamps, tick, words = _stamps(table, picks, loaded, clock_name)
     if picks.origin is not None and len(stamps):
         more["origin"] = float(loaded[picks.origin][0]) * 1e-9 - float(stamps[0]) * tick
-    warnings = tuple(more.pop("warnings", ()))
-    notes = tuple(pick.note for pick in signals if pick.note)
+    remarks = (*table.remarks, *(pick.remark for pick in signals if pick.remark))
     wrench = next((pick for pick in signals if pick.signal == "wrench"), None)
     more.setdefault("wrench_frame", wrench.frame if wrench else None)
     return RawLog(
@@ -130,8 +130,7 @@ def picked(
         tick=tick,
         clock=words,
         signals=arrays,
-        repairs=(*table.repairs, *notes),
-        warnings=warnings,
+        remarks=(*remarks, *more.pop("remarks", ())),
         constants=tuple(_last(loaded[column]) for column in picks.constants),
         **more,
     )
@@ -260,7 +259,7 @@ def _pick(item: Item, cells: tuple[Cell, ...]) -> Pick:
         factor=item.factor,
         unit=item.unit,
         frame=WrenchFrame.parsed(item.unit) if wrench and item.unit else None,
-        note=f"turned the sign of {item.signal} (--columns)" if item.factor < 0 else "",
+        remark=fact("sign-turned", signal=item.signal) if item.factor < 0 else None,
     )
 
 

@@ -16,6 +16,7 @@ from vftcli.readers.joints import robot_of
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Column, Table, picked, picks_of
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Remark
 
 NOT_AN_ARRAY = (
     ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError, KeyError, OverflowError,
@@ -63,15 +64,16 @@ class ArrayTable:
     """A table whose columns are in memory already: arrays of numbers or of lists.
 
     Attributes:
-        path: The file.
+        path: What messages call it: the file, and in a bag the topic.
         columns: Name → (T,) or (T, k).
         headed: Whether the names are the file's own.
+        remarks: What had to be done to the arrays.
     """
 
-    path: Path
+    path: Path | str
     columns: Mapping[str, Column]
     headed: bool = True
-    notes: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     lists: Mapping[int, int] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -87,11 +89,6 @@ class ArrayTable:
     def width(self) -> int:
         """Number of columns."""
         return len(self.columns)
-
-    @property
-    def repairs(self) -> tuple[str, ...]:
-        """What had to be done to the arrays."""
-        return self.notes
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
         """Return columns as float64; whole stamps stay whole.

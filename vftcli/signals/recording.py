@@ -8,6 +8,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
+from vftcli.signals.remarks import Remark
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import WrenchFrame
 
@@ -78,8 +79,8 @@ class Source:
         t0_ns: The same stamp in whole nanoseconds where the log counts them. [ns]
         rows: Samples the file held before any were dropped.
         duplicates: Rows dropped because their stamp repeated the one before.
-        repairs: Everything that was dropped, turned or derived, one sentence each.
-        warnings: What looks suspicious but was left as it is, one sentence each.
+        remarks: Facts on what was dropped, turned or derived; cautions and warnings on what looks
+            suspicious but was left as it is.
     """
 
     path: Path | None = None
@@ -91,12 +92,21 @@ class Source:
     t0_ns: int | None = None
     rows: int = 0
     duplicates: int = 0
-    repairs: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.label and self.path is not None:
             object.__setattr__(self, "label", self.path.name)
+
+    @property
+    def repairs(self) -> tuple[str, ...]:
+        """What was dropped, turned or derived, in words."""
+        return tuple(str(remark) for remark in self.remarks if remark.level == "fact")
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What looks suspicious, in words."""
+        return tuple(str(remark) for remark in self.remarks if remark.level != "fact")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,6 +9,7 @@ from vftcli.robots import Robot, load_robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording, Source
+from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import WrenchFrame
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.force_sensor import read_force_sensor
@@ -65,7 +66,8 @@ class Simulation:
         seen = self.measured
         t = seen.stamp[rows] - seen.stamp[rows[0]]
         duplicates = len(written) - len(rows)
-        repairs = (f"dropped {duplicates} repeated rows",) if duplicates else ()
+        repeated = "repeated-stamps" if duplicates > 1 else "repeated-stamp"
+        remarks = (fact(repeated, rows=duplicates),) if duplicates else ()
         in_current = seen.current is not None
         current = self.vendor.target_current
         return Recording(
@@ -89,7 +91,7 @@ class Simulation:
                 clock="simulated controller clock",
                 rows=len(written),
                 duplicates=duplicates,
-                repairs=repairs,
+                remarks=remarks,
             ),
         )
 

@@ -16,8 +16,10 @@ def test_run_json_says_how_to_make_it_again(analysis: Analysis) -> None:
     assert record["input"]["samples"] == 600
     assert len(record["robot"]["sha256"]) == 64
     assert "ON the robot" in record["conventions"]["sign"]
-    assert record["repairs"] == ["turned <b>one</b> column"]
-    assert record["warnings"] == ["looks & feels odd"]
+    assert record["repairs"] == ["turned the sign of <b>one</b> (--columns)"]
+    assert record["warnings"] == [
+        "left out look & feel of /odd: it does not cover the joints' time"
+    ]
     assert record["reference"]["name"] == "vendor"
 
 

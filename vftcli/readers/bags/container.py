@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Remark
 
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]
@@ -62,12 +63,12 @@ class Ingest:
     Attributes:
         path: The file, for messages.
         size: Its size. [B]
-        repairs: What was left behind, one sentence each.
+        remarks: What was left behind.
     """
 
     path: Path
     size: int
-    repairs: list[str] = field(default_factory=list)
+    remarks: list[Remark] = field(default_factory=list)
     unpacked: int = 0
 
     def claim(self, size: int) -> None:
@@ -84,10 +85,10 @@ class Ingest:
                 "than a log of this size can hold. It is damaged or made to fill memory."
             )
 
-    def note(self, repair: str) -> None:
-        """Remember a repair once."""
-        if repair not in self.repairs:
-            self.repairs.append(repair)
+    def note(self, remark: Remark) -> None:
+        """Remember a remark once."""
+        if remark not in self.remarks:
+            self.remarks.append(remark)
 
 
 def printable(name: str) -> str:

@@ -161,11 +161,11 @@ def read_documents(file: LogFile, documents: Documents, request: ReadChoice) -> 
         try:
             return _read(file, channel, rows, documents.times[channel], request)
         except LogError as error:
-            failures.append((len(rows), str(error).partition(": ")[2], channel.topic))
+            failures.append((len(rows), error))
     if not failures:
         raise LogError(f"{file.path}: no messages of a kind that is known.")
-    _, reason, topic = max(failures)
-    raise LogError(f"{file.path}: topic {topic}: {reason}")
+    # The fullest channel is the one that was meant; what it lacks is what the user can mend.
+    raise max(failures, key=lambda failure: failure[0])[1]
 
 
 def _read(
@@ -194,7 +194,7 @@ def _read(
         columns["timestamp_ns" if stamps.dtype == np.int64 else "timestamp"] = stamps
     else:
         columns["timestamp_ns"] = np.array(times, dtype=np.int64)
-    table = ArrayTable(path=file.path, columns=columns)
+    table = ArrayTable(path=f"{file.path}: topic {channel.topic}", columns=columns)
     ordered = tuple(names[k] for k in kinematic_order(names))
     more: dict[str, Any] = {"clock_name": clock}
     if request.columns is None and ordered:

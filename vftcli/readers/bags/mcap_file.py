@@ -25,6 +25,7 @@ from vftcli.readers.bags.container import (
 )
 from vftcli.readers.bags.storage import MCAP
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import fact
 
 SCHEMA, CHANNEL, MESSAGE, CHUNK, STATISTICS, FOOTER, DATA_END = 3, 4, 5, 6, 11, 2, 15
 HEADER = 9
@@ -146,11 +147,8 @@ def _check_end(catalogue: Catalogue, left: int) -> None:
             f"{ingest.path}: {left} bytes follow its end where {len(MCAP)} should; it is damaged."
         )
     if not catalogue.ended:
-        ingest.note(
-            f"the file is cut: read up to the last whole chunk, {left} bytes left behind"
-            if left > 0
-            else "the file was not closed by its recorder"
-        )
+        is_cut = left > 0
+        ingest.note(fact("chunks-cut", rest_bytes=left) if is_cut else fact("recorder-stopped"))
 
 
 def _take(catalogue: Catalogue, opcode: int, content: memoryview) -> None:

@@ -12,6 +12,7 @@ from vftcli.readers.bags.storage import MCAP, ROSBAG1, SQLITE, storage_files
 from vftcli.readers.bags.topics import aligned
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, open_log
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Where, fact
 
 METADATA_BYTES = 1024 * 1024
 
@@ -31,15 +32,15 @@ def read_bag(file: LogFile, request: ReadChoice) -> RawLog:
             decoder.take(batch)
     _check_count(file, messages, ingest)
     if messages == 0:
-        cut = f" ({ingest.repairs[0]})" if ingest.repairs else ""
-        raise LogError(f"{file.path}: no messages in any whole chunk{cut}.")
+        said = "; ".join(["no messages in any whole chunk", *map(str, ingest.remarks)])
+        raise LogError(f"{file.path}: {said}.")
     streams = decoder.streams()
     if documents.rows and not any("q" in stream.signals for stream in streams):
         raw = read_documents(file, documents, request)
     else:
         others = decoder.others | {c.topic: c.type or c.encoding for c in documents.rows}
         raw = aligned(streams, file.path, request, others)
-    return replace(raw, repairs=(*ingest.repairs, *raw.repairs))
+    return replace(raw, remarks=(*ingest.remarks, *raw.remarks))
 
 
 def _size(file: LogFile) -> int:
@@ -55,8 +56,8 @@ def _batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
     for name in storage_files(file):
         inner = open_log(file.path / name)
         yield from _file_batches(inner, ingest)
-        for repair in inner.repairs:
-            ingest.note(f"{name}: {repair}")
+        for remark in inner.remarks:
+            ingest.note(replace(remark, where=Where(about=name)))
 
 
 def _file_batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
@@ -78,4 +79,4 @@ def _check_count(file: LogFile, messages: int, ingest: Ingest) -> None:
         text = metadata.read(METADATA_BYTES)
     match = re.search(rb"^  message_count: (\d{1,15})\s*$", text, flags=re.MULTILINE)
     if match is not None and int(match[1]) != messages:
-        ingest.note(f"metadata.yaml counts {int(match[1])} messages, {messages} were found")
+        ingest.note(fact("message-count-differs", counted=int(match[1]), found=messages))

@@ -23,6 +23,7 @@ from vftcli.readers.bags.container import (
 )
 from vftcli.readers.bags.storage import ROSBAG1
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import fact
 
 OP_MESSAGE, OP_BAG, OP_INDEX, OP_CHUNK, OP_CHUNK_INFO, OP_CONNECTION = 2, 3, 4, 5, 6, 7
 MAX_HEADER = 64 * 1024
@@ -111,10 +112,7 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
         try:
             record = record_at(content, position)
         except Cut:
-            ingest.note(
-                "the bag is cut: read up to the last whole chunk, "
-                f"{len(content) - position} bytes left behind"
-            )
+            ingest.note(fact("chunks-cut", rest_bytes=len(content) - position))
             return
         if record.op == OP_BAG:
             indexed = record.header.get(b"index_pos", bytes(8)) != bytes(8)
@@ -131,7 +129,7 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
             raise LogError(f"{ingest.path}: an unknown record at byte {position}; damaged.")
         position = record.end
     if not indexed:
-        ingest.note("the bag was not closed by its recorder: read without its index")
+        ingest.note(fact("recorder-stopped"))
 
 
 def _compare(record: Record, counts: dict[int, int], ingest: Ingest) -> None:

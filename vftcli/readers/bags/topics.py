@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import TURNED_NOTE
+from vftcli.readers.aliases import RESIDUAL_TURNED
 from vftcli.readers.bags.container import Integers
 from vftcli.readers.bags.decode import Stream
 from vftcli.readers.columns import SIGNALS, parse_columns
@@ -16,6 +16,7 @@ from vftcli.readers.joints import UR_NAMES, robot_of
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import median_step, resampled
 from vftcli.signals.wrench import WrenchFrame
 
@@ -27,18 +28,18 @@ NEAR = 3.0
 OWN = "/vftcli/"
 """Topics that vftcli itself writes."""
 
-EFFORT_IS_CURRENT = (
-    "effort of UR joints taken as motor current [A], as the UR drivers publish it (a simulator "
-    "publishes torque: --columns tau=effort)"
-)
-
 
 @dataclass
-class Notes:
-    """What was chosen, and what looks suspicious."""
+class Account:
+    """What was made of a bag's topics.
 
-    repairs: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    Attributes:
+        remarks: What was chosen, and what looks suspicious.
+        taken: Topics other than the leading one of which a signal was taken.
+    """
+
+    remarks: list[Remark] = field(default_factory=list)
+    taken: set[str] = field(default_factory=set)
 
 
 def aligned(
@@ -49,17 +50,17 @@ def aligned(
     Raises:
         LogError: If no topic has joint positions, or --columns names what is not there.
     """
-    notes = Notes()
+    account = Account()
     lead = leading(streams, path, others)
     stamps, tick, clock, times = clock_of(lead)
-    signals, names = _joint_signals(lead, notes, request)
+    signals, names = _joint_signals(lead, account, request)
     for stream in streams:
         if stream.channel.topic.startswith(OWN):
             _own_topic(signals, stream, lead, times)
         elif stream is not lead and _same_arm(stream, lead):
-            _supplement(signals, stream, lead, times, notes)
-    frame = _take_wrench(signals, streams, lead, times, notes, request)
-    _tell_left(streams, lead, notes)
+            _supplement(signals, stream, lead, times, account)
+    frame = _take_wrench(signals, streams, lead, times, account, request)
+    _tell_left(streams, lead, account)
     hint = robot_of(names)
     if not names:
         names, hint = _names_elsewhere(streams, lead)
@@ -72,8 +73,7 @@ def aligned(
         wrench_frame=frame,
         joint_names=names,
         robot_hint=hint,
-        repairs=tuple(notes.repairs),
-        warnings=tuple(notes.warnings),
+        remarks=tuple(account.remarks),
         payload_mass=next(iter(lead.constants.get("mass", ())), None),
         payload_com=lead.constants.get("com"),
     )
@@ -84,7 +84,7 @@ def _take_wrench(
     streams: Sequence[Stream],
     lead: Stream,
     times: Integers,
-    notes: Notes,
+    account: Account,
     request: ReadChoice,
 ) -> WrenchFrame | None:
     """Put a sensor's wrench in place of the vendor's estimate; return what is stated of it."""
@@ -94,7 +94,7 @@ def _take_wrench(
         return frame
     if sensor.channel.topic.startswith(OWN):
         return WrenchFrame.parsed(sensor.frame) if sensor.frame else None
-    values = interpolated(sensor, "wrench", lead, times, notes)
+    values = interpolated(sensor, "wrench", lead, times, account)
     if values is None:
         return frame
     signals["wrench"] = values
@@ -102,18 +102,22 @@ def _take_wrench(
     return WrenchFrame(sensor.frame, sensor.frame) if sensor.frame else None
 
 
-def _tell_left(streams: Sequence[Stream], lead: Stream, notes: Notes) -> None:
+def _tell_left(streams: Sequence[Stream], lead: Stream, account: Account) -> None:
     """Say which messages and topics were left out."""
     for stream in streams:
         if stream.channel == lead.channel and stream.names == lead.names and stream is not lead:
-            notes.warnings.append(
-                f"left out {stream.messages} messages of {lead.channel.topic} that hold only "
-                f"{', '.join(stream.signals) or 'names'}"
+            account.remarks.append(
+                caution(
+                    "messages-left-out",
+                    messages=stream.messages,
+                    topic=lead.channel.topic,
+                    signals=tuple(stream.signals) or ("names",),
+                )
             )
     topics = {s.channel.topic for s in streams if not s.channel.topic.startswith(OWN)}
-    left = sorted(topics - {lead.channel.topic} - _taken(notes))
+    left = sorted(topics - {lead.channel.topic} - account.taken)
     if left:
-        notes.repairs.append(f"left out {', '.join(left[:6])}: other joints, targets, or repeated")
+        account.remarks.append(fact("topics-left-out", topics=tuple(left[:6])))
 
 
 def _own_topic(signals: dict[str, Array], stream: Stream, lead: Stream, times: Integers) -> None:
@@ -138,10 +142,6 @@ def _names_elsewhere(streams: Sequence[Stream], lead: Stream) -> tuple[tuple[str
         if len(stream.names) == width and (hint := robot_of(stream.names)) is not None:
             return stream.names, hint
     return (), None
-
-
-def _taken(notes: Notes) -> set[str]:
-    return {word for note in notes.repairs for word in re.findall(r"/[\w/]+", note)}
 
 
 def leading(streams: Sequence[Stream], path: Path, others: dict[str, str]) -> Stream:
@@ -216,29 +216,27 @@ def host_times(stream: Stream) -> tuple[Integers, str]:
 
 
 def _joint_signals(
-    lead: Stream, notes: Notes, request: ReadChoice
+    lead: Stream, account: Account, request: ReadChoice
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
     """The leading topic's signals, the vendor's signs turned into ours."""
     if lead.mixed:
-        notes.repairs.append(
-            f"put the joints of {lead.channel.topic} in kinematic order by name, others set aside"
-        )
+        account.remarks.append(fact("joints-reordered", topic=lead.channel.topic))
     width = lead.signals["q"].shape[1]
     signals = {}
     for signal, value in lead.signals.items():
         if signal == "wrench":
             signals[signal] = value
-        elif value.shape[1] == width and not _empty(signal, value, notes):
+        elif value.shape[1] == width and not _empty(signal, value, account):
             signals[signal] = 0.0 - value if signal in lead.kind.turned else value
     if lead.kind.turned & set(signals):
-        notes.repairs.append(TURNED_NOTE)
-    return _with_effort(signals, lead, notes, request), lead.names
+        account.remarks.append(RESIDUAL_TURNED)
+    return _with_effort(signals, lead, account, request), lead.names
 
 
-def _empty(signal: str, value: Array, notes: Notes) -> bool:
+def _empty(signal: str, value: Array, account: Account) -> bool:
     """Whether a signal is NaN throughout, as drivers publish what they do not measure."""
     if np.isnan(value[0]).all() and np.isnan(value).all():
-        notes.repairs.append(f"left out {signal}: NaN in every message, so not measured")
+        account.remarks.append(fact("signal-empty", signal=signal))
         return True
     return False
 
@@ -259,7 +257,7 @@ FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}
 
 
 def _with_effort(
-    signals: dict[str, Array], lead: Stream, notes: Notes, request: ReadChoice
+    signals: dict[str, Array], lead: Stream, account: Account, request: ReadChoice
 ) -> dict[str, Array]:
     """Decide what effort is: what --columns says, else current for UR joints, torque for others."""
     found = dict(signals)
@@ -273,14 +271,14 @@ def _with_effort(
             )
         found.pop(source, None)
         found[signal] = signals[source] * factor + 0.0
-        turned = "with its sign turned " if factor < 0 else ""
-        notes.repairs.append(f"took {last} as {signal} {turned}(--columns)")
+        code = "field-taken-turned" if factor < 0 else "field-taken"
+        account.remarks.append(fact(code, field=last, signal=signal))
     if "effort" in found:
         names = lead.names
         is_ur = len(names) == len(UR_NAMES) and all(name.endswith(UR_NAMES) for name in names)
         found["current" if is_ur else "torque"] = found.pop("effort")
         if is_ur:
-            notes.repairs.append(EFFORT_IS_CURRENT)
+            account.remarks.append(fact("effort-is-current"))
     return found
 
 
@@ -296,13 +294,13 @@ def _same_arm(stream: Stream, lead: Stream) -> bool:
 
 
 def _supplement(
-    signals: dict[str, Array], stream: Stream, lead: Stream, times: Integers, notes: Notes
+    signals: dict[str, Array], stream: Stream, lead: Stream, times: Integers, account: Account
 ) -> None:
     """Add the signals that only another topic about the same joints has, interpolated."""
     for signal in stream.signals:
         if signal in signals or signal == "effort":
             continue
-        values = interpolated(stream, signal, lead, times, notes)
+        values = interpolated(stream, signal, lead, times, account)
         if values is None:
             continue
         signals[signal] = 0.0 - values if signal in stream.kind.turned else values
@@ -318,7 +316,7 @@ def _sensor(streams: Sequence[Stream], lead: Stream) -> Stream | None:
 
 
 def interpolated(
-    stream: Stream, signal: str, lead: Stream, times: Integers, notes: Notes
+    stream: Stream, signal: str, lead: Stream, times: Integers, account: Account
 ) -> Array | None:
     """A smooth signal of another topic at the leading topic's times, held at the ends. (T, k)
 
@@ -335,13 +333,19 @@ def interpolated(
     usual = median_step(own.astype(np.float64)) if len(own) > 1 else 0.0
     outside = (times < own[0] - NEAR * usual) | (times > own[-1] + NEAR * usual)
     if len(own) < 2 or np.mean(outside) > 0.05 or np.any(np.diff(own) < 0):
-        notes.warnings.append(f"left out {signal} of {topic}: it does not cover the joints' time")
+        account.remarks.append(caution("topic-too-short", signal=signal, topic=topic))
         return None
     start = int(own[0])
     x, xp = np.asarray((times - start) * 1e-9, float), np.asarray((own - start) * 1e-9, float)
     result = resampled(x, xp, values)
-    notes.repairs.append(
-        f"interpolated {signal} of {topic} ({1e9 / usual:.4g} Hz) at the times of "
-        f"{lead.channel.topic}"
+    account.taken.add(topic)
+    account.remarks.append(
+        fact(
+            "signal-interpolated",
+            signal=signal,
+            topic=topic,
+            rate_Hz=1e9 / usual,
+            lead=lead.channel.topic,
+        )
     )
     return result
