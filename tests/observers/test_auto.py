@@ -13,7 +13,8 @@ from vftcli.observers.auto_tuning import (
     noise_level,
     tuned,
 )
-from vftcli.observers.spectra import Part, Spectra, raw_disturbance, spectra_of
+from vftcli.observers.spectra import Part, Spectra, spectra_of
+from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
 

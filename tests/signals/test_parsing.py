@@ -1,10 +1,10 @@
-"""Words of the command line: spans and lists of numbers."""
+"""Words of the command line: spans, lists of numbers, assignments."""
 
 import numpy as np
 import pytest
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import interval, numbers
+from vftcli.signals.parsing import assignment, interval, numbers
 
 
 @pytest.mark.parametrize(
@@ -25,3 +25,14 @@ def test_numbers_or_none() -> None:
     assert numbers("1,-2.5, 3e-1") == (1.0, -2.5, 0.3)
     assert numbers("1,,2") is None
     assert numbers("tool") is None
+
+
+def test_assignments() -> None:
+    assert assignment(" gmo.gain = 5,3 ", "--set", "KEY=VALUE") == ("gmo.gain", "5,3")
+    assert assignment("a=b=c", "--set", "KEY=VALUE") == ("a", "b=c")
+
+
+@pytest.mark.parametrize("text", ["gain", "gain=", "=3", " = ", ""])
+def test_assignments_that_are_none(text: str) -> None:
+    with pytest.raises(ParameterError, match=r"--set .* is not KEY=VALUE"):
+        assignment(text, "--set", "KEY=VALUE")

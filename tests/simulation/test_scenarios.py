@@ -76,7 +76,7 @@ def test_twists_exceed_the_threshold() -> None:
         (["step=two"], "must be a number"),
         (["duration=inf"], "finite"),
         (["pair=1"], "true or false"),
-        (["duration"], "takes key=value"),
+        (["duration"], "is not key=value"),
         (["servo=3"], "must be a section"),
         (["title.x=3"], "is a value, not a section"),
     ],

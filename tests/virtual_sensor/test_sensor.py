@@ -9,7 +9,7 @@ from vftcli.signals.pose import Pose, adjoint, inverse, rpy_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import Wrench, WrenchFrame
 from vftcli.virtual_sensor.frames import Mounting
-from vftcli.virtual_sensor.sensor import fit_pose, time_offset, weigh_tool
+from vftcli.virtual_sensor.sensor import fit_pose, weigh_tool
 from vftcli.virtual_sensor.vendor import axes_words, check_vendor, fit_axes
 
 POSE = Pose(rpy_matrix((0.1, -0.2, 0.8)), np.array([0.01, -0.02, 0.04]))
@@ -66,15 +66,6 @@ def test_one_orientation_weighs_nothing() -> None:
     rotation = np.tile(np.eye(3), (20, 1, 1))
     with pytest.raises(ParameterError, match="all in one orientation"):
         weigh_tool(np.zeros((20, 6)), rotation, GRAVITY)
-
-
-@pytest.mark.parametrize("lag", [-0.123, 0.0, 0.05, 0.2])
-def test_a_time_offset_is_found_below_the_sample_time(lag: float) -> None:
-    t = np.arange(0, 12, 0.008)
-    shape = lambda x: np.column_stack([np.sin(2 * x), np.sin(3.3 * x + 1)])  # noqa: E731
-    found = time_offset(t, shape(t - lag), shape(t))
-    # a parabola through a band-limited peak: a small part of the 8 ms step; ends do not overlap
-    assert found.lag == pytest.approx(lag, abs=2e-3)
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -8,6 +8,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, check_shape, frozen
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import assignment, numbers
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 """The six axes: translation of the flange point along the base axes, rotation about them."""
@@ -261,34 +262,30 @@ def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:
     """
     settings: dict[str, dict[str, Any]] = {}
     for text in assignments:
-        left, equals, right = text.partition("=")
-        section, dot, name = left.strip().rpartition(".")
+        form = "SECTION.PARAMETER=VALUE, as position.stiffness=12"
+        left, value = assignment(text, "--set", form)
+        section, dot, name = left.rpartition(".")
         section = section if dot else "admittance"
-        if not equals or not right.strip():
-            raise ParameterError(
-                f"--set {text!r} is not SECTION.PARAMETER=VALUE, as position.stiffness=12"
-            )
         name = LETTERS.get(name.lower(), name)
         if section not in GROUPS or name not in (*PER_AXIS, *PLAIN):
             raise ParameterError(
                 f"--set {text!r}: no such admittance parameter. Sections: {', '.join(GROUPS)}; "
                 f"parameters: {', '.join((*PER_AXIS, 'period'))}"
             )
-        settings.setdefault(section, {})[name] = parse_value(name, right.strip(), text)
+        settings.setdefault(section, {})[name] = parse_value(name, value, text)
     return settings
 
 
-def parse_value(name: str, text: str, assignment: str) -> Any:  # noqa: ANN401
+def parse_value(name: str, text: str, whole: str) -> Any:  # noqa: ANN401
     """A word, a number, or a list of numbers; ``none`` is no speed limit."""
     if name in {"threshold_mode", "source"}:
         return text
     if name == "speed_limit" and text.lower() == "none":
         return float("inf")
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise ParameterError(f"--set {assignment!r}: {text!r} is not a number or a list") from None
-    return numbers[0] if len(numbers) == 1 else numbers
+    values = numbers(text)
+    if values is None:
+        raise ParameterError(f"--set {whole!r}: {text!r} is not a number or a list")
+    return values[0] if len(values) == 1 else list(values)
 
 
 def is_admittance_setting(assignment: str) -> bool:

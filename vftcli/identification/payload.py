@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.filtering import zero_phase
 from vftcli.identification.least_squares import fit_column, solve
 from vftcli.identification.processing import (
     PreparedLog,
     Processing,
     gravity_torque,
     prepare,
+    zero_phase,
 )
 from vftcli.robots.chain import Payload
 from vftcli.robots.drive import drive_torque

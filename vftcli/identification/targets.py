@@ -11,10 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.filtering import derivative, zero_phase
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.least_squares import fit_column, solve
-from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
+from vftcli.identification.processing import (
+    PreparedLog,
+    Processing,
+    derivative,
+    gravity_torque,
+    prepare,
+    zero_phase,
+)
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array

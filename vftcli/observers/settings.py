@@ -8,6 +8,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import assignment, numbers
 
 Value = float | str | list[float]
 Settings = dict[str, dict[str, Value]]
@@ -20,7 +21,11 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
 }
 """Section → the parameters it takes; `kfo` holds for every Kalman filter."""
 
+FORM = "OBSERVER.PARAMETER=VALUE, as gmo.gain=30 or gmo.gain=5,3,4,10,10,10"
+"""What an assignment of ``--set`` looks like."""
+
 WORDS = {"noise_convention"}
+"""Parameters whose value is a word."""
 
 
 def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[str]]) -> Settings:
@@ -35,15 +40,12 @@ def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[s
     """
     settings: Settings = {}
     for text in assignments:
-        left, equals, right = text.partition("=")
-        section, dot, parameter = left.strip().partition(".")
-        if not (equals and dot and right.strip()):
-            raise ParameterError(
-                f"--set {text!r} is not OBSERVER.PARAMETER=VALUE, as gmo.gain=30 or "
-                "gmo.gain=5,3,4,10,10,10"
-            )
+        name, value = assignment(text, "--set", FORM)
+        section, dot, parameter = name.partition(".")
+        if not dot:
+            raise ParameterError(f"--set {text!r} is not {FORM}")
         check_name(section, parameter, sections)
-        settings.setdefault(section, {})[parameter] = parse_value(parameter, right.strip(), text)
+        settings.setdefault(section, {})[parameter] = parse_value(parameter, value, text)
     return settings
 
 
@@ -63,17 +65,16 @@ def check_name(section: str, parameter: str, sections: Mapping[str, Sequence[str
         )
 
 
-def parse_value(parameter: str, text: str, assignment: str) -> Value:
+def parse_value(parameter: str, text: str, whole: str) -> Value:
     """A word, a number, or a list of numbers."""
     if parameter in WORDS:
         return text
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise ParameterError(f"--set {assignment!r}: {text!r} is not a number or a list") from None
-    if not all(np.isfinite(numbers)):
-        raise ParameterError(f"--set {assignment!r}: every number must be finite")
-    return numbers[0] if len(numbers) == 1 else numbers
+    values = numbers(text)
+    if values is None:
+        raise ParameterError(f"--set {whole!r}: {text!r} is not a number or a list")
+    if not all(np.isfinite(values)):
+        raise ParameterError(f"--set {whole!r}: every number must be finite")
+    return values[0] if len(values) == 1 else list(values)
 
 
 def merged(section: str, name: str, *sources: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:

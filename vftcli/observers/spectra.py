@@ -9,23 +9,21 @@ From the two follows the error of every linear estimator with frequency response
 
 H is complex, so that delay counts. The spectra are one-sided and not detrended: a constant error is
 an error too.
-
-References:
-    P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra",
-    IEEE Trans. Audio Electroacoust. 15(2), 1967, for the averaging of segments.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vftcli.robots.disturbance import disturbance_stretches
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, Mask, frozen, handed_over, is_uniform
+from vftcli.signals.arrays import Array, Mask, frozen, handed_over
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.series import median_step, resampled, runs_of
+from vftcli.signals.series import median_step
+from vftcli.signals.spectrum import welch
 
 SEGMENT = 4.0
 """Length of a segment: what changes more slowly counts as constant. [s]"""
@@ -35,9 +33,6 @@ LEAST_SEGMENT = 32
 
 NEIGHBOURS = 0.2
 """How far the average of neighbouring frequencies reaches, as a share of the frequency."""
-
-GAP = 5.5
-"""A step of more than this many median steps is a gap; no segment reaches across."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,8 +142,8 @@ def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
     """
     t = loaded.terms.t
     nominal = median_step(t) if len(t) > 1 else 0.0
-    heavy = list(runs(loaded, nominal))
-    quiet = [run for part in free for run in runs(part, nominal)]
+    heavy = disturbance_stretches(loaded.terms, loaded.inside, nominal)
+    quiet = [d for part in free for d in disturbance_stretches(*part, nominal)]
     longest = [max((len(run) for run in found), default=0) for found in (heavy, quiet)]
     size = min(round(SEGMENT / nominal) if nominal else 0, *longest)
     if size < LEAST_SEGMENT:
@@ -165,61 +160,3 @@ def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
         step=nominal,
         segments=(few, many),
     )
-
-
-def raw_disturbance(terms: DynamicsTerms) -> Array:
-    """Return d of every sample but the first, by the log's own sample times. (T−1, n) [N·m]"""
-    d = np.diff(terms.p, axis=0)
-    d /= np.diff(terms.t)[:, None]
-    d -= 0.5 * (terms.mu[1:] + terms.mu[:-1])
-    return d
-
-
-def runs(part: Part, step: float) -> Iterator[Array]:
-    """The unbroken stretches of a part's raw disturbance, on a uniform clock. (N, n) each
-
-    On an uneven clock the integral of d is interpolated, which averages d over each new step.
-    """
-    t = part.terms.t
-    d = raw_disturbance(part.terms)
-    uniform = is_uniform(t) and len(t) > 1
-    whole = part.inside[1:] & part.inside[:-1]
-    if not uniform:
-        whole = whole & (np.diff(t) <= GAP * step)
-    for first, stop in runs_of(whole):
-        stretch = d[first:stop]
-        if uniform:
-            yield stretch
-            continue
-        clock = t[first : stop + 1]
-        even = np.arange(clock[0], clock[-1], step)
-        total = np.concatenate([np.zeros((1, d.shape[1])), stretch * np.diff(clock)[:, None]])
-        np.cumsum(total, axis=0, out=total)
-        at = resampled(even, clock, total)
-        yield np.diff(at, axis=0) / step
-
-
-def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, int]:
-    """Mean periodogram of Hann-windowed, half overlapping segments, and their number.
-
-    Nothing is detrended; the density at 0 Hz holds the square of the mean. Each stretch is
-    mirrored at its ends by half a segment, so that its first and last samples count like all
-    others: a free part is often no longer than a segment.
-    """
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(size) / size)
-    joints = stretches[0].shape[1]
-    power, count = np.zeros((joints, size // 2 + 1)), 0
-    for stretch in stretches:
-        if len(stretch) < size:
-            continue
-        columns = np.pad(stretch, ((size // 2, size // 2), (0, 0)), mode="symmetric").T
-        last = columns.shape[1] - size
-        for first in np.linspace(0, last, 1 + -(-last // (size // 2))).astype(int):
-            spectrum = np.fft.rfft(columns[:, first : first + size] * window)
-            power += spectrum.real**2
-            power += spectrum.imag**2
-            count += 1
-    power *= 2.0 * step / (float(np.sum(window**2)) * count)
-    power[:, 0] *= 0.5
-    power[:, -1] *= 0.5
-    return np.ascontiguousarray(power.T), count

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vftcli.observers.observer import Observer
-from vftcli.observers.spectra import Part, Spectra, raw_disturbance, spectra_of
+from vftcli.observers.spectra import Part, Spectra, spectra_of
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_part import FreePart, find_free_part
 from vftcli.repetition.pairing import mean_of
 from vftcli.repetition.standstill import at_rest, stops
+from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array, frozen

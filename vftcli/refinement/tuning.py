@@ -18,6 +18,7 @@ from vftcli.observers.matching import MatchTarget, tune
 from vftcli.observers.spectra import Spectra
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import numbers
 
 GOALS = {
     "rmse": "the smallest expected error",
@@ -98,10 +99,7 @@ def parse_threshold(text: str | None) -> Array | None:
     """
     if text is None:
         return None
-    try:
-        level = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        level = np.array([-1.0])
+    level = np.array(numbers(text) or [np.nan])
     if not (np.all(np.isfinite(level)) and np.all(level > 0.0)):
         raise ParameterError(f"--threshold {text!r} is not a positive number or one a joint [N·m]")
     return level

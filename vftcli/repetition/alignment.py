@@ -6,6 +6,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.lag import closest_lag
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import resampled, runs_of
 
@@ -146,7 +147,9 @@ def explaining_rate(recording: Recording, free: Recording) -> float | None:
         if span < LEAST_OVERLAP:
             continue
         step = max(recording.median_step * rate, free.median_step, free.duration / 4000.0)
-        lag = lag_of(uniform(recording, step / rate), uniform(free, step)) * step
+        lag = (
+            closest_lag(uniform(free, step), uniform(recording, step / rate), LEAST_OVERLAP) * step
+        )
         shift = lag + float(free.t[0] - rate * recording.t[0])
         shift, found = refined(recording, free, shift, float(rate))
         if deviation_at(recording, free, shift, found)[0] <= 0.5 * SAME_TRAJECTORY:
@@ -162,29 +165,8 @@ def uniform(recording: Recording, step: float) -> Array:
 
 def coarse_shift(recording: Recording, free: Recording, step: float) -> float:
     """The shift with the smallest mean squared position difference, to one `step`. [s]"""
-    lag = lag_of(uniform(recording, step), uniform(free, step))
+    lag = closest_lag(uniform(free, step), uniform(recording, step), LEAST_OVERLAP)
     return lag * step + float(free.t[0] - recording.t[0])
-
-
-def lag_of(a: Array, b: Array) -> float:
-    """The lag of b's samples against a's with the smallest mean squared difference. [samples]"""
-    middle = b.mean(axis=0)
-    a, b = a - middle, b - middle
-    size = 1 << int(np.ceil(np.log2(len(a) + len(b))))
-    spectra = np.conj(np.fft.rfft(a, size, axis=0)) * np.fft.rfft(b, size, axis=0)
-    cross = np.fft.irfft(np.sum(spectra, axis=1), size)
-    lags = np.arange(-(len(a) - 1), len(b))
-    first = np.maximum(0, -lags)
-    last = np.minimum(len(a), len(b) - lags)
-    energy_a = np.concatenate([[0.0], np.cumsum(np.sum(a**2, axis=1))])
-    energy_b = np.concatenate([[0.0], np.cumsum(np.sum(b**2, axis=1))])
-    overlap = last - first
-    here = energy_a[last] - energy_a[first]
-    there = energy_b[last + lags] - energy_b[first + lags]
-    squares = here + there - 2.0 * cross[lags % size]
-    least = max(2, int(LEAST_OVERLAP * min(len(a), len(b))))
-    mean = np.where(overlap >= least, squares / np.maximum(overlap, 1), np.inf)
-    return float(lags[int(np.argmin(mean))])
 
 
 def refined(

@@ -1,4 +1,4 @@
-"""Zero-phase filters on clocks that may be uneven, and how much white noise they let through."""
+"""Filters without phase shift on clocks that may be uneven, and how much white noise they pass."""
 
 import numpy as np
 
@@ -9,46 +9,68 @@ from vftcli.signals.series import median_step, resampled
 ORDER = 2
 """Order of the Butterworth filter; run forwards and backwards it attenuates twice as much."""
 
+UNEVEN = 0.05
+"""Steps that differ from their median by a larger share are resampled: by less, the error of a
+filter that takes them as equal is below what the interpolation would make."""
 
-def low_pass(t: Array, x: Array, cutoff: float) -> Array:
+
+def low_pass(
+    t: Array, x: Array, cutoff: float, order: int = ORDER, settling: float | None = None
+) -> Array:
     """Low-pass each column without phase shift. (T, n)
 
-    On an uneven clock the signal is brought onto a uniform one of the median step and back by
-    linear interpolation. A log too short for the filter's start-up is returned as it is.
+    A Butterworth filter runs forwards and backwards. On an uneven clock the signal is brought onto
+    a uniform one of the median step and back by linear interpolation. A log too short for the
+    filter's start-up is returned as it is.
 
     Args:
         t: Clock. (T,) [s]
         x: Signals, all finite. (T, n)
-        cutoff: −6 dB frequency of the forward and backward pass together. [Hz]
+        cutoff: Frequency at which one pass loses 3 dB, both together 6 dB. [Hz]
+        order: Order of one pass.
+        settling: Length by which the ends are continued, mirrored about their value, for the
+            filter to settle; None for the least that its order needs. [s]
 
     Raises:
         ParameterError: If the cutoff is not below half the sample rate.
     """
-    return filtered(t, x, cutoff, "lowpass")
+    return filtered(t, x, design(median_step(t), cutoff, "lowpass", order), settling)
 
 
 def band_pass(t: Array, x: Array, low: float, high: float) -> Array:
     """Keep the band from `low` to `high` [Hz] of each column, without phase shift. (T, n)"""
-    return filtered(t, x, (low, high), "bandpass")
+    return filtered(t, x, design(median_step(t), (low, high), "bandpass"))
 
 
-def filtered(t: Array, x: Array, cutoff: float | tuple[float, float], kind: str) -> Array:
-    """Forward and backward Butterworth filter along time. (T, n)"""
+def filtered(t: Array, x: Array, sections: Array, settling: float | None = None) -> Array:
+    """Columns behind second-order sections that run forwards and backwards along time. (T, n)"""
     from scipy.signal import sosfiltfilt
 
     step = median_step(t)
-    sos = design(step, cutoff, kind)
-    if len(t) <= 3 * (2 * len(sos) + 1):
+    if settling is not None:
+        padding = int(settling / step)
+    elif len(t) <= 3 * (2 * len(sections) + 1):
         return x.copy()
-    if is_uniform(t, tolerance=0.05):
-        result: Array = sosfiltfilt(sos, x, axis=0)
-        return result
-    even = np.arange(t[0], t[-1] + step, step)
-    return resampled(t, even, sosfiltfilt(sos, resampled(even, t, x), axis=0))
+    else:
+        padding = None
+    even = is_uniform(t, tolerance=UNEVEN)
+    clock = t if even else even_clock(t, step)
+    if padding is not None:
+        padding = min(len(clock) - 1, padding)
+    columns = x if even else resampled(clock, t, x)
+    smooth: Array = sosfiltfilt(sections, columns, axis=0, padlen=padding)
+    return smooth if even else resampled(t, clock, smooth)
 
 
-def design(step: float, cutoff: float | tuple[float, float], kind: str) -> Array:
-    """Second-order sections for a sample time. [s]
+def even_clock(t: Array, step: float) -> Array:
+    """Instants about `step` [s] apart from a clock's first sample to its last. (K,) [s]"""
+    return np.linspace(t[0], t[-1], max(2, round(float(t[-1] - t[0]) / step) + 1))
+
+
+def design(
+    step: float, cutoff: float | tuple[float, float], kind: str, order: int = ORDER
+) -> Array:
+    """Second-order sections of a Butterworth filter for a sample time. [s]
 
     Raises:
         ParameterError: If a cutoff is not between zero and half the sample rate.
@@ -60,8 +82,8 @@ def design(step: float, cutoff: float | tuple[float, float], kind: str) -> Array
             f"a filter at {cutoff} Hz is not possible on a log of {1.0 / step:.4g} Hz; "
             f"choose a cutoff between 0 and {0.5 / step:.4g} Hz"
         )
-    sos: Array = butter(ORDER, cutoff, kind, fs=1.0 / step, output="sos")
-    return sos
+    sections: Array = butter(order, cutoff, kind, fs=1.0 / step, output="sos")
+    return sections
 
 
 def passed(step: float, cutoff: float | tuple[float, float], kind: str, slope: int = 0) -> float:

@@ -1,9 +1,16 @@
-"""By how much an estimate lags its reference: the best-fitting delay."""
+"""By how much one series runs behind another: the shift at which they fit best.
+
+In every function the late series comes first, the early one second, and a positive lag says that
+the first runs behind.
+"""
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, is_uniform
+from vftcli.signals.series import bridged, median_step, resampled
 
 LONGEST = 1.0
 """Longest delay looked for. [s]"""
@@ -15,19 +22,19 @@ LEAST_FIT = 0.3
 """Below this correlation at the best delay there is nothing to tell a delay by."""
 
 
-def lags(estimate: Array, reference: Array, step: float) -> Array:
-    """Delay at which the estimate fits the reference best, NaN where nothing fits. (n,) [s]
+def lags(late: Array, early: Array, step: float) -> Array:
+    """Delay of each column at which it fits best, NaN where nothing fits. (n,) [s]
 
     Maximises the correlation over the samples that overlap, for delays from −`LEAD` to `LONGEST`,
     refined between samples by a parabola.
 
     Args:
-        estimate: (T, n) [N·m]
-        reference: (T, n) [N·m]
+        late: An estimate, NaN where unknown. (T, n)
+        early: Its reference, likewise. (T, n)
         step: Sample time; an uneven clock's delay is in median steps. [s]
     """
-    known = np.isfinite(estimate) & np.isfinite(reference)
-    x, y = (centred(signal, known) for signal in (estimate, reference))
+    known = np.isfinite(late) & np.isfinite(early)
+    x, y = (centred(signal, known) for signal in (late, early))
     first = -min(round(LEAD / step), len(x) // 4)
     last = max(1, min(round(LONGEST / step), len(x) // 4))
     size = 1 << int(np.ceil(np.log2(2 * len(x))))
@@ -58,5 +65,81 @@ def peak(fit: Array) -> float:
     before, here, after = fit[k - 1], fit[k], fit[k + 1]
     if not here >= LEAST_FIT or here < max(before, after):
         return float("nan")
+    return k + parabola(before, here, after)
+
+
+def parabola(before: float, here: float, after: float) -> float:
+    """Where the parabola through three neighbours peaks, counted in samples from the middle one."""
     bend = before - 2.0 * here + after
-    return k + (0.5 * (before - after) / bend if bend < 0 else 0.0)
+    return 0.5 * (before - after) / bend if bend < 0 else 0.0
+
+
+class Offset(NamedTuple):
+    """How far one series runs behind another.
+
+    Attributes:
+        lag: Time by which the first is late. [s]
+        correlation: Correlation once that is taken out.
+    """
+
+    lag: float
+    correlation: float
+
+
+def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offset:
+    """The lag of `late` behind `early` at which they correlate best, all columns together.
+
+    The columns count by their size: those of a wrench are to be in one unit. The peak is refined by
+    a parabola through its neighbours. Unknown samples are bridged.
+
+    Args:
+        t: Common clock. (T,) [s]
+        late: A series. (T, k)
+        early: Another. (T, k)
+        limit: Largest lag considered, either way. [s]
+    """
+    step = median_step(t)
+    even = t if is_uniform(t) else np.arange(t[0], t[-1], step)
+    x, y = (resampled(even, t, bridged(t, series)) for series in (late, early))
+    x, y = x - x.mean(axis=0), y - y.mean(axis=0)
+    count = len(even)
+    reach = min(int(limit / step), count - 2)
+    at = np.arange(-reach, reach + 1)
+    size = 1 << int(np.ceil(np.log2(2 * count)))
+    cross = sliding(x, y, size, at % size).sum(axis=1)
+    energy = overlap_energy(x, at, count) * overlap_energy(y, -at, count)
+    value = cross / np.sqrt(np.maximum(energy, np.finfo(np.float64).tiny))
+    best = int(np.argmax(value))
+    inside = 0 < best < len(at) - 1
+    shift = parabola(*value[best - 1 : best + 2]) if inside else 0.0
+    return Offset(lag=float((at[best] + shift) * step), correlation=float(value[best]))
+
+
+def closest_lag(late: Array, early: Array, least: float) -> float:
+    """The lag of `late` with the smallest mean squared difference, all columns together. [samples]
+
+    Args:
+        late: A series. (M, k)
+        early: Another, on a clock of the same step. (N, k)
+        least: Share of the shorter series that must overlap.
+    """
+    middle = late.mean(axis=0)
+    x, y = late - middle, early - middle
+    size = 1 << int(np.ceil(np.log2(len(x) + len(y))))
+    at = np.arange(-(len(y) - 1), len(x))
+    overlap = np.minimum(len(y), len(x) - at) - np.maximum(0, -at)
+    cross = sliding(x, y, size, at % size).sum(axis=1)
+    energy = overlap_energy(x, at, len(y)) + overlap_energy(y, -at, len(x))
+    enough = overlap >= max(2, int(least * min(len(x), len(y))))
+    mean = np.where(enough, (energy - 2.0 * cross) / np.maximum(overlap, 1), np.inf)
+    return float(at[int(np.argmin(mean))])
+
+
+def overlap_energy(series: Array, lags: NDArray[np.int64], other: int) -> Array:
+    """Sum of squares of what a series shares with one of `other` samples that it lags. (L,)
+
+    Without it a fit would favour small lags, which overlap longer.
+    """
+    total = np.concatenate([[0.0], np.cumsum(np.sum(series**2, axis=1))])
+    energy: Array = total[np.minimum(len(series), other + lags)] - total[np.maximum(0, lags)]
+    return energy

@@ -1,4 +1,4 @@
-"""Words of the command line that several rooms read: a span of time, a list of numbers."""
+"""Words of the command line that rooms share: a span of time, a list of numbers, an assignment."""
 
 from vftcli.signals.errors import ParameterError
 
@@ -28,3 +28,20 @@ def numbers(text: str) -> tuple[float, ...] | None:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         return None
+
+
+def assignment(text: str, option: str, form: str) -> tuple[str, str]:
+    """Key and value of ``KEY=VALUE``, without the blanks around them.
+
+    Args:
+        text: The word.
+        option: The option it was given to, for the message.
+        form: What the word is to look like, for the message.
+
+    Raises:
+        ParameterError: If there is no equals sign, or nothing before or behind it.
+    """
+    key, _, value = text.partition("=")
+    if not key.strip() or not value.strip():
+        raise ParameterError(f"{option} {text!r} is not {form}")
+    return key.strip(), value.strip()

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import assignment
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.schema import build, unknown
 
@@ -62,14 +63,12 @@ def read_table(path: Path) -> dict[str, Any]:
 
 def apply(table: dict[str, Any], override: str) -> None:
     """Put one `key=value` into the parsed file; contacts are addressed by name."""
-    key, equals, text = override.partition("=")
-    if not equals or not key.strip():
-        raise ParameterError(f"--set takes key=value, not {override!r}")
-    parts = key.strip().split(".")
+    key, text = assignment(override, "--set", "key=value")
+    parts = key.split(".")
     node: Any = table
     for depth, part in enumerate(parts[:-1]):
         node = inner(node, part, ".".join(parts[: depth + 1]))
-    node[parts[-1]] = parse_value(text.strip())
+    node[parts[-1]] = parse_value(text)
 
 
 def inner(node: Any, part: str, where: str) -> Any:  # noqa: ANN401 - TOML values

@@ -17,6 +17,7 @@ import numpy as np
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import numbers
 from vftcli.signals.pose import IDENTITY, Pose, adjoint, inverse, rpy_matrix
 
 ROTATION_TOLERANCE = 1e-6
@@ -139,21 +140,21 @@ def checked_pose(rotation: Array, translation: Array, what: str) -> Pose:
     return Pose(R, p)
 
 
-def pose_of_numbers(numbers: Sequence[float], what: str) -> Pose:
+def pose_of_numbers(values: Sequence[float], what: str) -> Pose:
     """A pose from x, y, z [m]; with roll, pitch, yaw [rad]; or with nine entries of R, row by row.
 
     Raises:
         ParameterError: If there are not 3, 6 or 12 numbers, or the nine are no rotation.
     """
-    p = np.array(numbers[:3], dtype=np.float64)
-    if len(numbers) == 3:
+    p = np.array(values[:3], dtype=np.float64)
+    if len(values) == 3:
         return checked_pose(np.eye(3), p, what)
-    if len(numbers) == 6:
-        return checked_pose(rpy_matrix(numbers[3:]), p, what)
-    if len(numbers) == 12:
-        return checked_pose(np.reshape(numbers[3:], (3, 3)), p, what)
+    if len(values) == 6:
+        return checked_pose(rpy_matrix(values[3:]), p, what)
+    if len(values) == 12:
+        return checked_pose(np.reshape(values[3:], (3, 3)), p, what)
     raise ParameterError(
-        f"{what}: {len(numbers)} numbers; a pose is x,y,z or x,y,z,roll,pitch,yaw or x,y,z and "
+        f"{what}: {len(values)} numbers; a pose is x,y,z or x,y,z,roll,pitch,yaw or x,y,z and "
         "nine entries of a rotation matrix, row by row [m, rad]"
     )
 
@@ -170,11 +171,10 @@ def read_pose(text: str, robot: Robot, section: str, option: str) -> Pose:
     Raises:
         ParameterError: If it is neither.
     """
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
+    values = numbers(text)
+    if values is None:
         return named_pose(text, robot, section, option)
-    return pose_of_numbers(numbers, option)
+    return pose_of_numbers(values, option)
 
 
 def named_pose(name: str, robot: Robot, section: str, option: str) -> Pose:

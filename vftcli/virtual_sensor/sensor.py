@@ -1,17 +1,13 @@
 """A real force/torque sensor beside the virtual one: its pose, its tool's weight, its lag."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array, frozen, is_uniform
+from vftcli.signals.arrays import Array, frozen
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import Pose, rpy_angles, skew
 from vftcli.signals.remarks import Remark, fact
-from vftcli.signals.series import bridged, median_step, resampled
-from vftcli.virtual_sensor.solvers import SCALE
 
 LEAST_DIRECTIONS = 0.02
 """Second to first singular value of the forces below which they lie on one line."""
@@ -150,67 +146,6 @@ def weigh_tool(sensor: Array, rotation: Array, gravity: Array) -> ToolWeight:
         mass_sd=float(np.sqrt(np.mean(left**2) / np.sum(centred**2))),
         force_rms=float(np.sqrt(np.mean(left**2))),
     )
-
-
-class Offset(NamedTuple):
-    """How far one series runs behind another.
-
-    Attributes:
-        lag: Time by which the first is late. [s]
-        correlation: Correlation once that is taken out.
-    """
-
-    lag: float
-    correlation: float
-
-
-def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offset:
-    """The lag of `late` behind `early` at which they correlate best, all columns together.
-
-    Of six columns the last three are moments and count by a lever of 0.3 m. The peak is refined
-    by a parabola through its neighbours.
-
-    Args:
-        t: Common clock. (T,) [s]
-        late: A series. (T, k)
-        early: Another. (T, k)
-        limit: Largest lag considered, either way. [s]
-    """
-    step = median_step(t)
-    even = t if is_uniform(t) else np.arange(t[0], t[-1], step)
-    x, y = (comparable(resampled(even, t, bridged(t, series))) for series in (late, early))
-    count = len(even)
-    reach = min(int(limit / step), count - 2)
-    size = 1 << int(np.ceil(np.log2(2 * count)))
-    spectrum = np.fft.rfft(x, size, axis=0) * np.conj(np.fft.rfft(y, size, axis=0))
-    cross = np.fft.irfft(spectrum, size, axis=0).sum(axis=1)
-    lags = np.arange(-reach, reach + 1)
-    value = cross[lags % size] / np.sqrt(overlap_energy(x, lags) * overlap_energy(y, -lags))
-    best = int(np.argmax(value))
-    shift = 0.0
-    if 0 < best < len(lags) - 1:
-        low, peak, high = value[best - 1 : best + 2]
-        bend = low - 2.0 * peak + high
-        shift = 0.5 * (low - high) / bend if bend < 0 else 0.0
-    return Offset(lag=float((lags[best] + shift) * step), correlation=float(value[best]))
-
-
-def overlap_energy(series: Array, lags: NDArray[np.intp]) -> Array:
-    """Sum of squares of what overlaps when a series is moved back by each lag. (L,)
-
-    Without it a correlation would favour small lags, which overlap longer.
-    """
-    total = np.concatenate([[0.0], np.cumsum(np.sum(series**2, axis=1))])
-    count = len(series)
-    energy = total[np.minimum(count, count + lags)] - total[np.maximum(0, lags)]
-    positive: Array = np.maximum(energy, np.finfo(np.float64).tiny)
-    return positive
-
-
-def comparable(series: Array) -> Array:
-    """Columns without mean; moments of a wrench as the forces of a lever of 0.3 m. (N, k)"""
-    centred: Array = series - series.mean(axis=0)
-    return centred / SCALE if series.shape[1] == len(SCALE) else centred
 
 
 def pose_remark(fit: PoseFit) -> Remark:

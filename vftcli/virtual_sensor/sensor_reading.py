@@ -10,13 +10,14 @@ from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.lag import time_offset
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import resampled
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.frames import Mounting
 from vftcli.virtual_sensor.null_space import Elsewhere, contact_elsewhere
-from vftcli.virtual_sensor.sensor import time_offset
+from vftcli.virtual_sensor.solvers import SCALE
 from vftcli.virtual_sensor.torque_error import (
     Disturbance,
     TorqueError,
@@ -194,7 +195,10 @@ def referred(sensed: SensorReading, reference: Wrench) -> SensorReading:
 
 def offset_note(wrenches: Sequence[Wrench], reference: Wrench) -> str:
     """How far each virtual sensor runs behind the real one, in words."""
-    told = (time_offset(reference.t, wrench.known, reference.known) for wrench in wrenches)
+    told = (
+        time_offset(reference.t, wrench.known / SCALE, reference.known / SCALE)
+        for wrench in wrenches
+    )
     each = ", ".join(
         f"{wrench.name} {offset.lag * 1e3:+.0f} ms (correlation {offset.correlation:.3f})"
         for wrench, offset in zip(wrenches, told, strict=True)

@@ -6,28 +6,23 @@ S_τ = (S_d − S_n)₊ is the spectrum of the external torque, S_d and S_n thos
 d = Δp/Δt − ½(μᵗ + μᵗ⁻¹) over the loaded and the free part.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vftcli.observers.spectra import Part, spectra_of
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.series import median_step, runs_of
+from vftcli.signals.parsing import numbers
 from vftcli.virtual_sensor.solvers import TORQUE_SD
 
 OWN = "own"
 """The word for the observers' own covariance as the torque error."""
-
-SEGMENT = 2.0
-"""Length of a segment of the spectra. [s]"""
-
-LEAST_SEGMENT = 16
-"""Fewest samples of a segment."""
 
 
 class Responsive(Protocol):
@@ -65,50 +60,21 @@ class Disturbance:
         Args:
             free: FreeRunTorque samples of the log, used where there is no free run. (T,)
         """
-        step = median_step(self.terms.t)
-        whole = raw_disturbance(self.terms)
-        loaded, quiet = runs(whole, ~free[1:]), runs(whole, free[1:])
+        everywhere = np.ones(len(self.terms.t), dtype=bool)
+        loaded, quiet = Part(self.terms, ~free), Part(self.terms, free)
         if self.free is not None:
-            loaded, quiet = [whole], [raw_disturbance(self.free)]
-        longest = [max([len(run) for run in part], default=0) for part in (loaded, quiet)]
-        size = min(int(SEGMENT / step), *longest)
-        if size < LEAST_SEGMENT:
+            loaded = Part(self.terms, everywhere)
+            quiet = Part(self.free, np.ones(len(self.free.t), dtype=bool))
+        try:
+            spectra = spectra_of(loaded, [quiet])
+        except ParameterError:  # too short for a spectrum: nothing is known of the lag's part
             return {o.name: np.zeros(self.terms.joints) for o in self.observers}
-        excess = spectrum(loaded, size, step) - spectrum(quiet, size, step)
-        width = 1.0 / (size * step)
-        frequency = np.arange(size // 2 + 1, dtype=np.float64) * width
+        n = self.terms.joints
         missed = {}
         for observer in self.observers:
-            H = observer.frequency_response(frequency, step, self.terms.joints)
-            power = np.sum(np.abs(1.0 - H) ** 2 * np.maximum(excess, 0.0), axis=0) * width
-            missed[observer.name] = np.sqrt(power)
+            response = observer.frequency_response(spectra.frequency, spectra.step, n)
+            missed[observer.name] = np.sqrt(spectra.missed(response))
         return missed
-
-
-def raw_disturbance(terms: DynamicsTerms) -> Array:
-    """The unfiltered external torque Δp/Δt − ½(μᵗ + μᵗ⁻¹). (T−1, n) [N·m]"""
-    rate = np.diff(terms.p, axis=0) / np.diff(terms.t)[:, None]
-    d: Array = rate - 0.5 * (terms.mu[1:] + terms.mu[:-1])
-    return d
-
-
-def runs(series: Array, chosen: Mask) -> list[Array]:
-    """The unbroken stretches of the chosen samples."""
-    return [series[start:stop] for start, stop in runs_of(chosen)]
-
-
-def spectrum(series: Iterable[Array], size: int, step: float) -> Array:
-    """One-sided power spectrum by Welch's method: Hann windows, half overlap. (F, n) [(N·m)²/Hz]"""
-    window = np.hanning(size)[:, None]
-    total: Array | None = None
-    count = 0
-    for run in series:
-        for start in range(0, len(run) - size + 1, max(size // 2, 1)):
-            power = np.abs(np.fft.rfft(run[start : start + size] * window, axis=0)) ** 2
-            total = power if total is None else total + power
-            count += 1
-    scale = 2.0 * step / (max(count, 1) * float(np.sum(window**2)))
-    return np.zeros((size // 2 + 1, 1)) if total is None else scale * total
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,10 +99,7 @@ def stated(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
     if text == OWN:
         return TorqueError(sd={})
     joints = torques[0].joints if torques else 0
-    try:
-        values = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        values = np.array([])
+    values = np.array(numbers(text) or ())
     if len(values) not in {1, joints} or not np.all(np.isfinite(values) & (values > 0)):
         raise ParameterError(
             f"--torque-sd {text!r} is not {OWN!r}, one positive number, or one for each of "

@@ -7,10 +7,10 @@ import numpy as np
 from vftcli.robots.chain import Chain
 from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array, frozen
+from vftcli.signals.lag import Offset, time_offset
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import bridged, resampled
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.sensor import Offset, time_offset
 
 DERIVED = 0.9995
 """A correlation that no independent measurement reaches: the field is made from the torques."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.identification.filtering import derivative, zero_phase
+from vftcli.identification.processing import derivative, zero_phase
 from vftcli.signals.errors import ClockError
 
 

@@ -1,0 +1,88 @@
+"""Lags: found again where they are known, and equal to the plainest search for them."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vftcli.signals.lag import closest_lag, lags, parabola, time_offset
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def waves(t: np.ndarray) -> np.ndarray:
+    return np.column_stack([np.sin(2.0 * t), np.sin(3.3 * t + 1.0)])
+
+
+@pytest.mark.parametrize("lag", [-0.123, 0.0, 0.05, 0.2])
+def test_a_time_offset_is_found_below_the_sample_time(lag: float) -> None:
+    t = np.arange(0, 12, 0.008)
+    found = time_offset(t, waves(t - lag), waves(t))
+    # a parabola through a band-limited peak: a small part of the 8 ms step; ends do not overlap
+    assert found.lag == pytest.approx(lag, abs=2e-3)
+    assert found.correlation > 0.99
+
+
+@pytest.mark.parametrize("lag", [-0.1, 0.05, 0.3])
+def test_lags_and_offsets_have_one_sign(lag: float) -> None:
+    """The late series first: both find the same lag, column by column and together."""
+    t = np.arange(0, 12, 0.01)
+    late, early = waves(t - lag), waves(t)
+    # the ends, which do not overlap, pull a sine's peak by up to a fifth of the 10 ms step
+    np.testing.assert_allclose(lags(late, early, 0.01), lag, atol=2e-3)
+    assert time_offset(t, late, early).lag == pytest.approx(lag, abs=2e-3)
+    samples = closest_lag(late, early, 0.3)
+    assert 0.01 * samples == pytest.approx(lag, abs=0.005)  # half a step
+
+
+def test_an_uneven_clock_and_unknown_samples_do_not_move_an_offset() -> None:
+    rng = np.random.default_rng(3)
+    t = np.cumsum(rng.uniform(0.004, 0.012, 1500))
+    late = np.where(rng.random((1500, 2)) < 0.2, np.nan, waves(t - 0.05))
+    # bridges of a few samples of 8 ms over waves of 2 s
+    assert time_offset(t, late, waves(t)).lag == pytest.approx(0.05, abs=2e-3)
+
+
+@given(SEEDS)
+def test_the_closest_lag_is_that_of_a_plain_search(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    early = np.cumsum(rng.standard_normal((int(rng.integers(10, 40)), 2)), axis=0)
+    late = np.cumsum(rng.standard_normal((int(rng.integers(10, 40)), 2)), axis=0)
+    least = max(2, int(0.3 * min(len(late), len(early))))
+    squares = {}
+    for lag in range(-(len(early) - 1), len(late)):
+        pairs = [(i + lag, i) for i in range(len(early)) if 0 <= i + lag < len(late)]
+        if len(pairs) >= least:
+            squares[lag] = np.mean([np.sum((late[a] - early[b]) ** 2) for a, b in pairs])
+    best = min(squares.values())
+    # The FFT's rounding may choose among lags that are equally good.
+    assert squares[int(closest_lag(late, early, 0.3))] == pytest.approx(best, rel=1e-9)
+
+
+@given(SEEDS)
+def test_the_offset_is_that_of_the_best_normalised_correlation(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    step, count = 0.125, 40
+    t = step * np.arange(count)
+    late, early = np.cumsum(rng.standard_normal((2, count, 3)), axis=1)
+    x, y = late - late.mean(axis=0), early - early.mean(axis=0)
+    value = {}
+    for lag in range(-4, 5):
+        a, b = x[max(lag, 0) : count + min(lag, 0)], y[max(-lag, 0) : count - max(lag, 0)]
+        value[lag] = np.sum(a * b) / np.sqrt(np.sum(a**2) * np.sum(b**2))
+    found = time_offset(t, late, early, limit=0.5)
+    assert found.correlation == pytest.approx(max(value.values()), rel=1e-9)
+    assert abs(found.lag / step - max(value, key=lambda lag: value[lag])) <= 0.5
+
+
+def test_nothing_fits_noise() -> None:
+    noise = np.random.default_rng(0).standard_normal((2000, 1))
+    flat = np.zeros((2000, 1))
+    assert np.isnan(lags(noise, flat, 0.01)[0])
+
+
+@given(st.floats(-0.5, 0.5), st.floats(0.1, 10.0))
+def test_the_parabola_s_peak(at: float, height: float) -> None:
+    values = [height * (1.0 - (k - at) ** 2) for k in (-1.0, 0.0, 1.0)]
+    assert parabola(*values) == pytest.approx(at, abs=1e-12)
+    assert parabola(0.0, 0.0, 0.0) == 0.0

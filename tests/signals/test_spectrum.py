@@ -1,0 +1,67 @@
+"""Welch's density: white noise, a sine and a constant of known power."""
+
+import numpy as np
+import pytest
+
+from vftcli.signals.spectrum import welch
+
+STEP = 0.01
+SIZE = 200
+
+
+def density(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    power, _ = welch([x[:, None]], SIZE, STEP)
+    return np.fft.rfftfreq(SIZE, STEP), power[:, 0]
+
+
+def test_white_noise_has_twice_its_variance_by_the_rate() -> None:
+    sigma = 3.0
+    x = sigma * np.random.default_rng(1).standard_normal(100_000)
+    _, power = density(x)
+    inner = power[2:-2]  # Hann spreads the bins at the ends, which are counted once
+    # 1000 segments, half overlapping: each bin to 4 %, the mean over 97 bins to .5 %
+    assert np.mean(inner) == pytest.approx(2.0 * sigma**2 * STEP, rel=0.02)
+    assert inner == pytest.approx(2.0 * sigma**2 * STEP, rel=0.25)  # six of those 4 %
+
+
+def test_the_integral_is_the_mean_square() -> None:
+    """Parseval over the one-sided density, DC and Nyquist counted once: of noise and of a mean."""
+    x = 2.0 + np.random.default_rng(2).standard_normal(50_000)
+    frequency, power = density(x)
+    # the sampling error of a mean square of 50 000 samples is .6 %
+    assert np.sum(power) * frequency[1] == pytest.approx(np.mean(x**2), rel=0.02)
+
+
+def test_a_constant_stays_at_the_two_lowest_frequencies() -> None:
+    frequency, power = density(np.full(5000, 2.0))
+    assert np.sum(power[:2]) * frequency[1] == pytest.approx(4.0, rel=1e-9)
+    assert np.all(power[2:] < 1e-20)
+
+
+def test_a_sine_has_half_its_squared_amplitude() -> None:
+    t = STEP * np.arange(20_000)
+    frequency, power = density(3.0 * np.sin(2.0 * np.pi * 10.0 * t))
+    assert frequency[np.argmax(power)] == pytest.approx(10.0)
+    # the mirrored ends put a kink into one segment of two hundred
+    assert np.sum(power) * frequency[1] == pytest.approx(4.5, rel=0.01)
+
+
+def test_the_first_and_last_samples_count_like_all_others() -> None:
+    """An impulse weighs the same wherever it stands; Hann alone would lose it at the ends."""
+    sizes = []
+    for place in (0, 1, 250, 499):
+        x = np.zeros(500)
+        x[place] = 1.0
+        sizes.append(np.sum(density(x)[1]))
+    # a mirrored end doubles the sample but halves its segment's share of the window
+    assert max(sizes) / min(sizes) < 4.0
+    assert min(sizes) > 0.0
+
+
+def test_stretches_shorter_than_a_segment_do_not_count() -> None:
+    long = np.random.default_rng(3).standard_normal((1000, 2))
+    alone, count = welch([long], SIZE, STEP)
+    both, again = welch([long, np.full((SIZE - 1, 2), 1e3)], SIZE, STEP)
+    assert np.array_equal(alone, both)
+    # mirrored by half a segment at either end: 1200 samples hold 11 segments, 100 apart
+    assert count == again == 11

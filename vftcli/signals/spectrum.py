@@ -1,0 +1,48 @@
+"""Power spectral density of what is known in pieces, by Welch's method.
+
+References:
+    P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra",
+    IEEE Trans. Audio Electroacoust. 15(2), 1967, for the averaging of segments.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vftcli.signals.arrays import Array
+
+
+def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, int]:
+    """One-sided density, the mean over Hann-windowed, half overlapping segments, and their number.
+
+    Nothing is detrended; the density at 0 Hz holds the square of the mean. Each stretch is
+    mirrored at its ends by half a segment, so that its first and last samples count like all
+    others: a free part is often no longer than a segment.
+
+    Args:
+        stretches: Unbroken pieces on one uniform clock, one of them at least a segment long.
+            (N, n) each
+        size: Samples of a segment, even.
+        step: Sample time. [s]
+
+    Returns:
+        The density at ``numpy.fft.rfftfreq(size, step)`` (size/2 + 1, n), in the square of the
+        series' unit by Hz, and the number of segments.
+    """
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(size) / size)
+    joints = stretches[0].shape[1]
+    power, count = np.zeros((joints, size // 2 + 1)), 0
+    for stretch in stretches:
+        if len(stretch) < size:
+            continue
+        columns = np.pad(stretch, ((size // 2, size // 2), (0, 0)), mode="symmetric").T
+        last = columns.shape[1] - size
+        for first in np.linspace(0, last, 1 + -(-last // (size // 2))).astype(int):
+            spectrum = np.fft.rfft(columns[:, first : first + size] * window)
+            power += spectrum.real**2
+            power += spectrum.imag**2
+            count += 1
+    power *= 2.0 * step / (float(np.sum(window**2)) * count)
+    # The density is one-sided: every frequency stands for its negative too, but 0 and Nyquist's.
+    power[:, [0, -1]] *= 0.5
+    return np.ascontiguousarray(power.T), count
