@@ -4,8 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation import SCHEMA, evaluate, evaluate_pooled, rmse
-from vftcli.evaluation.pooling import ScoredLog
+from vftcli.evaluation import SCHEMA, evaluate, rmse
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 
@@ -94,21 +93,63 @@ def test_shapes_must_agree() -> None:
         rmse(np.zeros((3, 2)), np.zeros((3, 1)))
 
 
-def test_pooled_rows_weigh_samples() -> None:
-    """Errors 1 over 1500 samples and 3 over 500: √((1500 + 9·500)/2000)."""
-    whole = ScoredLog([torque("fdo", WAVE + 1.0)], torque("x", WAVE, floor=np.array([1.0])))
-    part = np.where(T < 4.0, WAVE, np.nan)
-    short = ScoredLog([torque("fdo", WAVE + 3.0)], torque("x", part, floor=np.array([2.0])))
-    row = rows_of(evaluate_pooled([whole, short]))["fdo", 1]
-    assert row["recording"] == "pooled"
-    assert row["samples"] == 2000
-    assert row["rmse_Nm"] == pytest.approx(np.sqrt((1500.0 + 9.0 * 500.0) / 2000.0))
-    assert row["bias_Nm"] == pytest.approx(1.5)
-    assert row["reference_floor_Nm"] == pytest.approx(np.sqrt((1500.0 + 4.0 * 500.0) / 2000.0))
+def banded(name: str, error: float, sd: float = 1.0, **more: object) -> ExternalTorque:
+    """An estimate of zero with a constant error and a constant band."""
+    tau = np.full(T.shape, error)
+    return torque(name, tau, error_sd=np.full((len(T), 1), sd), **more)
 
 
-def test_one_log_or_unlike_logs_are_not_pooled() -> None:
-    one = ScoredLog([torque("fdo", WAVE)], torque("x", WAVE))
-    other = ScoredLog([torque("gmo", WAVE)], torque("x", WAVE))
-    assert evaluate_pooled([one]).is_empty()
-    assert evaluate_pooled([one, other]).is_empty()
+@pytest.mark.parametrize(("error", "share"), [(0.0, 1.0), (-1.95, 1.0), (1.97, 0.0), (3.0, 0.0)])
+def test_coverage_is_the_share_within_1_96_deviations(error: float, share: float) -> None:
+    row = rows_of(evaluate("log", [banded("gmo", error)], torque("x", 0.0)))["gmo", 1]
+    assert row["coverage_95"] == share
+
+
+def test_coverage_counts_samples_in_motion_only() -> None:
+    """Ten samples in motion without error, the others at rest with a huge one: coverage 1."""
+    moving = np.zeros((len(T), 1), dtype=bool)
+    moving[:10] = True
+    tau = np.where(moving[:, 0], 0.0, 99.0)
+    estimate = torque("gmo", tau, error_sd=np.ones((len(T), 1)), moving=moving)
+    assert rows_of(evaluate("log", [estimate], torque("x", 0.0)))["gmo", 1]["coverage_95"] == 1.0
+
+
+@pytest.mark.parametrize(("count", "share"), [(9, None), (10, 1.0), (11, 1.0)])
+def test_a_coverage_rests_on_ten_samples(count: int, share: float | None) -> None:
+    moving = np.arange(len(T))[:, None] < count
+    reference = torque("x", 0.0, moving=moving)
+    row = rows_of(evaluate("log", [banded("gmo", 0.5)], reference))["gmo", 1]
+    assert row["coverage_95"] == share
+
+
+def test_without_a_band_there_is_no_coverage() -> None:
+    row = rows_of(evaluate("log", [torque("gmo", 0.0)], torque("x", 0.0)))["gmo", 1]
+    assert row["coverage_95"] is None
+
+
+def test_an_observer_known_in_half_the_samples_is_compared_with_the_others() -> None:
+    """Known in exactly half as many: the rows of all are over that half; in fewer: it has none."""
+    half = np.where(np.arange(len(T)) < len(T) // 2, WAVE, np.nan)
+    less = np.where(np.arange(len(T)) < len(T) // 2 - 1, WAVE, np.nan)
+    whole = torque("fdo", WAVE)
+    found = rows_of(evaluate("log", [torque("gmo", half), whole], torque("x", 0.0)))
+    assert found["fdo", 1]["samples"] == found["gmo", 1]["samples"] == len(T) // 2
+    found = rows_of(evaluate("log", [torque("gmo", less), whole], torque("x", 0.0)))
+    assert (found["fdo", 1]["samples"], found["gmo", 1]["samples"]) == (len(T), 0)
+
+
+def test_the_best_observer_is_the_one_compared_with() -> None:
+    """p is 1 for the smallest error, and small for one that is surely larger."""
+    rng = np.random.default_rng(1)
+    small, large = (s * rng.standard_normal(len(T)) for s in (1.0, 3.0))
+    found = rows_of(evaluate("log", [torque("a", large), torque("b", small)], torque("x", 0.0)))
+    assert found["b", 1]["p_vs_best"] == 1.0
+    assert found["a", 1]["p_vs_best"] <= 0.01
+    assert found["b", 1]["rmse_low_Nm"] < found["b", 1]["rmse_Nm"] < found["b", 1]["rmse_high_Nm"]
+
+
+def test_rmse_skips_unknown_samples_joint_by_joint() -> None:
+    estimate = np.array([[3.0, 1.0], [np.nan, 1.0], [4.0, np.nan]])
+    reference = np.array([[0.0, 0.0], [0.0, np.nan], [0.0, 0.0]])
+    assert rmse(estimate, reference) == pytest.approx([np.sqrt(12.5), 1.0])
+    assert np.isnan(rmse(np.full((3, 1), np.nan), np.zeros((3, 1))))[0]

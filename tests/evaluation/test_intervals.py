@@ -131,3 +131,36 @@ def test_intervals_cover_the_true_rmse(samples: int) -> None:
         low, high = interval(float(squares.mean()), drawn.draws[:, 0], drawn.blocks)
         covered += low <= true <= high
     assert 0.90 <= covered / 400 <= 0.98
+
+
+def test_an_interval_is_students_of_its_blocks() -> None:
+    """Five blocks: t of four degrees of freedom, 2.7764 (tables), times √(5/4), times the scatter.
+
+    Draws of mean square 4 with a standard deviation of .2: h = 2.7764·1.1180·.2/4 = .15520.
+    """
+    draws = np.tile([3.8, 4.2], 500)
+    low, high = interval(4.0, draws, 5)
+    half = 2.7764 * np.sqrt(5.0 / 4.0) * 0.2 / 4.0
+    assert low == pytest.approx(2.0 * np.exp(-half / 2.0), rel=1e-4)
+    assert high == pytest.approx(2.0 / np.sqrt(1.0 - half), rel=1e-4)
+
+
+def test_two_blocks_are_the_fewest() -> None:
+    draws = np.tile([3.8, 4.2], 500)
+    assert np.isnan(interval(4.0, draws, 1)).all()
+    assert np.isfinite(interval(4.0, draws, 2)).all()
+
+
+def test_an_upper_end_is_at_most_five_times_the_rmse() -> None:
+    assert interval(4.0, np.tile([0.0, 40.0], 500), 3)[1] == pytest.approx(2.0 / np.sqrt(0.04))
+
+
+def test_a_resampled_series_closes_to_a_ring() -> None:
+    """Each sample is in as many blocks as any other: one large last square counts like a first."""
+    rng = np.random.default_rng(8)
+    noise = rng.standard_normal((2000, 1)) ** 2
+    last, first = noise.copy(), np.roll(noise, 1, axis=0)
+    last[-1], first[0] = 500.0, 500.0
+    # 1000 draws of a mean of ~1.25 with a scatter of .25: told to .008, four times that allowed.
+    assert resample(last).draws.mean() == pytest.approx(last.mean(), abs=0.035)
+    assert resample(first).draws.mean() == pytest.approx(first.mean(), abs=0.035)

@@ -1,9 +1,18 @@
 """The selection guide: facts that follow from known observers."""
 
 import numpy as np
+import polars as pl
 import pytest
 
-from vftcli.evaluation.selection import advice, facts, step_response
+from vftcli.evaluation.selection import (
+    Facts,
+    advice,
+    best,
+    facts,
+    mean_rmse,
+    step_response,
+    white_noise,
+)
 from vftcli.observers import KalmanObserver, MomentumObserver
 from vftcli.robots.terms import DynamicsTerms
 
@@ -42,3 +51,46 @@ def test_advice_names_the_fastest_and_the_quietest() -> None:
     assert detection.best == ("gmo",)
     assert response.best == ("kfo-fe",)
     assert estimation.best == ()  # no reference, no errors
+
+
+def test_an_observers_rmse_is_its_own_mean_over_joints() -> None:
+    """Two observers, three joints, rows of a wrench and an unknown joint among them."""
+    errors = pl.DataFrame(
+        {
+            "observer": ["gmo", "gmo", "gmo", "fdo", "fdo", "gmo"],
+            "joint": [1, 2, 3, 1, 2, None],
+            "rmse_Nm": [1.0, 3.0, None, 50.0, 70.0, 900.0],
+        }
+    )
+    assert mean_rmse("gmo", errors) == pytest.approx(2.0)
+    assert mean_rmse("fdo", errors) == pytest.approx(60.0)
+    assert np.isnan(mean_rmse("kfo-fe", errors))
+
+
+def test_alike_within_two_per_cent_are_both_best() -> None:
+    names = ("a", "b", "c")
+    found = [Facts(name, 0.1, 0.1, 0.1, 0.1, np.nan, 0.1, 1) for name in names]
+    assert best(found, [1.0, 1.019, 1.021]) == ("a", "b")
+    assert best(found, [np.nan, 2.0, 1.0]) == ("c",)
+    assert best(found, [np.nan] * 3) == ()
+
+
+def test_what_passes_is_noise_above_a_persons_contacts() -> None:
+    """A first-order low-pass of 50 1/s passes more of what lies above 5 Hz than one of 5 1/s."""
+    observers = [MomentumObserver(gain=50.0), MomentumObserver(gain=5.0)]
+    fast, slow = (
+        facts([o], {"gmo": o.tuning(STEP, 2)}, terms(), None)[0].passed for o in observers
+    )
+    f = np.linspace(0.0, 250.0, 513)[1:]  # up to half the sample rate of 2 ms
+    for gain, passed in ((50.0, fast), (5.0, slow)):
+        size = 1.0 / np.sqrt(1.0 + (2.0 * np.pi * f[f > 5.0] / gain) ** 2)
+        # The sampled observer's response bends down near half the sample rate.
+        assert passed == pytest.approx(np.sqrt(np.mean(size**2)), rel=0.05)
+
+
+def test_white_noise_of_a_ramp_is_that_of_its_second_differences() -> None:
+    rng = np.random.default_rng(2)
+    x = 3.0 * np.arange(20_000)[:, None] + 0.7 * rng.standard_normal((20_000, 1))
+    # A standard deviation of 20 000 samples, to 1/√(2·20 000), three times that for what overlaps.
+    assert white_noise(x)[0] == pytest.approx(0.7, rel=0.02)
+    assert np.isnan(white_noise(x[:2])[0])

@@ -50,7 +50,7 @@ def compare(
 
     from vftcli.cli.console import say_notes, say_recording
     from vftcli.evaluation import paired_significance
-    from vftcli.evaluation.pooling import ScoredLog, pooled_rows
+    from vftcli.evaluation.pooling import PoolMember, evaluate_pooled
     from vftcli.outputs.log import tables
     from vftcli.outputs.log.wrench_tables import paper_bounds
     from vftcli.pipeline import analyse
@@ -81,6 +81,10 @@ def compare(
         typer.echo(tables.pairs_text(pl.concat(pairs), as_json=table.json))
         return
     errors = [a.errors for a in analyses if a.errors is not None]
-    runs = [ScoredLog(a.estimates, a.reference) for a in analyses if a.reference is not None]
-    together = pl.concat([*errors, *pooled_rows(runs)], how="diagonal")
+    members = [
+        PoolMember(a.robot.name, a.estimates, a.reference)
+        for a in analyses
+        if a.reference is not None
+    ]
+    together = pl.concat([*errors, evaluate_pooled(members)], how="diagonal")
     typer.echo(show(together, paper_bounds(analyses)))

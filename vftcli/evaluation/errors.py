@@ -6,12 +6,11 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.coverage import coverage
 from vftcli.evaluation.intervals import Resampled, interval, resample
 from vftcli.evaluation.significance import p_value
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ShapeError
-from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.lag import lags
 from vftcli.signals.series import median_step
 
@@ -42,6 +41,9 @@ SCHEMA: dict[str, type[pl.DataType]] = {
 
 TRUSTED_SHARE = 0.5
 """A joint's reference is trusted if at least this share of its samples is."""
+
+LEAST = 10
+"""Fewest samples that a coverage is stated of: fewer tell a share to no better than ±30 %."""
 
 
 def rmse(estimate: Array, reference: Array) -> Array:
@@ -75,22 +77,24 @@ class Scored(NamedTuple):
         joint: Joint number, from 1.
         estimates: One column an observer. (T, m) [N·m]
         reference: (T,) [N·m]
-        trusted: Whether a sample of the reference may be relied on. (T,)
+        moving: Whether the joint moves, so that the reference may be relied on. (T,)
         floor: The reference's own error, NaN where it is not known. [N·m]
         resampled: Bootstrap draws of the mean squared errors, one column an observer.
         lag: Best-fitting delay of each observer, NaN where nothing fits. (m,) [s]
-        covered: Share of samples within each observer's band, NaN without one. (m,)
+        within: Samples whose error lies within each observer's 95 % band. (m,)
+        banded: Samples in which it has a band and the joint moves: `within` is a part of them. (m,)
     """
 
     names: tuple[str, ...]
     joint: int
     estimates: Array
     reference: Array
-    trusted: Mask
+    moving: Mask
     floor: float
     resampled: Resampled
     lag: Array
-    covered: Array
+    within: Array
+    banded: Array
 
     @property
     def error(self) -> Array:
@@ -125,7 +129,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> li
     names = tuple(estimate.name for estimate in estimates)
     step = median_step(reference.t) if len(reference.t) > 1 else 1.0
     lag = np.array([lags(e.tau, reference.tau, step) for e in estimates])
-    covered = np.array([coverage(e, reference) for e in estimates])
+    covered = [covered_samples(e, reference) for e in estimates]
     moving = reference.moving if reference.moving is not None else reference.known
     found = []
     for j in range(reference.joints if estimates else 0):
@@ -133,11 +137,41 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> li
         known = comparable(x, y)
         squares = np.nan_to_num((x[known] - y[known, None]) ** 2)
         draws = resample(squares) if len(squares) else Resampled(np.ones((1, len(names))), 0)
-        floor = float(reference.floor[j]) if reference.floor is not None else float("nan")
-        sure = moving[known, j]
-        told = (draws, lag[:, j], covered[:, j])
-        found.append(Scored(names, j + 1, x[known], y[known], sure, floor, *told))
+        found.append(
+            Scored(
+                names=names,
+                joint=j + 1,
+                estimates=x[known],
+                reference=y[known],
+                moving=moving[known, j],
+                floor=float(reference.floor[j]) if reference.floor is not None else float("nan"),
+                resampled=draws,
+                lag=lag[:, j],
+                within=np.array([within[j] for within, _ in covered]),
+                banded=np.array([banded[j] for _, banded in covered]),
+            )
+        )
     return found
+
+
+def covered_samples(estimate: ExternalTorque, reference: ExternalTorque) -> tuple[Array, Array]:
+    """Samples within ±1.96 `error_sd` of the estimate, and samples that were asked. (n,), (n,)
+
+    Samples in which the joint rests do not count: stiction hides there what the band cannot know.
+    Without a band none counts.
+    """
+    if estimate.error_sd is None:
+        return np.zeros(estimate.joints), np.zeros(estimate.joints)
+    error = estimate.tau - reference.tau
+    counted = np.isfinite(error)
+    for torque in (estimate, reference):
+        if torque.moving is not None:
+            counted &= torque.moving
+    within = counted & (np.abs(np.nan_to_num(error)) <= COVERS * estimate.error_sd)
+    return (
+        np.count_nonzero(within, axis=0).astype(np.float64),
+        np.count_nonzero(counted, axis=0).astype(np.float64),
+    )
 
 
 def comparable(estimates: Array, reference: Array) -> Mask:
@@ -197,13 +231,14 @@ def sizes(joint: Scored, k: int) -> dict[str, object]:
 
 def trust(joint: Scored, k: int) -> dict[str, object]:
     """How far the reference of this joint can be trusted, and the error where it can."""
-    share = float(np.mean(joint.trusted))
-    moving = joint.error[joint.trusted, k]
+    share = float(np.mean(joint.moving))
+    error = joint.error[joint.moving, k]
+    enough = joint.banded[k] >= LEAST
     return {
         "reference_trusted": share >= TRUSTED_SHARE,
         "at_rest": 1.0 - share,
-        "rmse_moving_Nm": number(np.sqrt(np.mean(moving**2))) if len(moving) else None,
-        "coverage_95": number(joint.covered[k]),
+        "rmse_moving_Nm": number(np.sqrt(np.mean(error**2))) if len(error) else None,
+        "coverage_95": number(joint.within[k] / joint.banded[k]) if enough else None,
     }
 
 

@@ -14,38 +14,34 @@ POOLED = "pooled"
 """Name of the pooled rows in the column `recording`."""
 
 
-class ScoredLog(NamedTuple):
+class PoolMember(NamedTuple):
     """One log's estimates and what they are judged by.
 
     Attributes:
+        robot: The arm's name.
         estimates: One an observer.
         reference: On the same clock.
     """
 
+    robot: str
     estimates: Sequence[ExternalTorque]
     reference: ExternalTorque
 
 
-def evaluate_pooled(runs: Sequence[ScoredLog]) -> pl.DataFrame:
+def evaluate_pooled(members: Sequence[PoolMember]) -> pl.DataFrame:
     """Rows over all samples of several logs together, each log resampled on its own.
 
-    Logs of arms with other joint numbers, or run with other observers, are not pooled: the table
+    An error is an arm's: logs of two arms are not pooled, nor those of other observers; the table
     is then empty, as it is for fewer than two logs.
     """
-    shapes = {(r.reference.joints, tuple(e.name for e in r.estimates)) for r in runs}
-    if len(runs) < 2 or len(shapes) != 1:
+    kinds = {(m.robot, m.reference.joints, tuple(e.name for e in m.estimates)) for m in members}
+    if len(members) < 2 or len(kinds) != 1:
         return pl.DataFrame(schema=SCHEMA)
-    each = [scored(run.estimates, run.reference) for run in runs]
-    references = list(dict.fromkeys(run.reference.name for run in runs))
+    each = [scored(member.estimates, member.reference) for member in members]
+    references = list(dict.fromkeys(member.reference.name for member in members))
     return table(
         POOLED, " + ".join(references), [together(joints) for joints in zip(*each, strict=True)]
     )
-
-
-def pooled_rows(runs: Sequence[ScoredLog]) -> list[pl.DataFrame]:
-    """The pooled table as a list, empty where there is nothing to pool."""
-    rows = evaluate_pooled(runs)
-    return [rows] if len(rows) else []
 
 
 def together(parts: Sequence[Scored]) -> Scored:
@@ -55,15 +51,17 @@ def together(parts: Sequence[Scored]) -> Scored:
     share = weight / max(weight.sum(), 1.0)
     draws = sum(w * p.resampled.draws for w, p in zip(share, parts, strict=True))
     lag = np.array([p.lag for p in parts])
-    told = np.isfinite(lag) * share[:, None]
-    mean_lag = np.nansum(lag * told, axis=0) / np.where(
-        told.sum(axis=0) > 0, told.sum(axis=0), np.nan
-    )
+    # A log in which no lag fits says nothing of it: the others' shares are weighed anew.
+    weights = np.isfinite(lag) * share[:, None]
+    total = weights.sum(axis=0)
+    mean_lag = np.nansum(lag * weights, axis=0) / np.where(total > 0, total, np.nan)
     return parts[0]._replace(
         estimates=np.concatenate([p.estimates for p in parts]),
         reference=np.concatenate([p.reference for p in parts]),
-        trusted=np.concatenate([p.trusted for p in parts]),
+        moving=np.concatenate([p.moving for p in parts]),
         floor=float(np.sqrt(np.sum(share * np.array([p.floor for p in parts]) ** 2))),
         resampled=Resampled(np.asarray(draws), sum(p.resampled.blocks for p in parts)),
         lag=mean_lag,
+        within=np.sum([p.within for p in parts], axis=0),
+        banded=np.sum([p.banded for p in parts], axis=0),
     )

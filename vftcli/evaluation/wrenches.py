@@ -7,6 +7,7 @@ import polars as pl
 
 from vftcli.evaluation.errors import SCHEMA, correlation, number, rmse
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.external_torque import COVERS
 from vftcli.signals.wrench import AXES, Wrench
 from vftcli.virtual_sensor.detection import ContactScore
 from vftcli.virtual_sensor.sensor_reading import SensorReading
@@ -64,7 +65,7 @@ def band_share(wrench: Wrench, k: int, error: Array, known: Mask) -> float | Non
     """Share of the known samples whose error lies within 1.96 standard deviations."""
     if wrench.sd is None or not known.any():
         return None
-    return float(np.mean(np.abs(error[known]) <= 1.96 * wrench.sd[known, k]))
+    return float(np.mean(np.abs(error[known]) <= COVERS * wrench.sd[known, k]))
 
 
 def with_wrenches(errors: pl.DataFrame, recording: str, sensed: SensorReading) -> pl.DataFrame:
@@ -93,20 +94,20 @@ CONTACT_SCHEMA: dict[str, type[pl.DataType]] = {
 def with_contacts(
     errors: pl.DataFrame, recording: str, reference: str, contacts: Iterable[ContactScore]
 ) -> pl.DataFrame:
-    """The errors, and below them one row an observer on the contacts it tells."""
+    """The errors, and below them one row an observer: how it tells contacts."""
     rows = [
         {
             "recording": recording,
-            "observer": told.name,
+            "observer": score.name,
             "reference": reference,
-            "signal": told.signal,
-            "contacts": told.detection.contacts,
-            "missed_contacts": told.detection.missed,
-            "false_alarms": told.detection.false_alarms,
-            "false_alarms_per_h": number(told.detection.false_alarms_per_h),
-            "detection_delay_s": number(told.detection.mean_delay),
-            "longest_delay_s": number(told.detection.longest_delay),
+            "signal": score.signal,
+            "contacts": score.detection.contacts,
+            "missed_contacts": score.detection.missed,
+            "false_alarms": score.detection.false_alarms,
+            "false_alarms_per_h": number(score.detection.false_alarms_per_h),
+            "detection_delay_s": number(score.detection.mean_delay),
+            "longest_delay_s": number(score.detection.longest_delay),
         }
-        for told in contacts
+        for score in contacts
     ]
     return pl.concat([errors, pl.DataFrame(rows, schema=CONTACT_SCHEMA)], how="diagonal")
