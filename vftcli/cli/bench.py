@@ -8,7 +8,9 @@ from vftcli.cli import options as opt
 
 
 def bench(
-    robot: Annotated[str, opt.ROBOT] = "ur5",
+    robot: Annotated[
+        str, typer.Option(opt.ROBOT[0], metavar=opt.ROBOT[1], help=opt.ROBOT[2])
+    ] = "ur5",
     samples: Annotated[int, typer.Option(min=100, help="Length of the log.")] = 30_060,
     rounds: Annotated[int, typer.Option(min=1, help="Interleaved repetitions.")] = 7,
     memory: Annotated[

@@ -1,8 +1,7 @@
 """Options in bundles: a command takes one object a bundle, typer sees every option of it.
 
-A bundle is a frozen dataclass whose fields are annotated as typer wants a parameter, or are
-bundles themselves. `taken_apart` gives typer a function with one parameter a field, and hands the
-command the bundles put together again::
+A bundle is a frozen dataclass of `option`s and `flag`s, or of further bundles. `taken_apart` gives
+typer a function with one parameter an option, and hands the command the bundles put together::
 
     @taken_apart
     def convert_log(log: Log, reading: ReadOptions, force: Force = False) -> None: ...
@@ -11,14 +10,72 @@ command the bundles put together again::
 import dataclasses
 import inspect
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from importlib import import_module
+from typing import Annotated, Any, ClassVar, Generic, TypeVar
+
+import typer
+
+Choice = TypeVar("Choice")
+
+HOW = "typer"
+"""Key of a field's metadata under which stands how it is typed."""
+
+
+def option(name: str, metavar: str, help: str, default: object = None) -> Any:  # noqa: ANN401
+    """One field of a bundle that takes a value.
+
+    Args:
+        name: As it is typed, with its dashes.
+        metavar: What its value looks like.
+        help: What `--help` says of it.
+        default: Its value if it is not given; ``dataclasses.MISSING`` if it has to be.
+    """
+    how = {HOW: typer.Option(name, metavar=metavar, help=help)}
+    if default is dataclasses.MISSING:
+        return dataclasses.field(metadata=how)
+    return dataclasses.field(default=default, metadata=how)
+
+
+def flag(name: str, help: str) -> Any:  # noqa: ANN401
+    """One field of a bundle that is given or not."""
+    return dataclasses.field(default=False, metadata={HOW: typer.Option(name, help=help)})
+
+
+class Bundle:
+    """Options that belong together."""
+
+    def words(self) -> dict[str, Any]:
+        """Every option by the name of its field."""
+        own: Any = self
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(own)}
+
+
+class ChoiceBundle(Bundle, Generic[Choice]):
+    """Options that state a room's choice; their names are the arguments of its `parsed`.
+
+    Attributes:
+        HOME: Where the choice is, as ``room.file:Class``; it is imported when it is made, since
+            `--help` needs none of it.
+    """
+
+    HOME: ClassVar[str]
+
+    def choice(self) -> Choice:
+        """The choice that the options state, checked.
+
+        Raises:
+            VftError: If a word is not what the room takes.
+        """
+        module, _, name = self.HOME.partition(":")
+        made: Choice = getattr(import_module(f"vftcli.{module}"), name).parsed(**self.words())
+        return made
 
 
 def taken_apart(command: Callable[..., None]) -> Callable[..., None]:
     """Return the command as typer wants it: every field of its bundles a parameter of its own.
 
     The parameters are called ``BUNDLE_FIELD``, so that bundles need not know each other; what the
-    user types is what the field's annotation names.
+    user types is what the field says.
     """
     own = inspect.signature(command).parameters.values()
 
@@ -48,7 +105,9 @@ def parameters(name: str, kind: Any, default: Any) -> Iterator[inspect.Parameter
     for field in dataclasses.fields(kind):
         missing = field.default is dataclasses.MISSING
         default = inspect.Parameter.empty if missing else field.default
-        yield from parameters(f"{name}_{field.name}", field.type, default)
+        how = field.metadata.get(HOW)
+        annotation = field.type if how is None else Annotated[field.type, how]
+        yield from parameters(f"{name}_{field.name}", annotation, default)
 
 
 def put_together(name: str, kind: Any, values: Mapping[str, Any]) -> Any:  # noqa: ANN401

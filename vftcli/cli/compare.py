@@ -6,17 +6,17 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import taken_apart
+from vftcli.cli.bundles import Bundle, flag, taken_apart
 
 
 @dataclass(frozen=True, kw_only=True)
-class TableOptions(opt.Bundle):
+class TableOptions(Bundle):
     """The form of the table; one at most."""
 
     json: opt.Json = False
-    csv: Annotated[bool, typer.Option("--csv", help="One row per observer and joint.")] = False
-    markdown: Annotated[bool, typer.Option("--markdown", help="A Markdown table.")] = False
-    latex: Annotated[bool, typer.Option("--latex", help="A LaTeX table (booktabs).")] = False
+    csv: bool = flag("--csv", "Print one row per observer and joint.")
+    markdown: bool = flag("--markdown", "Print a Markdown table.")
+    latex: bool = flag("--latex", "Print a LaTeX table (booktabs).")
 
     @property
     def form(self) -> str:

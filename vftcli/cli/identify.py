@@ -7,38 +7,27 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import taken_apart
+from vftcli.cli.bundles import Bundle, flag, option, taken_apart
 
 if TYPE_CHECKING:
     from vftcli.identification import Task
 
 
 @dataclass(frozen=True, kw_only=True)
-class TaskOptions(opt.Bundle):
+class TaskOptions(Bundle):
     """What is identified, and how."""
 
-    method: Annotated[
-        str | None,
-        typer.Option(
-            "--method",
-            metavar="METHOD",
-            help="friction, base, consistent or targets. Default: friction; none with "
-            "--find-payload.",
-        ),
-    ] = None
-    find_payload: Annotated[
-        bool,
-        typer.Option(
-            "--find-payload",
-            help="Find a load on the flange: from two LOGs of one motion, from --free, or poses.",
-        ),
-    ] = False
-    fit_constants: Annotated[
-        bool, typer.Option("--fit-constants", help="Friction method: drive constants K too.")
-    ] = False
-    cutoff: Annotated[
-        float, typer.Option("--cutoff", metavar="HZ", help="Cutoff of the zero-phase filter.")
-    ] = 8.0
+    method: str | None = option(
+        "--method",
+        "METHOD",
+        "friction, base, consistent or targets. Default: friction; none with --find-payload.",
+    )
+    find_payload: bool = flag(
+        "--find-payload",
+        "Find a load on the flange: from two LOGs of one motion, from --free, or poses.",
+    )
+    fit_constants: bool = flag("--fit-constants", "Friction method: drive constants K too.")
+    cutoff: float = option("--cutoff", "HZ", "Cutoff of the zero-phase filter.", 8.0)
 
     def task(self, name: str) -> "Task":
         """What shall be identified, for a robot of this name.
@@ -58,21 +47,36 @@ class TaskOptions(opt.Bundle):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ValidationOptions(opt.Bundle):
+class ValidationOptions(Bundle):
     """Which logs the new robot is scored on besides those it is made from."""
 
-    validate: Annotated[
-        list[Path] | None,
-        typer.Option("--validate", metavar="LOG", help="Score on this log too. Repeatable."),
-    ] = None
-    interval: Annotated[
-        str | None,
-        typer.Option(
-            "--validate-interval",
-            metavar="A:B",
-            help="Use only this span of the --validate logs.",
-        ),
-    ] = None
+    validate: list[Path] | None = option("--validate", "LOG", "Score on this log too. Repeatable.")
+    interval: str | None = option(
+        "--validate-interval", "A:B", "Use only this span of the --validate logs."
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class WithoutLoad(Bundle):
+    """The same motion without the load that is sought."""
+
+    free: opt.Words = option(*opt.FREE)
+
+    def logs(self) -> tuple[Path, ...]:
+        """The logs that are given, one at most.
+
+        Raises:
+            ParameterError: If a span of the log is given, or more than one log.
+        """
+        from vftcli.repetition.choice import FreeChoice
+        from vftcli.signals.errors import ParameterError
+
+        chosen = FreeChoice.parsed(free=self.free)
+        if chosen.spans or len(chosen.logs) > 1:
+            raise ParameterError(
+                "a load is found from one pair of logs: give --free the log without it, once"
+            )
+        return chosen.logs
 
 
 @taken_apart
@@ -85,7 +89,7 @@ def identify_robot(
     robot: opt.RobotOptions,
     asked: TaskOptions,
     validation: ValidationOptions,
-    free: Annotated[list[str] | None, opt.FREE] = None,
+    free: WithoutLoad,
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
@@ -107,7 +111,7 @@ def identify_robot(
         refuse_existing(file, force)
     choice, chosen = reading.choice(), robot.choice()
     held_out_choice = replace(reading, interval=validation.interval).choice()
-    validated, without_load = validation.validate or [], unloaded_logs(free)
+    validated, without_load = validation.validate or [], free.logs()
     library = Library([*logs, *validated, *without_load])
     train = [library.open(log, choice) for log in logs]
     held_out = [library.open(log, held_out_choice) for log in validated]
@@ -122,20 +126,3 @@ def identify_robot(
         say(f"note: {remark}")
     say(f"wrote {', '.join(str(file) for file in beside(output).values())}")
     typer.echo(record.rstrip("\n") if json else tables_text(found))
-
-
-def unloaded_logs(free: list[str] | None) -> tuple[Path, ...]:
-    """The logs of ``--free``: here the same motion without the load.
-
-    Raises:
-        ParameterError: If a span of the log is given, or more than one log.
-    """
-    from vftcli.repetition.choice import FreeChoice
-    from vftcli.signals.errors import ParameterError
-
-    chosen = FreeChoice.parsed(free=free)
-    if chosen.spans or len(chosen.logs) > 1:
-        raise ParameterError(
-            "a load is found from one pair of logs: give --free the log without it, once"
-        )
-    return chosen.logs

@@ -1,14 +1,16 @@
 """The options of the commands, each declared once, in one bundle a choice.
 
-The fields of a bundle are the parameters of its choice's `parsed`, which checks them: a room says
-what its words mean, here stands how they are typed and what `--help` says of them.
+A room says what its words mean and checks them, in the `parsed` of its choice; here stands how
+they are typed and what `--help` says of them.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from vftcli.cli.bundles import Bundle, ChoiceBundle, flag, option
 
 if TYPE_CHECKING:
     from vftcli.evaluation.reference_choice import ReferenceChoice
@@ -40,305 +42,175 @@ Json = Annotated[
         help="What the command makes as JSON on stdout: rows of a table, a run record, a summary.",
     ),
 ]
-ROBOT = typer.Option("--robot", metavar="NAME|FILE", help="Profile, FILE.toml or FILE.urdf.")
-FREE = typer.Option(
+Words = list[str] | None
+"""The values of an option that may be repeated."""
+
+ROBOT = ("--robot", "NAME|FILE", "Profile, FILE.toml or FILE.urdf.")
+FREE = (
     "--free",
-    metavar="LOG|A:B",
-    help="Motion that nobody touched: a free run of the same trajectory, or a span of the log "
-    "itself. Repeatable: two free runs measure the floor.",
+    "LOG|A:B",
+    "Motion that nobody touched: a free run of the same trajectory, or a span of the log itself. "
+    "Repeatable: two free runs measure the floor.",
 )
-REFERENCE = typer.Option(
-    "--reference", metavar="REF", help="two-cycle, sensor, vendor, zero, or file:PATH."
-)
-
-
-class Bundle:
-    """Options that belong together."""
-
-    def words(self) -> dict[str, Any]:
-        """The options as the keyword arguments of their choice's `parsed`."""
-        own: Any = self
-        return {field.name: getattr(self, field.name) for field in fields(own)}
+REFERENCE = ("--reference", "REF", "two-cycle, sensor, vendor, zero, or file:PATH.")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReadOptions(Bundle):
+class ReadOptions(ChoiceBundle["ReadChoice"]):
     """How a log is read, and which part of it."""
 
-    format: Annotated[
-        str | None,
-        typer.Option(
-            "--format", metavar="NAME", help="Skip recognition; `vftcli formats` lists the names."
-        ),
-    ] = None
-    columns: Annotated[
-        str | None,
-        typer.Option(
-            "--columns",
-            metavar="SPEC",
-            help="Columns of a table: 't,q:6,dq:6,current:6' in file order, or "
-            "'q=joint_pos_{i},tau=eff_{i}' by header.",
-        ),
-    ] = None
-    interval: Annotated[
-        str | None,
-        typer.Option(
-            "--interval",
-            metavar="A:B",
-            help="Use only this time span, in seconds from the first sample.",
-        ),
-    ] = None
+    HOME = "readers.reader:ReadChoice"
 
-    def choice(self) -> "ReadChoice":
-        """The choice that the options state.
-
-        Raises:
-            ParameterError: If the interval is malformed.
-        """
-        from vftcli.readers.reader import ReadChoice
-
-        return ReadChoice.parsed(**self.words())
+    format: str | None = option(
+        "--format", "NAME", "Skip recognition; `vftcli formats` lists the names."
+    )
+    columns: str | None = option(
+        "--columns",
+        "SPEC",
+        "Columns of a table: 't,q:6,dq:6,current:6' in file order, or "
+        "'q=joint_pos_{i},tau=eff_{i}' by header.",
+    )
+    interval: str | None = option(
+        "--interval", "A:B", "Use only this time span, in seconds from the first sample."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
-class RobotOptions(Bundle):
+class RobotOptions(ChoiceBundle["RobotChoice"]):
     """Which arm, and how it is modelled."""
 
-    robot: Annotated[str | None, ROBOT] = None
-    friction: Annotated[
-        str | None,
-        typer.Option(
-            "--friction",
-            metavar="profile|none",
-            help="The robot's friction model (default), or none.",
-        ),
-    ] = None
-    payload: Annotated[
-        str | None,
-        typer.Option("--payload", metavar="NAME", help="Mount a [payload.NAME] of the robot file."),
-    ] = None
+    HOME = "robots.choice:RobotChoice"
 
-    def choice(self) -> "RobotChoice":
-        """The choice that the options state.
-
-        Raises:
-            ParameterError: If the friction is neither of its words.
-        """
-        from vftcli.robots.choice import RobotChoice
-
-        return RobotChoice.parsed(**self.words())
+    robot: str | None = option(*ROBOT)
+    friction: str | None = option(
+        "--friction", "profile|none", "The robot's friction model (default), or none."
+    )
+    payload: str | None = option("--payload", "NAME", "Mount a [payload.NAME] of the robot file.")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ObserverOptions(Bundle):
+class ObserverOptions(ChoiceBundle["ObserverChoice"]):
     """Which observers run, and with which gains."""
 
-    observer: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--observer", metavar="NAME", help="Repeatable. Default: fdo gmo kfo-fe kfo-zoh."
-        ),
-    ] = None
-    assignments: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="OBSERVER.PARAMETER=VALUE",
-            help="Repeatable: gmo.gain=30, gmo.gain=5,3,4,10,10,10, kfo.noise_convention=discrete.",
-        ),
-    ] = None
-    gains_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--set-file",
-            metavar="FILE",
-            help="Gains that `vftcli tune` wrote; --set goes before them.",
-        ),
-    ] = None
-    match: Annotated[
-        str | None,
-        typer.Option(
-            "--match",
-            metavar="delay=S|bandwidth=HZ",
-            help="Gains that give every observer the same delay or −3 dB bandwidth on every joint.",
-        ),
-    ] = None
-    as_printed: Annotated[
-        bool,
-        typer.Option("--as-printed", help="The paper's printed formulas, errata and all."),
-    ] = False
+    HOME = "observers.choice:ObserverChoice"
 
-    def choice(self) -> "ObserverChoice":
-        """The choice that the options state.
-
-        Raises:
-            ParameterError: If an observer or parameter does not exist, or a value is malformed.
-        """
-        from vftcli.observers.choice import ObserverChoice
-
-        return ObserverChoice.parsed(**self.words())
+    observer: Words = option("--observer", "NAME", "Repeatable. Default: fdo gmo kfo-fe kfo-zoh.")
+    assignments: Words = option(
+        "--set",
+        "OBSERVER.PARAMETER=VALUE",
+        "Repeatable: gmo.gain=30, gmo.gain=5,3,4,10,10,10, kfo.noise_convention=discrete.",
+    )
+    gains_file: Path | None = option(
+        "--set-file", "FILE", "Gains that `vftcli tune` wrote; --set goes before them."
+    )
+    match: str | None = option(
+        "--match",
+        "delay=S|bandwidth=HZ",
+        "Gains that give every observer the same delay or −3 dB bandwidth on every joint.",
+    )
+    as_printed: bool = flag("--as-printed", "The paper's printed formulas, errata and all.")
 
 
 @dataclass(frozen=True, kw_only=True)
-class FreeOptions(Bundle):
+class FreeOptions(ChoiceBundle["FreeChoice"]):
     """What nobody touched, and how it is laid under the log."""
 
-    free: Annotated[list[str] | None, FREE] = None
-    free_part: Annotated[
-        str | None,
-        typer.Option(
-            "--free-part",
-            metavar="A:B",
-            help="The same as --free A:B; without either, the log's own free cycles are found.",
-        ),
-    ] = None
-    period: Annotated[
-        float | None,
-        typer.Option(
-            "--period",
-            metavar="S",
-            help="Commanded period of a repeated motion; found if not given.",
-        ),
-    ] = None
-    free_cycles: Annotated[
-        str | None,
-        typer.Option(
-            "--free-cycles",
-            metavar="1|1,2|1-3",
-            help="Cycles free of contact; found if not given.",
-        ),
-    ] = None
-    alignment: Annotated[
-        str,
-        typer.Option(
-            "--alignment",
-            metavar="auto|commanded|period|phase|model",
-            help="How the two-cycle difference lays free and loaded motion over one another; auto "
-            "takes what has the smallest error on this log.",
-        ),
-    ] = "auto"
-    low_pass: Annotated[
-        str,
-        typer.Option(
-            "--low-pass", metavar="auto|none|HZ", help="Zero-phase low-pass of that difference."
-        ),
-    ] = "auto"
+    HOME = "repetition.choice:FreeChoice"
 
-    def choice(self) -> "FreeChoice":
-        """The choice that the options state.
-
-        Raises:
-            ParameterError: If a span is malformed.
-            ReferenceTorqueError: If cycles, alignment or cutoff are not what there is.
-        """
-        from vftcli.repetition.choice import FreeChoice
-
-        return FreeChoice.parsed(**self.words())
+    free: Words = option(*FREE)
+    free_part: str | None = option(
+        "--free-part",
+        "A:B",
+        "The same as --free A:B; without either, the log's own free cycles are found.",
+    )
+    period: float | None = option(
+        "--period", "S", "Commanded period of a repeated motion; found if not given."
+    )
+    free_cycles: str | None = option(
+        "--free-cycles", "1|1,2|1-3", "Cycles free of contact; found if not given."
+    )
+    alignment: str = option(
+        "--alignment",
+        "auto|commanded|period|phase|model",
+        "How the two-cycle difference lays free and loaded motion over one another; auto takes "
+        "what has the smallest error on this log.",
+        "auto",
+    )
+    low_pass: str = option(
+        "--low-pass", "auto|none|HZ", "Zero-phase low-pass of that difference.", "auto"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
-class BiasOptions(Bundle):
+class BiasOptions(ChoiceBundle["RefinementChoice"]):
     """What is taken off the estimates once the whole log is known."""
 
-    remove_bias: Annotated[
-        str | None,
-        typer.Option(
-            "--remove-bias",
-            metavar="free-cycle|model|none",
-            help="Subtract what the observers read in free motion at the same phase, or a model of "
-            "it over position and velocity. Default: none.",
-        ),
-    ] = None
+    HOME = "refinement.choice:RefinementChoice"
 
-    def choice(self) -> "RefinementChoice":
-        """The choice that the options state.
-
-        Raises:
-            ParameterError: If there is no such way to remove a bias.
-        """
-        from vftcli.refinement.choice import RefinementChoice
-
-        return RefinementChoice.parsed(**self.words())
+    remove_bias: str | None = option(
+        "--remove-bias",
+        "free-cycle|model|none",
+        "Subtract what the observers read in free motion at the same phase, or a model of it over "
+        "position and velocity. Default: none.",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class RefinementOptions(BiasOptions):
     """What only a complete log allows."""
 
-    bands: Annotated[
-        bool,
-        typer.Option("--bands", help="Measure on the free part how far the estimates may be off."),
-    ] = False
+    bands: bool = flag(
+        "--bands",
+        "Measure on the free part how far the estimates may be off. Implied by --free, "
+        "--free-part, --free-cycles and --period.",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
-class WrenchOptions(Bundle):
+class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
     """The Cartesian wrench."""
 
-    wrench: Annotated[
-        bool, typer.Option("--wrench", help="Also the Cartesian wrench, as force on the robot.")
-    ] = False
-    frame: Annotated[
-        str | None,
-        typer.Option(
-            "--frame",
-            metavar="flange|base|tool|sensor",
-            help="Frame of the wrench (default flange; base: base axes, moment about the flange "
-            "point). Implies --wrench.",
-        ),
-    ] = None
-    solver: Annotated[
-        str | None,
-        typer.Option(
-            "--solver",
-            metavar="pinv|damped|map",
-            help="How torques become a wrench: least squares (default), damped, or with a prior of "
-            "50 N and 10 N·m. Implies --wrench.",
-        ),
-    ] = None
-    tool: Annotated[
-        str | None,
-        typer.Option(
-            "--tool",
-            metavar="POSE|NAME",
-            help="The tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or [tool.NAME] of the "
-            "robot file.",
-        ),
-    ] = None
-    sensor_pose: Annotated[
-        str | None,
-        typer.Option(
-            "--sensor-pose",
-            metavar="POSE|NAME|fit",
-            help="The force/torque sensor on the flange, likewise; fit estimates it from the log.",
-        ),
-    ] = None
-    zero: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--zero",
-            metavar="A:B|start|LOG",
-            help="Unloaded span whose mean wrench is removed, the unloaded start, or a free run. "
-            "Repeat A:B to see the drift between spans. Implies --wrench.",
-        ),
-    ] = None
-    sensor_weight: Annotated[
-        bool,
-        typer.Option(
-            "--sensor-weight",
-            help="Weigh the sensor's own tool in the unloaded spans and remove it from its "
-            "reading.",
-        ),
-    ] = False
-    torque_sd: Annotated[
-        str | None,
-        typer.Option(
-            "--torque-sd",
-            metavar="own|NUMBER(S)",
-            help="Joint torque error behind the wrench's band [N·m]; own: the observer's "
-            "covariance.",
-        ),
-    ] = None
+    HOME = "virtual_sensor.choice:WrenchChoice"
+
+    wrench: bool = flag("--wrench", "Also the Cartesian wrench, as force on the robot.")
+    frame: str | None = option(
+        "--frame",
+        "flange|base|tool|sensor",
+        "Frame of the wrench (default flange; base: base axes, moment about the flange point). "
+        "Implies --wrench.",
+    )
+    solver: str | None = option(
+        "--solver",
+        "pinv|damped|map",
+        "How torques become a wrench: least squares (default), damped, or with a prior of 50 N and "
+        "10 N·m. Implies --wrench.",
+    )
+    tool: str | None = option(
+        "--tool",
+        "POSE|NAME",
+        "The tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or [tool.NAME] of the robot "
+        "file.",
+    )
+    sensor_pose: str | None = option(
+        "--sensor-pose",
+        "POSE|NAME|fit",
+        "The force/torque sensor on the flange, likewise; fit estimates it from the log.",
+    )
+    zero: Words = option(
+        "--zero",
+        "A:B|start|LOG",
+        "Unloaded span whose mean wrench is removed, the unloaded start, or a free run. Repeat A:B "
+        "to see the drift between spans. Implies --wrench.",
+    )
+    sensor_weight: bool = flag(
+        "--sensor-weight",
+        "Weigh the sensor's own tool in the unloaded spans and remove it from its reading.",
+    )
+    torque_sd: str | None = option(
+        "--torque-sd",
+        "own|NUMBER(S)",
+        "Joint torque error behind the wrench's band [N·m]; own: the observer's covariance.",
+    )
 
     @property
     def asks(self) -> bool:
@@ -346,58 +218,38 @@ class WrenchOptions(Bundle):
         return any(self.words().values())
 
     def choice(self) -> "WrenchChoice | None":
-        """The choice that the options state, None where none of them asks for a wrench.
-
-        Raises:
-            ParameterError: If a frame or solver does not exist, or a zero is malformed.
-        """
-        if not self.asks:
-            return None
-        from vftcli.virtual_sensor.choice import WrenchChoice
-
-        return WrenchChoice.parsed(**self.words())
+        """The choice that the options state, None where none of them asks for a wrench."""
+        # What nobody asks for is not even imported.
+        return super().choice() if self.asks else None
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReferenceOptions(Bundle):
+class ReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
     """What the estimates are compared with."""
 
-    reference: Annotated[str | None, REFERENCE] = None
-    reference_columns: Annotated[
-        str | None,
-        typer.Option(
-            "--reference-columns",
-            metavar="SPEC",
-            help="Columns of a reference file, as --columns: 't,tau_ext:6'.",
-        ),
-    ] = None
-    contacts: Annotated[
-        bool,
-        typer.Option(
-            "--contacts",
-            help="Also detection delay, false alarms per hour and missed contacts against the "
-            "reference.",
-        ),
-    ] = False
+    HOME = "evaluation.reference_choice:ReferenceChoice"
+
+    reference: str | None = option(*REFERENCE)
+    reference_columns: str | None = option(
+        "--reference-columns",
+        "SPEC",
+        "Columns of a reference file, as --columns: 't,tau_ext:6'.",
+    )
+    contacts: bool = flag(
+        "--contacts",
+        "Also detection delay, false alarms per hour and missed contacts against the reference.",
+    )
 
     def choice(self) -> "ReferenceChoice | None":
-        """The choice that the options state, None where no reference is named.
-
-        Raises:
-            ReferenceTorqueError: If there is no such reference.
-        """
-        if self.reference is None:
-            return None
-        from vftcli.evaluation.reference_choice import ReferenceChoice
-
-        return ReferenceChoice.parsed(**self.words())
+        """The choice that the options state, None where no reference is named."""
+        return super().choice() if self.reference is not None else None
 
 
 @dataclass(frozen=True, kw_only=True)
 class RequiredReferenceOptions(ReferenceOptions):
     """The same where nothing can be shown without a reference."""
 
-    reference: Annotated[str, REFERENCE]
+    reference: str = option(*REFERENCE, MISSING)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -421,7 +273,7 @@ class AnalysisOptions(Bundle):
             reference: What the estimates are compared with.
 
         Raises:
-            VftError: If a choice cannot be made.
+            VftError: If a word is not what its room takes.
         """
         from vftcli.pipeline import AnalysisChoice
 
