@@ -110,7 +110,7 @@ RELEASE = ("--release", "x=0.3", "--robot", "ur5")
     ("words", "code", "complaint"),
     [
         ((*RELEASE, "--alpha", "0"), 1, "alpha of axis x is 0; it must be positive"),
-        ((*RELEASE, "--alpha", "one"), 2, "is not a list of numbers"),
+        ((*RELEASE, "--alpha", "one"), 1, "is not a list of numbers"),
         ((*RELEASE, "--xi", "0"), 1, "xi of axis x is 0; it must be positive"),
         ((*RELEASE, "--set", "position.mass=0"), 1, "mass of axis x is 0"),
         ((*RELEASE, "--set", "rx.K=-1"), 1, "stiffness of axis rx is -1"),

@@ -190,6 +190,10 @@ class Loop:
         return Reference(self.q_command[None], speed[None], np.zeros_like(speed)[None])
 
 
+UNLOADED = (0.5, 3.0)
+"""In all built-in closed-loop scenarios nothing touches the arm in this span. [s]"""
+
+
 def run_closed_loop(
     scenario: Scenario,
     controller: Controller,
@@ -215,7 +219,7 @@ def run_closed_loop(
         zero: Unloaded span whose mean wrench is removed; the controller holds still until it ends.
             None removes nothing. [s]
         force_unstable: Run unstable settings too.
-        progress: ContactScore how far the run is.
+        progress: Told how far the run is.
 
     Raises:
         UnstableError: If the controller is unstable.

@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import taken_apart
+from vftcli.cli.bundles import Bundle, flag, option, taken_apart
 
 if TYPE_CHECKING:
+    from vftcli.admittance.choice import ControlChoice
     from vftcli.admittance.closed_loop import ClosedLoop
+    from vftcli.admittance.driving_force import DrivingForce
     from vftcli.admittance.replay import Replay
+    from vftcli.pipeline import AnalysisChoice
+    from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
 
 OBSERVER = "kfo-fe"
@@ -28,125 +32,66 @@ Output = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class ControllerOptions(opt.Bundle):
+class ControllerOptions(Bundle):
     """Which controllers are compared."""
 
-    alpha: Annotated[
-        str | None,
-        typer.Option(
-            "--alpha",
-            metavar="A,B,…",
-            help="One variable controller for each; default the profile's.",
-        ),
-    ] = None
-    controller: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--controller",
-            metavar="variable|traditional",
-            help="Repeatable; default both.",
-        ),
-    ] = None
-    xi: Annotated[
-        str | None,
-        typer.Option(
-            "--xi",
-            metavar="NUMBER|from-B",
-            help="Damping ratio of the recovery; default from B_d, M_d, K_d.",
-        ),
-    ] = None
-    threshold_mode: Annotated[
-        str | None,
-        typer.Option(
-            "--threshold-mode", metavar="hard|soft", help="The whole force above it, or the excess."
-        ),
-    ] = None
-    parameters: Annotated[
-        Path | None,
-        typer.Option(
-            "--parameters",
-            metavar="FILE.toml",
-            help="Take [admittance] from this file, not the profile.",
-        ),
-    ] = None
-    force_unstable: Annotated[
-        bool, typer.Option("--force-unstable", help="Run settings that are unstable, for study.")
-    ] = False
+    alpha: str | None = option(
+        "--alpha", "A,B,…", "One variable controller for each; default the profile's."
+    )
+    controller: opt.Words = option(
+        "--controller", "variable|traditional", "Repeatable; default both."
+    )
+    xi: str | None = option(
+        "--xi", "NUMBER|from-B", "Damping ratio of the recovery; default from B_d, M_d, K_d."
+    )
+    threshold_mode: str | None = option(
+        "--threshold-mode", "hard|soft", "The whole force above it, or the excess."
+    )
+    parameters: Path | None = option(
+        "--parameters", "FILE.toml", "Take [admittance] from this file, not the profile."
+    )
+    force_unstable: bool = flag("--force-unstable", "Run settings that are unstable, for study.")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReleaseOptions(opt.Bundle):
+class ReleaseOptions(Bundle):
     """A release from rest, without a log."""
 
-    release: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--release",
-            metavar="AXIS=VALUE",
-            help="Replay a release from rest: x=0.3 [m], rz=0.5 [rad].",
-        ),
-    ] = None
-    start: Annotated[
-        str | None,
-        typer.Option(
-            "--start",
-            metavar="Q1,Q2,…",
-            help="Start pose of a release [rad]; default the profile's.",
-        ),
-    ] = None
-    duration: Annotated[
-        float | None,
-        typer.Option(
-            "--duration", metavar="S", help="Length of a release; default until it is over."
-        ),
-    ] = None
+    release: opt.Words = option(
+        "--release", "AXIS=VALUE", "Replay a release from rest: x=0.3 [m], rz=0.5 [rad]."
+    )
+    start: str | None = option(
+        "--start", "Q1,Q2,…", "Start pose of a release [rad]; default the profile's."
+    )
+    duration: float | None = option(
+        "--duration", "S", "Length of a release; default until it is over."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoopOptions(opt.Bundle):
+class LoopOptions(Bundle):
     """A controller in the loop of a simulation, without a log."""
 
-    closed_loop: Annotated[
-        str | None,
-        typer.Option(
-            "--closed-loop",
-            metavar="SCENARIO",
-            help="No log: run a scenario's contacts against the controller in simulation, then "
-            "replay the force it acted on.",
-        ),
-    ] = None
-    seed: Annotated[
-        int | None, typer.Option("--seed", metavar="N", help="Seed of the closed loop.")
-    ] = None
-    torque: Annotated[
-        str,
-        typer.Option(
-            "--torque", metavar="average|instant", help="What the closed loop's sensors report."
-        ),
-    ] = "average"
+    closed_loop: str | None = option(
+        "--closed-loop",
+        "SCENARIO",
+        "No log: run a scenario's contacts against the controller in simulation, then replay the "
+        "force it acted on.",
+    )
+    seed: int | None = option("--seed", "N", "Seed of everything drawn; the scenario's own if not.")
+    torque: str = option(
+        "--torque", "average|instant", "What the closed loop's sensors report.", "average"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
-class ForceOptions(opt.Bundle):
+class ForceOptions(Bundle):
     """Which force drives the replay, if not an observer's."""
 
-    sensor: Annotated[bool, typer.Option("--sensor", help="Take the log's own wrench.")] = False
-    truth: Annotated[
-        Path | None,
-        typer.Option(
-            "--truth",
-            metavar="FILE",
-            help="Take the wrench of a truth file, flange, base axes.",
-        ),
-    ] = None
-    zero: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--zero",
-            metavar="A:B|start|LOG",
-            help="The wrench's zero: an unloaded span, the unloaded start, or a free run.",
-        ),
-    ] = None
+    sensor: bool = flag("--sensor", "Take the log's own wrench.")
+    truth: Path | None = option(
+        "--truth", "FILE", "Take the wrench of a truth file, flange, base axes."
+    )
 
 
 @taken_apart
@@ -154,10 +99,8 @@ def admit(
     controllers: ControllerOptions,
     release: ReleaseOptions,
     loop: LoopOptions,
-    force_from: ForceOptions,
-    reading: opt.ReadOptions,
-    robot: opt.RobotOptions,
-    observers: opt.ObserverOptions,
+    source: ForceOptions,
+    analysis: opt.AnalysisOptions,
     log: LogOrNone = None,
     output: Output = None,
     json: opt.Json = False,
@@ -165,65 +108,191 @@ def admit(
 ) -> None:
     """Replay a log's external force through traditional and variable-parameter admittance.
 
-    Writes DIR/index.html, recording.rrd, motion.parquet, comparison.{csv,json} and run.json.
+    Writes DIR/index.html, recording.rrd, motion.parquet, comparison.{csv,json} and run.json. The
+    force is that of one observer, kfo-fe unless another is named. --set also takes the controllers'
+    parameters: position.stiffness=12, rz.threshold=4, admittance.xi=1.
 
     Example: vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9
     """
-    from vftcli.admittance.parameters import is_admittance_setting
-    from vftcli.cli.admit_runs import Choice, looped, released, replayed
-    from vftcli.cli.console import say
-    from vftcli.pipeline import AnalysisChoice
-    from vftcli.readers.estimates import estimates_columns
-    from vftcli.virtual_sensor.choice import ZeroChoice
+    from vftcli.admittance.choice import ControlChoice, split_settings
+    from vftcli.cli.console import command_line, say
+    from vftcli.outputs.admittance.files import write_admittance
 
     if sum((log is not None, bool(release.release), loop.closed_loop is not None)) != 1:
         raise typer.BadParameter("give one of LOG, --release AXIS=VALUE, --closed-loop SCENARIO")
-    given = list(observers.assignments or ())
-    own = [text for text in given if is_admittance_setting(text)]
-    if controllers.xi is not None and controllers.xi != "from-B":
-        own.append(f"admittance.xi={controllers.xi}")
-    if controllers.threshold_mode is not None:
-        own.append(f"admittance.threshold_mode={controllers.threshold_mode}")
-    others = [text for text in given if text not in own]
-    name, *more = observers.observer or [OBSERVER]
-    if more:
-        raise typer.BadParameter("one observer's force drives the replay; give --observer once")
-    read = reading.choice()
-    spec = estimates_columns(log, name) if log is not None and read.columns is None else None
-    # A table of estimates may hold those of an observer that is none of ours.
-    names = [name] if spec is None else None
-    request = AnalysisChoice(
-        read=read if spec is None else replace(read, columns=spec),
-        robot=robot.choice(),
-        observers=replace(observers, observer=names, assignments=others).choice(),
-    )
-    parameters = controllers.parameters
-    choice = Choice(
-        alpha=controllers.alpha,
-        kinds=tuple(controllers.controller or ()),
-        force_unstable=controllers.force_unstable,
-        sensor=force_from.sensor,
-        truth=force_from.truth,
-        zero=ZeroChoice.parsed(force_from.zero or ()),
-        release=tuple(release.release or ()),
-        start=release.start,
-        duration=release.duration,
-        seed=loop.seed,
-        torque=loop.torque,
-    )
+    own, others = split_settings(analysis.observers.assignments or ())
+    control = ControlChoice.parsed(assignments=own, **controllers.words())
+    observers = replace(analysis.observers, assignments=others)
+    analysis = replace(analysis, observers=observers)
     recording, run = None, None
     if loop.closed_loop is not None:
-        result, run = looped(loop.closed_loop, request, choice, own, parameters)
+        result, run = looped(loop, analysis, control)
     elif log is None:
-        result = released(request, choice, own, parameters)
+        result = released(release, analysis, control)
     else:
-        estimated = name if spec is not None else None
-        result, recording = replayed(log, request, choice, own, parameters, estimated)
+        result, recording = replayed(log, source, analysis, control)
     show(result, run, json)
     if output is not None:
-        write(output, result, recording, run, force)
+        write_admittance(output, result, recording, run, command=command_line(), force=force)
         if not json:
             say(f"wrote {output}: open {output / 'index.html'}; rerun {output / 'recording.rrd'}")
+
+
+def chosen(analysis: opt.AnalysisOptions, log: Path | None = None) -> "AnalysisChoice":
+    """What is asked of the log: one observer, and its wrench in base axes.
+
+    Raises:
+        ParameterError: If several observers are named, or another frame of the wrench.
+    """
+    from vftcli.readers.library import Library
+    from vftcli.signals.errors import ParameterError
+    from vftcli.virtual_sensor.choice import WrenchChoice
+
+    named = analysis.observers.observer or [OBSERVER]
+    if len(named) > 1:
+        raise ParameterError("one observer's force drives the replay; give --observer once")
+    if analysis.wrench.frame not in {None, "base"}:
+        raise ParameterError(
+            "the replay is in base axes about the flange point; leave --frame away"
+        )
+    observers = replace(analysis.observers, observer=named)
+    choice = replace(analysis, observers=observers).choice(Library([log] if log else []))
+    return replace(choice, wrench=replace(choice.wrench or WrenchChoice(), frame="base"))
+
+
+def released(
+    release: ReleaseOptions, analysis: opt.AnalysisOptions, control: "ControlChoice"
+) -> "Replay":
+    """A release from rest."""
+    from vftcli.admittance.choice import ReleaseChoice, released_robot
+    from vftcli.admittance.replay import replay_release
+
+    choice = ReleaseChoice.parsed(**release.words())
+    arm = released_robot(chosen(analysis).robot.name)
+    settings = control.parameters(arm)
+    return replay_release(
+        choice.deviation,
+        arm,
+        settings,
+        control.controllers(settings),
+        start=choice.pose(arm),
+        duration=choice.duration,
+        force_unstable=control.force_unstable,
+    )
+
+
+def replayed(
+    log: Path, source: ForceOptions, analysis: opt.AnalysisOptions, control: "ControlChoice"
+) -> "tuple[Replay, Recording]":
+    """A log's force through every controller."""
+    from vftcli.admittance.replay import replay
+    from vftcli.readers.estimates import estimates_columns
+
+    stored, observers = None, analysis.observers
+    if analysis.reading.columns is None:
+        name = (observers.observer or [OBSERVER])[0]
+        if (columns := estimates_columns(log, name)) is not None:
+            # A table of estimates may hold those of an observer that is none of ours.
+            stored, observers = name, replace(observers, observer=None)
+            reading = replace(analysis.reading, columns=columns)
+            analysis = replace(analysis, reading=reading, observers=observers)
+    choice = chosen(analysis, log)
+    recording = choice.library.open(log, choice.read)
+    arm = choice.robot.load(recording)
+    settings = control.parameters(arm)
+    driving = force_of(recording, arm, choice, source, stored)
+    result = replay(
+        driving.wrench,
+        recording.q,
+        arm,
+        settings,
+        control.controllers(settings),
+        source=driving.source,
+        force_unstable=control.force_unstable,
+    )
+    return replace(result, notes=(*driving.notes, *result.notes)), recording
+
+
+def force_of(
+    recording: "Recording",
+    robot: "Robot",
+    choice: "AnalysisChoice",
+    source: ForceOptions,
+    stored: str | None,
+) -> "DrivingForce":
+    """The wrench that drives the replay.
+
+    Args:
+        recording: The log.
+        robot: The arm.
+        choice: What is asked of it.
+        source: Whether another force than an observer's is wanted.
+        stored: The observer whose torque the log itself holds, None if it is to be estimated.
+    """
+    from vftcli.admittance import driving_force
+    from vftcli.pipeline import analyse
+
+    if source.sensor and source.truth is not None:
+        raise typer.BadParameter("choose one of --sensor and --truth")
+    assert choice.wrench is not None, "`chosen` asks for one"
+    if source.truth is not None:
+        return driving_force.truth_force(recording, robot, choice.wrench, source.truth)
+    if source.sensor:
+        return driving_force.sensor_force(recording, robot, choice.wrench)
+    if stored is not None:
+        return driving_force.stored_force(recording, robot, choice.wrench, stored)
+    reading = analyse(recording, robot, choice).virtual_sensor
+    assert reading is not None, "a wrench was asked for"
+    return driving_force.observed_force(reading)
+
+
+def looped(
+    loop: LoopOptions, analysis: opt.AnalysisOptions, control: "ControlChoice"
+) -> "tuple[Replay, ClosedLoop]":
+    """A scenario with a controller in the loop, and the force it acted on through all of them."""
+    from vftcli.admittance.closed_loop import UNLOADED, run_closed_loop
+    from vftcli.admittance.replay import replay
+    from vftcli.cli.simulate import progress_bar
+    from vftcli.observers import KalmanObserver
+    from vftcli.robots import load_robot
+    from vftcli.signals.errors import ParameterError
+    from vftcli.signals.remarks import fact
+    from vftcli.simulation import load_scenario
+    from vftcli.simulation.sensing import log_rate
+
+    choice = chosen(analysis)
+    assert choice.wrench is not None, "`chosen` asks for one"
+    zero = choice.wrench.zero
+    if zero.start or zero.log is not None:
+        raise ParameterError("--closed-loop holds still over a span: give it as --zero A:B")
+    scenario = load_scenario(str(loop.closed_loop), ())
+    arm = load_robot(scenario.robot)
+    settings = control.parameters(arm)
+    step = 1.0 / log_rate(scenario.sensing, arm)
+    observer = choice.observers.build(arm, step)[0][0]
+    if not isinstance(observer, KalmanObserver):
+        raise ParameterError("the closed loop runs kfo-fe or kfo-zoh; choose one with --observer")
+    controllers = control.controllers(settings)
+    run = run_closed_loop(
+        scenario,
+        controllers[-1],
+        observer,
+        seed=loop.seed,
+        torque=loop.torque,
+        zero=zero.spans[0] if zero.spans else UNLOADED,
+        force_unstable=control.force_unstable,
+        progress=progress_bar(),
+    )
+    result = replay(
+        run.wrench,
+        run.q,
+        arm,
+        settings,
+        controllers,
+        source=fact("force-of-loop"),
+        force_unstable=control.force_unstable,
+    )
+    return result, run
 
 
 def show(result: "Replay", run: "ClosedLoop | None", json: bool) -> None:
@@ -246,17 +315,3 @@ def show(result: "Replay", run: "ClosedLoop | None", json: bool) -> None:
     if run is not None:
         say(latency_text(run))
     typer.echo(comparison_text(result.rows))
-
-
-def write(
-    output: Path,
-    result: "Replay",
-    recording: "Recording | None",
-    run: "ClosedLoop | None",
-    force: bool,
-) -> None:
-    """The folder of a replay."""
-    from vftcli.cli.console import command_line
-    from vftcli.outputs.admittance.files import write_admittance
-
-    write_admittance(output, result, recording, run, command=command_line(), force=force)

@@ -1,0 +1,175 @@
+"""What a user may choose of an admittance replay: its controllers, and a release from rest."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vftcli.admittance.law import Controller, check_kinds, controllers
+from vftcli.admittance.parameters import (
+    Admittance,
+    from_document,
+    is_admittance_setting,
+    parse_settings,
+    release_deviation,
+)
+from vftcli.robots import PROFILES, Robot, load_robot
+from vftcli.robots.profile import RobotFile
+from vftcli.signals import parsing
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError, RobotError
+
+FROM_DAMPING = "from-B"
+"""The word for a damping ratio ξ that is that of the drag phase."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControlChoice:
+    """Which controllers are compared, and with which parameters.
+
+    Attributes:
+        kinds: Keys of `vftcli.admittance.law.KINDS`; all if empty.
+        alphas: One variable controller for each; the parameters' own α if empty.
+        settings: Parameters the user sets, which go before every file's.
+        file: A file whose ``[admittance]`` is taken instead of the robot's, or None.
+        force_unstable: Whether unstable settings run too.
+
+    Raises:
+        ParameterError: If there is no such kind.
+    """
+
+    kinds: tuple[str, ...] = ()
+    alphas: tuple[float, ...] = ()
+    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    file: Path | None = None
+    force_unstable: bool = False
+
+    def __post_init__(self) -> None:
+        check_kinds(self.kinds)
+
+    @classmethod
+    def parsed(
+        cls,
+        *,
+        assignments: Sequence[str] = (),
+        alpha: str | None = None,
+        controller: Sequence[str] | None = None,
+        xi: str | None = None,
+        threshold_mode: str | None = None,
+        parameters: Path | None = None,
+        force_unstable: bool = False,
+    ) -> "ControlChoice":
+        """The choice that the options of a command state.
+
+        Args:
+            assignments: Those of ``--set SECTION.PARAMETER=VALUE`` that are of the admittance.
+            alpha: Values of α, comma-separated.
+            controller: The kinds of every ``--controller``.
+            xi: Damping ratio of the recovery, or "from-B" for the drag phase's.
+            threshold_mode: "hard" or "soft".
+            parameters: See `file`.
+            force_unstable: See the attribute.
+
+        Raises:
+            ParameterError: If a word is malformed or names nothing there is.
+        """
+        given = list(assignments)
+        if xi is not None and xi != FROM_DAMPING:
+            given.append(f"admittance.xi={xi}")
+        if threshold_mode is not None:
+            given.append(f"admittance.threshold_mode={threshold_mode}")
+        return cls(
+            kinds=tuple(controller or ()),
+            alphas=listed(alpha, "--alpha") if alpha is not None else (),
+            settings=parse_settings(given),
+            file=parameters,
+            force_unstable=force_unstable,
+        )
+
+    def parameters(self, robot: Robot) -> Admittance:
+        """The admittance parameters: the file's or the robot's, then those that are set.
+
+        Raises:
+            ParameterError: If one is missing, unknown or out of range.
+        """
+        document = robot.document if self.file is None else RobotFile(self.file).document
+        return from_document(document, robot.name, self.settings)
+
+    def controllers(self, parameters: Admittance) -> tuple[Controller, ...]:
+        """The controllers that are compared, the traditional one first."""
+        return controllers(parameters, self.kinds, self.alphas)
+
+
+def split_settings(assignments: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The assignments of ``--set`` that are of the admittance, and those of the observers."""
+    own = [text for text in assignments if is_admittance_setting(text)]
+    return own, [text for text in assignments if text not in own]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReleaseChoice:
+    """A release from rest.
+
+    Attributes:
+        deviation: From the target pose. (6,) [m, rad]
+        start: Joint positions of the target pose, None for the robot file's. [rad]
+        duration: How long to watch, None for as long as it takes. [s]
+    """
+
+    deviation: Array
+    start: tuple[float, ...] | None = None
+    duration: float | None = None
+
+    @classmethod
+    def parsed(
+        cls, *, release: Sequence[str], start: str | None = None, duration: float | None = None
+    ) -> "ReleaseChoice":
+        """The choice that ``--release AXIS=VALUE``, ``--start`` and ``--duration`` state.
+
+        Raises:
+            ParameterError: If an axis does not exist or a value is no number.
+        """
+        return cls(
+            deviation=release_deviation(release),
+            start=listed(start, "--start") if start is not None else None,
+            duration=duration,
+        )
+
+    def pose(self, robot: Robot) -> Array:
+        """Joint positions of the target pose: as chosen, else the robot file's. (n,) [rad]
+
+        Raises:
+            ParameterError: If neither gives one.
+        """
+        start = self.start or robot.document.get("admittance", {}).get("start")
+        if start is None:
+            raise ParameterError(
+                f"{robot.name} has no admittance.start; give the start pose with --start q1,…,"
+                f"q{robot.joints} [rad]"
+            )
+        return np.array(start, dtype=np.float64)
+
+
+def released_robot(name: str | None) -> Robot:
+    """The arm of a release, which no log settles.
+
+    Raises:
+        RobotError: If none is named, or there is none of that name.
+    """
+    if name is None:
+        raise RobotError(f"a release needs an arm: --robot {'|'.join(PROFILES)}, or a file")
+    return load_robot(name)
+
+
+def listed(text: str, option: str) -> tuple[float, ...]:
+    """The numbers of ``A,B,C``.
+
+    Raises:
+        ParameterError: If one is no number.
+    """
+    numbers = parsing.numbers(text)
+    if numbers is None:
+        raise ParameterError(f"{option} {text!r} is not a list of numbers")
+    return numbers

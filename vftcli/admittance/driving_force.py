@@ -1,0 +1,93 @@
+"""The wrench that drives a replay: an observer's, the log's own sensor's, or a truth file's."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from vftcli.robots.robot import Robot
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Note, Remark, fact
+from vftcli.signals.wrench import Wrench
+from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.virtual_sensor.log_wrench import logged_wrench
+from vftcli.virtual_sensor.sensor_reading import SensorReading
+from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.zero import zeroed
+
+
+class DrivingForce(NamedTuple):
+    """The wrench that drives a replay.
+
+    Attributes:
+        wrench: Force on the robot, base axes, about the flange point.
+        source: Where it comes from.
+        notes: What a reader should know of it.
+    """
+
+    wrench: Wrench
+    source: Remark
+    notes: tuple[Note, ...]
+
+
+def observed_force(reading: SensorReading) -> DrivingForce:
+    """What the virtual sensor makes of the one observer that ran."""
+    wrench = reading.wrenches[0]
+    source = fact("force-of-observer", observer=wrench.name)
+    return DrivingForce(wrench, source, (*reading.notes, *reading.warnings))
+
+
+def stored_force(
+    recording: Recording, robot: Robot, choice: WrenchChoice, observer: str
+) -> DrivingForce:
+    """What the virtual sensor makes of an observer's torque that a file of estimates holds.
+
+    Raises:
+        MissingSignalError: If the file holds no torque.
+    """
+    tau = recording.require("tau_ext")
+    estimate = ExternalTorque(name=observer, t=recording.t, tau=tau)
+    sensor = VirtualSensor(
+        solver=choice.solver, frame=choice.frame, mounting=choice.mounting(robot)
+    )
+    # The band of a torque whose covariance nobody kept says nothing of the replay.
+    seen = replace(sensor.wrench(estimate, recording.q, robot.chain), remarks=())
+    return less_zero(seen, fact("force-of-observer", observer=observer), choice)
+
+
+def sensor_force(recording: Recording, robot: Robot, choice: WrenchChoice) -> DrivingForce:
+    """The log's own wrench.
+
+    Raises:
+        MissingSignalError: If the log has none, or one that is zero throughout.
+    """
+    frame = recording.wrench_frame
+    source = fact("force-of-sensor", frame=str(frame) if frame else "frame not stated")
+    wrench = logged_wrench(recording, robot.chain, choice.mounting(robot))
+    return less_zero(wrench, source, choice)
+
+
+def truth_force(
+    recording: Recording, robot: Robot, choice: WrenchChoice, path: Path
+) -> DrivingForce:
+    """The wrench of a truth file, on the log's own clock.
+
+    Raises:
+        ReferenceTorqueError: If it holds none, or its clock does not overlap the log's.
+    """
+    # Few replays have a truth, and reading one loads the references.
+    from vftcli.evaluation.reference_file import file_reference
+
+    wrench = file_reference(path, recording, robot, choice.mounting(robot)).wrench
+    if wrench is None:
+        raise ReferenceTorqueError(
+            f"{path}: it has no wrench; a truth file has wrench/fx … wrench/mz at the flange"
+        )
+    return less_zero(wrench, fact("force-of-truth", file=path.name), choice)
+
+
+def less_zero(wrench: Wrench, source: Remark, choice: WrenchChoice) -> DrivingForce:
+    """A wrench that no observer of this run made, its zero removed as it is chosen."""
+    wrench, notes = zeroed(wrench, choice.zero)
+    return DrivingForce(wrench, source, (*wrench.remarks, *notes))
