@@ -22,6 +22,7 @@ from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.signals.errors import RobotError
+from vftcli.signals.remarks import Remark
 
 FIXTURE = Path(__file__).parent.parent / "fixtures" / "ur5_circle.csv"
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
@@ -66,7 +67,7 @@ def test_as_printed_differs_and_says_so() -> None:
     short = AnalysisChoice(read=ReadChoice(interval=(4.0, 6.0)), robot=RobotChoice(name="ur5"))
     printed = analyse_log(FIXTURE, replace(short, observers=ObserverChoice(as_printed=True)))
     corrected = analyse_log(FIXTURE, short)
-    assert any("as printed" in note for note in printed.notes)
+    assert "as-printed" in {r.code for r in printed.remarks if isinstance(r, Remark)}
     for one, other in zip(printed.estimates, corrected.estimates, strict=True):
         assert np.max(np.abs(one.tau - other.tau)) > 0.1
 

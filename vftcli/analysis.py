@@ -4,16 +4,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-import polars as pl
-
 from vftcli.observers.observer import Observer, Tuning
+from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Note
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from vftcli.evaluation.print_table import Comparison
     from vftcli.refinement.refine import Refinement
     from vftcli.signals.wrench import Wrench
@@ -26,37 +28,48 @@ class Analysis:
     """One log, one robot, its observers' estimates, and how they compare with the reference.
 
     Attributes:
-        recording: The log.
-        robot: The arm as it was used: payload mounted, friction possibly off.
-        terms: p and μ along the log.
+        motion: The log with its robot as it was used, payload mounted, friction possibly off, and
+            what is known of its free motion.
         observers: The observers that ran.
         estimates: Their estimates, in the same order.
         tunings: What each observer's parameters mean at this log's sample time, by name.
+        refinement: What the complete log makes of the estimates, or None where nothing asked.
+        virtual_sensor: The wrenches and what is known of them, or None where none was asked for.
         reference: What the estimates are judged by, or None.
         errors: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
-        virtual_sensor: The wrenches and what is known of them, or None where none was asked for.
         contacts: How each observer tells contacts, or empty where it was not asked.
         published: A printed table beside these errors, or None where none was asked for.
-        workup: What the complete log told, its free part, spectra and limits, or None where nothing
-            asked for it.
-        notes: What the reader of the numbers should know, one sentence each.
+        remarks: What the reader of the numbers should know.
         run: The command, versions and conventions, as `run.json` holds them.
     """
 
-    recording: Recording
-    robot: Robot
-    terms: DynamicsTerms
+    motion: FreeMotion
     observers: tuple[Observer, ...]
     estimates: tuple[ExternalTorque, ...]
     tunings: Mapping[str, Tuning]
-    reference: ExternalTorque | None = None
-    errors: pl.DataFrame | None = None
+    refinement: "Refinement | None" = None
     virtual_sensor: "SensorReading | None" = None
+    reference: ExternalTorque | None = None
+    errors: "pl.DataFrame | None" = None
     contacts: "tuple[ContactScore, ...]" = ()
     published: "Comparison | None" = None
-    workup: "Refinement | None" = None
-    notes: tuple[str, ...] = ()
+    remarks: tuple[Note, ...] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def recording(self) -> Recording:
+        """The log."""
+        return self.motion.log.recording
+
+    @property
+    def robot(self) -> Robot:
+        """The arm as it was used."""
+        return self.motion.log.robot
+
+    @property
+    def terms(self) -> DynamicsTerms:
+        """P and μ along the log."""
+        return self.motion.log.terms
 
     @property
     def torques(self) -> tuple[ExternalTorque, ...]:

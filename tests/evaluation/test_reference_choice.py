@@ -15,6 +15,8 @@ from vftcli.evaluation.reference_choice import (
 )
 from vftcli.evaluation.reference_wrench import reference_wrench
 from vftcli.readers.references import read_reference
+from vftcli.repetition.free_motion import FreeMotion
+from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.signals.errors import ReferenceTorqueError
@@ -26,7 +28,7 @@ T = 0.01 * np.arange(300)
 RNG = np.random.default_rng(3)
 Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.2 * np.sin(np.outer(T, RNG.uniform(0.3, 1, 6)))
 RECORDING = Recording(t=T, q=Q, tau_ext=RNG.standard_normal((300, 6)))
-SOURCE = ReferenceSource(recording=RECORDING, robot=ROBOT)
+SOURCE = ReferenceSource(motion=FreeMotion(log=ModelledRun(recording=RECORDING, robot=ROBOT)))
 WRENCH = 5.0 * RNG.standard_normal((300, 6))
 
 
@@ -65,12 +67,6 @@ def test_zero_is_zero_with_no_floor_and_vendor_is_the_log_s_own() -> None:
     vendor = make_reference(SOURCE, ReferenceChoice(name="vendor")).torque
     np.testing.assert_array_equal(vendor.tau, RECORDING.tau_ext)
     assert vendor.floor is None  # its error is not known
-
-
-def test_free_runs_may_stand_beside_any_reference() -> None:
-    """Once `compare --reference zero --free F` was an error without --bands, accepted with it."""
-    source = ReferenceSource(recording=RECORDING, robot=ROBOT, free=(RECORDING,))
-    assert not make_reference(source, ReferenceChoice(name="zero")).torque.tau.any()
 
 
 def test_a_file_is_read_once_for_torque_and_wrench(tmp_path, monkeypatch) -> None:

@@ -17,6 +17,7 @@ from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, VftError
+from vftcli.signals.remarks import Remark
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 FREE_CYCLE, MODEL = (RefinementChoice(remove_bias=name) for name in ("free-cycle", "model"))
@@ -24,6 +25,10 @@ SHORT = ReadChoice(interval=(4.5, 6.0))
 """Less than one lap of the circle: nothing repeats."""
 MOVING = np.array([1, 2, 3, 4, 6])
 """Joint 5 of the circle rests."""
+
+
+def codes(analysis: Analysis) -> set[str]:
+    return {remark.code for remark in analysis.remarks if isinstance(remark, Remark)}
 
 
 def mean_rmse(analysis: Analysis, observer: str) -> float:
@@ -34,13 +39,15 @@ def mean_rmse(analysis: Analysis, observer: str) -> float:
 
 
 def test_the_free_cycle_is_found_and_the_resting_joint_named(worked_up: Analysis) -> None:
-    found = worked_up.workup
+    found = worked_up.refinement
     assert found is not None
-    assert "free part: cycle 1 of 5" in found.notes[0]
-    inside = worked_up.t[found.survey.part.inside]
+    assert found.remarks[0].code == "free-cycle-found"
+    assert (found.remarks[0].values["cycles"], found.remarks[0].values["whole"]) == ([1], 5)
+    inside = worked_up.t[found.baseline.part.own]
     assert inside[0] == pytest.approx(0.0, abs=0.05)
     assert inside[-1] == pytest.approx(4.0, abs=0.05)
-    assert any("J5 rests" in note for note in found.notes)
+    band = next(r for r in found.remarks if r.code == "band-of-a-standing-joint")
+    assert band.where.joints == (5,)
 
 
 def test_ratios_to_the_hand_set_filter(
@@ -77,14 +84,14 @@ def test_the_band_covers_the_truth_on_moving_joints(worked_up: Analysis) -> None
 
 
 def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
-    found = worked_up.workup
+    found = worked_up.refinement
     assert found is not None
-    spectra = found.survey.spectra
+    spectra = found.baseline.spectra
     assert spectra is not None
     for observer, estimate in zip(worked_up.observers, worked_up.estimates, strict=True):
         response = observer.frequency_response(spectra.frequency, spectra.step, 6)
         lag = np.sum(np.abs(1 - response) ** 2 * spectra.external, axis=0) * spectra.width
-        free = np.mean(estimate.tau[found.survey.part.inside] ** 2, axis=0)
+        free = np.mean(estimate.tau[found.baseline.part.own] ** 2, axis=0)
         np.testing.assert_allclose(estimate.error_sd[7], np.sqrt(free + lag), rtol=1e-12)
         assert estimate.sd is None or not np.allclose(estimate.sd[7], estimate.error_sd[7])
 
@@ -92,26 +99,26 @@ def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
 def test_removing_the_bias_subtracts_the_free_cycle_at_the_same_phase(
     worked_up: Analysis, without_bias: Analysis
 ) -> None:
-    found = worked_up.workup
+    found = worked_up.refinement
     assert found is not None
     before, after = worked_up.estimates[0], without_bias.estimates[0]
-    inside, t = found.survey.part.inside, worked_up.t
+    inside, t = found.baseline.part.own, worked_up.t
     assert np.all(after.tau[inside] == 0.0)
     k = int(np.searchsorted(t, 9.0))
     phase = t[k] - 2 * 4.0
     same = [np.interp(phase, t[inside], x) for x in before.tau[inside].T]
     # the period found on the positions differs from 4 s by microseconds
     np.testing.assert_allclose(before.tau[k] - after.tau[k], same, atol=1e-3)
-    assert any("zero by construction" in note for note in without_bias.notes)
+    assert "free-cycle-is-zero" in codes(without_bias)
 
 
 def test_what_is_left_without_the_bias_is_tuned_on(
     worked_up: Analysis, without_bias: Analysis
 ) -> None:
     """Joints that friction and model limit gain; where noise does (J1), there is twice as much."""
-    assert worked_up.workup is not None
-    assert without_bias.workup is not None
-    plain, left = (a.workup.curves["kfo-auto"] for a in (worked_up, without_bias))
+    assert worked_up.refinement is not None
+    assert without_bias.refinement is not None
+    plain, left = (a.refinement.curves["kfo-auto"] for a in (worked_up, without_bias))
     limited = [1, 2, 3]
     assert np.all(left.least[limited] < 0.7 * plain.least[limited])
 
@@ -127,25 +134,29 @@ def test_a_bias_model_helps_where_nothing_repeats(request_: AnalysisChoice) -> N
     modelled = analyse_log(FIXTURE, asked)
     plain = analyse_log(FIXTURE, replace(asked, refinement=RefinementChoice()))
     assert mean_rmse(modelled, "rts-auto") < 0.8 * mean_rmse(plain, "rts-auto")
-    assert any("cross-validated" in note for note in modelled.notes)
+    assert "bias-modelled" in codes(modelled)
 
 
 def test_what_limits_the_log_is_said_joint_by_joint(worked_up: Analysis) -> None:
-    found = worked_up.workup
+    found = worked_up.refinement
     assert found is not None
     budget = found.budgets[-1]
-    sentence = found.notes[-1]
-    assert sentence.startswith("what limits rts-auto on this log: J1 ")
-    assert "J5 stiction at rest" in sentence
+    limits = found.remarks[-1]
+    assert (limits.code, limits.where.about) == ("limits", "rts-auto")
+    assert limits.values["causes"][4] == "stiction at rest"  # J5 rests
+    for j in (0, 1, 2, 3, 5):
+        cause, size = limits.values["causes"][j], limits.values["size_Nm"][j]
+        assert size == max(budget.parts[c][j] for c in ("noise", "friction", "model", "bandwidth"))
+        assert size == budget.parts[cause][j]
     assert all(np.all(part >= 0.0) for part in budget.parts.values())
     # its parts but bandwidth are the free rms, cause by cause
-    read = np.mean(worked_up.estimates[-1].tau[found.survey.part.inside] ** 2, axis=0)
+    read = np.mean(worked_up.estimates[-1].tau[found.baseline.part.own] ** 2, axis=0)
     parts = sum(budget.parts[cause] ** 2 for cause in ("noise", "friction", "model"))
     np.testing.assert_allclose(parts, read, rtol=1e-9)
 
 
 def test_innovations_of_the_tuned_filter_have_their_expected_size(worked_up: Analysis) -> None:
-    found = worked_up.workup
+    found = worked_up.refinement
     assert found is not None
     by_name = {one.name: one for one in found.consistency}
     assert set(by_name) == {"kfo-zoh", "kfo-auto"}
@@ -161,8 +172,8 @@ def test_a_log_that_repeats_nothing_falls_back_and_says_so() -> None:
         observers=ObserverChoice(names=("rts-auto", "kfo-rts")),
     )
     analysis = analyse_log(FIXTURE, request)
-    assert any("rts-auto: no free part to tune on" in note for note in analysis.notes)
-    assert any("State one with --free-part A:B or --free LOG" in note for note in analysis.notes)
+    assert any("rts-auto: no free part to tune on" in str(note) for note in analysis.remarks)
+    assert "no-free-part" in codes(analysis)
     auto, by_hand = analysis.estimates
     np.testing.assert_array_equal(auto.tau, by_hand.tau)
     assert auto.error_sd is None
@@ -175,7 +186,7 @@ def test_a_free_part_that_is_too_short_falls_back_and_says_so() -> None:
         observers=ObserverChoice(names=("rts-auto",)),
     )
     analysis = analyse_log(FIXTURE, request)
-    assert any("no spectra: a spectrum needs 32 samples" in note for note in analysis.notes)
+    assert "no-spectra" in codes(analysis)
     assert analysis.estimates[0].error_sd is None
 
 
@@ -198,7 +209,7 @@ def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
         robot=RobotChoice(name="ur5"), observers=ObserverChoice(names=("kfo-auto",))
     )
     analysis = analyse(twice, request.robot.load(twice), request)
-    assert any("is not much quieter than the rest" in note for note in analysis.notes)
+    assert "free-part-not-quiet" in codes(analysis)
     assert analysis.estimates[0].error_sd is None
 
 
@@ -210,7 +221,7 @@ def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: Analys
         observers=ObserverChoice(names=("rts-auto", "kfo-rts")),
     )
     analysis = analyse_log(FIXTURE, always)
-    assert any("something touches the arm in all of them" in note for note in analysis.notes)
+    assert "free-part-not-quiet" in codes(analysis)
     np.testing.assert_array_equal(analysis.estimates[0].tau, analysis.estimates[1].tau)
     assert analysis.estimates[0].error_sd is None
     with pytest.raises(ParameterError, match="something touches the arm in all of them"):

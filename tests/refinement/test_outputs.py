@@ -78,7 +78,7 @@ def test_a_run_that_asks_for_nothing_shows_nothing() -> None:
             observers=ObserverChoice(names=("gmo",)),
         ),
     )
-    assert plain.workup is None
+    assert plain.refinement is None
     assert "What the complete log tells" not in render(plain)
     assert json.loads(to_json(run_record(plain, "")))["complete_log"] is None
 

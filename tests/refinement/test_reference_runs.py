@@ -12,13 +12,14 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse_log, look_over
+from vftcli.pipeline import AnalysisChoice, analyse_log, model, read
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
-from vftcli.refinement.refine import work_up
+from vftcli.refinement.refine import refine
 from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.free_run import Models
 from vftcli.robots.choice import RobotChoice
-from vftcli.robots.terms import dynamics_terms
+from vftcli.signals.remarks import Remark
 from vftcli.simulation import load_scenario, simulate
 
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
@@ -37,8 +38,8 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
         observers=ObserverChoice(names=("kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto")),
         refinement=RefinementChoice(bands=True),
     )
-    terms = dynamics_terms(log, robot)
-    found = look_over(log, robot, terms, asked)
+    motion = read(log, robot, asked, Models())
+    terms, found = motion.log.terms, model(motion, asked)
     assert found is not None
     observers, _ = asked.observers.build(robot, log.median_step, found.spectra)
     estimates = [observer.estimate(terms) for observer in observers]
@@ -46,14 +47,14 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
     quick = [
         o.estimate(terms) for o in discrete.build(robot, log.median_step, found.spectra)[0][:2]
     ]
-    banded, _ = work_up(found, log, robot, observers, estimates)
+    banded = refine(found, observers, estimates).estimates
     rid = replace(asked, refinement=RefinementChoice(remove_bias="free-cycle"))
-    relieved = look_over(log, robot, terms, rid)
+    relieved = model(motion, rid)
     assert relieved is not None
     tuned, _ = rid.observers.build(robot, log.median_step, relieved.spectra)
     raw = [observer.estimate(terms) for observer in tuned]
-    unbiased, _ = work_up(relieved, log, robot, tuned, raw, "free-cycle")
-    moving = found.stuck == 0
+    unbiased = refine(relieved, tuned, raw, "free-cycle").estimates
+    moving = ~found.stuck
 
     def error(tau: np.ndarray) -> float:
         return float(np.sqrt(np.mean((tau - truth) ** 2, axis=0))[moving].mean())
@@ -149,7 +150,9 @@ def test_ur10e_pushes_between_which_stiction_is_named(logs: Path) -> None:
         observers=ObserverChoice(names=("rts-auto",)),
     )
     analysis = analyse_log(logs / "ur10e" / "push_pose.csv", request)
-    assert any(
-        "J1, J2, J3, J4, J5, J6 rest in most of the log: stiction" in note
-        for note in analysis.notes
-    )
+    named = [
+        remark.where.joints
+        for remark in analysis.remarks
+        if isinstance(remark, Remark) and remark.code == "band-of-a-standing-joint"
+    ]
+    assert named == [(1, 2, 3, 4, 5, 6)]

@@ -12,7 +12,18 @@ def swing(seed: int = 0) -> tuple[DriveRun, np.random.Generator]:
     t = 0.008 * np.arange(2500)
     dq = np.sin(2.0 * np.pi * t[:, None] * np.array([0.4, 0.7]))
     still = np.zeros_like(dq)
-    motion = DriveRun("log", t, still, dq, still, still, still, np.zeros(2), still, still)
+    motion = DriveRun(
+        name="log",
+        t=t,
+        q=still,
+        dq=dq,
+        torque=still,
+        model=still,
+        momentum=still,
+        coulomb=np.zeros(2),
+        standstill_s=still,
+        standing=still > 0,
+    )
     return motion, np.random.default_rng(seed)
 
 

@@ -16,6 +16,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark
 
 
 class Circle(Protocol):
@@ -79,10 +80,12 @@ def test_free_cycle_and_joint_at_rest_are_told(circle: Circle, ur5: Robot) -> No
     assert np.isnan(reference.tau[t < 3.99]).all()  # the free cycle has no reference of its own
     assert np.isfinite(reference.tau[(t > 4.01) & (t < 19.9)]).all()
     assert reference.mostly_rests == (False, False, False, False, True, False)
-    text = " ".join(reference.remarks)
-    assert "free: cycle 1 of 5, found by the smallest residual" in text
-    assert "J5 rests in 100 % of the samples" in text
-    assert "alignment used:" in text
+    remarks = {remark.code: remark for remark in reference.remarks if isinstance(remark, Remark)}
+    assert remarks["free-cycle-found"].values["cycles"] == [1]
+    assert remarks["free-cycle-found"].values["whole"] == 5
+    assert remarks["joint-stands"].where.joints == (5,)
+    assert remarks["joint-stands"].values["share"] == 1.0
+    assert "alignment-chosen-filtered" in remarks
 
 
 def test_sign(circle: Circle, ur5: Robot) -> None:
@@ -101,7 +104,7 @@ def test_two_free_cycles_measure_the_floor(circle: Circle, ur5: Robot) -> None:
     assert pushed.floor is not None
     assert free.floor is not None
     assert np.all(pushed.floor[MOVING] > 1.5 * free.floor[MOVING])
-    assert any("floor measured between the free runs" in note for note in pushed.remarks)
+    assert "floor-measured" in {r.code for r in pushed.remarks if isinstance(r, Remark)}
 
 
 def test_missing_samples(circle: Circle, ur5: Robot) -> None:
@@ -132,7 +135,7 @@ def test_a_log_is_not_its_own_free_run(circle: Circle, ur5: Robot) -> None:
 
 
 def test_options_of_one_log_do_not_go_with_two(circle: Circle, ur5: Robot) -> None:
-    source = replace(circle.recording.source, path=Path("other.csv"))
+    source = replace(circle.recording.source, path=Path("other.csv"), t0=1.0)  # another run
     other = replace(circle.recording, source=source)
     with pytest.raises(ReferenceTorqueError, match="leave them away with --free"):
         two_cycle_difference(circle.recording, other, ur5, FreeChoice(period=4.0))

@@ -53,7 +53,7 @@ def compare(
     from vftcli.evaluation.pooling import PoolMember, evaluate_pooled
     from vftcli.outputs.log import tables
     from vftcli.outputs.log.wrench_tables import paper_bounds
-    from vftcli.pipeline import analyse
+    from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
 
     show = {
@@ -63,13 +63,11 @@ def compare(
         "markdown": tables.to_markdown,
         "latex": tables.to_latex,
     }[table.form]
-    library = Library(logs)
-    choice = analysis.choice(library, reference)
+    choice = analysis.choice(Library(logs), reference)
     analyses = []
-    for recording in library.open_logs(logs, choice.read):
-        made = analyse(recording, choice.robot.load(recording), choice)
+    for made in analyse_logs(logs, choice):
         if not table.json:
-            say_recording(recording)
+            say_recording(made.recording)
             say_notes(made)
         analyses.append(made)
     if significance:

@@ -36,22 +36,20 @@ def report(
     from vftcli.outputs.log.report import write_report, write_reports
     from vftcli.outputs.log.tables import print_text, to_terminal
     from vftcli.outputs.log.wrench_tables import paper_bounds
-    from vftcli.pipeline import analyse
+    from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
 
-    library = Library(logs)
-    choice = analysis.choice(library, reference)
+    choice = analysis.choice(Library(logs), reference)
     if published is not None:
         check_published(published, reference.reference)
     analyses = []
-    for recording in library.open_logs(logs, choice.read):
-        made = analyse(recording, choice.robot.load(recording), choice)
+    for made in analyse_logs(logs, choice):
+        beside = None
         if published is not None and made.errors is not None:
-            found = compare_with(published, made.errors, made.observers, made.tunings)
-            made = replace(made, published=found)
-        analyses.append(made)
+            beside = compare_with(published, made.errors, made.observers, made.tunings)
+        analyses.append(replace(made, published=beside))
         if not json:
-            say_recording(recording)
+            say_recording(made.recording)
             say_notes(made)
     command = command_line()
     if len(analyses) == 1:

@@ -52,9 +52,9 @@ def tune_gains(
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
     from vftcli.outputs.log.run_record import plain
-    from vftcli.pipeline import AnalysisChoice, look_over
+    from vftcli.pipeline import AnalysisChoice, model, read
     from vftcli.refinement.tuning import gains_document, parse_goal, tune_all
-    from vftcli.robots.terms import dynamics_terms
+    from vftcli.repetition.free_run import Models
     from vftcli.robots.writing import lines_of
     from vftcli.signals.errors import ParameterError
 
@@ -68,10 +68,10 @@ def tune_gains(
     )
     recording = choice.library.open(log, choice.read)
     arm = choice.robot.load(recording)
-    found = look_over(recording, arm, dynamics_terms(recording, arm), choice)
-    notes = found.notes if found is not None else ()
+    found = model(read(recording, arm, choice, Models()), choice)
     if found is None or found.spectra is None:
-        raise ParameterError(f"nothing to tune on: {notes[-1] if notes else 'no free part'}")
+        raise ParameterError(f"nothing to tune on: {found.missing if found else 'no free part'}")
+    notes = [str(remark) for remark in found.remarks]
     tuned = tune_all(found.spectra, wanted)
     heading = [command_line(), f"goal: {goal}", f"robot: {arm.name}", *notes]
     comments = "".join(f"# {line}\n" for line in heading)

@@ -1,17 +1,18 @@
 """ReferenceChoice: which reference a comparison is made against, and the table of all there are."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from vftcli.evaluation.reference import Reference, vendor_reference, zero_reference
 from vftcli.evaluation.reference_file import file_reference
 from vftcli.evaluation.reference_sensor import sensor_reference
-from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.two_cycle import two_cycle_difference
+from vftcli.repetition.free_motion import FreeMotion
+from vftcli.repetition.two_cycle import two_cycle_reference
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import NOTHING, Mounting
 
 FILE = "file:"
@@ -58,32 +59,33 @@ class ReferenceSource:
     """All that a reference can be made from.
 
     Attributes:
-        recording: The log that is compared.
-        robot: The arm, its payload mounted.
-        free: Free runs of the same motion, for the two-cycle difference.
-        free_choice: What is free in the log itself, and how that difference is made.
+        motion: The log that is compared, its robot, and its free motion.
         mounting: Where tool and sensor sit on the flange.
+        logged: The log's own wrench without its tool's weight, None where it was not weighed.
     """
 
-    recording: Recording
-    robot: Robot
-    free: Sequence[Recording] = ()
-    free_choice: FreeChoice = field(default_factory=FreeChoice)
+    motion: FreeMotion
     mounting: Mounting = NOTHING
+    logged: Wrench | None = None
+
+    @property
+    def recording(self) -> Recording:
+        """The log."""
+        return self.motion.log.recording
+
+    @property
+    def robot(self) -> Robot:
+        """The arm, its payload mounted."""
+        return self.motion.log.robot
 
 
-def two_cycle(source: ReferenceSource) -> Reference:
-    """The two-cycle difference, against cycles of the same log or free runs in others."""
-    return Reference(
-        torque=two_cycle_difference(source.recording, source.free, source.robot, source.free_choice)
-    )
-
-
-REFERENCES: dict[str, Callable[[ReferenceSource, ReferenceChoice], Reference]] = {
-    "zero": lambda source, _: zero_reference(source.recording),
-    "vendor": lambda source, _: vendor_reference(source.recording),
-    "two-cycle": lambda source, _: two_cycle(source),
-    "sensor": lambda source, _: sensor_reference(source.recording, source.robot, source.mounting),
+REFERENCES: dict[str, Callable[[ReferenceSource], Reference]] = {
+    "zero": lambda source: zero_reference(source.recording),
+    "vendor": lambda source: vendor_reference(source.recording),
+    "two-cycle": lambda source: Reference(torque=two_cycle_reference(source.motion)),
+    "sensor": lambda source: sensor_reference(
+        source.recording, source.robot, source.mounting, source.logged
+    ),
 }
 """Name at the command line → what makes it; ``file:PATH`` is the one name with a path in it."""
 
@@ -97,4 +99,4 @@ def make_reference(source: ReferenceSource, choice: ReferenceChoice) -> Referenc
     if choice.path is not None:
         mounting = source.mounting
         return file_reference(choice.path, source.recording, source.robot, mounting, choice.columns)
-    return REFERENCES[choice.name](source, choice)
+    return REFERENCES[choice.name](source)

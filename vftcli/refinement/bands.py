@@ -11,36 +11,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.observers.observer import Observer
-from vftcli.refinement.baseline import Baseline, free_estimates, free_rms, stuck_joints
+from vftcli.refinement.baseline import Baseline, FreeReading
 from vftcli.signals.arrays import handed_over
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.remarks import Remark, Where, caution, fact
 
 
-def with_band(found: Baseline, observer: Observer, estimate: ExternalTorque) -> ExternalTorque:
-    """The estimate with its band, and its samples at rest marked; itself without spectra."""
-    if found.spectra is None:
+def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
+    """The estimate with its band, and marked where joints move; itself without spectra."""
+    estimate, spectra = reading.estimate, found.spectra
+    if spectra is None:
         return estimate
-    response = observer.frequency_response(
-        found.spectra.frequency, found.spectra.step, found.spectra.joints
-    )
-    variance = free_rms(found, free_estimates(found, observer, estimate)) ** 2
-    variance = variance + found.spectra.missed(response)
-    sd = np.broadcast_to(handed_over(np.sqrt(variance)), estimate.tau.shape)
-    return replace(estimate, error_sd=sd, moving=found.rest == 0.0)
+    response = reading.observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
+    sd = np.sqrt(reading.rms**2 + spectra.missed(response))
+    banded = np.broadcast_to(handed_over(sd), estimate.tau.shape)
+    return replace(estimate, error_sd=banded, moving=~found.standing)
 
 
-def band_notes(found: Baseline) -> tuple[str, ...]:
+def band_remarks(found: Baseline) -> tuple[Remark, ...]:
     """What the bands are, and where they do not hold."""
     if found.spectra is None:
         return ()
-    note = "bands: sd² = rms_free² + ∫|1−H|²S_τ df, model error and lag included; 95 % is 1.96 sd"
-    stuck = stuck_joints(found)
-    if not stuck:
-        return (note,)
-    verb = "rests" if len(stuck) == 1 else "rest"
-    return (
-        note,
-        f"{', '.join(stuck)} {verb} in most of the log: stiction limits what can be said there, "
-        "and the band does not hold",
-    )
+    stuck = tuple(int(j) + 1 for j in np.flatnonzero(found.stuck))
+    limit = (caution("band-of-a-standing-joint", Where(joints=stuck)),) if stuck else ()
+    return (fact("band"), *limit)

@@ -1,24 +1,22 @@
-"""A log's free part and spectra, and what they make of the observers' estimates."""
+"""A log's free part and spectra, and what the observers read where nothing touches the arm."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Part, Spectra, spectra_of
-from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_part import FreePart, find_free_part
+from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.repetition.pairing import mean_of
-from vftcli.repetition.standstill import at_rest, stops
+from vftcli.repetition.standstill import duration, standing
 from vftcli.robots.disturbance import raw_disturbance
-from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms, dynamics_terms
-from vftcli.signals.arrays import Array, frozen
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, Mask, frozen_mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.identity import refuse_repeated_runs
-from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import resampled
 
 QUIETER = 0.85
@@ -26,11 +24,11 @@ QUIETER = 0.85
 slow power beyond the free one's. Reference runs show 0.96 and more, those that are in contact all
 the time 0.82 and less."""
 
-SLOW = 5.0
+CONTACT_BAND = 5.0
 """Where contacts are told from noise: below this frequency. [Hz]"""
 
-RESTS = 0.5
-"""A joint that rests in more than this share of the samples is limited by stiction."""
+STANDS = 0.5
+"""A joint that stands in more than this share of the samples is limited by stiction."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,129 +36,155 @@ class Baseline:
     """What a log shows of itself before any observer has run.
 
     Attributes:
-        terms: p and μ of the log.
+        motion: The log and its free motion.
         part: Its free part, None where there is none.
-        run_terms: p and μ of the free runs in other logs.
         spectra: Spectra of the raw disturbance, None where the free part is too short or not free.
-        rest: 1 where a joint rests. (T, n)
-        notes: What was found, and what was not and why.
+        standing: Where a joint stands still. (T, n)
+        missing: Why there is no free part, or are no spectra; None where there are both.
     """
 
-    terms: DynamicsTerms
-    part: FreePart | None
-    run_terms: tuple[DynamicsTerms, ...] = ()
+    motion: FreeMotion
+    part: FreePart | None = None
     spectra: Spectra | None = None
-    rest: Array
-    notes: tuple[str, ...] = ()
+    standing: Mask
+    missing: Remark | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rest", frozen(self.rest))
+        object.__setattr__(self, "standing", frozen_mask(self.standing))
 
     @property
-    def stuck(self) -> Array:
-        """1 for a joint that rests in most samples, where stiction decides. (n,)"""
-        return np.asarray(self.rest.mean(axis=0) > RESTS, dtype=np.float64)
+    def terms(self) -> DynamicsTerms:
+        """P and μ of the log."""
+        return self.motion.log.terms
+
+    @property
+    def pieces(self) -> tuple[FreePiece, ...]:
+        """The free samples, of the log itself and of free runs; none without a free part."""
+        return self.part.pieces if self.part is not None else ()
+
+    @property
+    def stuck(self) -> Mask:
+        """Joints that stand in most samples, where stiction decides. (n,)"""
+        return np.asarray(self.standing.mean(axis=0) > STANDS)
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What was found, and what was not and why."""
+        found = self.part.remarks if self.part is not None else ()
+        return found if self.missing is None else (*found, self.missing)
 
 
-def survey(
-    recording: Recording,
-    robot: Robot,
-    terms: DynamicsTerms,
-    choice: FreeChoice,
-    runs: tuple[Recording, ...] = (),
-) -> Baseline:
+def baseline_of(motion: FreeMotion) -> Baseline:
     """Find the free part of a log and its spectra, or say why there are none.
 
     Raises:
-        ReferenceTorqueError: If a free run is the log itself, or two free runs are one.
+        ParameterError: If a span that is given as free holds no samples of the log, or all.
     """
-    refuse_repeated_runs(recording, runs)
-    rest = at_rest(recording.t, stops(recording.t, recording.require("dq")))
+    log = motion.log
+    dq = log.recording.require("dq")
+    bare = Baseline(
+        motion=motion, standing=standing(log.recording.t, duration(log.recording.t, dq))
+    )
     try:
-        part = find_free_part(recording, robot, choice, runs)
+        part = motion.part
     except ReferenceTorqueError as error:
-        why = f"no free part: {error}. State one with --free-part A:B or --free LOG"
-        return Baseline(terms=terms, part=None, rest=rest, notes=(why,))
-    run_terms = tuple(dynamics_terms(run, robot) for run in part.runs)
-    found = Baseline(terms=terms, part=part, run_terms=run_terms, rest=rest, notes=(part.note,))
+        return replace(bare, missing=caution("no-free-part", reason=str(error)))
     try:
-        spectra = spectra_of(Part(terms, ~part.inside), free_samples(found))
+        spectra = spectra_of(Part(log.terms, ~part.own), samples_of(part.pieces))
     except ParameterError as error:
-        return replace(found, notes=(part.note, f"no spectra: {error}"))
-    if choice.is_given or looks_free(spectra):
-        return replace(found, spectra=spectra)
-    return Baseline(terms=terms, part=None, rest=rest, notes=(not_free(recording, part),))
+        return replace(bare, part=part, missing=caution("no-spectra", reason=str(error)))
+    if motion.choice.is_given or looks_free(spectra):
+        return replace(bare, part=part, spectra=spectra)
+    residuals = motion.free_cycles.residuals
+    listed = [] if residuals is None else residuals.tolist()
+    return replace(bare, missing=caution("free-part-not-quiet", residuals=listed))
 
 
-def without_free_motion(found: Baseline) -> Spectra | None:
-    """Spectra as they are once the free motion at the same phase is subtracted.
+def without_free_motion(found: Baseline) -> Baseline:
+    """The baseline with spectra as they are once the free motion at the same phase is subtracted.
 
     What repeats is gone from both parts. Left in the free one is what does not repeat: the noise
     in S_n, from the log and from the mean of the k free motions, 1 + 1/k of it.
     """
     part, spectra = found.part, found.spectra
     if part is None or spectra is None or not part.pairings:
-        return spectra
-    terms, clocks = found.terms, {len(x.t): x for x in (*found.run_terms, found.terms)}
-    series = [padded(raw_disturbance(clocks[len(p.free.t)])) for p in part.pairings]
-    d = padded(raw_disturbance(terms)) - mean_of(part.pairings, series)
-    known = np.isfinite(d[:, 0]) & ~part.inside
-    step = np.diff(terms.t, prepend=terms.t[0])[:, None]
+        return found
+    free = bias_at_phase(part, [raw_disturbance_of(piece.run.terms) for piece in part.pieces])
+    d = raw_disturbance_of(found.terms) - free
+    known = np.isfinite(d[:, 0]) & ~part.own
+    # Terms whose raw disturbance is d: the same estimator then makes its spectrum.
+    step = np.diff(found.terms.t, prepend=found.terms.t[0])[:, None]
     p = np.cumsum(step * np.nan_to_num(d), axis=0)
-    relieved = Part(DynamicsTerms(t=terms.t, p=p, mu=np.zeros_like(p)), known)
+    left = Part(DynamicsTerms(t=found.terms.t, p=p, mu=np.zeros_like(p)), known)
     try:
-        loaded = spectra_of(relieved, free_samples(found))
+        loaded = spectra_of(left, samples_of(part.pieces))
     except ParameterError:
-        return spectra
+        return found
     floor = (1.0 + 1.0 / len(part.pairings)) * spectra.floor
-    return replace(loaded, free=resampled(loaded.frequency, spectra.frequency, floor))
+    noise = resampled(loaded.frequency, spectra.frequency, floor)
+    return replace(found, spectra=replace(loaded, free=noise))
 
 
-def padded(d: Array) -> Array:
-    """The raw disturbance with its first sample repeated, so that every sample has one. (T, n)"""
+def raw_disturbance_of(terms: DynamicsTerms) -> Array:
+    """The raw disturbance, its first value repeated so that every sample has one. (T, n) [N·m]"""
+    d = raw_disturbance(terms)
     return np.concatenate([d[:1], d])
 
 
-def free_samples(found: Baseline) -> list[Part]:
-    """The free part's terms and samples, of the log itself or of the free runs."""
-    if found.run_terms:
-        return [Part(terms, np.ones(terms.samples, dtype=bool)) for terms in found.run_terms]
-    inside = found.part.inside if found.part is not None else np.zeros(found.terms.samples, bool)
-    return [Part(found.terms, inside)]
+def bias_at_phase(part: FreePart, series: Sequence[Array]) -> Array:
+    """Mean over the free motions of a signal at each sample's phase, NaN where there is none.
+
+    Args:
+        part: The free part.
+        series: The signal along each of its pieces, in their order. (S, n) each
+
+    Returns:
+        (T, n), on the log's clock.
+    """
+    laid = zip(part.pieces, series, strict=True)
+    signals = [x for piece, x in laid for _ in piece.pairings]
+    return mean_of(part.pairings, signals)
+
+
+def samples_of(pieces: Sequence[FreePiece]) -> list[Part]:
+    """P and μ of the free pieces, and which samples are free."""
+    return [Part(piece.run.terms, piece.inside) for piece in pieces]
 
 
 def looks_free(spectra: Spectra) -> bool:
     """Whether most joints have clearly less slow power in the free part than in the loaded one."""
-    slow = spectra.frequency < SLOW
+    slow = spectra.frequency < CONTACT_BAND
     power = np.maximum(spectra.loaded[slow].sum(axis=0), np.finfo(float).tiny)
     return bool(np.median(spectra.external[slow].sum(axis=0) / power) > QUIETER)
 
 
-def not_free(recording: Recording, part: FreePart) -> str:
-    """One line on a free part that is not much quieter than the rest."""
-    return (
-        f"{recording.name}: no free part: the quietest cycle is not much quieter than the rest "
-        f"({part.note.removeprefix('free part: ')}), so something touches the arm in all of them, "
-        "or in none. State what is free with --free-cycles, --free-part A:B or --free LOG"
+class FreeReading(NamedTuple):
+    """What one observer reads of a log, and where nothing touches the arm.
+
+    Attributes:
+        observer: The observer.
+        estimate: Its estimate of the log.
+        free: Its estimate along each free piece, in the pieces' order.
+        samples: Of these, what it reads in the free samples, of all pieces in a row. (S, n) [N·m]
+    """
+
+    observer: Observer
+    estimate: ExternalTorque
+    free: tuple[ExternalTorque, ...]
+    samples: Array
+
+    @property
+    def rms(self) -> Array:
+        """Root mean square over the free samples, bias included. (n,) [N·m]"""
+        return np.asarray(np.sqrt(np.nanmean(self.samples**2, axis=0)))
+
+
+def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:
+    """Run an observer along the free pieces; along the log itself that is its estimate."""
+    free = tuple(
+        estimate if piece.run is found.motion.log else observer.estimate(piece.run.terms)
+        for piece in found.pieces
     )
-
-
-def free_estimates(
-    found: Baseline, observer: Observer, estimate: ExternalTorque
-) -> tuple[ExternalTorque, ...]:
-    """What an observer reads in the free runs, or its estimate of the log where that is free."""
-    if found.run_terms:
-        return tuple(observer.estimate(terms) for terms in found.run_terms)
-    return (estimate,)
-
-
-def free_rms(found: Baseline, estimates: Sequence[ExternalTorque]) -> Array:
-    """Root mean square of an estimator's own output on the free part, bias included. (n,) [N·m]"""
-    parts = free_samples(found)
-    rows = [e.tau[part.inside] for e, part in zip(estimates, parts, strict=True)]
-    return np.asarray(np.sqrt(np.nanmean(np.concatenate(rows) ** 2, axis=0)))
-
-
-def stuck_joints(found: Baseline) -> tuple[str, ...]:
-    """The names of the joints that rest, as J5."""
-    return tuple(f"J{j + 1}" for j in np.flatnonzero(found.stuck))
+    inside = [e.tau[piece.inside] for e, piece in zip(free, found.pieces, strict=True)]
+    samples = np.concatenate(inside) if inside else np.zeros((0, estimate.joints))
+    return FreeReading(observer, estimate, free, samples)

@@ -13,13 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.observers.observer import Observer
-from vftcli.refinement.baseline import Baseline, free_estimates, free_rms, free_samples
-from vftcli.repetition.pairing import mean_of
+from vftcli.refinement.baseline import Baseline, FreeReading, bias_at_phase
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, Where, caution, fact
 
 FOLDS = 5
 """Contiguous parts of the free samples, each predicted from the others."""
@@ -30,7 +29,7 @@ PENALTIES = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
 WORTH = 0.9
 """The model is used on a joint if it leaves at most this share of the free rms, unseen."""
 
-SLOW = 0.05
+SIGN_SPEED = 0.05
 """Velocity over which the sign of friction turns. [rad/s]"""
 
 RANGE = 1.1
@@ -42,29 +41,19 @@ class Removal(NamedTuple):
 
     Attributes:
         estimates: One an observer.
-        notes: What was subtracted and what was not.
+        remarks: What was subtracted and what was not.
     """
 
     estimates: tuple[ExternalTorque, ...]
-    notes: tuple[str, ...]
+    remarks: tuple[Remark, ...] = ()
 
 
-def remove_nothing(
-    _found: Baseline,
-    _recording: Recording,
-    _observers: Sequence[Observer],
-    estimates: Sequence[ExternalTorque],
-) -> Removal:
+def remove_nothing(_found: Baseline, readings: Sequence[FreeReading]) -> Removal:
     """Leave the estimates as they are."""
-    return Removal(tuple(estimates), ())
+    return Removal(tuple(reading.estimate for reading in readings))
 
 
-def remove_free_cycle(
-    found: Baseline,
-    _recording: Recording,
-    observers: Sequence[Observer],
-    estimates: Sequence[ExternalTorque],
-) -> Removal:
+def remove_free_cycle(found: Baseline, readings: Sequence[FreeReading]) -> Removal:
     """Subtract the free cycle's own estimate at the same phase, or the free run's, aligned.
 
     With several free cycles or runs it is their mean, for a free cycle that of the others; a single
@@ -73,92 +62,66 @@ def remove_free_cycle(
     Raises:
         ParameterError: If there is no free motion to subtract.
     """
-    if found.part is None or not found.part.pairings:
-        why = found.notes[-1] if found.part is None and found.notes else ""
+    part = found.part
+    if part is None or not part.pairings:
+        here = f". Here: {found.missing}" if found.missing is not None else ""
         raise ParameterError(
             "--remove-bias free-cycle needs a motion that repeats with a free cycle, or a free run "
             "of the same motion (--free LOG); --remove-bias model needs neither, only a free part"
-            f"{f'. Here: {why}' if why else ''}"
+            f"{here}"
         )
-    removed = []
-    for observer, estimate in zip(observers, estimates, strict=True):
-        bias = repeated_bias(found, free_estimates(found, observer, estimate), estimate)
-        removed.append(less(estimate, np.nan_to_num(bias), found, bias))
-    outside = ~np.isfinite(bias[:, 0]) if removed else np.zeros(0, dtype=bool)
-    count = len(found.part.pairings)
-    what = f"the mean of {count} free ones" if count > 1 else "the free one"
-    notes = [f"bias removed: at each sample the estimate of {what} at the same phase"]
-    if count == 1 and found.part.inside.any():
-        notes[0] += "; the free cycle itself is zero by construction"
-    if outside.any():
-        share = 100.0 * float(np.mean(outside))
-        notes.append(f"{share:.1f} % of the samples lie outside that motion and keep their bias")
-    return Removal(tuple(removed), tuple(notes))
+    removed = tuple(minus_free_motion(found, reading) for reading in readings)
+    count = len(part.pairings)
+    remarks = [fact("bias-at-phase" if count == 1 else "bias-at-phase-mean", motions=count)]
+    if count == 1 and part.own.any():
+        remarks.append(fact("free-cycle-is-zero"))
+    known = np.any([pairing.known for pairing in part.pairings], axis=0) | part.own
+    if not known.all():
+        remarks.append(caution("bias-kept-outside", share=float(np.mean(~known))))
+    return Removal(removed, tuple(remarks))
 
 
-def repeated_bias(
-    found: Baseline, free: Sequence[ExternalTorque], estimate: ExternalTorque
-) -> Array:
-    """The free motion's estimate at each sample's phase, NaN where there is none. (T, n)"""
-    part = found.part
+def minus_free_motion(found: Baseline, reading: FreeReading) -> ExternalTorque:
+    """An estimate less what its observer reads in the free motion at the same phase."""
+    part, estimate = found.part, reading.estimate
     if part is None:
-        return np.full(estimate.tau.shape, np.nan)
-    clocks = [pairing.free.t for pairing in part.pairings]
-    signals = [signal_of(clock, free).tau for clock in clocks]
-    bias = mean_of(part.pairings, signals)
-    own = part.inside & ~np.isfinite(bias[:, 0])
+        return estimate
+    bias = bias_at_phase(part, [e.tau for e in reading.free])
+    # A free cycle that no other is laid under reads nothing but bias.
+    own = part.own & ~np.isfinite(bias[:, 0])
     bias[own] = estimate.tau[own]
-    return bias
+    error_sd = estimate.error_sd
+    if error_sd is not None and part.own.any() and len(part.pairings) > 1:
+        left = np.sqrt(np.nanmean((estimate.tau - bias)[part.own] ** 2, axis=0))
+        # What two free motions leave of one another takes the place of what one reads.
+        variance = np.maximum(error_sd**2 - reading.rms**2, 0.0) + left**2
+        error_sd = handed_over(np.sqrt(variance))
+    return replace(estimate, tau=handed_over(estimate.tau - np.nan_to_num(bias)), error_sd=error_sd)
 
 
-def signal_of(clock: Array, estimates: Sequence[ExternalTorque]) -> ExternalTorque:
-    """The estimate on a free run's clock."""
-    return next(e for e in estimates if len(e.t) == len(clock) and np.array_equal(e.t, clock))
-
-
-def less(estimate: ExternalTorque, bias: Array, found: Baseline, known: Array) -> ExternalTorque:
-    """The estimate less its bias, its band rid of it where two free motions tell what is left."""
-    band = estimate.error_sd
-    part = found.part
-    if band is not None and part is not None and len(part.pairings) > 1 and part.inside.any():
-        left = np.sqrt(np.nanmean((estimate.tau - known)[part.inside] ** 2, axis=0))
-        free = free_rms(found, (estimate,))
-        band = handed_over(np.sqrt(np.maximum(band**2 - free**2, 0.0) + left**2))
-    return replace(estimate, tau=handed_over(estimate.tau - bias), error_sd=band)
-
-
-def remove_modelled(
-    found: Baseline,
-    recording: Recording,
-    observers: Sequence[Observer],
-    estimates: Sequence[ExternalTorque],
-) -> Removal:
+def remove_modelled(found: Baseline, readings: Sequence[FreeReading]) -> Removal:
     """Subtract a model of the bias over position and velocity, fitted to the free part.
 
     Raises:
         ParameterError: If there is no free part.
     """
     if found.part is None:
-        raise ParameterError("--remove-bias model needs a free part: --free-part A:B or --free LOG")
-    logs = found.part.runs or (recording,)
-    inside = [part.inside for part in free_samples(found)]
-    X = np.concatenate([features(log)[m] for log, m in zip(logs, inside, strict=True)])
+        raise ParameterError("--remove-bias model needs a free part: --free A:B or --free LOG")
+    X = np.concatenate([features(piece.run.recording)[piece.inside] for piece in found.pieces])
     scale = Scale(X.mean(axis=0), np.maximum(X.std(axis=0), 1e-6), np.abs(X).max(axis=0))
-    here = scale.applied(features(recording))
-    removed, notes = [], []
-    for observer, estimate in zip(observers, estimates, strict=True):
-        free = free_estimates(found, observer, estimate)
-        y = np.concatenate([e.tau[m] for e, m in zip(free, inside, strict=True)])
-        weights, share = fitted(scale.applied(X), y)
+    here = scale.applied(features(found.motion.log.recording))
+    removed, remarks = [], []
+    for reading in readings:
+        weights, share = fitted(scale.applied(X), reading.samples)
         used = share <= WORTH
         bias = np.where(used, here @ weights[1:] + weights[0], 0.0)
-        removed.append(without_model(estimate, bias, np.where(used, share, 1.0), y))
-        listed = ", ".join(f"J{j + 1} {100 * s:.0f} %" for j, s in enumerate(share) if used[j])
-        notes.append(
-            f"{estimate.name}: bias model over position and velocity, cross-validated on the free "
-            f"part; it leaves of the free rms: {listed or 'no joint gains by it, none is changed'}"
+        removed.append(minus_model(reading, bias, np.where(used, share, 1.0)))
+        where = Where(
+            about=reading.estimate.name, joints=tuple(int(j) + 1 for j in np.flatnonzero(used))
         )
-    return Removal(tuple(removed), tuple(notes))
+        code = "bias-modelled" if used.any() else "bias-not-modelled"
+        remarks.append(fact(code, where, share=share[used].tolist()))
+    return Removal(tuple(removed), tuple(remarks))
 
 
 class Scale(NamedTuple):
@@ -185,7 +148,7 @@ def features(recording: Recording) -> Array:
     q, dq = recording.q, recording.require("dq")
     sums = np.cumsum(q[:, 1:], axis=1)
     angles = np.hstack([q, sums[:, 1:4]])
-    return np.hstack([np.tanh(dq / SLOW), dq, np.sin(angles), np.cos(angles)])
+    return np.hstack([np.tanh(dq / SIGN_SPEED), dq, np.sin(angles), np.cos(angles)])
 
 
 def fitted(X: Array, y: Array) -> tuple[Array, Array]:
@@ -220,21 +183,22 @@ def ridge(X: Array, y: Array, penalty: float) -> Array:
     return np.concatenate([np.asarray(level - mean @ weights)[None], weights])
 
 
-def without_model(
-    estimate: ExternalTorque, bias: Array, share: Array, free: Array
-) -> ExternalTorque:
-    """The estimate less the modelled bias, its band rid of what the model predicts unseen."""
-    band = estimate.error_sd
-    if band is not None:
-        square = np.mean(free**2, axis=0)
-        band = handed_over(np.sqrt(np.maximum(band**2 - square * (1.0 - share**2), 0.0)))
-    return replace(estimate, tau=handed_over(estimate.tau - bias), error_sd=band)
+def minus_model(reading: FreeReading, bias: Array, share: Array) -> ExternalTorque:
+    """The estimate less the modelled bias, its band rid of what the model predicts unseen.
+
+    Args:
+        reading: The estimate, and what its observer reads in the free part.
+        bias: The modelled bias. (T, n) [N·m]
+        share: Share of the free rms that the model leaves, 1 where it is not used. (n,)
+    """
+    estimate, error_sd = reading.estimate, reading.estimate.error_sd
+    if error_sd is not None:
+        square = np.mean(reading.samples**2, axis=0)
+        error_sd = handed_over(np.sqrt(np.maximum(error_sd**2 - square * (1.0 - share**2), 0.0)))
+    return replace(estimate, tau=handed_over(estimate.tau - bias), error_sd=error_sd)
 
 
-REMOVALS: dict[
-    str,
-    Callable[[Baseline, Recording, Sequence[Observer], Sequence[ExternalTorque]], Removal],
-] = {
+REMOVALS: dict[str, Callable[[Baseline, Sequence[FreeReading]], Removal]] = {
     "none": remove_nothing,
     "free-cycle": remove_free_cycle,
     "model": remove_modelled,

@@ -4,23 +4,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.observers.observer import Observer
-from vftcli.refinement.baseline import (
-    Baseline,
-    free_estimates,
-    free_rms,
-    free_samples,
-    stuck_joints,
-)
-from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array
-from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.recording import Recording
+from vftcli.refinement.baseline import Baseline, FreeReading
+from vftcli.repetition.drive_run import dry_friction
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.remarks import Remark, Where, fact
 
-CAUSES = ("noise", "friction", "model", "bandwidth", "stiction at rest")
+STICTION = "stiction at rest"
+"""The cause that is not part of an error's sum: it says what a standing joint may hide."""
+
+CAUSES = ("noise", "friction", "model", "bandwidth", STICTION)
 """What an error is divided into."""
 
-SLOW = 0.02
+SIGN_SPEED = 0.02
 """Velocity over which the sign of friction turns. [rad/s]"""
 
 
@@ -38,84 +33,69 @@ class Budget(NamedTuple):
     @property
     def total(self) -> Array:
         """Root sum of squares of all causes but stiction at rest. (n,) [N·m]"""
-        squares = [v**2 for cause, v in self.parts.items() if cause != "stiction at rest"]
+        squares = [v**2 for cause, v in self.parts.items() if cause != STICTION]
         return np.asarray(np.sqrt(np.sum(squares, axis=0)))
 
 
-def budget(
-    found: Baseline,
-    recording: Recording,
-    robot: Robot,
-    observer: Observer,
-    estimate: ExternalTorque,
-) -> Budget:
+def budget(found: Baseline, reading: FreeReading) -> Budget:
     """Divide an observer's error into its causes, each estimated from the log.
 
     Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. What else the observer
     reads on the free part is model error: friction as far as sign and size of a joint's own
     velocity explain it, the rest of the model otherwise. Stiction at rest is the dry friction a
-    resting joint may hide, F_c/√3, times the share of the time that it rests.
+    standing joint may hide, F_c/√3, times the share of the time that it stands.
     """
-    spectra = found.spectra
+    name, spectra = reading.observer.name, found.spectra
     n = found.terms.joints
     if spectra is None:
-        return Budget(observer.name, {cause: np.zeros(n) for cause in CAUSES})
-    response = observer.frequency_response(spectra.frequency, spectra.step, n)
-    free = free_estimates(found, observer, estimate)
-    read = free_rms(found, free) ** 2
+        return Budget(name, {cause: np.zeros(n) for cause in CAUSES})
+    response = reading.observer.frequency_response(spectra.frequency, spectra.step, n)
+    read = reading.rms**2
     share: Array = np.abs(response) ** 2
     noise = np.minimum(np.sum(spectra.floor * share, axis=0) * spectra.width, read)
     modelled = read - noise
-    by_friction = modelled * friction_share(found, recording, free)
+    velocity = [piece.run.recording.require("dq")[piece.inside] for piece in found.pieces]
+    by_friction = modelled * friction_share(np.concatenate(velocity), reading.samples)
+    # A torque anywhere within ±F_c is F_c/√3 rms.
+    hidden = dry_friction(found.motion.log.robot) ** 2 / 3.0 * found.standing.mean(axis=0)
     squares = {
         "noise": noise,
         "friction": by_friction,
         "model": modelled - by_friction,
         "bandwidth": spectra.missed(response),
-        "stiction at rest": dry_friction(robot, n) ** 2 / 3.0 * found.rest.mean(axis=0),
+        STICTION: hidden,
     }
-    return Budget(observer.name, {cause: np.sqrt(value) for cause, value in squares.items()})
+    return Budget(name, {cause: np.sqrt(value) for cause, value in squares.items()})
 
 
-def friction_share(
-    found: Baseline, recording: Recording, free: tuple[ExternalTorque, ...]
-) -> Array:
-    """Share of the free estimate's power that sign and size of a joint's velocity explain. (n,)"""
-    logs = found.part.runs if found.part is not None and found.part.runs else (recording,)
-    inside = [part.inside for part in free_samples(found)]
-    dq = np.concatenate([g.require("dq")[m] for g, m in zip(logs, inside, strict=True)])
-    tau = np.concatenate([e.tau[m] for e, m in zip(free, inside, strict=True)])
+def friction_share(dq: Array, tau: Array) -> Array:
+    """Share of a torque's power that sign and size of a joint's own velocity explain. (n,)
+
+    Args:
+        dq: Joint velocities. (S, n) [rad/s]
+        tau: What the observer reads there. (S, n) [N·m]
+    """
     shares = []
     for velocity, y in zip(dq.T, tau.T, strict=True):
-        X = np.column_stack([np.tanh(velocity / SLOW), velocity])
+        X = np.column_stack([np.tanh(velocity / SIGN_SPEED), velocity])
         weights, *_ = np.linalg.lstsq(X, y, rcond=None)
         power = float(np.sum(y**2))
         shares.append(1.0 - float(np.sum((y - X @ weights) ** 2)) / power if power > 0 else 0.0)
     return np.clip(shares, 0.0, 1.0)
 
 
-def dry_friction(robot: Robot, joints: int) -> Array:
-    """Coulomb friction of each joint, 0 where the robot's model has none. (n,) [N·m]"""
-    from vftcli.robots.friction import friction_torque
+def limits_remark(found: Budget, stuck: Mask) -> Remark:
+    """What limits a log: the largest cause of each joint, and how much of the error it makes.
 
-    if not robot.friction:
-        return np.zeros(joints)
-    creep = np.full((1, joints), 0.05)
-    sides = [friction_torque(robot.friction, v, np.zeros((1, joints)))[0] for v in (creep, -creep)]
-    return np.asarray(0.5 * np.abs(sides[0] - sides[1]))
-
-
-def sentence(found: Budget, survey: Baseline) -> str:
-    """What limits this log, in plain words: the largest cause of each joint."""
-    causes = [cause for cause in CAUSES if cause != "stiction at rest"]
-    stuck = stuck_joints(survey)
-    words = []
-    for j, total in enumerate(found.total):
-        name = f"J{j + 1}"
-        if name in stuck:
-            size = found.parts["stiction at rest"][j]
-            words.append(f"{name} stiction at rest (up to about {size:.2g} N·m rms)")
-            continue
-        largest = max(causes, key=lambda cause: float(found.parts[cause][j]))
-        words.append(f"{name} {largest} ({found.parts[largest][j]:.2g} of {total:.2g} N·m)")
-    return f"what limits {found.name} on this log: {', '.join(words)}"
+    Args:
+        found: The budget.
+        stuck: Joints that stand in most samples, where stiction decides. (n,)
+    """
+    causes = [cause for cause in CAUSES if cause != STICTION]
+    largest = [
+        max(causes, key=lambda cause: float(found.parts[cause][j])) for j in range(len(stuck))
+    ]
+    named = [STICTION if stands else cause for cause, stands in zip(largest, stuck, strict=True)]
+    size = [float(found.parts[cause][j]) for j, cause in enumerate(named)]
+    where = Where(about=found.name)
+    return fact("limits", where, causes=named, size_Nm=size, total_Nm=found.total.tolist())

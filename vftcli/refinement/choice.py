@@ -34,6 +34,16 @@ class RefinementChoice:
         return cls(bands=bands, remove_bias=remove_bias or NOTHING)
 
     @property
+    def removes_bias(self) -> bool:
+        """Whether a bias is taken off."""
+        return self.remove_bias != NOTHING
+
+    @property
+    def at_phase(self) -> bool:
+        """Whether the bias taken off is what the free motion reads at the same phase."""
+        return self.remove_bias == "free-cycle"
+
+    @property
     def looks_back(self) -> bool:
         """Whether it needs the log's free part."""
-        return self.bands or self.remove_bias != NOTHING
+        return self.bands or self.removes_bias

@@ -48,15 +48,6 @@ class Consistency(NamedTuple):
     coloured: Array
     loudest: Array
 
-    def sentence(self) -> str:
-        """How far the covariance can be believed, in words."""
-        nis = ", ".join(f"{x:.2g}" for x in self.nis)
-        white = ", ".join(f"{x:.2f}" for x in self.correlation)
-        return (
-            f"{self.name}: innovations: mean NIS {nis} (1 if the model were true), correlation one "
-            f"sample apart {white} (0): √P₂₂ is the filter's own account, not an error"
-        )
-
 
 def consistency(
     found: Baseline, observer: Observer, estimate: ExternalTorque

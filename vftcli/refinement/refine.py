@@ -1,55 +1,52 @@
-"""From a survey of the log to finished estimates: bias removed, bands drawn, limits named."""
+"""From a log's baseline to finished estimates: bands drawn, bias removed, limits named."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from vftcli.observers.auto_tuning import AutoTuned, Curve
 from vftcli.observers.observer import Observer
-from vftcli.refinement.bands import band_notes, with_band
-from vftcli.refinement.baseline import Baseline
+from vftcli.refinement.bands import band_remarks, with_band
+from vftcli.refinement.baseline import Baseline, free_reading
 from vftcli.refinement.bias import REMOVALS, check_removal
-from vftcli.refinement.budget import Budget, budget, sentence
+from vftcli.refinement.budget import Budget, budget, limits_remark
 from vftcli.refinement.consistency import Consistency, consistency
-from vftcli.robots.robot import Robot
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, Where, fact
 
 
 @dataclass(frozen=True, kw_only=True)
 class Refinement:
-    """What the complete log told of its estimates.
+    """What the complete log makes of its estimates.
 
     Attributes:
-        survey: Its free part and spectra.
+        estimates: The estimates with their bands, and without their bias where that is asked for.
+        baseline: The log's free part and spectra.
         curves: Observer that was tuned → the curve that was minimised.
         budgets: Where each observer's error comes from, one an observer; none without spectra.
         consistency: How each Kalman filter's innovations look, one a filter.
         removed: What ``--remove-bias`` asked for.
-        notes: One sentence each.
+        remarks: What the reader of the estimates should know.
     """
 
-    survey: Baseline
+    estimates: tuple[ExternalTorque, ...]
+    baseline: Baseline
     curves: Mapping[str, Curve]
     budgets: tuple[Budget, ...]
     consistency: tuple[Consistency, ...]
     removed: str
-    notes: tuple[str, ...]
+    remarks: tuple[Remark, ...]
 
 
-def work_up(
+def refine(
     found: Baseline,
-    recording: Recording,
-    robot: Robot,
     observers: Sequence[Observer],
     estimates: Sequence[ExternalTorque],
     removal: str = "none",
-) -> tuple[tuple[ExternalTorque, ...], Refinement]:
+) -> Refinement:
     """Give estimates their bands, take their bias off, and say what limits them.
 
     Args:
-        found: The survey of the log.
-        recording: The log.
-        robot: The arm, for what stiction may hide.
+        found: The log's baseline.
         observers: The observers.
         estimates: Their estimates, in the same order.
         removal: A key of `REMOVALS`.
@@ -59,27 +56,38 @@ def work_up(
     """
     remove = REMOVALS[check_removal(removal)]
     pairs = list(zip(observers, estimates, strict=True))
-    banded = [with_band(found, observer, estimate) for observer, estimate in pairs]
-    finished, notes = remove(found, recording, observers, banded)
+    readings = [free_reading(found, observer, estimate) for observer, estimate in pairs]
+    banded = [reading._replace(estimate=with_band(found, reading)) for reading in readings]
+    finished = remove(found, banded)
     budgets: tuple[Budget, ...] = ()
     if found.spectra is not None:
-        budgets = tuple(budget(found, recording, robot, o, e) for o, e in pairs)
+        budgets = tuple(budget(found, reading) for reading in readings)
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
-    limits = (sentence(budgets[-1], found),) if budgets else ()
-    return finished, Refinement(
-        survey=found,
+    return Refinement(
+        estimates=finished.estimates,
+        baseline=found,
         curves=curves,
         budgets=budgets,
         consistency=tuple(c for o, e in pairs if (c := consistency(found, o, e)) is not None),
         removed=removal,
-        notes=(*found.notes, *tuning_notes(curves), *band_notes(found), *notes, *limits),
+        remarks=(
+            *found.remarks,
+            *tuning_remarks(curves),
+            *band_remarks(found),
+            *finished.remarks,
+            *(limits_remark(one, found.stuck) for one in budgets[-1:]),
+        ),
     )
 
 
-def tuning_notes(curves: Mapping[str, Curve]) -> tuple[str, ...]:
+def tuning_remarks(curves: Mapping[str, Curve]) -> tuple[Remark, ...]:
     """What was chosen for each tuned observer."""
     return tuple(
-        f"{name}: ω_n {', '.join(f'{w:.3g}' for w in curve.best)} rad/s on J1…, ζ 0.707; expected "
-        f"rmse {', '.join(f'{e:.2g}' for e in curve.least)} N·m"
+        fact(
+            "tuned",
+            Where(about=name),
+            omega_n_rad_s=curve.best.tolist(),
+            expected_rmse_Nm=curve.least.tolist(),
+        )
         for name, curve in curves.items()
     )

@@ -1,23 +1,25 @@
-"""What the two-cycle difference is made from: a log's torque, and what the model says of it."""
+"""What a difference of two motions is made from: the drive torques, and the model's of them."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.repetition.standstill import at_rest, stops
+from vftcli.repetition.standstill import duration, standing
 from vftcli.robots.drive import drive_torque
 from vftcli.robots.friction import SMOOTHING, friction_torque
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import dynamics_terms
-from vftcli.signals.arrays import Array
+from vftcli.robots.terms import DynamicsTerms, dynamics_terms
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import median_step
 
 
-class DriveRun(NamedTuple):
-    """One log's signals on its own clock.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DriveRun:
+    """One recording's motion and torque, on its own clock.
 
     Attributes:
-        name: The log's name.
+        name: The recording's name.
         t: Clock. (T,) [s]
         q: Joint positions. (T, n) [rad]
         dq: Joint velocities. (T, n) [rad/s]
@@ -26,8 +28,8 @@ class DriveRun(NamedTuple):
             with ṗ by central differences. (T, n) [N·m]
         momentum: p = M q̇. (T, n) [kg·m²/s]
         coulomb: Dry friction of each joint by the robot's model, 0 without one. (n,) [N·m]
-        stop: Length of the stop a sample belongs to, 0 where the joint moves. (T, n) [s]
-        rest: 1 where a joint rests. (T, n)
+        standstill_s: Length of the stop a sample belongs to, 0 where the joint moves. (T, n) [s]
+        standing: Where a joint stands still. (T, n)
     """
 
     name: str
@@ -38,20 +40,33 @@ class DriveRun(NamedTuple):
     model: Array
     momentum: Array
     coulomb: Array
-    stop: Array
-    rest: Array
+    standstill_s: Array
+    standing: Mask
+
+    @property
+    def step(self) -> float:
+        """Median sample time. [s]"""
+        return median_step(self.t)
 
 
-def drive_run_of(recording: Recording, robot: Robot) -> DriveRun:
-    """Evaluate a log's drive torque and the model's.
+def drive_run_of(
+    recording: Recording, robot: Robot, terms: DynamicsTerms | None = None
+) -> DriveRun:
+    """Evaluate a recording's drive torque and the model's.
+
+    Args:
+        recording: The recording.
+        robot: For drive constants and the model's torque.
+        terms: Its p and μ by the corrected formulas; evaluated here if not given.
 
     Raises:
         MissingSignalError: If velocities, or both currents and torques, are missing.
         RobotError: If the number of joints differs.
     """
-    torque, terms = drive_torque(recording, robot), dynamics_terms(recording, robot)
+    torque = drive_torque(recording, robot)
+    terms = dynamics_terms(recording, robot) if terms is None else terms
     dq = recording.require("dq")
-    stop = stops(recording.t, dq)
+    standstill_s = duration(recording.t, dq)
     return DriveRun(
         name=recording.name,
         t=recording.t,
@@ -61,8 +76,8 @@ def drive_run_of(recording: Recording, robot: Robot) -> DriveRun:
         model=np.gradient(terms.p, recording.t, axis=0) - terms.mu + torque,
         momentum=terms.p,
         coulomb=dry_friction(robot),
-        stop=stop,
-        rest=at_rest(recording.t, stop),
+        standstill_s=standstill_s,
+        standing=standing(recording.t, standstill_s),
     )
 
 

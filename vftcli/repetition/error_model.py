@@ -9,7 +9,6 @@ from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.pairing import Pairing, mean_of
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.filters import band_pass, low_pass, passed
-from vftcli.signals.series import median_step
 
 STUCK = 0.3
 """A stop of this length leaves the whole of the dry friction open, a shorter one its share. [s]"""
@@ -32,16 +31,16 @@ class ErrorModel(NamedTuple):
 
     Attributes:
         sd: Standard deviation of each sample, NaN where there is no reference. (T, n) [N·m]
-        rest: 1 where the joint rests in the log or in the free run. (T, n)
+        standing: Where the joint stands in the log or in the free run. (T, n)
     """
 
     sd: Array
-    rest: Array
+    standing: Mask
 
     @property
-    def at_rest(self) -> Array:
-        """Share of the paired samples in which the joint rests. (n,)"""
-        return np.asarray(np.mean(self.rest[self.known], axis=0))
+    def standing_share(self) -> Array:
+        """Share of the paired samples in which the joint stands. (n,)"""
+        return np.asarray(np.mean(self.standing[self.known], axis=0))
 
     @property
     def known(self) -> Mask:
@@ -51,25 +50,24 @@ class ErrorModel(NamedTuple):
     @property
     def trusted_joints(self) -> Mask:
         """Joints that move enough for friction to cancel; all if none does. (n,)"""
-        trusted = np.asarray(self.at_rest <= 1.0 - TRUSTED_SHARE)
+        trusted = np.asarray(self.standing_share <= 1.0 - TRUSTED_SHARE)
         return trusted if np.any(trusted) else np.ones_like(trusted)
 
     @property
     def floor(self) -> Array:
-        """Root mean square of `sd` while the joint moves; over all samples if it mostly rests."""
+        """Root mean square of `sd` while the joint moves; over all samples if it mostly stands."""
         known = self.known
-        moving = self.rest[known] == 0.0
-        share = np.where(self.at_rest <= 1.0 - TRUSTED_SHARE, moving, True)
+        share = np.where(self.standing_share <= 1.0 - TRUSTED_SHARE, ~self.standing[known], True)
         square = np.sum(np.where(share, self.sd[known] ** 2, 0.0), axis=0)
         return np.asarray(np.sqrt(square / np.maximum(np.sum(share, axis=0), 1)))
 
     @property
-    def floor_at_rest(self) -> Array:
-        """Root mean square of `sd` while the joint rests, NaN where it never does. (n,) [N·m]"""
+    def floor_standing(self) -> Array:
+        """Root mean square of `sd` while the joint stands, NaN where it never does. (n,) [N·m]"""
         known = self.known
-        resting = self.rest[known] > 0.0
-        square = np.sum(np.where(resting, self.sd[known] ** 2, 0.0), axis=0)
-        count = np.sum(resting, axis=0)
+        standing = self.standing[known]
+        square = np.sum(np.where(standing, self.sd[known] ** 2, 0.0), axis=0)
+        count = np.sum(standing, axis=0)
         return np.where(count > 0, np.sqrt(square / np.maximum(count, 1)), np.nan)
 
 
@@ -103,31 +101,35 @@ def error_model(
     """
     known = np.isfinite(raw).all(axis=1)
     t = motion.t[known]
-    rest = resting(motion, pairings)
+    standing = stands_in_any(motion, pairings)
     momentum = motion.momentum - mean_of(pairings, [p.free.momentum for p in pairings])
-    moving = rest[known] == 0.0
-    step = median_step(motion.t)
-    said = change[known]
-    signal = raw[known] + said if corrected else raw[known]
+    moving, step = ~standing[known], motion.step
+    modelled = change[known]
+    signal = raw[known] + modelled if corrected else raw[known]
     noise = noise_of(t, signal, moving, step, cutoff)
-    motion_error = local_rms(low_pass(t, said, band(step, cutoff)[0]), step)
+    motion_error = local_rms(low_pass(t, modelled, band(step, cutoff)[0]), step)
     if corrected:
         motion_error = motion_error * np.maximum(LEAST_SHARE, misfit(pairings))
     else:
+        # The model's torque differentiates momenta: their noise is no difference of the motions.
         own = slope_noise(t, momentum[known], moving, step, band(step, cutoff)[0])
-        motion_error = np.sqrt(np.maximum(motion_error**2 - own**2, 0.0))
+        motion_error = less_noise(motion_error, own)
     stuck = np.sqrt(2.0 / 3.0) * motion.coulomb * stopped(motion, pairings)[known]
     square = noise**2 + motion_error**2 + stuck**2
     sd = np.full(raw.shape, np.nan)
     sd[known] = np.sqrt(square)
-    return ErrorModel(sd, rest)
+    return ErrorModel(sd, standing)
 
 
-def resting(motion: DriveRun, pairings: Sequence[Pairing]) -> Array:
-    """1 where a joint rests in the log or in any free run. (T, n)"""
-    there = [np.nan_to_num(p.there(p.free.rest)) for p in pairings]
-    rest: Array = (np.max(np.stack([motion.rest, *there]), axis=0) > 0.0).astype(np.float64)
-    return rest
+def less_noise(size: Array, noise: Array) -> Array:
+    """Standard deviations without that of an independent noise in them, 0 where it is larger."""
+    return np.sqrt(np.maximum(size**2 - noise**2, 0.0))
+
+
+def stands_in_any(motion: DriveRun, pairings: Sequence[Pairing]) -> Mask:
+    """Where a joint stands in the log or in any free run. (T, n)"""
+    there = [np.nan_to_num(p.there(p.free.standing.astype(np.float64))) > 0.0 for p in pairings]
+    return np.asarray(np.any(np.stack([motion.standing, *there]), axis=0))
 
 
 def band(step: float, cutoff: float | None) -> tuple[float, float]:
@@ -184,21 +186,21 @@ def local_rms(x: Array, step: float) -> Array:
 
 def stopped(motion: DriveRun, pairings: Sequence[Pairing]) -> Array:
     """Share of the dry friction a stop leaves open, in the log or in a free run, 0 to 1. (T, n)"""
-    there = [np.nan_to_num(p.there(p.free.stop)) for p in pairings]
-    longest = np.max(np.stack([motion.stop, *there]), axis=0)
-    alike = np.min(np.stack([motion.stop, *there]), axis=0) / np.maximum(longest, 1e-9)
+    there = [np.nan_to_num(p.there(p.free.standstill_s)) for p in pairings]
+    stops = np.stack([motion.standstill_s, *there])
+    longest = np.max(stops, axis=0)
+    alike = np.min(stops, axis=0) / np.maximum(longest, 1e-9)
     share = np.minimum(longest / STUCK, 1.0) * (1.0 - REPEATED * alike)
-    return np.asarray(np.maximum(share, resting(motion, pairings)))
+    return np.asarray(np.maximum(share, stands_in_any(motion, pairings)))
 
 
 def misfit(pairings: Sequence[Pairing]) -> Array:
     """How much of its own torque's variation the model misses in the free run, at most 1. (n,)"""
-    missed = said = np.zeros(pairings[0].free.torque.shape[1])
+    missed = total = np.zeros(pairings[0].free.torque.shape[1])
     for p in pairings:
-        used = np.unique(np.searchsorted(p.free.t, p.times[p.known]).clip(0, len(p.free.t) - 1))
-        step = median_step(p.free.t)
-        gap = low_pass(p.free.t, p.free.torque - p.free.model, band(step, None)[0])[used]
-        model = low_pass(p.free.t, p.free.model, band(step, None)[0])[used]
+        free, cutoff = p.free, band(p.free.step, None)[0]
+        used = np.unique(np.searchsorted(free.t, p.times[p.known]).clip(0, len(free.t) - 1))
+        gap = low_pass(free.t, free.torque - free.model, cutoff)[used]
         missed = missed + np.var(gap, axis=0)
-        said = said + np.var(model, axis=0)
-    return np.asarray(np.sqrt(np.minimum(missed / np.maximum(said, 1e-12), 1.0)))
+        total = total + np.var(low_pass(free.t, free.model, cutoff)[used], axis=0)
+    return np.asarray(np.sqrt(np.minimum(missed / np.maximum(total, 1e-12), 1.0)))

@@ -1,6 +1,5 @@
 """Which cycles of a repeated motion were free of contact: given, or found by what they show."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from vftcli.repetition.pairing import pair_with_cycle
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
-from vftcli.signals.series import median_step
+from vftcli.signals.remarks import Remark, fact
 
 ALIKE = 1.5
 """A cycle is free too if its difference from the freest is within this many expected errors."""
@@ -24,11 +23,21 @@ class FreeCycles(NamedTuple):
 
     Attributes:
         numbers: Counted from 0.
-        note: How they were found, with the residuals they were chosen by.
+        residuals: Of every whole cycle, relative to the smallest, by which these were chosen; None
+            where they were given. (cycles,)
     """
 
     numbers: tuple[int, ...]
-    note: str
+    residuals: Array | None
+
+    def remark(self, whole: int) -> Remark:
+        """Which of so many whole cycles they are, and how they were found."""
+        code = "free-cycle" if len(self.numbers) == 1 else "free-cycles"
+        named = [number + 1 for number in self.numbers]
+        if self.residuals is None:
+            return fact(f"{code}-given", cycles=named, whole=whole)
+        residuals = [float(x) for x in self.residuals]
+        return fact(f"{code}-found", cycles=named, whole=whole, residuals=residuals)
 
 
 def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
@@ -52,18 +61,13 @@ def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
     ]
     if len(also) == cycles.whole:
         also = also[:-1] if len(also) > 1 else also
-    listed = ", ".join(f"{value:.2f}" for value in residual)
-    note = (
-        f"free: {named(also)} of {cycles.whole}, found by the smallest residual "
-        f"(relative: {listed})"
-    )
-    return FreeCycles(tuple(also), note)
+    return FreeCycles(tuple(also), residual)
 
 
 def residuals(motion: DriveRun, cycles: Cycles) -> Array:
     """Mean over joints of each cycle's residual relative to the smallest. (cycles,)"""
-    step = median_step(motion.t)
-    cutoff = min(5.0, band(step, None)[0])
+    # Below 5 Hz a push stands out from the drives' ripple.
+    cutoff = min(5.0, band(motion.step, None)[0])
     gap = low_pass(motion.t, motion.torque - motion.model, cutoff)
     number = cycles.number(motion.t)
     square = np.array([np.mean(gap[number == c] ** 2, axis=0) for c in range(cycles.whole)])
@@ -77,13 +81,6 @@ def differs_by_noise(motion: DriveRun, cycles: Cycles, freest: int, other: int) 
     pairing = pair_with_cycle(motion, cycles, freest, cycles.period)
     only = cycles.number(motion.t) == other
     pairing = pairing._replace(times=np.where(only, pairing.times, np.nan))
-    step = median_step(motion.t)
-    found = difference(motion, [pairing], "model", band(step, None)[0])
+    found = difference(motion, [pairing], "model", band(motion.step, None)[0])
     shown = np.sqrt(np.nanmean(found.tau**2, axis=0))
     return bool(np.all(shown <= ALIKE * found.floor))
-
-
-def named(cycles: Sequence[int]) -> str:
-    """Cycles in words, counted from 1."""
-    listed = ", ".join(str(c + 1) for c in cycles)
-    return f"cycle{'s' if len(cycles) > 1 else ''} {listed}"

@@ -1,7 +1,7 @@
 """The alignment ladder: ways to lay a free run under a log, each a rung better than the last."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from vftcli.repetition.pairing import Pairing, by_phase, mean_of
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
+from vftcli.signals.remarks import Remark, fact
 
 LOW_PASS = 12.0
 """Default cutoff of the zero-phase low-pass. [Hz]"""
@@ -61,10 +62,11 @@ class Difference(NamedTuple):
     tau: Array
     error: ErrorModel
 
-    @property
-    def name(self) -> str:
-        """Rung and low-pass in words."""
-        return self.rung if self.cutoff is None else f"{self.rung} + {self.cutoff:g} Hz"
+    def remark(self, code: str, **values: Any) -> Remark:  # noqa: ANN401 - any value
+        """A remark on this rung, by another code, -filtered, where it is low-passed."""
+        if self.cutoff is None:
+            return fact(code, rung=self.rung, **values)
+        return fact(f"{code}-filtered", rung=self.rung, cutoff_Hz=self.cutoff, **values)
 
     @property
     def floor(self) -> Array:
@@ -72,7 +74,7 @@ class Difference(NamedTuple):
         return self.error.floor
 
 
-def climb(
+def differences(
     motion: DriveRun,
     clocks: Mapping[str, Sequence[Pairing]],
     rungs: Sequence[str],
@@ -123,15 +125,15 @@ def difference(
     return Difference(name, cutoff, tau, error)
 
 
-def best(differences: Sequence[Difference]) -> Difference:
+def most_certain(made: Sequence[Difference]) -> Difference:
     """The difference with the smallest expected error, the simpler one where they are alike.
 
     Compared is the mean over trusted joints of expected error relative to the lowest rung's.
     """
-    lowest = differences[0].floor
-    trusted = differences[0].error.trusted_joints
-    chosen, least = differences[0], 1.0
-    for candidate in differences[1:]:
+    lowest = made[0].floor
+    trusted = made[0].error.trusted_joints
+    chosen, least = made[0], 1.0
+    for candidate in made[1:]:
         share = float(np.mean((candidate.floor / lowest)[trusted]))
         if share < WORTH * least:
             chosen, least = candidate, share

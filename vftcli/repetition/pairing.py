@@ -9,7 +9,7 @@ from vftcli.repetition.cycles import Cycles
 from vftcli.repetition.drive_run import DriveRun
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.filters import low_pass
-from vftcli.signals.series import median_step, resampled
+from vftcli.signals.series import resampled
 
 GAP = 5.5
 """A gap of more than this many median steps is not interpolated across."""
@@ -64,9 +64,9 @@ def pair_with_cycle(motion: DriveRun, cycles: Cycles, free: int, period: float) 
     return Pairing(motion, times)
 
 
-def pair_with_run(motion: DriveRun, free: DriveRun, shift: float, rate: float = 1.0) -> Pairing:
-    """Pair a log with a free run in another log, at rate·t + shift on the free run's clock."""
-    times = rate * motion.t + shift
+def pair_with_run(t: Array, free: DriveRun, shift: float, rate: float = 1.0) -> Pairing:
+    """Pair samples at times t (T,) with a free run, at rate·t + shift on the free run's clock."""
+    times = rate * t + shift
     inside = (times >= free.t[0]) & (times <= free.t[-1]) & ~in_gap(free.t, times)
     return Pairing(free, np.where(inside, times, np.nan))
 
@@ -90,7 +90,7 @@ def by_phase(motion: DriveRun, pairing: Pairing) -> Pairing:
         return pairing
     times, q = pairing.times[known], motion.q[known]
     free = pairing.free
-    speed = low_pass(free.t, free.dq, min(12.0, 0.2 / median_step(free.t)))
+    speed = low_pass(free.t, free.dq, min(12.0, 0.2 / free.step))
     shift = np.zeros(len(times))
     damping = 0.01 * float(np.mean(np.sum(speed**2, axis=1))) + 1e-6
     for _ in range(4):
@@ -99,8 +99,8 @@ def by_phase(motion: DriveRun, pairing: Pairing) -> Pairing:
         distance = resampled(at, free.t, free.q) - q
         shift -= np.sum(distance * path, axis=1) / (np.sum(path**2, axis=1) + damping)
         shift = np.clip(shift, -FARTHEST, FARTHEST)
-    step = median_step(motion.t)
-    smooth = low_pass(motion.t[known], shift[:, None], min(PHASE_CUTOFF, 0.2 / step))[:, 0]
+    cutoff = min(PHASE_CUTOFF, 0.2 / motion.step)
+    smooth = low_pass(motion.t[known], shift[:, None], cutoff)[:, 0]
     moved = pairing.times.copy()
     moved[known] = np.clip(times + smooth, times.min(), times.max())
     return Pairing(free, moved)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import median_step, runs_of
 
 STILL = 0.01
@@ -15,7 +15,7 @@ BREAKAWAY = 0.1
 """Time around a stop in which the joint settles or breaks away. [s]"""
 
 
-def stops(t: Array, dq: Array) -> Array:
+def duration(t: Array, dq: Array) -> Array:
     """How long the stop lasts that a sample belongs to, 0 where the joint moves. (T, n) [s]
 
     Args:
@@ -30,18 +30,17 @@ def stops(t: Array, dq: Array) -> Array:
     return length
 
 
-def at_rest(t: Array, stop: Array) -> Array:
-    """1 where a joint rests, with the moments before and after, 0 where it moves. (T, n)
-
-    A joint rests where it stops for at least `LEAST` seconds.
+def standing(t: Array, standstill_s: Array) -> Mask:
+    """Where a joint stops for at least `LEAST` seconds, the moments before and after too. (T, n)
 
     Args:
         t: Clock. (T,) [s]
-        stop: Lengths of stops, as from `stops`. (T, n) [s]
+        standstill_s: Lengths of stops, as from `duration`. (T, n) [s]
     """
-    rest = np.zeros(stop.shape)
-    for j, long in enumerate((stop >= LEAST).T):
+    found = np.zeros(standstill_s.shape, dtype=bool)
+    for j, long in enumerate((standstill_s >= LEAST).T):
         for start, end in runs_of(long):
+            # A joint is stuck before its speed is zero and settles after it has broken away.
             around = (t >= t[start] - BREAKAWAY) & (t <= t[end - 1] + BREAKAWAY)
-            rest[around, j] = 1.0
-    return rest
+            found[around, j] = True
+    return found

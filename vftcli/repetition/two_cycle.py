@@ -1,39 +1,36 @@
 """The two-cycle difference: the paper's ground truth, from repeated cycles or from a free run."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.repetition.alignment import align
 from vftcli.repetition.choice import AUTOMATIC, FreeChoice
-from vftcli.repetition.cycles import check_cycles, segment
-from vftcli.repetition.drive_run import DriveRun, drive_run_of
 from vftcli.repetition.error_model import TRUSTED_SHARE, rms
-from vftcli.repetition.free_cycles import find_free_cycles, named
+from vftcli.repetition.free_motion import FreeMotion
+from vftcli.repetition.free_run import FreeRun, ModelledRun
 from vftcli.repetition.friction_change import friction_change
-from vftcli.repetition.ladder import LOW_PASS, RUNGS, Difference, best, climb
-from vftcli.repetition.pairing import Pairing, pair_with_cycle, pair_with_run
-from vftcli.repetition.periodicity import find_period
+from vftcli.repetition.ladder import LOW_PASS, RUNGS, Difference, differences, most_certain
+from vftcli.repetition.pairing import Pairing, pair_with_run
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.identity import refuse_repeated_runs
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, Where, caution, fact
 
 
 class Partners(NamedTuple):
-    """A log's free runs, laid under it.
+    """A log's free motion, laid under it.
 
     Attributes:
         clocks: "found" and, where a period is stated, "commanded" → one pairing a free run.
-        notes: How they were found, one sentence each.
+        remarks: How they were found.
         free: Whether a sample is itself free, so that its difference is all error. (T,)
     """
 
     clocks: Mapping[str, Sequence[Pairing]]
-    notes: tuple[str, ...]
+    remarks: tuple[Remark, ...]
     free: Mask
 
 
@@ -45,11 +42,6 @@ def two_cycle_difference(
 ) -> ExternalTorque:
     """τ_ext = τ_free − τ at the same place of a repeated motion, with its own error.
 
-    Where position and velocity repeat, gravity, inertia and friction cancel and what is left is
-    the torque the environment exerts (Sec. IV-A of the paper; sign of (18)). The free run is one
-    or more cycles of the same log, which then have no reference of their own unless there are two,
-    or other logs of the same motion.
-
     Args:
         recording: The log with contact.
         free: A free run in another log or several; none to find free cycles in the log itself.
@@ -60,89 +52,100 @@ def two_cycle_difference(
         ReferenceTorqueError: If nothing repeats, or what is asked for is not there.
         MissingSignalError: If a log has neither currents nor torques, or no velocities.
     """
-    choice = choice or FreeChoice()
-    motion = drive_run_of(recording, robot)
-    runs = (free,) if isinstance(free, Recording) else tuple(free)
-    if runs:
-        partners = partners_in_logs(recording, motion, runs, robot, choice)
-    else:
-        partners = partners_in_log(recording, motion, choice)
-    cutoffs = cutoffs_for(choice.low_pass, recording.median_step)
-    ladder = climb(motion, partners.clocks, rungs_for(choice), cutoffs)
-    chosen = best(ladder)
+    log = ModelledRun(recording=recording, robot=robot)
+    others = (free,) if isinstance(free, Recording) else tuple(free)
+    runs = tuple(FreeRun(run=ModelledRun(recording=r, robot=robot), log=log) for r in others)
+    return two_cycle_reference(FreeMotion(log=log, choice=choice or FreeChoice(), runs=runs))
+
+
+def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
+    """The two-cycle difference of a log and its free motion, with its own error.
+
+    Where position and velocity repeat, gravity, inertia and friction cancel and what is left is
+    the torque the environment exerts (Sec. IV-A of the paper; sign of (18)). The free run is one
+    or more cycles of the same log, which then have no reference of their own unless there are two,
+    or other logs of the same motion.
+
+    Raises:
+        ReferenceTorqueError: If nothing repeats, or what is asked for is not there.
+        MissingSignalError: If a log has neither currents nor torques, or no velocities.
+    """
+    log, choice = motion.log, motion.choice
+    partners = partners_in_logs(motion) if motion.runs else partners_in_log(motion)
+    rungs = tuple(RUNGS) if choice.alignment == AUTOMATIC else (choice.alignment,)
+    cutoffs = cutoffs_for(choice.low_pass, log.recording.median_step)
+    ladder = differences(log.drive, partners.clocks, rungs, cutoffs)
+    chosen = most_certain(ladder)
     measured = measured_scale(partners, chosen)
-    moving = np.isfinite(chosen.tau) & (chosen.error.rest == 0.0)
-    scale = measured if measured is not None else np.ones(motion.torque.shape[1])
-    change = friction_change(motion, chosen.tau, moving) if runs else np.zeros(len(scale))
+    scale = measured if measured is not None else np.ones(chosen.tau.shape[1])
+    moving = np.isfinite(chosen.tau) & ~chosen.error.standing
+    # Cycles of one log lie too close in time for friction to change between them.
+    change = friction_change(log.drive, chosen.tau, moving) if motion.runs else np.zeros(len(scale))
     return ExternalTorque(
         name="two-cycle",
-        t=recording.t,
+        t=log.recording.t,
         tau=chosen.tau,
         sd=np.hypot(chosen.error.sd * scale, change),
         floor=np.hypot(chosen.floor * scale, change),
         moving=moving,
         remarks=(
-            *partners.notes,
-            *ladder_notes(ladder, chosen),
-            *floor_notes(chosen, measured),
-            *change_notes(change),
+            *partners.remarks,
+            *ladder_remarks(ladder, chosen),
+            *floor_remarks(chosen, measured),
+            *change_remarks(change),
         ),
     )
 
 
-def partners_in_log(recording: Recording, motion: DriveRun, choice: FreeChoice) -> Partners:
-    """Find the cycles of a log and lay its free ones under the others."""
-    period = find_period(recording, choice.period)
-    cycles = segment(recording, period)
-    if choice.cycles:
-        check_cycles(recording, cycles, choice.cycles)
-        numbers = tuple(c - 1 for c in choice.cycles)
-        note = f"free: {named(numbers)} of {cycles.whole}, as given"
-    else:
-        numbers, note = find_free_cycles(motion, cycles)
-    found = (
-        f"period {cycles.period:.6g} s, found on the joint positions to {period.deviation:.2g} rad"
-    )
-    stated = f" (stated: {choice.period:g} s)" if choice.period is not None else ""
-    span = f"{cycles.whole} whole cycles from {cycles.begin:.4g} to {cycles.end:.4g} s"
-    clocks = {"found": [pair_with_cycle(motion, cycles, c, cycles.period) for c in numbers]}
-    if choice.period is not None:
-        clocks["commanded"] = [pair_with_cycle(motion, cycles, c, choice.period) for c in numbers]
-    lone = "; the free cycle has no reference of its own" if len(numbers) == 1 else ""
-    inside = np.isin(cycles.number(motion.t), numbers)
-    return Partners(clocks, (f"{found}{stated}: {span}", f"{note}{lone}"), inside)
+def partners_in_log(motion: FreeMotion) -> Partners:
+    """The free cycles of a log, laid under the others."""
+    period, cycles, stated = motion.period, motion.cycles, motion.choice.period
+    free = motion.free_cycles
+    clocks = {"found": motion.pairings_by(cycles.period, free.numbers)}
+    values: dict[str, Any] = {
+        "period_s": cycles.period,
+        "deviation_rad": period.deviation,
+        "whole": cycles.whole,
+        "begin_s": cycles.begin,
+        "end_s": cycles.end,
+    }
+    remarks = [fact("period", **values)]
+    if stated is not None:
+        clocks["commanded"] = motion.pairings_by(stated, free.numbers)
+        remarks = [fact("period-near-stated", stated_s=stated, **values)]
+    remarks.append(free.remark(cycles.whole))
+    if len(free.numbers) == 1:
+        remarks.append(fact("free-cycle-without-reference"))
+    inside = np.isin(cycles.number(motion.log.recording.t), free.numbers)
+    return Partners(clocks, tuple(remarks), inside)
 
 
-def partners_in_logs(
-    recording: Recording,
-    motion: DriveRun,
-    free: Sequence[Recording],
-    robot: Robot,
-    choice: FreeChoice,
-) -> Partners:
-    """Lay free runs in other logs under a log."""
-    if choice.cycles or choice.period is not None:
+def partners_in_logs(motion: FreeMotion) -> Partners:
+    """Free runs in other logs, laid under a log.
+
+    Raises:
+        ReferenceTorqueError: If one is not of the same motion, or cycles of the log are asked for.
+    """
+    if motion.choice.cycles or motion.choice.period is not None:
         raise ReferenceTorqueError(
             "--period and --free-cycles are for cycles of one log; leave them away with --free"
         )
-    refuse_repeated_runs(recording, free)
-    pairings, notes = [], []
-    for other in free:
-        found = align(recording, other)
-        pairing = pair_with_run(motion, drive_run_of(other, robot), found.shift, found.rate)
-        pairings.append(pairing._replace(times=np.where(found.overlap, pairing.times, np.nan)))
-        rate = f", clock rate {found.rate:.6f}" if abs(found.rate - 1.0) > 1e-4 else ""
-        covered = float(np.count_nonzero(pairings[-1].known)) * recording.median_step
-        notes.append(
-            f"free run {other.name}: shift {found.shift:+.4f} s{rate}, joint positions agree to "
-            f"{found.deviation * 1e3:.3g} mrad rms over {covered:.1f} s"
-        )
-    return Partners({"found": pairings}, tuple(notes), np.zeros(recording.samples, dtype=bool))
-
-
-def rungs_for(choice: FreeChoice) -> tuple[str, ...]:
-    """The rungs to make: the one that is chosen, else all."""
-    return tuple(RUNGS) if choice.alignment == AUTOMATIC else (choice.alignment,)
+    recording = motion.log.recording
+    remarks = []
+    for run in motion.runs:
+        found = run.alignment
+        values: dict[str, Any] = {
+            "shift_s": found.shift,
+            "deviation_mrad": 1e3 * found.deviation,
+            "covered_s": float(np.count_nonzero(run.pairing.known)) * recording.median_step,
+        }
+        about = Where(about=run.recording.name)
+        if abs(found.rate - 1.0) > 1e-4:
+            remarks.append(fact("free-run-on-another-clock", about, rate=found.rate, **values))
+        else:
+            remarks.append(fact("free-run-aligned", about, **values))
+    pairings = [run.pairing for run in motion.runs]
+    return Partners({"found": pairings}, tuple(remarks), np.zeros(recording.samples, dtype=bool))
 
 
 def cutoffs_for(low_pass: float | str | None, step: float) -> tuple[float | None, ...]:
@@ -169,83 +172,72 @@ def measured_scale(partners: Partners, chosen: Difference) -> Array | None:
     if len(pairings) < 2:
         return None
     if np.any(partners.free):
-        both = partners.free & chosen.error.known
-        return ratio(chosen, both)
+        return error_ratio(chosen, partners.free & chosen.error.known)
     first, second = pairings[:2]
     shared = [pair_runs(first, second)]
-    cutoffs = (chosen.cutoff,)
-    spread = climb(first.free, {"found": shared, "commanded": shared}, (chosen.rung,), cutoffs)[0]
-    return ratio(spread, spread.error.known)
+    both = {"found": shared, "commanded": shared}
+    spread = differences(first.free, both, (chosen.rung,), (chosen.cutoff,))[0]
+    return error_ratio(spread, spread.error.known)
 
 
 def pair_runs(first: Pairing, second: Pairing) -> Pairing:
-    """Pair one free run with another by way of the log both are laid under."""
+    """Pair one free run with another by way of the log both are laid under.
+
+    Raises:
+        ReferenceTorqueError: If they share no part of the motion.
+    """
     both = first.known & second.known
     if np.count_nonzero(both) < 2:
         raise ReferenceTorqueError(
             f"{first.free.name} and {second.free.name} do not overlap, so they measure no floor; "
             "give two free runs of the same part of the motion"
         )
-    here, there = first.times[both], second.times[both]
-    rate, shift = np.polyfit(here, there, 1)
-    return pair_with_run(first.free, second.free, float(shift), float(rate))
+    rate, shift = np.polyfit(first.times[both], second.times[both], 1)
+    return pair_with_run(first.free.t, second.free, float(shift), float(rate))
 
 
-def ratio(found: Difference, where: Mask) -> Array:
-    """Root mean square of a difference that should be zero, over its expected error. (n,)"""
-    moving = found.error.rest[where] == 0.0
+def error_ratio(found: Difference, where: Mask) -> Array:
+    """Root mean square of a difference that should be zero, over its expected error. (n,)
+
+    Held between 0.3 and 3: beyond, something else than the error model is wrong.
+    """
+    moving = ~found.error.standing[where]
     expected = rms(found.error.sd[where], moving)
     shown = rms(found.tau[where], moving)
     return np.asarray(np.clip(shown / np.maximum(expected, 1e-12), 0.3, 3.0))
 
 
-def ladder_notes(ladder: Sequence[Difference], chosen: Difference) -> tuple[str, ...]:
+def ladder_remarks(ladder: Sequence[Difference], chosen: Difference) -> tuple[Remark, ...]:
     """Every rung with its floor, and which one is used and why."""
-    lines = [f"alignment {d.name}: floor {listed(d.floor)} N·m on J1…" for d in ladder]
-    title = RUNGS[chosen.rung].title
-    smooth = (
-        "" if chosen.cutoff is None else f", then a zero-phase low-pass at {chosen.cutoff:g} Hz"
-    )
-    why = (
-        "the smallest expected error, or the simplest within 3 % of it"
-        if len(ladder) > 1
-        else "as asked for"
-    )
-    return (*lines, f"alignment used: {chosen.name} ({title}{smooth}): {why}")
+    made = [d.remark("alignment-floor", floor_Nm=d.floor.tolist()) for d in ladder]
+    code = "alignment-chosen" if len(ladder) > 1 else "alignment-asked"
+    return (*made, chosen.remark(code, title=RUNGS[chosen.rung].title))
 
 
-def floor_notes(chosen: Difference, measured: Array | None) -> tuple[str, ...]:
+def floor_remarks(chosen: Difference, measured: Array | None) -> tuple[Remark, ...]:
     """Where the floor comes from, and which joints it cannot speak for."""
-    origin = (
-        "floor measured between the free runs (shown over expected error: "
-        f"{listed(measured)}) and carried to the other samples"
-        if measured is not None
-        else "floor by propagation: noise of the two torques, the motion difference's torque and "
-        "the stiction of stops; two free runs would measure it"
-    )
-    notes = [origin]
-    rests = chosen.error.at_rest
-    for j in np.flatnonzero(rests > 0.02):
-        size = f"up to about {chosen.error.floor_at_rest[j]:.2g} N·m rms"
-        marked = "the joint is marked" if rests[j] > 1.0 - TRUSTED_SHARE else "they are marked"
-        notes.append(
-            f"J{j + 1} rests in {100 * rests[j]:.0f} % of the samples, where it keeps its "
-            f"stiction ({size}): {marked}"
-        )
-    return tuple(notes)
-
-
-def change_notes(change: Array) -> tuple[str, ...]:
-    """Joints whose friction changed between the free run and the log."""
-    found = [f"J{j + 1} {change[j]:+.2f}" for j in np.flatnonzero(change)]
-    if not found:
-        return ()
+    origin = fact("floor-propagated")
+    if measured is not None:
+        origin = fact("floor-measured", ratio=measured.tolist())
+    share, error = chosen.error.standing_share, chosen.error
     return (
-        f"friction changed between the free run and the log ({', '.join(found)} N·m along the "
-        "motion; joints warm up): it does not cancel and is in the floor",
+        origin,
+        *(
+            caution(
+                "joint-stands" if share[j] > 1.0 - TRUSTED_SHARE else "joint-stands-at-times",
+                Where(joints=(int(j) + 1,)),
+                share=float(share[j]),
+                stiction_Nm=float(error.floor_standing[j]),
+            )
+            for j in np.flatnonzero(share > 0.02)
+        ),
     )
 
 
-def listed(values: Array) -> str:
-    """Numbers with two decimals."""
-    return " ".join(f"{value:.2f}" for value in values)
+def change_remarks(change: Array) -> tuple[Remark, ...]:
+    """Joints whose friction changed between the free run and the log."""
+    found = np.flatnonzero(change)
+    if not len(found):
+        return ()
+    where = Where(joints=tuple(int(j) + 1 for j in found))
+    return (caution("friction-changed", where, change_Nm=change[found].tolist()),)

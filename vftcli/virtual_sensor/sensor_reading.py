@@ -5,14 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vftcli.repetition.free_run import FreeRun
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import time_offset
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import resampled
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.frames import Mounting
@@ -53,14 +52,12 @@ class FreeRunTorque:
         mean: Observer → its mean over the free run. (n,) [N·m]
         rms: Observer → its root mean square over the free run. (n,) [N·m]
         note: Where it comes from, one sentence.
-        terms: p and μ along the free run, or None.
     """
 
     torque: Mapping[str, Array]
     mean: Mapping[str, Array]
     rms: Mapping[str, Array]
     note: str
-    terms: DynamicsTerms | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +71,8 @@ class SensorReading:
         free: Samples known to be unloaded: those of the zero spans, or of the unloaded start. (T,)
         vendor: What convention the log's own wrench is in, None if it has none.
         elsewhere: The null-space channel's verdicts, for arms of more than six joints.
+        logged: The log's own wrench without the weight of its sensor's tool, in base axes; None
+            where it was not weighed.
         reference: The wrench the others are judged by, in the same frame, or None.
         notes: What the reader of the numbers should know, one sentence each.
         warnings: What looks wrong, one sentence each.
@@ -85,6 +84,7 @@ class SensorReading:
     free: Mask
     vendor: VendorCheck | None = None
     elsewhere: tuple[Elsewhere, ...] = ()
+    logged: Wrench | None = None
     reference: Wrench | None = None
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -245,31 +245,27 @@ def torque_error(
     return assumed(torques, request.solver)
 
 
-def unloaded_from(
-    name: str, estimates: Sequence[ExternalTorque], shift: float | None, t: Array
-) -> FreeRunTorque:
-    """What a free run reads, at the same place where a shift brings its trajectory to the log's.
+def free_run_torque(run: FreeRun, estimates: Sequence[ExternalTorque]) -> FreeRunTorque:
+    """What a free run reads, at the same place of the trajectory where it is the log's.
 
     Args:
-        name: The free run's name.
+        run: The free run beside its log.
         estimates: Its observers' torques; the first `SETTLING` seconds count for no mean.
-        shift: Time to add to the log's t to reach the same place, None if it is another motion. [s]
-        t: The log's clock. (T,) [s]
     """
     settled = {
         e.name: e.tau[e.t - e.t[0] >= min(SETTLING, 0.5 * (e.t[-1] - e.t[0]))] for e in estimates
     }
     there = {}
     words = "its mean torque is removed: it is another trajectory"
-    if shift is not None:
+    if run.is_same_motion:
+        shift = run.alignment.shift
         words = f"its torque at the same place of the trajectory is removed (shift {shift:+.4f} s)"
-        for e in estimates:
-            there[e.name] = resampled(t + shift, e.t, e.tau, outside=np.nan)
+        there = {e.name: run.pairing.there(e.tau) for e in estimates}
     return FreeRunTorque(
         torque=there,
         mean={name: tau.mean(axis=0) for name, tau in settled.items()},
         rms={name: np.sqrt(np.mean(tau**2, axis=0)) for name, tau in settled.items()},
-        note=f"zero from the free run {name}: {words}",
+        note=f"zero from the free run {run.recording.name}: {words}",
     )
 
 

@@ -19,6 +19,7 @@ from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.robot import Robot
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Note, Remark
 
 CONVENTIONS = {
     "sign": "tau_ext is the torque the environment exerts ON the robot: "
@@ -65,7 +66,7 @@ def run_record(
         ],
         "reference": reference_record(analysis.reference),
         "wrench": wrench_record(analysis),
-        "complete_log": workup_record(analysis),
+        "complete_log": refinement_record(analysis),
         "conventions": CONVENTIONS,
         "repairs": list(analysis.recording.source.repairs),
         "warnings": list(analysis.recording.source.warnings),
@@ -221,14 +222,15 @@ def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
     }
 
 
-def workup_record(analysis: Analysis) -> dict[str, Any] | None:
+def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
     """What the complete log told: free part, chosen gains, error budget, consistency."""
-    found = analysis.workup
+    found = analysis.refinement
     if found is None:
         return None
+    spectra = found.baseline.spectra
     return {
         "bias_removed": found.removed,
-        "segments_free_loaded": found.survey.spectra.segments if found.survey.spectra else None,
+        "segments_free_loaded": spectra.segments if spectra is not None else None,
         "tuned": {
             name: {"omega_n_rad_s": curve.best, "expected_rmse_Nm": curve.least}
             for name, curve in found.curves.items()
@@ -240,18 +242,23 @@ def workup_record(analysis: Analysis) -> dict[str, Any] | None:
             for e in analysis.estimates
             if e.error_sd is not None
         },
-        "notes": list(found.notes),
+        "notes": [str(remark) for remark in found.remarks],
     }
+
+
+def names_what(remark: Note) -> bool:
+    """Whether a remark says itself what it is about."""
+    return isinstance(remark, Remark) and bool(remark.where.about)
 
 
 def all_notes(analysis: Analysis) -> list[str]:
     """Notes of the run, of every estimate and of the reference, each once."""
-    notes = [*analysis.notes]
+    notes = [str(remark) for remark in analysis.remarks]
     for torque in analysis.torques:
         notes += [
-            note if torque.name in note else f"{torque.name}: {note}"
-            for note in map(str, torque.remarks)
-            if note not in analysis.notes
+            str(remark) if names_what(remark) else f"{torque.name}: {remark}"
+            for remark in torque.remarks
+            if remark not in analysis.remarks
         ]
     if analysis.virtual_sensor is not None:
         notes += [*analysis.virtual_sensor.warnings, *analysis.virtual_sensor.notes]

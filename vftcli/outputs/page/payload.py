@@ -155,7 +155,7 @@ def responses(analysis: Analysis) -> list[dict[str, Any]]:
 
 def refinement_charts(analysis: Analysis) -> list[dict[str, Any]]:
     """What was minimised for every observer that the log tuned, and the spectra behind it."""
-    found = analysis.workup
+    found = analysis.refinement
     if found is None:
         return []
     shown = []
@@ -163,7 +163,7 @@ def refinement_charts(analysis: Analysis) -> list[dict[str, Any]]:
         over = [curve.omega_n / (2.0 * np.pi) for curve in found.curves.values()]
         colours = colours_of(analysis.estimates)
         shown.append(packed_over_frequency(tuning_chart(found, colours), over))
-    if (spectra := found.survey.spectra) is not None:
+    if (spectra := found.baseline.spectra) is not None:
         chart = spectra_chart(spectra)
         shown.append(packed_over_frequency(chart, [spectra.frequency[1:]] * len(chart.series)))
     return shown

@@ -18,7 +18,7 @@ FREE, LOADED = "#3b7ea1", "#c2410c"
 
 def refinement_section(analysis: Analysis) -> str:
     """Remarks, error budget and innovations of a complete log, "" where nothing asked for it."""
-    found = analysis.workup
+    found = analysis.refinement
     if found is None:
         return ""
     tables = {
@@ -26,7 +26,7 @@ def refinement_section(analysis: Analysis) -> str:
         "Innovations; in brackets what a true model would give": consistency_grid(found),
     }
     shown = "".join(folded(caption, html(grid)) for caption, grid in tables.items() if grid.rows)
-    return f"<h2>What the complete log tells</h2>{bullets(found.notes)}{shown}"
+    return f"<h2>What the complete log tells</h2>{bullets(found.remarks)}{shown}"
 
 
 def budget_grid(found: Refinement) -> Grid:

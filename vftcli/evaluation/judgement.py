@@ -1,0 +1,67 @@
+"""From estimates and wrenches to how they compare with a reference: one table of errors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import polars as pl
+
+from vftcli.evaluation.errors import evaluate
+from vftcli.evaluation.reference_choice import ReferenceChoice, ReferenceSource, make_reference
+from vftcli.evaluation.reference_wrench import reference_wrench
+from vftcli.evaluation.wrenches import with_contacts, with_wrenches
+from vftcli.repetition.free_motion import FreeMotion
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.virtual_sensor.detection import ContactScore, judge_contacts
+from vftcli.virtual_sensor.sensor_reading import SensorReading, referred
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judgement:
+    """How the estimates of one log compare with a reference.
+
+    Attributes:
+        reference: What they are judged by.
+        errors: The tidy error table (`vftcli.evaluation.SCHEMA`).
+        virtual_sensor: The wrenches, with the reference's beside them; None without wrenches.
+        contacts: How each observer tells contacts, or empty where it was not asked.
+    """
+
+    reference: ExternalTorque
+    errors: pl.DataFrame
+    virtual_sensor: SensorReading | None
+    contacts: tuple[ContactScore, ...]
+
+
+def judge(
+    motion: FreeMotion,
+    estimates: Sequence[ExternalTorque],
+    sensed: SensorReading | None,
+    choice: ReferenceChoice,
+) -> Judgement:
+    """Make the reference and compare with it.
+
+    Args:
+        motion: The log and its free motion.
+        estimates: The observers' torques.
+        sensed: Their wrenches, or None.
+        choice: Which reference.
+
+    Raises:
+        ReferenceTorqueError: If the reference cannot be made.
+    """
+    recording, robot = motion.log.recording, motion.log.robot
+    source = ReferenceSource(motion=motion)
+    if sensed is not None:
+        mounting = sensed.sensor.mounting
+        source = ReferenceSource(motion=motion, mounting=mounting, logged=sensed.logged)
+    made = make_reference(source, choice)
+    reference = made.torque
+    errors = evaluate(recording.name, estimates, reference)
+    if sensed is not None:
+        sensed = referred(sensed, reference_wrench(recording, robot, made, sensed.sensor))
+        errors = with_wrenches(errors, recording.name, sensed)
+    contacts: tuple[ContactScore, ...] = ()
+    if choice.contacts:
+        contacts = judge_contacts(estimates, sensed, reference)
+        errors = with_contacts(errors, recording.name, reference.name, contacts)
+    return Judgement(reference=reference, errors=errors, virtual_sensor=sensed, contacts=contacts)

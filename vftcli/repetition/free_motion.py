@@ -1,0 +1,201 @@
+"""All that is known to be free of contact beside a log: its own spans and cycles, other runs."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.cycles import Cycles, check_cycles, segment
+from vftcli.repetition.free_cycles import FreeCycles, find_free_cycles
+from vftcli.repetition.free_run import FreeRun, ModelledRun
+from vftcli.repetition.pairing import Pairing, pair_with_cycle
+from vftcli.repetition.periodicity import Period, find_period
+from vftcli.signals.arrays import Mask
+from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.identity import refuse_repeated_runs
+from vftcli.signals.remarks import Remark, Where, fact
+
+SLACK = 0.03
+"""A cycle counts as inside a span if it sticks out by no more than this share of itself."""
+
+
+class FreePiece(NamedTuple):
+    """Samples of one recording that nobody touched.
+
+    Attributes:
+        run: The recording they are in: the log itself or a free run.
+        inside: Which of its samples they are. (S,)
+        pairings: Where in them each sample of the log belongs, one a free cycle or run that repeats
+            the log's motion; none where nothing repeats.
+    """
+
+    run: ModelledRun
+    inside: Mask
+    pairings: tuple[Pairing, ...]
+
+
+class FreePart(NamedTuple):
+    """Everything that is free of contact, of the log and of free runs.
+
+    Attributes:
+        pieces: One a recording, the log's own first.
+        own: Samples of the log itself that are free. (T,)
+        remarks: What it is and how it was found.
+    """
+
+    pieces: tuple[FreePiece, ...]
+    own: Mask
+    remarks: tuple[Remark, ...]
+
+    @property
+    def pairings(self) -> tuple[Pairing, ...]:
+        """Where in each free motion that repeats the log's the log's samples belong."""
+        return tuple(pairing for piece in self.pieces for pairing in piece.pairings)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FreeMotion:
+    """The free motion of one log. What is asked of it is found or made once, when first asked for.
+
+    Attributes:
+        log: The log.
+        choice: What the user says is free.
+        runs: Free runs in other recordings.
+        zero: The free run whose torque is the zero of a wrench; it may be one of `runs`.
+
+    Raises:
+        ReferenceTorqueError: If a free run is the log itself, or two free runs are one.
+    """
+
+    log: ModelledRun
+    choice: FreeChoice = field(default_factory=FreeChoice)
+    runs: tuple[FreeRun, ...] = ()
+    zero: FreeRun | None = None
+
+    def __post_init__(self) -> None:
+        refuse_repeated_runs(self.log.recording, [run.recording for run in self.runs])
+        if self.zero is not None:
+            refuse_repeated_runs(self.log.recording, [self.zero.recording])
+
+    @cached_property
+    def period(self) -> Period:
+        """The period of the log's motion.
+
+        Raises:
+            ReferenceTorqueError: If the log repeats nothing.
+        """
+        return find_period(self.log.recording, self.choice.period)
+
+    @cached_property
+    def cycles(self) -> Cycles:
+        """The cycles of the log.
+
+        Raises:
+            ReferenceTorqueError: If the log repeats nothing.
+        """
+        return segment(self.log.recording, self.period)
+
+    @cached_property
+    def cycles_given(self) -> tuple[int, ...]:
+        """Cycles the user says are free, counted from 0: named, or whole inside a free span.
+
+        Raises:
+            ReferenceTorqueError: If the log repeats nothing, or has no such cycle.
+        """
+        check_cycles(self.log.recording, self.cycles, self.choice.cycles)
+        slack = SLACK * self.cycles.period
+        within = {
+            number
+            for number in range(self.cycles.whole)
+            for a, b in self.choice.spans
+            if self.cycles.span(number)[0] >= a - slack and self.cycles.span(number)[1] <= b + slack
+        }
+        return tuple(sorted(within | {number - 1 for number in self.choice.cycles}))
+
+    @cached_property
+    def free_cycles(self) -> FreeCycles:
+        """The free cycles of the log: those the user says, else those found by what they show.
+
+        Raises:
+            ReferenceTorqueError: If the log repeats nothing, or has no such cycle.
+        """
+        if self.cycles_given:
+            return FreeCycles(self.cycles_given, None)
+        return find_free_cycles(self.log.drive, self.cycles)
+
+    def pairings_by(self, period: float, numbers: tuple[int, ...]) -> tuple[Pairing, ...]:
+        """The log laid over cycles of its own, counted from 0, by a period. [s]"""
+        drive, cycles = self.log.drive, self.cycles
+        return tuple(pair_with_cycle(drive, cycles, number, period) for number in numbers)
+
+    @cached_property
+    def part(self) -> FreePart:
+        """The free part: what is given of the log itself and of other runs, else its free cycles.
+
+        Raises:
+            ReferenceTorqueError: If nothing is given and the log repeats nothing.
+            ParameterError: If a given span holds no samples, or the whole log.
+        """
+        log, choice = self.log, self.choice
+        own, remarks = self.within_spans, list(self.span_remarks)
+        pairings: tuple[Pairing, ...] = ()
+        if choice.cycles or not choice.is_given:
+            found = self.free_cycles
+            own = own | np.isin(self.cycles.number(log.recording.t), found.numbers)
+            pairings = self.pairings_by(self.cycles.period, found.numbers)
+            remarks.append(found.remark(self.cycles.whole))
+        elif choice.spans and self.repeats:
+            pairings = self.pairings_by(self.cycles.period, self.cycles_given)
+        pieces = [FreePiece(log, own, pairings)] if own.any() else []
+        for run in self.runs:
+            whole = np.ones(run.recording.samples, dtype=bool)
+            pieces.append(FreePiece(run.run, whole, (run.pairing,) if run.is_same_motion else ()))
+            remarks.append(run_remark(run))
+        return FreePart(tuple(pieces), own, tuple(remarks))
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the log repeats its motion."""
+        try:
+            return self.cycles.whole > 0
+        except ReferenceTorqueError:
+            return False
+
+    @property
+    def within_spans(self) -> Mask:
+        """Samples of the log inside the spans that are given as free. (T,)
+
+        Raises:
+            ParameterError: If they are none, or all.
+        """
+        recording, spans = self.log.recording, self.choice.spans
+        t = recording.t
+        inside = np.zeros(len(t), dtype=bool)
+        for first, last in spans:
+            inside |= (t >= first) & (t <= last)
+        if spans and (np.count_nonzero(inside) < 2 or inside.all()):
+            raise ParameterError(
+                f"{recording.name}: the free part {', '.join(f'{a:g}:{b:g}' for a, b in spans)} "
+                f"holds {np.count_nonzero(inside)} of its {recording.samples} samples; it must be "
+                f"a part of the log, which runs from {t[0]:g} to {t[-1]:g} s"
+            )
+        return inside
+
+    @property
+    def span_remarks(self) -> tuple[Remark, ...]:
+        """The spans that are given as free, as far as they are in the log."""
+        t = self.log.recording.t
+        return tuple(
+            fact("free-span", begin_s=max(a, float(t[0])), end_s=min(b, float(t[-1])))
+            for a, b in self.choice.spans
+        )
+
+
+def run_remark(run: FreeRun) -> Remark:
+    """Whether a free run repeats the log's motion, and where."""
+    about = Where(about=run.recording.name)
+    if not run.is_same_motion:
+        return fact("free-run-of-another-motion", about)
+    return fact("free-run", about, shift_s=run.alignment.shift)

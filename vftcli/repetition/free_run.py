@@ -1,0 +1,118 @@
+"""A free run has one owner: what was read, what the model says of it, where in it a log belongs."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from vftcli.repetition.alignment import Alignment, align
+from vftcli.repetition.drive_run import DriveRun, drive_run_of
+from vftcli.repetition.pairing import Pairing, pair_with_run
+from vftcli.robots.robot import Robot
+from vftcli.robots.terms import DynamicsTerms, dynamics_terms
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.recording import Recording
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModelledRun:
+    """A recording and what the robot's model says of it, evaluated once, when first asked for.
+
+    Attributes:
+        recording: The recording.
+        robot: The arm, its payload mounted.
+        literal: Whether `terms` are the paper's printed ones.
+    """
+
+    recording: Recording
+    robot: Robot
+    literal: bool = False
+
+    @cached_property
+    def terms(self) -> DynamicsTerms:
+        """P and μ, as the observers take them."""
+        return dynamics_terms(self.recording, self.robot, literal=self.literal)
+
+    @cached_property
+    def drive(self) -> DriveRun:
+        """Drive torque and the model's; a reference never follows the printed formulas."""
+        return drive_run_of(self.recording, self.robot, None if self.literal else self.terms)
+
+
+class Models:
+    """The recordings that a command models, each once for one robot."""
+
+    def __init__(self) -> None:
+        self._runs: list[ModelledRun] = []
+
+    def of(self, recording: Recording, robot: Robot, *, literal: bool = False) -> ModelledRun:
+        """The recording with this robot's model, the one that is there if there is one."""
+        for run in self._runs:
+            if run.recording is recording and run.robot is robot and run.literal == literal:
+                return run
+        self._runs.append(ModelledRun(recording=recording, robot=robot, literal=literal))
+        return self._runs[-1]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FreeRun:
+    """A motion in another recording that nobody touched, beside the log it serves.
+
+    Everything that is asked of it, by references, bias removal, zero and bands, is made once.
+
+    Attributes:
+        run: The free run.
+        log: The log.
+    """
+
+    run: ModelledRun
+    log: ModelledRun
+
+    @property
+    def recording(self) -> Recording:
+        """The free run as it was read."""
+        return self.run.recording
+
+    @property
+    def terms(self) -> DynamicsTerms:
+        """P and μ along the free run."""
+        return self.run.terms
+
+    @property
+    def drive(self) -> DriveRun:
+        """Drive torque along the free run, and the model's."""
+        return self.run.drive
+
+    @cached_property
+    def _alignment(self) -> Alignment | ReferenceTorqueError:
+        try:
+            return align(self.log.recording, self.recording)
+        except ReferenceTorqueError as error:
+            return error
+
+    @property
+    def is_same_motion(self) -> bool:
+        """Whether it follows the log's trajectory, or a part of it."""
+        return isinstance(self._alignment, Alignment)
+
+    @property
+    def alignment(self) -> Alignment:
+        """How it lies on the log.
+
+        Raises:
+            ReferenceTorqueError: If it is another motion, of another arm, or on another clock.
+        """
+        if isinstance(self._alignment, ReferenceTorqueError):
+            raise self._alignment
+        return self._alignment
+
+    @cached_property
+    def pairing(self) -> Pairing:
+        """Where in the free run each sample of the log belongs.
+
+        Raises:
+            ReferenceTorqueError: If it is another motion, of another arm, or on another clock.
+        """
+        found = self.alignment
+        pairing = pair_with_run(self.log.recording.t, self.drive, found.shift, found.rate)
+        return pairing._replace(times=np.where(found.overlap, pairing.times, np.nan))
