@@ -12,7 +12,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.simulation.friction import TrueFriction, true_friction
 from vftcli.simulation.plant import Plant
 from vftcli.simulation.scenario import FrictionSpec
-from vftcli.simulation.stiction import slide_or_stick, sweeps
+from vftcli.simulation.stiction import slide_or_stick, gauss_seidel
 
 
 def frictionless(robot: Robot) -> TrueFriction:
@@ -151,8 +151,8 @@ def test_stick_and_slide_agree_with_the_sweeps(seed: int) -> None:
     v[rng.random(n) < 0.4] = 0.0
     limit = rng.uniform(0.0, 1.5, n)
     after, friction, _ = slide_or_stick(M, impulse, v, limit, np.sign(v))
-    swept, swept_friction, _ = sweeps(M, impulse, v, limit)
-    # the sweeps stop at 1e-14 of change; their error is that times the condition of M
+    swept, swept_friction, _ = gauss_seidel(M, impulse, v, limit)
+    # the gauss_seidel stop at 1e-14 of change; their error is that times the condition of M
     np.testing.assert_allclose(after, swept, atol=1e-8)
     np.testing.assert_allclose(friction, swept_friction, atol=1e-8)
     assert np.all(np.abs(friction) <= limit * (1 + 1e-9))

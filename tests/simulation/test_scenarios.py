@@ -10,7 +10,7 @@ from vftcli.signals.errors import ParameterError, VftError
 from vftcli.simulation import load_scenario, scenario_names, simulate
 from vftcli.simulation.load import to_toml
 from vftcli.simulation.scenario import Scenario
-from vftcli.simulation.schema import build
+from vftcli.simulation.schema import section_from
 
 NAMES = (
     "free-excitation",
@@ -143,6 +143,6 @@ def test_two_contacts_of_one_name_are_refused(tmp_path: Path) -> None:
 
 
 def test_words_with_quotes_survive_the_file() -> None:
-    scenario = build(Scenario, {"name": 'a"b\\c', "title": "two\nlines"}, "")
-    again = build(Scenario, tomllib.loads(to_toml(scenario, scenario.seed)), "")
+    scenario = section_from(Scenario, {"name": 'a"b\\c', "title": "two\nlines"}, "")
+    again = section_from(Scenario, tomllib.loads(to_toml(scenario, scenario.seed)), "")
     assert again == scenario

@@ -25,7 +25,7 @@ from vftcli.simulation.arm import Arm
 from vftcli.simulation.experiment import Progress, Simulation, observe
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import Scenario
-from vftcli.simulation.sensing import known, log_rate
+from vftcli.simulation.sensing import known_noise, log_rate
 
 FARTHEST = 3.0
 """A flange this far from its start has run away. [m]"""
@@ -96,15 +96,15 @@ class Sensors:
         self.arm, self.torque = arm, torque
         self.interval = 1.0 / log_rate(spec, robot)
         self.rng = np.random.default_rng(arm.seeds["sensing"])
-        self.q_noise = spec.noise * known(robot.noise.q)
-        self.dq_noise = spec.noise * known(robot.noise.qd)
+        self.q_noise = spec.noise * known_noise(robot.noise.q)
+        self.dq_noise = spec.noise * known_noise(robot.noise.qd)
         if robot.torque_source == "current" and robot.torque_constant is not None:
-            current = spec.noise * known(robot.noise.current)
+            current = spec.noise * known_noise(robot.noise.current)
             if spec.current_noise is not None:
                 current = np.full(robot.joints, spec.current_noise)
             self.torque_noise = current * robot.torque_constant
         else:
-            self.torque_noise = spec.noise * known(robot.noise.tau)
+            self.torque_noise = spec.noise * known_noise(robot.noise.tau)
         self.grain = spec.position_step
 
     def read(self) -> tuple[Array, Array, Array]:

@@ -140,6 +140,7 @@ def assemble(file: RobotFile, joints: Sequence[Mapping[str, Any]], chain: Chain)
             **{k: column(file, joints, f"noise_{k}") for k in SensorNoise.__dataclass_fields__}
         ),
         sample_rate_hz=number(file, doc, "sample_rate_hz", default=math.nan),
+        ros_state=str(doc.get("ros_state", "")),
         payload=payloads.pop("", None),
         payloads=payloads,
         gains=gains,

@@ -88,6 +88,8 @@ class Robot:
         limits: Joint limits.
         noise: SensorReading noise.
         sample_rate_hz: The vendor's own rate, NaN if not given. [Hz]
+        ros_state: ROS 2 message in which its driver publishes the whole state, "" where it has none
+            but JointState.
         payload: The load mounted on the flange, or None.
         payloads: Further loads by name, for ``--payload NAME``.
         gains: Observer name → parameter → number, list or word, as in ``[observers.*]``.
@@ -106,6 +108,7 @@ class Robot:
     limits: Limits
     noise: SensorNoise
     sample_rate_hz: float = float("nan")
+    ros_state: str = ""
     payload: Payload | None = None
     payloads: Mapping[str, Payload] = field(default_factory=dict)
     gains: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)

@@ -21,6 +21,11 @@ CHECK_STEPS = 10
 """Inner steps between two looks at whether the arm still moves like an arm."""
 RUNAWAY = 200.0
 """Joint velocity no arm reaches. [rad/s]"""
+JOINT_HISTORY = (
+    *("q", "v", "a", "tau", "friction"),
+    *("target_q", "target_dq", "target_ddq", "walk"),
+)
+"""Fields of a History that hold a number a joint."""
 
 
 @dataclass(kw_only=True)
@@ -55,21 +60,9 @@ class History:
     @classmethod
     def room(cls, step: float, steps: int, joints: int, contacts: int) -> "History":
         """Return room for `steps` steps, and one more for the state after the last."""
-        room = (np.zeros((steps + 1, joints)) for _ in range(9))
-        q, v, a, tau, friction, target_q, target_dq, target_ddq, walk = room
-        return cls(
-            step=step,
-            q=q,
-            v=v,
-            a=a,
-            tau=tau,
-            friction=friction,
-            target_q=target_q,
-            target_dq=target_dq,
-            target_ddq=target_ddq,
-            wrenches=np.zeros((steps + 1, contacts, 6)),
-            walk=walk,
-        )
+        rows = steps + 1
+        arrays = {name: np.zeros((rows, joints)) for name in JOINT_HISTORY}
+        return cls(step=step, rows=0, wrenches=np.zeros((rows, contacts, 6)), **arrays)
 
 
 class Arm:
@@ -142,7 +135,7 @@ class Arm:
             dq_d: Commanded velocities, zero if not given. (n,) [rad/s]
             ddq_d: Commanded accelerations, zero if not given. (n,) [rad/s²]
         """
-        q_d = self.servo.within(np.asarray(q_d, dtype=float))
+        q_d = self.servo.clip_to_limits(np.asarray(q_d, dtype=float))
         nothing = np.zeros_like(q_d)
         rows = [q_d, nothing if dq_d is None else dq_d, nothing if ddq_d is None else ddq_d]
         reference = Reference(*(np.asarray(row, dtype=float)[None] for row in rows))
@@ -159,7 +152,7 @@ class Arm:
         history.target_q[k], history.target_dq[k], history.target_ddq[k] = q_d, dq_d, ddq_d
         t = (k + 0.5) * plant.step
         if self.scenario.friction.temperature_coefficient and k % WARMING_STEPS == 0:
-            self.warm(t)
+            self.warm_up(t)
         if self.touching.anything(t):
             plant.advance(tau, lambda m, data, v: self.touching.torque(t, m, data, v))
             history.wrenches[k] = self.touching.wrenches
@@ -179,15 +172,18 @@ class Arm:
                 f"of {self.scenario.step:g} s; lower servo.stiffness, a contact's stiffness or step"
             )
 
-    def warm(self, t: float) -> None:
+    def warm_up(self, t: float) -> None:
         """Let the viscous friction follow the joints' temperature."""
         sensing = self.scenario.sensing
         rise = sensing.warming * (1.0 - np.exp(-t / sensing.warming_time))
         factor = 1.0 + self.scenario.friction.temperature_coefficient * rise
-        self.plant.true_friction = self.true.friction.warmed(max(factor, 0.0))
+        self.plant.true_friction = self.true.friction.with_viscous_factor(max(factor, 0.0))
 
-    def finished(self) -> History:
-        """The history so far, with the state after the last step as its closing row."""
+    def close(self) -> History:
+        """The history so far, with the state after the last step as its closing row.
+
+        What has no value after the last step keeps its last one.
+        """
         self.check_motion()
         history, k = self.history, self.history.rows
         history.q[k], history.v[k] = self.plant.q, self.plant.v

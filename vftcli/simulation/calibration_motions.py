@@ -2,7 +2,6 @@
 
 import tomllib
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import ClassVar
 
@@ -12,8 +11,8 @@ from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.kinematics import check_start, flange_pose
-from vftcli.simulation.motion import Command, Periodic, Stretches
-from vftcli.simulation.schema import unknown
+from vftcli.simulation.motion import Command, Periodic, Stretches, straight_paths
+from vftcli.simulation.schema import unknown_name
 
 EXCITATIONS = Path(__file__).parent / "scenarios" / "excitation"
 """Optimised trajectories, a file a robot."""
@@ -49,16 +48,15 @@ class PosesSpec:
             raise ParameterError(
                 "trajectory.move must be positive, dwell not negative, and count at least 2"
             )
-        points = [check_start(robot, pose) for pose in self.poses] or self.drawn(robot)
+        points = [check_start(robot, pose) for pose in self.poses] or self.draw_poses(robot)
         starts = self.dwell + np.arange(max(len(points) - 1, 1)) * (self.move + self.dwell)
-        pairs = list(pairwise(points)) or [(points[0], points[0])]
         return Stretches(
             times=np.column_stack([starts, starts + self.move]),
-            paths=tuple(np.vstack([0.5 * (a + b), 0.5 * (b - a)]) for a, b in pairs),
+            paths=straight_paths(points if len(points) > 1 else 2 * points),
             duration=float(starts[-1] + self.move + self.dwell),
         )
 
-    def drawn(self, robot: Robot) -> list[Array]:
+    def draw_poses(self, robot: Robot) -> list[Array]:
         """Poses about the usual one, inside the limits and with the flange above the table."""
         rng, home = np.random.default_rng(self.draw), check_start(robot, ())
         low = np.where(np.isfinite(robot.limits.q_min), robot.limits.q_min + 0.05, -np.pi)
@@ -176,7 +174,7 @@ def optimised_excitation(robot: str, period: float, cycles: float) -> Periodic:
     if not path.is_file():
         there = sorted(p.stem for p in EXCITATIONS.glob("*.toml"))
         raise ParameterError(
-            unknown(f"optimised excitation for robot {robot!r}", robot, there)
+            unknown_name(f"optimised excitation for robot {robot!r}", robot, there)
             + " Give trajectory.period, mean, cosine and sine yourself."
         )
     table = tomllib.loads(path.read_text(encoding="utf-8"))

@@ -15,9 +15,9 @@ from vftcli.simulation.arm import Arm
 from vftcli.simulation.force_sensor import read_force_sensor
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import Scenario
-from vftcli.simulation.sensing import Measured, Samples, check_sensing, measure, sample
+from vftcli.simulation.sensing import Measured, Samples, check_sensing, measure_run, sample_run
 from vftcli.simulation.trajectories import plan
-from vftcli.simulation.truth import Truth, tell_truth
+from vftcli.simulation.truth import Truth, truth_of
 from vftcli.simulation.vendor import Vendor, vendor_view
 
 MOST_STEPS = 2_000_000
@@ -152,9 +152,9 @@ def simulate(
 
 def observe(arm: Arm) -> Simulation:
     """Turn a finished run, whoever commanded it, into its log and truth."""
-    samples = sample(arm)
-    measured = measure(arm, samples)
-    truth = tell_truth(arm, samples)
+    samples = sample_run(arm)
+    measured = measure_run(arm, samples)
+    truth = truth_of(arm, samples)
     return Simulation(
         scenario=arm.scenario,
         seed=arm.seed,

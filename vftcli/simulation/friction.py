@@ -69,13 +69,8 @@ class TrueFriction:
         """Whether any joint has sigmoid friction."""
         return bool(self.amplitude.any())
 
-    def scaled(self, factor: Array) -> "TrueFriction":
-        """Return friction whose levels are multiplied joint by joint. (n,)"""
-        names = ("coulomb", "viscous", "quadratic", "offset", "amplitude")
-        return replace(self, **{name: getattr(self, name) * factor for name in names})
-
-    def warmed(self, factor: float) -> "TrueFriction":
-        """Return friction whose viscous part is multiplied by `factor`."""
+    def with_viscous_factor(self, factor: float) -> "TrueFriction":
+        """The friction with its viscous part multiplied by `factor`; warm oil is thinner."""
         return replace(self, viscous=self.viscous * factor)
 
 

@@ -1,15 +1,16 @@
 """Scenarios by name or file, with the user's overrides, and back to TOML."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+from vftcli.robots.writing import lines_of
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import assignment
 from vftcli.simulation.scenario import Scenario
-from vftcli.simulation.schema import build, unknown
+from vftcli.simulation.schema import section_from, unknown_name
 
 FOLDER = Path(__file__).parent / "scenarios"
 
@@ -41,17 +42,21 @@ def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         if path.suffix.lower() != ".toml":
             names = scenario_names()
             raise ParameterError(
-                unknown(f"scenario {str(name)!r}", str(name), names) + " Or give a FILE.toml."
+                unknown_name(f"scenario {str(name)!r}", str(name), names) + " Or give a FILE.toml."
             )
     table = read_table(path)
     table.setdefault("name", path.stem)
     for override in overrides:
-        apply(table, override)
-    return build(Scenario, table, "")
+        apply_override(table, override)
+    return section_from(Scenario, table, "")
 
 
 def read_table(path: Path) -> dict[str, Any]:
-    """Return the parsed file."""
+    """The tables of a scenario file.
+
+    Raises:
+        ParameterError: If it cannot be read, or is not TOML.
+    """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -61,29 +66,31 @@ def read_table(path: Path) -> dict[str, Any]:
         raise ParameterError(f"{path}: not valid TOML: {error}") from None
 
 
-def apply(table: dict[str, Any], override: str) -> None:
+def apply_override(table: dict[str, Any], override: str) -> None:
     """Put one `key=value` into the parsed file; contacts are addressed by name."""
     key, text = assignment(override, "--set", "key=value")
     parts = key.split(".")
     node: Any = table
     for depth, part in enumerate(parts[:-1]):
-        node = inner(node, part, ".".join(parts[: depth + 1]))
+        node = section_of(node, part, ".".join(parts[: depth + 1]))
     node[parts[-1]] = parse_value(text)
 
 
-def inner(node: Any, part: str, where: str) -> Any:  # noqa: ANN401 - TOML values
+def section_of(node: Any, part: str, where: str) -> Any:  # noqa: ANN401 - TOML values
     """Return the section or the named contact `part` of a parsed table, made if not there."""
-    found = node.setdefault(part, {}) if isinstance(node, dict) else named(node, part, where)
+    found = (
+        node.setdefault(part, {}) if isinstance(node, dict) else contact_named(node, part, where)
+    )
     if not isinstance(found, dict | list):
         raise ParameterError(f"{where} is a value, not a section")
     return found
 
 
-def named(contacts: list[Any], name: str, where: str) -> Any:  # noqa: ANN401
+def contact_named(contacts: list[Any], name: str, where: str) -> Any:  # noqa: ANN401
     """Return the contact of a name."""
     there = [str(c.get("name")) for c in contacts if isinstance(c, dict)]
     if name not in there:
-        raise ParameterError(unknown(f"contact {where!r}", name, there or ["none"]))
+        raise ParameterError(unknown_name(f"contact {where!r}", name, there or ["none"]))
     return contacts[there.index(name)]
 
 
@@ -96,12 +103,8 @@ def parse_value(text: str) -> Any:  # noqa: ANN401
 
 
 def to_toml(scenario: Scenario, seed: int) -> str:
-    """Return a scenario as a TOML file that makes the same log again."""
-    table = as_table(scenario)
-    table["seed"] = seed
-    lines: list[str] = []
-    write_section(lines, "", table)
-    return "\n".join(lines) + "\n"
+    """A scenario as a TOML file that makes the same log again."""
+    return "".join(lines_of(as_table(scenario) | {"seed": seed}))
 
 
 def as_table(section: Any) -> dict[str, Any]:  # noqa: ANN401
@@ -117,38 +120,3 @@ def as_table(section: Any) -> dict[str, Any]:  # noqa: ANN401
             value = [as_table(v) for v in value]
         table[field.name] = value
     return table
-
-
-def write_section(lines: list[str], where: str, table: Mapping[str, Any]) -> None:
-    """Append a table's lines: its plain values first, then its sections."""
-    for key, value in table.items():
-        if not is_section(value):
-            lines.append(f"{key} = {literal(value)}")
-    for key, value in table.items():
-        name = f"{where}.{key}" if where else key
-        if isinstance(value, dict):
-            lines += ["", f"[{name}]"]
-            write_section(lines, name, value)
-        elif is_section(value):
-            for entry in value:
-                lines += ["", f"[[{name}]]"]
-                write_section(lines, name, entry)
-
-
-def is_section(value: Any) -> bool:  # noqa: ANN401
-    """Whether a value is a table or a list of tables."""
-    return isinstance(value, dict) or (
-        isinstance(value, list) and bool(value) and isinstance(value[0], dict)
-    )
-
-
-def literal(value: Any) -> str:  # noqa: ANN401
-    """Return a value as TOML writes it."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-        return f'"{escaped}"'
-    if isinstance(value, tuple | list):
-        return "[" + ", ".join(literal(v) for v in value) + "]"
-    return repr(value)

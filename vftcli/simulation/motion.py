@@ -1,6 +1,8 @@
 """Commanded joint motions with exact first and second derivatives."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -99,6 +101,11 @@ class Stretches:
             out.dq[rows] = slope * ds[:, None]
             out.ddq[rows] = slope * dds[:, None] + curve * (ds**2)[:, None]
         return out
+
+
+def straight_paths(points: Sequence[Array]) -> tuple[Array, ...]:
+    """Paths of `Stretches` that lead from each of the points (n,) [rad] to the next."""
+    return tuple(np.vstack([0.5 * (a + b), 0.5 * (b - a)]) for a, b in pairwise(points))
 
 
 def minimum_jerk(u: Array, length: float) -> tuple[Array, Array, Array]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.schema import unknown
+from vftcli.simulation.schema import unknown_name
 
 Vector = tuple[float, float, float]
 ORIGIN = (0.0, 0.0, 0.0)
@@ -61,7 +61,7 @@ def check_choice(key: str, value: str, options: Iterable[str]) -> None:
     """Raise unless `value` is one of the words a key takes."""
     words = list(options)
     if value not in words:
-        raise ParameterError(unknown(f"{key} {value!r}", value, words))
+        raise ParameterError(unknown_name(f"{key} {value!r}", value, words))
 
 
 class Push(NamedTuple):

@@ -12,7 +12,7 @@ from vftcli.signals.errors import ParameterError
 Section = TypeVar("Section")
 
 
-def build(cls: type[Section], table: Mapping[str, Any], where: str) -> Section:
+def section_from(cls: type[Section], table: Mapping[str, Any], where: str) -> Section:
     """Make a section's dataclass from its TOML table.
 
     Args:
@@ -25,16 +25,18 @@ def build(cls: type[Section], table: Mapping[str, Any], where: str) -> Section:
     """
     known = [f.name for f in fields(cls)]  # type: ignore[arg-type]
     if extra := [key for key in table if key not in known]:
-        raise ParameterError(unknown(f"scenario key {dotted(where, extra[0])!r}", extra[0], known))
+        raise ParameterError(
+            unknown_name(f"scenario key {key_path(where, extra[0])!r}", extra[0], known)
+        )
     hints = get_type_hints(cls)
     values = {}
     for field in fields(cls):  # type: ignore[arg-type]
         if field.name in table:
-            where_key = dotted(where, field.name)
+            where_key = key_path(where, field.name)
             values[field.name] = convert(table[field.name], hints[field.name], where_key)
         elif field.default is MISSING and field.default_factory is MISSING:
             raise ParameterError(
-                f"the scenario lacks {dotted(where, field.name)}; "
+                f"the scenario lacks {key_path(where, field.name)}; "
                 f"[{where or 'scenario'}] takes {', '.join(known)}"
             )
     return cls(**values)
@@ -49,7 +51,7 @@ def convert(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - TOML va
     if is_dataclass(hint) and isinstance(hint, type):
         if not isinstance(value, Mapping):
             raise ParameterError(f"{where} is {value!r}; it must be a section")
-        return build(hint, value, where)
+        return section_from(hint, value, where)
     if hint is float and isinstance(value, int | float) and not isinstance(value, bool):
         if not math.isfinite(value):
             raise ParameterError(f"{where} is {value!r}; it must be a finite number")
@@ -87,8 +89,8 @@ def convert_tagged(value: Any, options: Mapping[str, Any], where: str) -> Any:  
         raise ParameterError(f"{where} is {value!r}; it must be a section with a kind")
     kind = str(value.get("kind", ""))
     if kind not in options:
-        raise ParameterError(unknown(f"{where}.kind {kind!r}", kind, options))
-    return build(options[kind], {k: v for k, v in value.items() if k != "kind"}, where)
+        raise ParameterError(unknown_name(f"{where}.kind {kind!r}", kind, options))
+    return section_from(options[kind], {k: v for k, v in value.items() if k != "kind"}, where)
 
 
 def convert_tuple(value: Any, items: tuple[Any, ...], where: str) -> tuple[Any, ...]:  # noqa: ANN401
@@ -103,12 +105,12 @@ def convert_tuple(value: Any, items: tuple[Any, ...], where: str) -> tuple[Any, 
     return tuple(convert(v, item, f"{where}[{i}]") for i, (v, item) in enumerate(pairs))
 
 
-def dotted(where: str, key: str) -> str:
+def key_path(where: str, key: str) -> str:
     """Return the name of a key as `--set` takes it."""
     return f"{where}.{key}" if where else key
 
 
-def unknown(what: str, name: str, known: Iterable[str]) -> str:
+def unknown_name(what: str, name: str, known: Iterable[str]) -> str:
     """Return the complaint about an unknown name: the nearest one, and all there are."""
     there = list(known)
     close = difflib.get_close_matches(name, there, n=1, cutoff=0.5)

@@ -93,9 +93,9 @@ def log_rate(spec: SensingSpec, robot: Robot) -> float:
     return USUAL_RATE[robot.torque_source]
 
 
-def sample(arm: Arm) -> Samples:
+def sample_run(arm: Arm) -> Samples:
     """Sample a finished run on the log's clock."""
-    spec, history = arm.scenario.sensing, arm.finished()
+    spec, history = arm.scenario.sensing, arm.close()
     rate = log_rate(spec, arm.robot)
     end = history.rows * history.step
     count = int(np.floor(end * (1.0 + spec.clock_drift) * rate + 1e-6)) + 1
@@ -104,17 +104,17 @@ def sample(arm: Arm) -> Samples:
     grid = np.arange(history.rows + 1, dtype=float) * history.step
     interval = 1.0 / rate / (1.0 + spec.clock_drift)
     names = ("q", "v", "target_q", "target_dq", "target_ddq")
-    states = {name: at(time, grid, getattr(history, name)[: len(grid)]) for name in names}
+    states = {name: interpolate(time, grid, getattr(history, name)[: len(grid)]) for name in names}
     middle = grid[:-1] + 0.5 * history.step
     steps = {
-        name: at(time, middle, getattr(history, name)[:-1][: history.rows])
+        name: interpolate(time, middle, getattr(history, name)[:-1][: history.rows])
         for name in ("a", "friction")
     }
-    tau = torque_seen(history, grid, time, interval if spec.torque == "average" else 0.0)
+    tau = average_torque(history, grid, time, interval if spec.torque == "average" else 0.0)
     return Samples(time=time, stamp=stamp, tau=tau, **states, **steps)
 
 
-def at(time: Array, grid: Array, values: Array) -> Array:
+def interpolate(time: Array, grid: Array, values: Array) -> Array:
     """Interpolate columns of `values` (N, n), given on `grid` (N,), linearly at `time` (M,)."""
     step = grid[1] - grid[0]
     place = np.clip((time - grid[0]) / step, 0.0, len(grid) - 1.0)
@@ -126,7 +126,7 @@ def at(time: Array, grid: Array, values: Array) -> Array:
     return mixed
 
 
-def torque_seen(history: History, grid: Array, time: Array, interval: float) -> Array:
+def average_torque(history: History, grid: Array, time: Array, interval: float) -> Array:
     """Drive torque averaged over the `interval` before each sample, or over the last step. (M, n)
 
     The torque is constant over an inner step, so its integral is piecewise linear and the average
@@ -137,45 +137,47 @@ def torque_seen(history: History, grid: Array, time: Array, interval: float) -> 
     np.cumsum(history.tau[: history.rows] * history.step, axis=0, out=total[1:])
     begin = np.maximum(time - span, 0.0)
     end = np.maximum(time, grid[1])
-    mean: Array = (at(end, grid, total) - at(begin, grid, total)) / (end - begin)[:, None]
+    mean: Array = (interpolate(end, grid, total) - interpolate(begin, grid, total)) / (end - begin)[
+        :, None
+    ]
     return mean
 
 
-def measure(arm: Arm, samples: Samples) -> Measured:
+def measure_run(arm: Arm, samples: Samples) -> Measured:
     """Report what the sensors make of the true signals; everything random is from the seed."""
     spec, robot = arm.scenario.sensing, arm.robot
     rng = np.random.default_rng(arm.seeds["sensing"])
     shape = samples.q.shape
-    q = samples.q + spec.noise * known(robot.noise.q) * rng.standard_normal(shape)
+    q = samples.q + spec.noise * known_noise(robot.noise.q) * rng.standard_normal(shape)
     if spec.position_step > 0:
         q = np.round(q / spec.position_step) * spec.position_step
-    dq = samples.v + spec.noise * known(robot.noise.qd) * rng.standard_normal(shape)
+    dq = samples.v + spec.noise * known_noise(robot.noise.qd) * rng.standard_normal(shape)
     seen = samples.tau / arm.true.gain + arm.true.offset
     noise = rng.standard_normal(shape)
     current = None
     if robot.torque_source == "current" and robot.torque_constant is not None:
-        size = spec.noise * known(robot.noise.current)
+        size = spec.noise * known_noise(robot.noise.current)
         if spec.current_noise is not None:
             size = np.full(robot.joints, spec.current_noise)
         current = seen / robot.torque_constant + size * noise
         torque = current * robot.torque_constant
     else:
-        torque = seen + spec.noise * known(robot.noise.tau) * noise
+        torque = seen + spec.noise * known_noise(robot.noise.tau) * noise
     warm = spec.warming * (1.0 - np.exp(-samples.time / spec.warming_time))
     temperature = np.repeat((spec.temperature + warm)[:, None], shape[1], axis=1)
-    stamp = jittered(samples.stamp, spec.jitter, rng)
+    stamp = with_jitter(samples.stamp, spec.jitter, rng)
     rows = rows_logged(len(stamp), spec, rng)
     return Measured(
         stamp=stamp, q=q, dq=dq, torque=torque, current=current, temperature=temperature, rows=rows
     )
 
 
-def known(size: Array) -> Array:
+def known_noise(size: Array) -> Array:
     """Noise sizes with zero where the profile has none. (n,)"""
     return np.where(np.isfinite(size), size, 0.0)
 
 
-def jittered(stamp: Array, size: float, rng: np.random.Generator) -> Array:
+def with_jitter(stamp: Array, size: float, rng: np.random.Generator) -> Array:
     """Stamps with normal jitter, cut so that they still increase. (M,) [s]"""
     draw = rng.standard_normal(len(stamp))
     if size == 0 or len(stamp) < 2:

@@ -10,7 +10,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import ServoSpec
-from vftcli.simulation.schema import unknown
+from vftcli.simulation.schema import unknown_name
 
 STIFFNESS = {"stiff": 90.0, "soft": 28.0}
 """Natural frequency of the position loop by name. [rad/s]"""
@@ -35,7 +35,7 @@ class Servo:
         self.inertia = pin.crba
         if isinstance(spec.stiffness, str) and spec.stiffness not in STIFFNESS:
             raise ParameterError(
-                unknown(f"servo.stiffness {spec.stiffness!r}", spec.stiffness, STIFFNESS)
+                unknown_name(f"servo.stiffness {spec.stiffness!r}", spec.stiffness, STIFFNESS)
             )
         omega = STIFFNESS[spec.stiffness] if isinstance(spec.stiffness, str) else spec.stiffness
         if omega <= 0 or spec.damping < 0:
@@ -53,7 +53,7 @@ class Servo:
         self.q_min = np.where(np.isfinite(robot.limits.q_min), robot.limits.q_min, -np.inf)
         self.q_max = np.where(np.isfinite(robot.limits.q_max), robot.limits.q_max, np.inf)
 
-    def within(self, q_d: Array) -> Array:
+    def clip_to_limits(self, q_d: Array) -> Array:
         """A commanded position brought inside the joint limits. (n,) [rad]"""
         return np.clip(q_d, self.q_min, self.q_max)
 
@@ -62,13 +62,8 @@ class Servo:
         rest = np.zeros_like(reference.q)
         full = self.spec.feed_forward
         dq, ddq = (reference.dq, reference.ddq) if full else (rest, rest)
-        return self.rigid(Reference(reference.q, dq, ddq)) + friction_torque(
-            self.robot.friction, dq
-        )
-
-    def rigid(self, reference: Reference) -> Array:
-        """Nominal rigid-body torque along a reference. (T, n) [N·m]"""
-        return rigid_torque(self.model, reference)
+        rigid = rigid_torque(self.model, Reference(reference.q, dq, ddq))
+        return rigid + friction_torque(self.robot.friction, dq)
 
     def torque(self, forward: Array, q_d: Array, dq_d: Array, q: Array, dq: Array) -> Array:
         """The commanded torque. (n,) [N·m]"""

@@ -41,14 +41,14 @@ def slide_or_stick(
                 return after, limit * signs, signs
             signs = np.where(wrong, 0.0, signs)
             continue
-        after, friction, better = partly_stuck(M, impulse, v, limit, signs)
+        after, friction, better = step_with_stuck_joints(M, impulse, v, limit, signs)
         if np.array_equal(better, signs):
             return after, friction, signs
         signs = better
-    return sweeps(M, impulse, v, limit)
+    return gauss_seidel(M, impulse, v, limit)
 
 
-def partly_stuck(
+def step_with_stuck_joints(
     M: Array, impulse: Array, v: Array, limit: Array, signs: Array
 ) -> tuple[Array, Array, Array]:
     """The step if exactly the joints with sign 0 stick, and the directions that result."""
@@ -70,7 +70,7 @@ def partly_stuck(
     return after, friction, better
 
 
-def sweeps(M: Array, impulse: Array, v: Array, limit: Array) -> tuple[Array, Array, Array]:
+def gauss_seidel(M: Array, impulse: Array, v: Array, limit: Array) -> tuple[Array, Array, Array]:
     """The same step by projected Gauss–Seidel, which converges for every positive definite M̃."""
     A = np.linalg.inv(M)
     free = v + A @ impulse

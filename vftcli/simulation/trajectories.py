@@ -1,7 +1,6 @@
 """The kinds of ``[trajectory]`` a scenario can have, each turned into a motion of the joints."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -11,7 +10,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.calibration_motions import ExcitationSpec, JointwiseSpec, PosesSpec
 from vftcli.simulation.kinematics import FlangePose, check_limits, check_start, flange_pose, follow
-from vftcli.simulation.motion import Command, Periodic, Reference, Stretches
+from vftcli.simulation.motion import Command, Periodic, Reference, Stretches, straight_paths
 
 HARMONICS = 48
 """Harmonics kept of a periodic path; those of a circle fall below rounding long before."""
@@ -80,7 +79,7 @@ class HoldSpec:
         start = check_start(robot, self.start)
         return Stretches(
             times=np.array([[0.0, 1.0]]),
-            paths=(np.vstack([start, 0.0 * start]),),
+            paths=straight_paths([start, start]),
             duration=self.length,
         )
 
@@ -149,7 +148,7 @@ class JointMovesSpec:
         points = [start, *(start + np.array(row[2:]) for row in self.moves)]
         return Stretches(
             times=np.array([row[:2] for row in self.moves]),
-            paths=tuple(np.vstack([0.5 * (a + b), 0.5 * (b - a)]) for a, b in pairwise(points)),
+            paths=straight_paths(points),
             duration=self.length,
         )
 

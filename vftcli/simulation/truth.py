@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.simulation.arm import Arm
-from vftcli.simulation.sensing import Samples, at
+from vftcli.simulation.sensing import Samples, interpolate
 from vftcli.simulation.touch import Mounted, joint_jacobian
 
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -52,21 +52,23 @@ class Truth:
         return table
 
 
-def tell_truth(arm: Arm, samples: Samples) -> Truth:
+def truth_of(arm: Arm, samples: Samples) -> Truth:
     """Evaluate the contacts at the log's sampling instants."""
     history, touching = arm.history, arm.touching
     middle = (np.arange(history.rows, dtype=float) + 0.5) * history.step
-    wrenches = at(samples.time, middle, history.wrenches[: history.rows])
-    walk = at(samples.time, middle, history.walk[: history.rows])
+    wrenches = interpolate(samples.time, middle, history.wrenches[: history.rows])
+    walk = interpolate(samples.time, middle, history.walk[: history.rows])
     model = arm.plant.model
     data = model.createData()
     tau_ext, wrench = walk.copy(), np.zeros((len(samples.time), 6))
     for k in np.flatnonzero(np.any(wrenches != 0.0, axis=(1, 2))):
-        tau, flange = one_sample(model, data, samples.q[k], touching.mounted, wrenches[k])
+        tau, flange = torque_and_wrench(model, data, samples.q[k], touching.mounted, wrenches[k])
         tau_ext[k] += tau
         wrench[k] = flange
     contacts = {m.name: wrenches[:, c] for c, m in enumerate(touching.mounted) if not m.on_flange}
-    walks = {w.name: at(samples.time, middle, w.torque[: history.rows]) for w in touching.walks}
+    walks = {
+        w.name: interpolate(samples.time, middle, w.torque[: history.rows]) for w in touching.walks
+    }
     return Truth(
         t=samples.stamp,
         tau_ext=tau_ext,
@@ -81,7 +83,7 @@ def tell_truth(arm: Arm, samples: Samples) -> Truth:
     )
 
 
-def one_sample(
+def torque_and_wrench(
     model: Any,  # noqa: ANN401 - Pinocchio is untyped
     data: Any,  # noqa: ANN401
     q: Array,
@@ -96,17 +98,17 @@ def one_sample(
     for contact, wrench in zip(mounted, wrenches, strict=True):
         R = data.oMi[contact.joint].rotation
         if contact.on_flange:
-            flange += moved(wrench, R @ contact.turn @ contact.lever)
+            flange += at_other_point(wrench, R @ contact.turn @ contact.lever)
         else:
             J = joint_jacobian(model, data, contact.joint)
-            tau += J.T @ moved(wrench, R @ contact.point)
+            tau += J.T @ at_other_point(wrench, R @ contact.point)
     last = len(q)
     offset = (
         data.oMi[last].rotation @ model.frames[model.getFrameId("flange")].placement.translation
     )
-    return tau + joint_jacobian(model, data, last).T @ moved(flange, offset), flange
+    return tau + joint_jacobian(model, data, last).T @ at_other_point(flange, offset), flange
 
 
-def moved(wrench: Array, lever: Array) -> Array:
+def at_other_point(wrench: Array, lever: Array) -> Array:
     """A wrench referred to a point from which its own point lies `lever` (3,) [m] away. (6,)"""
     return np.concatenate([wrench[:3], wrench[3:] + np.cross(lever, wrench[:3])])

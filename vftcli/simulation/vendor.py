@@ -46,11 +46,11 @@ def vendor_view(arm: Arm, samples: Samples, measured: Measured) -> Vendor:
     model_torque += friction_torque(nominal.friction, measured.dq)
     spec = arm.scenario.sensing
     step = 1.0 / log_rate(spec, arm.robot)
-    residual = low_passed(measured.torque - model_torque, spec.vendor_cutoff, step)
+    residual = first_order_low_pass(measured.torque - model_torque, spec.vendor_cutoff, step)
     return Vendor(target_torque=target_torque, target_current=target_current, tau_ext=-residual)
 
 
-def low_passed(signal: Array, cutoff: float, step: float) -> Array:
+def first_order_low_pass(signal: Array, cutoff: float, step: float) -> Array:
     """First-order low-pass at `cutoff` [Hz] of a signal (M, n) sampled every `step` [s]."""
     share = 1.0 - np.exp(-2.0 * np.pi * cutoff * step)
     out = np.empty_like(signal)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.experiment import Simulation
-from vftcli.simulation.schema import unknown
+from vftcli.simulation.schema import unknown_name
 from vftcli.simulation.writers.libfranka import write_libfranka
 from vftcli.simulation.writers.parquet import write_parquet
 from vftcli.simulation.writers.rosbag2 import write_rosbag2
@@ -33,7 +33,7 @@ def usual_format(simulation: Simulation, wanted: str = "") -> str:
     """
     name = wanted or simulation.scenario.format or USUAL[simulation.robot.torque_source]
     if name not in WRITERS:
-        raise ParameterError(unknown(f"log format {name!r}", name, WRITERS))
+        raise ParameterError(unknown_name(f"log format {name!r}", name, WRITERS))
     return name
 
 

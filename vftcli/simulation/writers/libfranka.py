@@ -59,7 +59,8 @@ def franka_table(simulation: Simulation) -> Array:
     pose = np.zeros((len(samples.time), 4, 4))
     pose[:, :3, :3], pose[:, :3, 3], pose[:, 3, 3] = target.rotation, target.position, 1.0
     still = np.zeros_like(samples.target_q)
-    weight = gravity_torque(simulation, samples.target_q)
+    resting = Reference(samples.target_q, still, still)
+    weight = rigid_torque(simulation.nominal.model, resting)
     columns = [
         measured.q,
         samples.target_q,
@@ -67,21 +68,15 @@ def franka_table(simulation: Simulation) -> Array:
         samples.target_dq,
         measured.torque,
         -simulation.vendor.tau_ext,
-        following(samples.target_q),
-        following(samples.target_dq),
-        following(pose.transpose(0, 2, 1).reshape(-1, 16)),
-        following(target.twist),
-        following(simulation.vendor.target_torque - weight + still),
+        next_rows(samples.target_q),
+        next_rows(samples.target_dq),
+        next_rows(pose.transpose(0, 2, 1).reshape(-1, 16)),
+        next_rows(target.twist),
+        next_rows(simulation.vendor.target_torque - weight),
     ]
     return np.hstack(columns) + 0.0
 
 
-def following(values: Array) -> Array:
+def next_rows(values: Array) -> Array:
     """Each row's successor, the last repeated."""
     return np.vstack([values[1:], values[-1:]])
-
-
-def gravity_torque(simulation: Simulation, q: Array) -> Array:
-    """Nominal gravity torque at positions (M, n) [rad]. (M, n) [N·m]"""
-    still = np.zeros_like(q)
-    return rigid_torque(simulation.nominal.model, Reference(q, still, still))

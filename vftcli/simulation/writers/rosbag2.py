@@ -64,8 +64,7 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
     rows = np.array(simulation.measured.rows)
     clock = simulation.measured.stamp[rows] + simulation.scenario.sensing.start
     stamps = np.array([round(float(t) * 1e9) for t in clock], dtype=np.int64)
-    franka = simulation.robot.joints == 7 and simulation.robot.torque_source == "link_torque"
-    make = robot_states if franka else joint_states
+    make = robot_states if simulation.robot.ros_state == ROBOT_STATE else joint_states
     topics = [make(simulation, rows, stamps)]
     if simulation.force_sensor is not None:
         topics.append(wrenches(simulation.force_sensor[rows], stamps))

@@ -16,16 +16,6 @@ from vftcli.virtual_sensor.solvers import LEAST_SIGMA, wrench_of
 DIGITS = 9
 """Decimals kept; the client prints all seventeen digits, noise included."""
 
-SHORT = (
-    "timestamp",
-    "target_q",
-    "target_qd",
-    "target_current",
-    "target_moment",
-    "actual_q",
-    "actual_qd",
-    "actual_current",
-)
 FULL = (
     "timestamp",
     "target_q",
@@ -60,6 +50,8 @@ FULL = (
     "runtime_state",
     "joint_position_deviation_ratio",
 )
+SHORT = (*FULL[:3], *FULL[4:9])
+"""Joint motion, currents and the target moment alone: up to actual_current, no acceleration."""
 RECIPES: dict[str, Sequence[str]] = {"full": FULL, "short": SHORT}
 """Name of a recipe → its fields. "full" is the default record_configuration.xml of the client."""
 
