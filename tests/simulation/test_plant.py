@@ -12,7 +12,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.simulation.friction import TrueFriction, true_friction
 from vftcli.simulation.plant import Plant
 from vftcli.simulation.scenario import FrictionSpec
-from vftcli.simulation.stiction import slide_or_stick, gauss_seidel
+from vftcli.simulation.stiction import gauss_seidel, slide_or_stick
 
 
 def frictionless(robot: Robot) -> TrueFriction:
