@@ -145,3 +145,30 @@ def test_an_error_of_the_system_becomes_one_line(tmp_path: Path) -> None:
         raise OSError(28, "No space left on device")
     assert "\n" not in str(caught.value)
     assert names(tmp_path) == []
+
+
+def test_a_move_that_fails_half_way_is_undone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second of three files cannot be moved: the first is what it was, the third not there."""
+    for name in ("a.txt", "b.txt", "stale.txt"):
+        (tmp_path / name).write_text("old")
+    move = Path.replace
+
+    def failing(self: Path, target: Path) -> Path:
+        if self.name == "b.txt" and target.parent == tmp_path:
+            raise OSError(5, "Input/output error")
+        return move(self, target)
+
+    monkeypatch.setattr(Path, "replace", failing)
+    declared = ["a.txt", "b.txt", "c.txt", "stale.txt"]
+
+    def write() -> None:
+        with OutputFolder(tmp_path, force=True, names=declared) as folder:
+            for name in declared[:3]:
+                (folder / name).write_text("new")
+
+    with pytest.raises(OutputError, match="input/output error"):
+        write()
+    assert names(tmp_path) == ["a.txt", "b.txt", "stale.txt"]
+    assert {path.read_text() for path in tmp_path.iterdir()} == {"old"}

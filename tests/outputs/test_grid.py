@@ -6,9 +6,9 @@ from html.parser import HTMLParser
 import pytest
 
 from vftcli.outputs.grid import (
-    Cell,
     Column,
     Grid,
+    GridCell,
     csv_rows,
     escape_latex,
     html,
@@ -33,7 +33,7 @@ def grid() -> Grid:
         unit="N·m",
         columns=(Column("observer", words=True), *joint_columns(2)),
         rows=(
-            ("fdo", Cell("0.550", best=True, mark="*", html="0.550<i>!</i>"), 12.346),
+            ("fdo", GridCell("0.550", best=True, mark="*", html="0.550<i>!</i>"), 12.346),
             (HOSTILE, 2.0, float("nan")),
             ("floor", 0.5, None),
         ),

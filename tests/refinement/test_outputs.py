@@ -10,7 +10,7 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
-from vftcli.outputs.log.parquet import estimates_table
+from vftcli.outputs.log.estimates import estimates_table
 from vftcli.outputs.log.rerun_recording import line_groups
 from vftcli.outputs.log.run_record import run_record, to_json
 from vftcli.outputs.page.page import render

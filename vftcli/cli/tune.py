@@ -51,7 +51,7 @@ def tune_gains(
     from vftcli.outputs.files import refuse_existing, write_text
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
-    from vftcli.outputs.log.run_record import plain
+    from vftcli.outputs.log.run_record import jsonable
     from vftcli.pipeline import AnalysisChoice, model, read
     from vftcli.refinement.tuning import gains_document, parse_goal, tune_all
     from vftcli.repetition.free_run import Models
@@ -77,7 +77,7 @@ def tune_gains(
     comments = "".join(f"# {line}\n" for line in heading)
     write_text(output, comments + "".join(lines_of(gains_document(tuned))), force)
     if json:
-        rows = [plain({**line._asdict()}) for line in tuned]
+        rows = [jsonable({**line._asdict()}) for line in tuned]
         typer.echo(json_module.dumps({"goal": goal, "notes": notes, "observers": rows}, indent=2))
         return
     say_recording(recording)

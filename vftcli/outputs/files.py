@@ -121,11 +121,11 @@ class OutputFolder:
         for file in files:
             refuse_existing(self.path / file.relative_to(self.temporary), self.force)
         targets = [self.path / file.relative_to(self.temporary) for file in files]
-        for file, target in zip(files, targets, strict=True):
-            target.parent.mkdir(parents=True, exist_ok=True)
-            file.replace(target)
-        for stale in {self.path / name for name in self.names}.difference(targets):
-            stale.unlink(missing_ok=True)
+        stale = {self.path / name for name in self.names}.difference(targets)
+        with kept_aside([*targets, *stale], self.temporary / "earlier"):
+            for file, target in zip(files, targets, strict=True):
+                target.parent.mkdir(parents=True, exist_ok=True)
+                file.replace(target)
         for folder in sorted((p for p in self.temporary.rglob("*")), reverse=True):
             folder.rmdir()
 
@@ -140,6 +140,33 @@ class OutputFolder:
     def _concerns(self, error: OSError) -> bool:
         """Whether an error of the operating system is about this folder."""
         return error.filename is None or str(error.filename).startswith(str(self.path))
+
+
+@contextmanager
+def kept_aside(paths: Iterable[Path], aside: Path) -> Iterator[None]:
+    """Move files out of the way for a block; put them back, and only them, if the block fails.
+
+    Args:
+        paths: Files that are there or will be.
+        aside: A folder that is made for them, and goes with them when the block ends well.
+    """
+    paths = list(paths)
+    aside.mkdir()
+    moved = [path for path in paths if path.exists() or path.is_symlink()]
+    places = [aside / str(k) for k in range(len(moved))]
+    try:
+        for path, place in zip(moved, places, strict=True):
+            path.replace(place)
+        yield
+    except BaseException:
+        for path in set(paths).difference(moved):
+            path.unlink(missing_ok=True)
+        for path, place in zip(moved, places, strict=True):
+            # A file that could not be moved is where it was.
+            if place.exists() or place.is_symlink():
+                place.replace(path)
+        raise
+    shutil.rmtree(aside)
 
 
 def refuse_existing(path: Path, force: bool) -> None:

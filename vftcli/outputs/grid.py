@@ -41,7 +41,7 @@ BEST = ' class="best"'
 """What the style sheet makes bold."""
 
 
-class Cell(NamedTuple):
+class GridCell(NamedTuple):
     """An entry that stands out, or that the page shows otherwise than the terminal.
 
     Attributes:
@@ -57,7 +57,7 @@ class Cell(NamedTuple):
     html: str = ""
 
 
-Entry = Cell | str | float | None
+Entry = GridCell | str | float | None
 
 
 def significant(value: float, digits: int = 3) -> str:
@@ -102,16 +102,16 @@ class Column(NamedTuple):
         """The heading with its unit."""
         return f"{self.head} [{self.unit}]" if self.unit else self.head
 
-    def cell(self, entry: Entry) -> Cell:
+    def cell(self, entry: Entry) -> GridCell:
         """An entry as text; a dash where it is not known."""
-        if isinstance(entry, Cell):
+        if isinstance(entry, GridCell):
             return entry
         if entry is None or (isinstance(entry, float) and np.isnan(entry)):
-            return Cell(DASH)
+            return GridCell(DASH)
         if isinstance(entry, float):
             form = self.form
-            return Cell(format(entry, form) if isinstance(form, str) else form(entry))
-        return Cell(str(entry))
+            return GridCell(format(entry, form) if isinstance(form, str) else form(entry))
+        return GridCell(str(entry))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +148,7 @@ class Grid:
         return ", ".join(text for text in (self.title, quantity) if text)
 
     @property
-    def cells(self) -> list[list[Cell]]:
+    def cells(self) -> list[list[GridCell]]:
         """Every entry as text."""
         return [[c.cell(x) for c, x in zip(self.columns, row, strict=True)] for row in self.rows]
 
@@ -256,7 +256,7 @@ def html(grid: Grid) -> str:
     )
 
 
-def html_line(grid: Grid, row: Sequence[Cell], kind: str) -> str:
+def html_line(grid: Grid, row: Sequence[GridCell], kind: str) -> str:
     """One row of a table: its head, then its entries."""
     first, *rest = row
     # The page's script paints the observer's colour before every head that names one.

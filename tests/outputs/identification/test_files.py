@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from vftcli.identification import Task, identify
+from vftcli.outputs.identification import files
 from vftcli.outputs.identification.files import identification_record, write_identification
 from vftcli.outputs.identification.page import render_identification
 from vftcli.robots import load_robot
@@ -71,6 +72,25 @@ def test_a_name_without_toml_is_refused(found, tmp_path):
     with pytest.raises(OutputError, match=r"ends in \.toml"):
         write_identification(tmp_path / "mine", result, [log], "", force=False)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_failure_at_the_last_file_leaves_everything_as_it_was(found, tmp_path, monkeypatch):
+    """The files were written one by one: a full disk left a page beside another run's robot."""
+    result, log = found
+    path = tmp_path / "mine.toml"
+    path.write_text("earlier", encoding="utf-8")
+    last = files.write_text
+
+    def failing(target, text):
+        if target.suffix == ".toml":
+            raise OutputError("the disk is full")
+        last(target, text)
+
+    monkeypatch.setattr(files, "write_text", failing)
+    with pytest.raises(OutputError, match="disk is full"):
+        write_identification(path, result, [log], "", force=True)
+    assert [p.name for p in tmp_path.iterdir()] == ["mine.toml"]
+    assert path.read_text(encoding="utf-8") == "earlier"
 
 
 class Balance(HTMLParser):

@@ -5,7 +5,7 @@ import numpy as np
 import polars as pl
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.log.parquet import estimates_table, write_csv, write_estimates
+from vftcli.outputs.log.estimates import estimates_table, write_csv, write_estimates
 
 
 def test_parquet_holds_flat_float_columns(analysis: Analysis, tmp_path: Path) -> None:

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import polars as pl
@@ -27,16 +28,29 @@ def test_without_a_reference_there_are_no_error_tables(
     assert found == {"index.html", "recording.rrd", "estimates.parquet", "run.json"}
 
 
+def labelled(analysis: Analysis, label: str) -> Analysis:
+    """The same run under another label, as a second log of the command would have one."""
+    source = replace(analysis.recording.source, label=label)
+    assert analysis.errors is not None
+    errors = analysis.errors.with_columns(recording=pl.lit(label))
+    recording = replace(analysis.recording, source=source)
+    return replace(analysis, recording=recording, errors=errors)
+
+
 def test_several_logs_get_a_folder_each_and_an_index(analysis: Analysis, tmp_path: Path) -> None:
-    text = write_reports(tmp_path / "out", [analysis, analysis], command="vftcli report a b")
+    """Two logs of one file name: folders are numbered, rows bear the labels."""
+    labels = ["a/run.csv", "b/run.csv"]
+    analyses = [labelled(analysis, label) for label in labels]
+    text = write_reports(tmp_path / "out", analyses, command="vftcli report a b")
     folders = sorted(p.name for p in (tmp_path / "out").iterdir() if p.is_dir())
-    assert len(folders) == 2
+    assert folders == ["run", "run-2"]
     for folder in folders:
         assert sorted(p.name for p in (tmp_path / "out" / folder).iterdir()) == sorted(FILES)
     assert len(json.loads(text)) == 2
     errors = pl.read_csv(tmp_path / "out/errors.csv")
-    assert sorted(errors["recording"].unique()) == folders
+    assert errors["recording"].unique(maintain_order=True).to_list() == labels
     assert len(errors) == 2 * len(pl.read_csv(tmp_path / "out" / folders[0] / "errors.csv"))
+    assert (tmp_path / "out/errors.md").read_text(encoding="utf-8").count("run.csv against") == 2
 
 
 def test_a_failing_writer_leaves_nothing(

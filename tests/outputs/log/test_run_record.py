@@ -1,10 +1,14 @@
 import json
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import vftcli
 from vftcli.analysis import Analysis
-from vftcli.outputs.log.run_record import plain, to_json
+from vftcli.outputs.log.run_record import about, all_remarks, jsonable, run_record, to_json
+from vftcli.signals import remarks
+from vftcli.signals.remarks import Where, caution, fact
 
 
 def test_run_json_says_how_to_make_it_again(analysis: Analysis) -> None:
@@ -41,7 +45,7 @@ def test_a_built_in_robot_has_no_path(analysis: Analysis) -> None:
 
 def test_what_is_not_finite_becomes_null() -> None:
     value = {"a": np.array([1.0, np.nan]), "b": float("inf"), "c": (np.float64(2.0), True, "x")}
-    assert plain(value) == {"a": [1.0, None], "b": None, "c": [2.0, True, "x"]}
+    assert jsonable(value) == {"a": [1.0, None], "b": None, "c": [2.0, True, "x"]}
 
 
 def test_lists_of_numbers_stand_on_one_line() -> None:
@@ -49,3 +53,43 @@ def test_lists_of_numbers_stand_on_one_line() -> None:
     text = to_json(record)
     assert '"gain": [ 1.0, null, 3.0 ]' in text
     assert json.loads(text) == record
+
+
+@pytest.fixture
+def catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A catalogue of one remark."""
+    words = '[test-shift]\nshort = "shifted by {shift_s:.2f} s"\nlong = "it was shifted"\n'
+    monkeypatch.setattr(remarks, "catalogue", lambda: (words,))
+
+
+@pytest.mark.usefixtures("catalogue")
+def test_a_remark_is_recorded_as_data(analysis: Analysis) -> None:
+    shift = caution("test-shift", Where("gmo", (2, 3), (1.0, 2.5)), shift_s=np.float64(0.25))
+    record = json.loads(to_json(run_record(replace(analysis, notes=(shift,)), "x")))
+    assert record["notes"][0] == {
+        "code": "test-shift",
+        "level": "caution",
+        "message": "gmo: shifted by 0.25 s",
+        "values": {"shift_s": 0.25},
+        "about": "gmo",
+        "joints": [2, 3],
+        "span_s": [1.0, 2.5],
+    }
+
+
+@pytest.mark.usefixtures("catalogue")
+def test_a_remark_of_an_estimate_says_whose_it_is_once(analysis: Analysis) -> None:
+    own = fact("test-shift", shift_s=0.25)
+    first, *others = analysis.estimates
+    noted = replace(analysis, estimates=(replace(first, remarks=(own, own)), *others), notes=())
+    found = all_remarks(noted)
+    assert [str(remark) for remark in found].count("fdo: shifted by 0.25 s") == 1
+    of_run = replace(noted, notes=(own,))
+    assert "fdo: shifted by 0.25 s" not in map(str, all_remarks(of_run))
+
+
+@pytest.mark.usefixtures("catalogue")
+def test_what_a_remark_is_about_stays() -> None:
+    own = fact("test-shift", Where("sensor"), shift_s=0.25)
+    assert about("gmo", own) == own
+    assert str(about("gmo", fact("test-shift", shift_s=0.25))) == "gmo: shifted by 0.25 s"

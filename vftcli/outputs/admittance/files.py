@@ -86,7 +86,7 @@ def admittance_record(
         "versions": versions(),
         "input": input_record(recording) if recording is not None else None,
         "robot": robot_record(replay.robot),
-        "force": str(replay.source),
+        "force": replay.source,
         "closed_loop": None if run is None else loop_record(run),
         "start_rad": replay.start,
         "parameters": {
@@ -99,7 +99,7 @@ def admittance_record(
         },
         "controllers": [verdict_record(verdict) for verdict in replay.verdicts],
         "conventions": CONVENTIONS,
-        "notes": [str(note) for note in replay.notes],
+        "notes": list(replay.notes),
         "repairs": list(recording.source.repairs) if recording is not None else [],
     }
 

@@ -45,7 +45,7 @@ def render_admittance(
     parts = (
         headline(title, text),
         facts_section(replay),
-        remarks([str(note) for note in replay.notes]),
+        remarks(replay.notes),
         closed_loop_section(run),
         comparison_section(replay),
         charts_section(),

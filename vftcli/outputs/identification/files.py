@@ -5,7 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from vftcli.identification.result import Identification
-from vftcli.outputs.files import atomic, refuse_existing, write_text
+from vftcli.outputs.files import OutputFolder, write_text
+from vftcli.outputs.identification.page import render_identification
+from vftcli.outputs.identification.recording import write_identification_rrd
 from vftcli.outputs.log.run_record import (
     CONVENTIONS,
     file_sha256,
@@ -17,7 +19,6 @@ from vftcli.outputs.log.run_record import (
 from vftcli.robots.writing import robot_toml
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import as_record
 
 
 def beside(path: Path) -> dict[str, Path]:
@@ -39,7 +40,7 @@ def beside(path: Path) -> dict[str, Path]:
 def write_identification(
     path: Path, found: Identification, logs: Sequence[Recording], command: str, force: bool
 ) -> str:
-    """Write all files, the robot file last, so that it is there only if all the others are.
+    """Write all files or none; those of an earlier run stay as they were if one fails.
 
     Args:
         path: The robot file.
@@ -54,21 +55,19 @@ def write_identification(
     Raises:
         OutputError: If one exists and `force` is not set, or cannot be written.
     """
-    from vftcli.outputs.identification.page import render_identification
-    from vftcli.outputs.identification.recording import write_identification_rrd
-
-    files = beside(path)
-    for file in files.values():
-        refuse_existing(file, force)
+    names = {kind: file.name for kind, file in beside(path).items()}
     record = identification_record(found, logs, command)
-    text = to_json(record)
-    write_text(files["html"], render_identification(found, record), force)
-    with atomic(files["rrd"], force) as temporary:
-        write_identification_rrd(temporary, found)
-    write_text(files["run"], text, force)
     heading = [f"{found.robot.title}; written by vftcli identify, keys: docs/robots.md.", command]
-    write_text(files["toml"], robot_toml(found.robot, heading), force)
-    return text
+    texts = {
+        "html": render_identification(found, record),
+        "run": to_json(record),
+        "toml": robot_toml(found.robot, heading),
+    }
+    with OutputFolder(path.parent, force, names.values()) as folder:
+        write_identification_rrd(folder / names["rrd"], found)
+        for kind, text in texts.items():
+            write_text(folder / names[kind], text)
+    return texts["run"]
 
 
 def identification_record(
@@ -91,5 +90,5 @@ def identification_record(
         "conventions": CONVENTIONS,
         "repairs": [note for log in logs for note in log.source.repairs],
         "warnings": [note for log in logs for note in log.source.warnings],
-        "remarks": [as_record(remark) for remark in found.remarks],
+        "remarks": list(found.remarks),
     }

@@ -21,7 +21,6 @@ from vftcli.outputs.page.shell import (
     remarks,
 )
 from vftcli.outputs.palette import SPARE
-from vftcli.signals.remarks import explanation
 
 DOTS = 600
 """Samples drawn in a residual-over-velocity plot."""
@@ -36,7 +35,7 @@ def render_identification(found: Identification, record: Mapping[str, Any]) -> s
     text = f"{found.robot.title}: method {found.method}, from {logs}"
     parts = (
         headline(found.robot.name, text),
-        remarks([explanation(remark) for remark in found.remarks]),
+        remarks(found.remarks),
         residual_section(found),
         velocity_section(found),
         parameter_section(found),

@@ -5,15 +5,18 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from vftcli.outputs.files import atomic
-from vftcli.outputs.log.mcap_output import OutputTopic, joint_topic, stamps_of, write_topics
+from vftcli.outputs.log.estimates import per_axis, per_joint
+from vftcli.outputs.log.mcap_output import (
+    OutputTopic,
+    joint_topic,
+    source_stamps,
+    stamps_of,
+    write_topics,
+)
 from vftcli.readers.bags.ros_messages import Value, in_parts
-from vftcli.signals.arrays import Array
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
-from vftcli.signals.wrench import AXES
 
 COLUMN_NAMES = {"torque": "tau"}
 """Signals whose columns are called otherwise than the field of a Recording."""
@@ -34,7 +37,7 @@ def convert(recording: Recording, path: Path, *, force: bool = False) -> None:
         writer(recording, temporary)
 
 
-def columns_of(recording: Recording) -> Iterator[tuple[str, Array]]:
+def columns_of(recording: Recording) -> Iterator[tuple[str, Any]]:
     """Name and values of every column: t from 0, the source's own stamps, then the signals.
 
     The names are among the aliases of the table reader, so that the file reads back.
@@ -42,21 +45,10 @@ def columns_of(recording: Recording) -> Iterator[tuple[str, Array]]:
     yield "t", recording.t
     yield "t_src_ns", source_stamps(recording)
     for name in JOINT_SIGNALS:
-        value = getattr(recording, name)
-        if value is not None:
-            for j, column in enumerate(np.ascontiguousarray(value.T), start=1):
-                yield f"{COLUMN_NAMES.get(name, name)}/{j}", column
+        if (value := getattr(recording, name)) is not None:
+            yield from per_joint(COLUMN_NAMES.get(name, name), value)
     if recording.wrench is not None:
-        for axis, column in zip(AXES, np.ascontiguousarray(recording.wrench.T), strict=True):
-            yield f"wrench/{axis}", column
-
-
-def source_stamps(recording: Recording) -> Any:  # noqa: ANN401 - whole numbers
-    """The log's own stamps in whole nanoseconds. (T,) [ns]"""
-    start = recording.source.t0_ns
-    if start is None:
-        start = round(recording.source.t0 * 1e9)
-    return start + np.rint(recording.t * 1e9).astype(np.int64)
+        yield from per_axis("wrench", recording.wrench)
 
 
 def write_parquet(recording: Recording, path: Path) -> None:
@@ -65,15 +57,15 @@ def write_parquet(recording: Recording, path: Path) -> None:
 
     table = pl.DataFrame(dict(columns_of(recording)))
     frame = recording.wrench_frame
-    told = {
+    metadata = {
         "format": recording.source.format,
         "sha256": recording.source.sha256,
         "joint_names": recording.joint_names,
         "wrench_frame": frame.notation if frame is not None else None,
         "robot": recording.robot_hint,
-        "repairs": recording.source.repairs,
+        "repairs": [str(repair) for repair in recording.source.repairs],
     }
-    table.write_parquet(path, compression="zstd", metadata={"vftcli": json.dumps(told)})
+    table.write_parquet(path, compression="zstd", metadata={"vftcli": json.dumps(metadata)})
 
 
 def write_csv(recording: Recording, path: Path) -> None:

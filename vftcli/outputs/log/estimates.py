@@ -1,12 +1,112 @@
-"""What `vftcli estimate` writes: the estimates, how they were made, and other formats on demand."""
+"""What `vftcli estimate` writes: the estimates as flat columns, `run.json`, extras on demand."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.files import OutputFolder
-from vftcli.outputs.log.parquet import write_csv, write_estimates
+from vftcli.outputs.files import OutputFolder, one_line
 from vftcli.outputs.log.run_record import run_record, to_json
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import OutputError
+from vftcli.signals.wrench import AXES, Wrench
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+def estimates_table(analysis: Analysis) -> "pl.DataFrame":
+    """Time, motion, every observer's torque and the reference's, one flat column each.
+
+    Columns: ``t`` [s]; ``q/1``… [rad]; ``dq/1``… [rad/s]; ``tau_ext/<observer>/1``… [N·m];
+    ``sd/<observer>/1``… [N·m] where the observer gives one; ``tau_ext/reference/1``… [N·m];
+    where a wrench is asked for, ``wrench/<observer>/fx``…``mz`` [N, N·m], null where the pose
+    cannot tell it, ``wrench_sd/<observer>/fx``…, ``null_space/<observer>`` [N·m] and
+    ``sigma_min`` [m]; with a bounded solver, what it says of the masked samples stands apart in
+    ``wrench_masked/<observer>/fx``….
+    What is not known is null.
+    """
+    import polars as pl
+
+    table = pl.DataFrame(dict(columns(analysis)))
+    unknown = [s.name for s in table if s.dtype == pl.Float64 and s.is_nan().any()]
+    return table.with_columns(pl.col(unknown).fill_nan(None)) if unknown else table
+
+
+def columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
+    """Name and values of every column, in order."""
+    recording = analysis.recording
+    yield "t", recording.t
+    yield from per_joint("q", recording.q)
+    if recording.dq is not None:
+        yield from per_joint("dq", recording.dq)
+    for estimate in analysis.estimates:
+        yield from per_joint(f"tau_ext/{estimate.name}", estimate.tau)
+        if estimate.sd is not None:
+            yield from per_joint(f"sd/{estimate.name}", estimate.sd)
+        if estimate.error_sd is not None:
+            yield from per_joint(f"band/{estimate.name}", estimate.error_sd)
+    if analysis.reference is not None:
+        yield from per_joint("tau_ext/reference", analysis.reference.tau)
+        if analysis.reference.sd is not None:
+            yield from per_joint("sd/reference", analysis.reference.sd)
+    yield from wrench_columns(analysis)
+
+
+def per_joint(name: str, values: Array) -> Iterator[tuple[str, Array]]:
+    """One contiguous column a joint, named from 1."""
+    for j, column in enumerate(np.ascontiguousarray(values.T), start=1):
+        yield f"{name}/{j}", column
+
+
+def wrench_columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
+    """The wrenches, their standard deviations and what the pose can tell, where asked for."""
+    sensed = analysis.virtual_sensor
+    bounded = sensed is not None and sensed.sensor.solver != "pinv"
+    for wrench in analysis.wrenches:
+        yield from per_axis(f"wrench/{wrench.name}", wrench.known)
+        if wrench.known_sd is not None:
+            yield from per_axis(f"wrench_sd/{wrench.name}", wrench.known_sd)
+        if bounded and wrench.hidden.any():
+            yield from per_axis(f"wrench_masked/{wrench.name}", masked_only(wrench))
+        if wrench.null_space is not None:
+            yield f"null_space/{wrench.name}", wrench.null_space
+    sigma = next((w.sigma_min for w in analysis.wrenches if w.sigma_min is not None), None)
+    if sigma is not None:
+        yield "sigma_min", sigma
+
+
+def masked_only(wrench: Wrench) -> Array:
+    """What a bounded solver says where the pose cannot tell, NaN elsewhere. (T, 6)"""
+    return np.where(wrench.hidden[:, None], wrench.values, np.nan)
+
+
+def per_axis(name: str, values: Array) -> Iterator[tuple[str, Array]]:
+    """One contiguous column an axis, fx to mz."""
+    for axis, column in zip(AXES, np.ascontiguousarray(values.T), strict=True):
+        yield f"{name}/{axis}", column
+
+
+def write_estimates(path: Path, analysis: Analysis) -> None:
+    """Write the table as Parquet (zstd).
+
+    Raises:
+        OutputError: If the disk is full.
+    """
+    from polars.exceptions import ComputeError
+
+    table = estimates_table(analysis)
+    try:
+        table.write_parquet(path, compression="zstd", compression_level=1, statistics=False)
+    except ComputeError as error:  # how polars reports a full disk
+        raise OutputError(f"{path.name} cannot be written: {one_line(error)}") from None
+
+
+def write_csv(path: Path, analysis: Analysis) -> None:
+    """Write the table as CSV with nine digits after the point; unknown is empty."""
+    estimates_table(analysis).write_csv(path, float_precision=9)
 
 
 def write_mcap_file(path: Path, analysis: Analysis) -> None:

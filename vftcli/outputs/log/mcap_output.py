@@ -93,14 +93,19 @@ def ros_name(name: str) -> str:
     return "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in name)
 
 
-def stamps_of(recording: Recording) -> Nanoseconds:
-    """Time of every sample on the log's own clock, from 0 where ROS cannot count it. (T,) [ns]"""
+def source_stamps(recording: Recording) -> Nanoseconds:
+    """Time of every sample on the log's own clock, in whole nanoseconds. (T,) [ns]"""
     source = recording.source
     start = source.t0_ns if source.t0_ns is not None else round(source.t0 * 1e9)
-    since = np.round(recording.t * 1e9).astype(np.int64)
-    if start < 0 or (start + int(since[-1])) // 10**9 > LAST_STAMP:
-        return since
-    return since + start
+    stamps: Nanoseconds = start + np.rint(recording.t * 1e9).astype(np.int64)
+    return stamps
+
+
+def stamps_of(recording: Recording) -> Nanoseconds:
+    """The log's own stamps, from 0 where ROS cannot count them. (T,) [ns]"""
+    stamps = source_stamps(recording)
+    countable = stamps[0] >= 0 and stamps[-1] // 10**9 <= LAST_STAMP
+    return stamps if countable else stamps - stamps[0]
 
 
 def write_topics(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from vftcli.analysis import Analysis
 from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.log import tables
-from vftcli.outputs.log.parquet import write_estimates
+from vftcli.outputs.log.estimates import write_estimates
 from vftcli.outputs.log.rerun_recording import write_rrd
 from vftcli.outputs.log.run_record import run_record, to_json
 from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds

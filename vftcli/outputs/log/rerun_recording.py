@@ -20,7 +20,7 @@ from vftcli.outputs.files import one_line
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.log.rerun_blueprint import Plot, Scene, Tab, arrangement
 from vftcli.outputs.log.rerun_text import drawable
-from vftcli.outputs.log.run_record import CONVENTIONS, all_notes
+from vftcli.outputs.log.run_record import CONVENTIONS, all_remarks
 from vftcli.outputs.log.tables import to_markdown
 from vftcli.outputs.log.wrench_tables import paper_bounds
 from vftcli.outputs.palette import REFERENCE, SPARE, colours_of, rgb
@@ -276,8 +276,8 @@ def summary(analysis: Analysis) -> str:
             "wrench where one was asked for, else at the flange by the pseudo-inverse of Jᵀ; 1 m "
             f"is {NEWTON_PER_METRE:g} N; none where the pose cannot tell"
         )
-    remarks = [*source.repairs, *source.warnings, *all_notes(analysis)]
-    lines += ["", "## Notes", *(f"- {escape_markdown(note)}" for note in remarks)]
+    remarks = [*source.repairs, *source.warnings, *all_remarks(analysis)]
+    lines += ["", "## Notes", *(f"- {escape_markdown(str(note))}" for note in remarks)]
     lines += ["", f"Log sha256 {source.sha256 or 'unknown'}"]
     return "\n".join(lines) + "\n"
 

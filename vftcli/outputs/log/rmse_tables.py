@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.outputs.grid import DASH, Cell, Column, Grid, joint_columns, significant
+from vftcli.outputs.grid import DASH, Column, Grid, GridCell, joint_columns, significant
 
 AT_FLOOR = 1.2
 """An RMSE within this factor of the reference's floor cannot be told from the reference's own."""
@@ -128,7 +128,7 @@ def mean_of(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
 
 def rmse_grid(table: Block) -> Grid:
     """One recording's RMSE: observers down, joints and their mean across, the floor last."""
-    rows: list[tuple[Cell | str | float, ...]] = []
+    rows: list[tuple[GridCell | str | float, ...]] = []
     for name, values, bests, floors in zip(
         table.observers, table.rmse, table.best, table.at_floor, strict=True
     ):
@@ -153,10 +153,10 @@ def rmse_grid(table: Block) -> Grid:
     )
 
 
-def rmse_cell(value: float, best: bool, at_floor: bool) -> Cell:
+def rmse_cell(value: float, best: bool, at_floor: bool) -> GridCell:
     """One RMSE, with a star where the reference can tell no more."""
     text = significant(value)
-    return Cell(text, bool(best), "*" if at_floor else "", text + ON_PAGE if at_floor else "")
+    return GridCell(text, bool(best), "*" if at_floor else "", text + ON_PAGE if at_floor else "")
 
 
 def interval_text(row: dict[str, Any]) -> str:

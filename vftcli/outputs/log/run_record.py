@@ -6,7 +6,7 @@ import platform
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.robot import Robot
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Note, Remark
+from vftcli.signals.remarks import Note, Remark, as_record
 
 CONVENTIONS = {
     "sign": "tau_ext is the torque the environment exerts ON the robot: "
@@ -70,32 +70,37 @@ def run_record(
         "conventions": CONVENTIONS,
         "repairs": list(analysis.recording.source.repairs),
         "warnings": list(analysis.recording.source.warnings),
-        "notes": all_notes(analysis),
+        "notes": all_remarks(analysis),
         "options": dict(options or {}),
     }
 
 
 def to_json(record: Mapping[str, Any]) -> str:
     """A record as JSON text; what is not a finite number becomes null."""
-    text = json.dumps(plain(record), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(jsonable(record), indent=2, ensure_ascii=False, allow_nan=False)
     return NUMBERS.sub(lambda found: " ".join(found.group().split()), text) + "\n"
 
 
-def plain(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
-    """A value in JSON's own types: arrays as lists, NaN as None, dataclasses as objects."""
+def jsonable(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
+    """A value in JSON's own types: arrays as lists, NaN as None, dataclasses as objects.
+
+    A remark becomes its code, level, values, place and words.
+    """
     match value:
+        case Remark():
+            return jsonable(as_record(value))
         case None | bool() | int() | str():
             return value
         case float() | np.floating():
             return float(value) if np.isfinite(value) else None
         case np.ndarray() | np.generic():
-            return plain(value.tolist())
+            return jsonable(value.tolist())
         case Mapping():
-            return {str(key): plain(item) for key, item in value.items()}
+            return {str(key): jsonable(item) for key, item in value.items()}
         case list() | tuple() | set() | frozenset():
-            return [plain(item) for item in value]
+            return [jsonable(item) for item in value]
         case _ if is_dataclass(value) and not isinstance(value, type):
-            return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+            return {field.name: jsonable(getattr(value, field.name)) for field in fields(value)}
     return str(value)
 
 
@@ -164,19 +169,17 @@ def file_sha256(path: Path | None) -> str | None:
 
 def observer_record(observer: Observer, tuning: Tuning | None) -> dict[str, Any]:
     """An observer's parameters, and what they mean at the log's sample time."""
-    meaning = (
-        {
-            "omega_n_rad_s": tuning.omega_n,
-            "zeta": tuning.zeta,
-            "delay_s": tuning.delay,
-            "bandwidth_hz": tuning.bandwidth,
-            "dc_gain": tuning.dc_gain,
-            "numbers_to_tune": tuning.numbers,
-        }
-        if tuning is not None
-        else {}
-    )
-    return {"name": observer.name, "parameters": parameters(observer), **plain(meaning)}
+    record = {"name": observer.name, "parameters": parameters(observer)}
+    if tuning is None:
+        return record
+    return record | {
+        "omega_n_rad_s": tuning.omega_n,
+        "zeta": tuning.zeta,
+        "delay_s": tuning.delay,
+        "bandwidth_hz": tuning.bandwidth,
+        "dc_gain": tuning.dc_gain,
+        "numbers_to_tune": tuning.numbers,
+    }
 
 
 def parameters(observer: Observer) -> dict[str, Any]:
@@ -186,7 +189,9 @@ def parameters(observer: Observer) -> dict[str, Any]:
     if not is_dataclass(observer):
         return {}
     return {
-        field.name: plain(getattr(observer, field.name)) for field in fields(observer) if field.init
+        field.name: jsonable(getattr(observer, field.name))
+        for field in fields(observer)
+        if field.init
     }
 
 
@@ -194,11 +199,10 @@ def reference_record(reference: ExternalTorque | None) -> dict[str, Any] | None:
     """What the estimates were judged by."""
     if reference is None:
         return None
-    floor = plain(reference.floor)
     return {
         "name": reference.name,
-        "floor_Nm": floor,
-        "notes": [str(note) for note in reference.remarks],
+        "floor_Nm": reference.floor,
+        "notes": list(reference.remarks),
     }
 
 
@@ -215,9 +219,9 @@ def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
         "solver": sensed.sensor.solver,
         "least_sigma_m": sensed.sensor.least_sigma,
         "masked_share": sensed.masked_share,
-        "tool": plain(sensed.sensor.mounting.tool),
-        "sensor": plain(sensed.sensor.mounting.sensor),
-        "zero_drift": [plain(drift) for drift in sensed.drifts],
+        "tool": sensed.sensor.mounting.tool,
+        "sensor": sensed.sensor.mounting.sensor,
+        "zero_drift": list(sensed.drifts),
         "warnings": list(sensed.warnings),
     }
 
@@ -246,20 +250,19 @@ def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
     }
 
 
-def names_what(remark: Note) -> bool:
-    """Whether a remark says itself what it is about."""
-    return isinstance(remark, Remark) and bool(remark.where.about)
-
-
-def all_notes(analysis: Analysis) -> list[str]:
-    """Notes of the run, of every estimate and of the reference, each once."""
-    notes = [str(remark) for remark in analysis.remarks]
+def all_remarks(analysis: Analysis) -> list[Note]:
+    """Remarks of the run, of every estimate and of the reference, each once."""
+    found: list[Note] = [*analysis.remarks]
+    of_run = set(map(str, found))
     for torque in analysis.torques:
-        notes += [
-            str(remark) if names_what(remark) else f"{torque.name}: {remark}"
-            for remark in torque.remarks
-            if remark not in analysis.remarks
-        ]
+        found += [about(torque.name, n) for n in torque.remarks if str(n) not in of_run]
     if analysis.virtual_sensor is not None:
-        notes += [*analysis.virtual_sensor.warnings, *analysis.virtual_sensor.notes]
-    return list(dict.fromkeys(notes))
+        found += [*analysis.virtual_sensor.warnings, *analysis.virtual_sensor.notes]
+    return list({str(note): note for note in found}.values())
+
+
+def about(name: str, note: Note) -> Note:
+    """A remark that says what it is about, where it does not yet."""
+    if isinstance(note, str):
+        return f"{name}: {note}"
+    return note if note.where.about else replace(note, where=note.where._replace(about=name))

@@ -5,13 +5,13 @@ from html import escape
 from urllib.parse import quote
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.grid import DASH, Cell, Column, Grid, html, significant
+from vftcli.outputs.grid import DASH, Column, Grid, GridCell, html, significant
 from vftcli.outputs.log.rmse_tables import blocks, mean_of, rmse_grid
 from vftcli.outputs.log.run_record import run_record
 from vftcli.outputs.page import comparisons, sections
 from vftcli.outputs.page.payload import payload
 from vftcli.outputs.page.refinement_part import refinement_section
-from vftcli.outputs.page.shell import document, headline, messages, pairs, provenance, remarks
+from vftcli.outputs.page.shell import document, headline, pairs, provenance, remarks
 from vftcli.outputs.page.wrench_part import wrench_section
 
 
@@ -22,7 +22,7 @@ def render(analysis: Analysis) -> str:
     parts = (
         headline(name, f"External joint torques of {analysis.robot.name} from {name}"),
         sections.facts_section(analysis),
-        remarks([*messages(record, "warnings"), *messages(record, "notes")]),
+        remarks([*record.get("warnings", ()), *record.get("notes", ())]),
         sections.errors_section(analysis),
         comparisons.beside_print(analysis.published),
         sections.series_section(analysis),
@@ -60,7 +60,7 @@ def render_index(analyses: Sequence[tuple[str, Analysis]]) -> str:
     return document(title, f"{top}{html(overview)}{tables}")
 
 
-def index_row(folder: str, analysis: Analysis) -> tuple[Cell | str | float | None, ...]:
+def index_row(folder: str, analysis: Analysis) -> tuple[GridCell | str | float | None, ...]:
     """One log in the overview."""
     recording, reference = analysis.recording, analysis.reference
     found = blocks(analysis.errors) if analysis.errors is not None else ()
@@ -72,7 +72,7 @@ def index_row(folder: str, analysis: Analysis) -> tuple[Cell | str | float | Non
         best = f"{significant(means[k])} ({found[0].observers[k]})"
         floor = significant(mean_of(found[0].floor))
     return (
-        Cell(recording.name, html=link(folder, recording.name)),
+        GridCell(recording.name, html=link(folder, recording.name)),
         analysis.robot.name,
         reference.name if reference is not None else DASH,
         f"{recording.duration:.3f}",

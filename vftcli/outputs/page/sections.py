@@ -11,7 +11,7 @@ import polars as pl
 
 from vftcli.analysis import Analysis
 from vftcli.observers import OBSERVERS
-from vftcli.outputs.grid import Cell, Column, Grid, html, signed, significant
+from vftcli.outputs.grid import Column, Grid, GridCell, html, signed, significant
 from vftcli.outputs.log.rmse_tables import (
     AT_FLOOR,
     DAGGER,
@@ -136,14 +136,14 @@ def observers_section(analysis: Analysis) -> str:
     )
 
 
-def observer_row(analysis: Analysis, name: str) -> tuple[Cell | str | float | None, ...]:
+def observer_row(analysis: Analysis, name: str) -> tuple[GridCell | str | float | None, ...]:
     """One observer: what it is, and its tuning where that is known."""
     what = OBSERVERS[name].title if name in OBSERVERS else ""
     tuning = analysis.tunings.get(name)
     if tuning is None:
         return (name, what, *[None] * 5)
     columns = (tuning.omega_n, tuning.zeta, 1e3 * tuning.delay, tuning.bandwidth)
-    shown = (Cell("", html=joint_values(column)) for column in columns)
+    shown = (GridCell("", html=joint_values(column)) for column in columns)
     return (name, what, *shown, tuning.numbers)
 
 

@@ -9,6 +9,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from vftcli.signals.remarks import Note, Remark, explanation
+
 HERE = Path(__file__).parent
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
@@ -72,13 +74,13 @@ def pairs(table: Mapping[str, Any]) -> str:
     return f'<dl class="pairs">{rows}</dl>'
 
 
-def bullets(lines: Iterable[object]) -> str:
-    """A list; a remark is shown by its sentence."""
-    items = "".join(f"<li>{escape(str(line))}</li>" for line in lines)
+def bullets(lines: Iterable[Note]) -> str:
+    """A list; of a remark its long words."""
+    items = "".join(f"<li>{escape(in_full(line))}</li>" for line in lines)
     return f'<ul class="plain">{items}</ul>'
 
 
-def remarks(lines: Sequence[object]) -> str:
+def remarks(lines: Sequence[Note]) -> str:
     """What the reader should know before believing a number, "" where there is nothing."""
     if not lines:
         return ""
@@ -124,10 +126,10 @@ def provenance(record: Mapping[str, Any]) -> str:
         pairs({**table, "Versions": versions}),
     ]
     for name in ("repairs", "warnings", "notes"):
-        lines = messages(record, name)
+        lines = record.get(name) or ()
         parts.append(f"<h3>{name.capitalize()}</h3>")
         parts.append(bullets(lines) if lines else soft("none"))
-    if notes := messages(record.get("robot") or {}, "notes"):
+    if notes := (record.get("robot") or {}).get("notes"):
         parts.append(f"<h3>Notes on the robot file</h3>{bullets(notes)}")
     return "".join(parts)
 
@@ -153,7 +155,6 @@ def robot_facts(robot: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def messages(record: Mapping[str, Any], name: str) -> list[str]:
-    """The words of a record's remarks, which it holds as data."""
-    found = record.get(name) or ()
-    return [entry["message"] if isinstance(entry, Mapping) else str(entry) for entry in found]
+def in_full(note: Note) -> str:
+    """A remark's long words."""
+    return explanation(note) if isinstance(note, Remark) else note
