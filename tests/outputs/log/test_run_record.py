@@ -57,9 +57,10 @@ def test_lists_of_numbers_stand_on_one_line() -> None:
 
 @pytest.fixture
 def catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A catalogue of one remark."""
+    """The catalogue with one remark more."""
     words = '[test-shift]\nshort = "shifted by {shift_s:.2f} s"\nlong = "it was shifted"\n'
-    monkeypatch.setattr(remarks, "catalogue", lambda: (words,))
+    own = remarks.catalogue()
+    monkeypatch.setattr(remarks, "catalogue", lambda: (words, *own))
 
 
 @pytest.mark.usefixtures("catalogue")
