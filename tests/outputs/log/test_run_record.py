@@ -20,8 +20,10 @@ def test_run_json_says_how_to_make_it_again(analysis: Analysis) -> None:
     assert record["input"]["samples"] == 600
     assert len(record["robot"]["sha256"]) == 64
     assert "ON the robot" in record["conventions"]["sign"]
-    assert record["repairs"] == ["turned the sign of <b>one</b> (--columns)"]
-    assert record["warnings"] == [
+    assert [r["message"] for r in record["repairs"]] == [
+        "turned the sign of <b>one</b> (--columns)"
+    ]
+    assert [r["message"] for r in record["warnings"]] == [
         "left out look & feel of /odd: it does not cover the joints' time"
     ]
     assert record["reference"]["name"] == "vendor"
@@ -66,7 +68,7 @@ def catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("catalogue")
 def test_a_remark_is_recorded_as_data(analysis: Analysis) -> None:
     shift = caution("test-shift", Where("gmo", (2, 3), (1.0, 2.5)), shift_s=np.float64(0.25))
-    record = json.loads(to_json(run_record(replace(analysis, notes=(shift,)), "x")))
+    record = json.loads(to_json(run_record(replace(analysis, remarks=(shift,)), "x")))
     assert record["notes"][0] == {
         "code": "test-shift",
         "level": "caution",
@@ -82,10 +84,10 @@ def test_a_remark_is_recorded_as_data(analysis: Analysis) -> None:
 def test_a_remark_of_an_estimate_says_whose_it_is_once(analysis: Analysis) -> None:
     own = fact("test-shift", shift_s=0.25)
     first, *others = analysis.estimates
-    noted = replace(analysis, estimates=(replace(first, remarks=(own, own)), *others), notes=())
+    noted = replace(analysis, estimates=(replace(first, remarks=(own, own)), *others), remarks=())
     found = all_remarks(noted)
     assert [str(remark) for remark in found].count("fdo: shifted by 0.25 s") == 1
-    of_run = replace(noted, notes=(own,))
+    of_run = replace(noted, remarks=(own,))
     assert "fdo: shifted by 0.25 s" not in map(str, all_remarks(of_run))
 
 

@@ -13,7 +13,7 @@ from vftcli.outputs.admittance.page import render_admittance
 from vftcli.outputs.admittance.recording import write_ghosts
 from vftcli.outputs.admittance.tables import comparison_csv, comparison_json, latency_rows
 from vftcli.outputs.files import OutputFolder
-from vftcli.outputs.log.run_record import input_record, robot_record, to_json, versions
+from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, to_json, versions
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import AXES as FORCES
@@ -100,7 +100,7 @@ def admittance_record(
         "controllers": [verdict_record(verdict) for verdict in replay.verdicts],
         "conventions": CONVENTIONS,
         "notes": list(replay.notes),
-        "repairs": list(recording.source.repairs) if recording is not None else [],
+        **log_remarks([recording] if recording is not None else []),
     }
 
 

@@ -12,6 +12,7 @@ from vftcli.outputs.log.run_record import (
     CONVENTIONS,
     file_sha256,
     input_record,
+    log_remarks,
     robot_record,
     to_json,
     versions,
@@ -88,7 +89,6 @@ def identification_record(
         "friction_models": found.shape_choices.to_dicts(),
         "base_parameters": found.base.to_dicts() if found.base is not None else [],
         "conventions": CONVENTIONS,
-        "repairs": [note for log in logs for note in log.source.repairs],
-        "warnings": [note for log in logs for note in log.source.warnings],
+        **log_remarks(logs),
         "remarks": list(found.remarks),
     }

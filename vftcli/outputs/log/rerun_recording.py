@@ -276,7 +276,7 @@ def summary(analysis: Analysis) -> str:
             "wrench where one was asked for, else at the flange by the pseudo-inverse of Jᵀ; 1 m "
             f"is {NEWTON_PER_METRE:g} N; none where the pose cannot tell"
         )
-    remarks = [*source.repairs, *source.warnings, *all_remarks(analysis)]
+    remarks = [*source.remarks, *all_remarks(analysis)]
     lines += ["", "## Notes", *(f"- {escape_markdown(str(note))}" for note in remarks)]
     lines += ["", f"Log sha256 {source.sha256 or 'unknown'}"]
     return "\n".join(lines) + "\n"

@@ -5,7 +5,7 @@ import json
 import platform
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -68,8 +68,7 @@ def run_record(
         "wrench": wrench_record(analysis),
         "complete_log": refinement_record(analysis),
         "conventions": CONVENTIONS,
-        "repairs": list(analysis.recording.source.repairs),
-        "warnings": list(analysis.recording.source.warnings),
+        **log_remarks([analysis.recording]),
         "notes": all_remarks(analysis),
         "options": dict(options or {}),
     }
@@ -141,6 +140,15 @@ def input_record(recording: Recording) -> dict[str, Any]:
         "end_s": float(recording.t[-1]),
         "rate_hz": 1.0 / recording.median_step if recording.samples > 1 else None,
         "signals": list(recording.signals),
+    }
+
+
+def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
+    """What was dropped, turned or derived in reading the logs, and what looks suspicious."""
+    remarks = [remark for log in logs for remark in log.source.remarks]
+    return {
+        "repairs": [remark for remark in remarks if remark.level == "fact"],
+        "warnings": [remark for remark in remarks if remark.level != "fact"],
     }
 
 
