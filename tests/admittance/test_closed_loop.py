@@ -13,7 +13,7 @@ from vftcli.admittance.closed_loop import ClosedLoop, run_closed_loop
 from vftcli.admittance.latency import latencies
 from vftcli.admittance.law import controllers, variable
 from vftcli.admittance.online import OnlineKalman
-from vftcli.admittance.parameters import from_document, parse_settings
+from vftcli.admittance.parameters import from_table, parse_settings
 from vftcli.admittance.replay import replay
 from vftcli.observers import KalmanObserver
 from vftcli.robots import load_robot
@@ -46,7 +46,7 @@ def run(
     """A scenario against the profile's variable controller."""
     scenario = replace(load_scenario(name, ()), duration=duration)
     robot = load_robot(scenario.robot)
-    p = from_document(robot.document, robot.name, parse_settings(assignments))
+    p = from_table(robot.admittance, robot.name, parse_settings(assignments))
     kalman = observer(robot.name, convention)
     return run_closed_loop(scenario, variable(p), kalman, seed=seed, torque=torque, zero=zero)
 

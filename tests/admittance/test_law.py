@@ -12,7 +12,7 @@ from vftcli.admittance.law import (
     variable,
 )
 from vftcli.admittance.motion import AxisMotion, release, run
-from vftcli.admittance.parameters import Admittance, from_document
+from vftcli.admittance.parameters import Admittance, from_table
 from vftcli.robots import load_robot
 
 
@@ -97,7 +97,7 @@ def test_traditional_at_xi_one_is_the_other_figure_of_the_science() -> None:
 
 def test_release_figures_of_the_panda() -> None:
     robot = load_robot("panda")
-    p = from_document(robot.document, robot.name, {})
+    p = from_table(robot.admittance, robot.name, {})
     motion = release(controllers(p), start(0.2), 60.0)
     found = [[returned(motion, n, share) for n in (0, 1)] for share in (0.10, 0.02)]
     np.testing.assert_allclose(found, [[22.6, 3.6], [38.1, 6.2]], rtol=0.03)

@@ -6,7 +6,7 @@ import pytest
 from vftcli.admittance.law import controllers
 from vftcli.admittance.parameters import (
     AXES,
-    from_document,
+    from_table,
     is_admittance_setting,
     parse_settings,
     release_deviation,
@@ -17,7 +17,7 @@ from vftcli.signals.errors import ParameterError
 
 def read(robot: str = "ur5", *assignments: str):
     """A profile's parameters with assignments."""
-    return from_document(load_robot(robot).document, robot, parse_settings(assignments))
+    return from_table(load_robot(robot).admittance, robot, parse_settings(assignments))
 
 
 def test_table_iii_and_iv() -> None:
@@ -84,10 +84,10 @@ def test_wrong_parameters_are_one_clear_line(assignment: str, words: str) -> Non
 
 def test_missing_section_names_what_is_missing() -> None:
     with pytest.raises(ParameterError, match="no admittance mass for x, y, z, rx, ry, rz"):
-        from_document({}, "mine", {})
-    partial = {"admittance": {"period": 0.01, "position": {"mass": 1.0}}}
+        from_table({}, "mine", {})
+    partial = {"period": 0.01, "position": {"mass": 1.0}}
     with pytest.raises(ParameterError, match="no admittance mass for rx, ry, rz"):
-        from_document(partial, "mine", {})
+        from_table(partial, "mine", {})
 
 
 def test_controllers_of_a_comparison() -> None:

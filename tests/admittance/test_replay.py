@@ -7,7 +7,7 @@ import pytest
 
 from vftcli.admittance.joints import FlangeSolver, follow
 from vftcli.admittance.law import controllers, variable
-from vftcli.admittance.parameters import from_document, parse_settings
+from vftcli.admittance.parameters import from_table, parse_settings
 from vftcli.admittance.replay import Replay, on_control_clock, replay, replay_release
 from vftcli.admittance.stability import UnstableError
 from vftcli.robots import load_robot
@@ -23,7 +23,7 @@ START = np.array([0.0, -1.35, 1.9, -2.1208, -1.5708, 0.0])
 
 def parameters(*assignments: str):
     """The UR5's parameters with assignments."""
-    return from_document(UR5.document, "ur5", parse_settings(assignments))
+    return from_table(UR5.admittance, "ur5", parse_settings(assignments))
 
 
 Force = tuple[Wrench, np.ndarray]
@@ -112,7 +112,7 @@ def test_joints_follow_the_flange() -> None:
 def test_redundant_arm_stays_inside_its_limits() -> None:
     panda = load_robot("panda")
     solver = FlangeSolver(panda)
-    q = np.array(panda.document["admittance"]["start"])
+    q = np.array(panda.admittance["start"])
     x = np.zeros((400, 1, 6))
     x[:, 0, 1] = np.linspace(0.0, 1.2, 400)  # leaves the workspace
     path = follow(solver, q, x, 0.0025)

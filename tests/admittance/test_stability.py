@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from vftcli.admittance.law import controllers, traditional, variable
 from vftcli.admittance.motion import release
-from vftcli.admittance.parameters import Admittance, from_document
+from vftcli.admittance.parameters import Admittance, from_table
 from vftcli.admittance.stability import (
     UnstableError,
     check_stable,
@@ -20,7 +20,7 @@ from vftcli.robots import PROFILES, load_robot
 def profile(name: str) -> Admittance:
     """A profile's parameters."""
     robot = load_robot(name)
-    return from_document(robot.document, robot.name, {})
+    return from_table(robot.admittance, robot.name, {})
 
 
 def spectral_radius(mass: float, damping: float, stiffness: float, period: float) -> float:
@@ -98,12 +98,12 @@ def test_every_profile_is_stable(name: str) -> None:
 
 def test_unstable_settings_are_refused_with_the_number() -> None:
     robot = load_robot("ur5")
-    slow = from_document(robot.document, "ur5", {"admittance": {"period": 0.5}})
+    slow = from_table(robot.admittance, "ur5", {"admittance": {"period": 0.5}})
     with pytest.raises(UnstableError, match=r"axis rx, drag phase: .* = 4\.25, .* below 4"):
         check_stable(controllers(slow))
     _, complaints = check_stable(controllers(slow), force_unstable=True)
     assert len(complaints) > 1
-    free = from_document(robot.document, "ur5", {"rotation": {"speed_limit": np.inf}})
+    free = from_table(robot.admittance, "ur5", {"rotation": {"speed_limit": np.inf}})
     with pytest.raises(UnstableError, match=r"axis rx has no speed limit.*beyond 0\.31 rad"):
         check_stable(controllers(free))
     check_stable([traditional(free)])  # constant parameters need no limit

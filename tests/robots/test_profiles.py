@@ -127,7 +127,7 @@ def test_flange_and_gravity_are_the_makers(name: str) -> None:
 @pytest.mark.parametrize("name", PROFILES)
 def test_every_number_has_a_source_and_every_body_is_physical(name: str) -> None:
     robot = load_robot(name)
-    assert robot.document["sources"]
+    assert robot.sources
     for mass, inertia in zip(robot.chain.mass, robot.chain.inertia, strict=True):
         assert unphysical(float(mass), inertia) == ""
     assert robot.joints == robot.document["dof"]
@@ -156,3 +156,34 @@ def test_an_unknown_name_suggests_the_nearest() -> None:
 def test_an_unknown_payload_lists_what_there_is() -> None:
     with pytest.raises(RobotError, match="the robot file has franka_hand"):
         load_robot("panda").with_payload("bucket")
+
+
+def test_tools_sensors_and_admittance_are_typed(tmp_path):
+    text = PROFILES["ur5"].read_text(encoding="utf-8")
+    path = tmp_path / "own.toml"
+    path.write_text(
+        text + "\n[tool]\nxyz = [0, 0, 0.1]\n[tool.gripper]\nrpy = [0, 0, 1.0]\n"
+        "[sensor.wrist]\nxyz = [0, 0, 0.03]\n",
+        encoding="utf-8",
+    )
+    robot = load_robot(path)
+    assert sorted(robot.tools) == ["", "gripper"]
+    assert list(robot.sensors) == ["wrist"]  # no plain [sensor], so none is mounted
+    np.testing.assert_array_equal(robot.tools[""].translation, [0.0, 0.0, 0.1])
+    np.testing.assert_allclose(robot.tools["gripper"].rotation[0, 0], np.cos(1.0))
+    assert robot.admittance["period"] == 0.008
+    assert load_robot("panda").tools == {}
+
+
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        ("[tool.gripper]\nxyz = [0, 0]", r"line \d+: xyz .*3"),
+        ("[sensor]\nrpy = 'up'", r"line \d+: rpy .*3"),
+    ],
+)
+def test_a_pose_that_is_none_is_refused_with_its_line(tmp_path, section, words):
+    path = tmp_path / "own.toml"
+    path.write_text(PROFILES["ur5"].read_text(encoding="utf-8") + f"\n{section}\n")
+    with pytest.raises(RobotError, match=words):
+        load_robot(path)

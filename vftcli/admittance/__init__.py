@@ -2,7 +2,7 @@
 
 from vftcli.admittance.law import Controller, controllers, traditional, variable
 from vftcli.admittance.motion import AxisMotion, release, run
-from vftcli.admittance.parameters import AXES, Admittance, from_document
+from vftcli.admittance.parameters import AXES, Admittance, from_table
 from vftcli.admittance.stability import UnstableError, check_stable
 
 __all__ = [
@@ -13,7 +13,7 @@ __all__ = [
     "UnstableError",
     "check_stable",
     "controllers",
-    "from_document",
+    "from_table",
     "release",
     "run",
     "traditional",

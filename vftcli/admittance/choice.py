@@ -10,7 +10,7 @@ import numpy as np
 from vftcli.admittance.law import Controller, check_kinds, controllers
 from vftcli.admittance.parameters import (
     Admittance,
-    from_document,
+    from_table,
     is_admittance_setting,
     parse_settings,
     release_deviation,
@@ -94,8 +94,10 @@ class ControlChoice:
         Raises:
             ParameterError: If one is missing, unknown or out of range.
         """
-        document = robot.document if self.file is None else RobotFile(self.file).document
-        return from_document(document, robot.name, self.settings)
+        table = robot.admittance
+        if self.file is not None:
+            table = RobotFile(self.file).document.get("admittance", {})
+        return from_table(table, robot.name, self.settings)
 
     def controllers(self, parameters: Admittance) -> tuple[Controller, ...]:
         """The controllers that are compared, the traditional one first."""
@@ -143,7 +145,7 @@ class ReleaseChoice:
         Raises:
             ParameterError: If neither gives one.
         """
-        start = self.start or robot.document.get("admittance", {}).get("start")
+        start = self.start or robot.admittance.get("start")
         if start is None:
             raise ParameterError(
                 f"{robot.name} has no admittance.start; give the start pose with --start q1,…,"

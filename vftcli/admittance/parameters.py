@@ -149,20 +149,19 @@ class Admittance:
         return replace(self, alpha=np.full(6, float(alpha)))
 
 
-def from_document(
-    document: Mapping[str, Any], robot: str, settings: Mapping[str, Mapping[str, Any]]
+def from_table(
+    table: Mapping[str, Any], robot: str, settings: Mapping[str, Mapping[str, Any]]
 ) -> Admittance:
     """Build the parameters from a robot file's ``[admittance]`` and the user's assignments.
 
     Args:
-        document: The parsed robot file.
+        table: The section, empty if the file has none.
         robot: The robot's name, for messages.
         settings: Section (a key of `GROUPS`) → parameter → value; they win over the file.
 
     Raises:
         ParameterError: If a parameter is missing for an axis, unknown or out of range.
     """
-    table = document.get("admittance", {})
     given = [(name, table.get(name, {})) for name in ("position", "rotation")]
     values: dict[str, Array] = {}
     for section, entries in (*given, *settings.items()):

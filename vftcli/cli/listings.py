@@ -66,7 +66,7 @@ def robot_lines(robot: Any) -> list[str]:  # noqa: ANN401
         lines.append("")
         lines.extend(f"{observer}.{key} = {value}" for key, value in gains.items())
     lines += ["", *(f"note: {note}" for note in robot.notes)]
-    for source in robot.document.get("sources", []):
+    for source in robot.sources:
         lines.append(
             f"source {source.get('id', '?')}: {source.get('what', '')}: {source.get('ref', '')}"
         )

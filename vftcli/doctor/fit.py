@@ -14,7 +14,7 @@ import numpy as np
 
 from vftcli.robots import Robot
 from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.robots.regressor import load_regressor
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 
@@ -149,7 +149,7 @@ class Windows:
         terms = momentum_terms(robot.chain, recording.q, dq)
         rise = (terms.p[self.last] - terms.p[self.first]) / self.span
         self.needed = rise - self.mean(terms.coriolis_transpose_dq - terms.gravity)
-        self.load = load_regressor(robot, recording.q[starts + length // 2])
+        self.load = load_regressor(robot.chain, recording.q[starts + length // 2])
         self.friction = friction_regressor(self.mean(np.tanh(dq / SLOW)), self.mean(dq))
 
     def mean(self, value: Array) -> Array:
@@ -230,18 +230,3 @@ def robust_size(rest: Array) -> float:
     left = np.sum(rest**2, axis=1)
     quiet = left[left <= np.quantile(left, KEPT)]
     return float(np.sqrt(np.mean(quiet) / rest.shape[1]))
-
-
-def load_regressor(robot: Robot, q: Array) -> Array:
-    """External joint torques of a load's weight, by mass and first moment in flange axes. (W, n, 4)
-
-    A mass m at c gives the force m g₀ and the moment R m c × g₀ about the flange.
-    """
-    gravity = np.asarray(robot.chain.gravity)
-    x, y, z = gravity
-    cross = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # v ↦ v × g₀
-    wrench = np.zeros((len(q), 6, 4))
-    wrench[:, :3, 0] = gravity
-    wrench[:, 3:, 1:] = cross @ link_poses(robot.chain, q).rotation[:, -1]
-    regressor: Array = flange_jacobian(robot.chain, q).transpose(0, 2, 1) @ wrench
-    return regressor

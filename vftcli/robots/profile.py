@@ -14,7 +14,7 @@ from vftcli.robots.conventions import CONVENTIONS, Convention, Kinematics
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
-from vftcli.signals.pose import rpy_matrix
+from vftcli.signals.pose import Pose, rpy_matrix
 
 SCHEMA = 1
 UPRIGHT = (0.0, 0.0, -9.81)
@@ -144,6 +144,11 @@ def assemble(file: RobotFile, joints: Sequence[Mapping[str, Any]], chain: Chain)
         payload=payloads.pop("", None),
         payloads=payloads,
         gains=gains,
+        tools=checked_poses(file, "tool"),
+        sensors=checked_poses(file, "sensor"),
+        admittance=checked_section(file, "admittance"),
+        sources=tuple(str(source) for source in doc.get("sources", ())),
+        published=checked_section(file, "published"),
         document=doc,
         notes=(notes,) if isinstance(notes, str) and notes else tuple(notes or ()),
         path=file.path,
@@ -278,9 +283,7 @@ def checked_friction(
 
 def checked_payloads(file: RobotFile) -> dict[str, Payload]:
     """Return ``[payload]`` under the name "" and each ``[payload.NAME]`` under its own."""
-    section = file.document.get("payload", {})
-    if not isinstance(section, dict):
-        file.refuse("payload must be a section [payload]", key="payload")
+    section = checked_section(file, "payload")
     found = {}
     if "mass" in section:
         found[""] = checked_payload(file, section, "payload")
@@ -304,6 +307,34 @@ def checked_payload(file: RobotFile, section: Mapping[str, Any], table: str) -> 
     if why := unphysical(mass, inertia):
         file.refuse(why, table, None, "mass" if why.startswith("mass") else "inertia")
     return Payload(mass=mass, com=com, inertia=inertia)
+
+
+def checked_section(file: RobotFile, name: str) -> Mapping[str, Any]:
+    """Return the section of a name, empty if the file has none, or complain about its line."""
+    section: Mapping[str, Any] = file.document.get(name, {})
+    if not isinstance(section, dict):
+        file.refuse(f"{name} must be a section [{name}]", key=name)
+    return section
+
+
+def checked_poses(file: RobotFile, name: str) -> dict[str, Pose]:
+    """Return the poses on the flange that ``[name]``, under "", and each ``[name.NAME]`` state.
+
+    Keys are xyz [m] and rpy [rad]; what is left out is zero.
+    """
+    section = checked_section(file, name)
+    tables: dict[str, Mapping[str, Any]] = {k: v for k, v in section.items() if isinstance(v, dict)}
+    if "xyz" in section or "rpy" in section:
+        tables[""] = section
+    found = {}
+    for key, table in tables.items():
+        place = f"{name}.{key}" if key else name
+        xyz, rpy = (
+            vector(file, table, part, 3, place) if part in table else np.zeros(3)
+            for part in ("xyz", "rpy")
+        )
+        found[key] = Pose(rpy_matrix(rpy.tolist()), xyz)
+    return found
 
 
 def column(

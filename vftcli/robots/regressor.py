@@ -10,8 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from vftcli.robots.chain import Chain
+from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.signals.arrays import Array
-from vftcli.signals.pose import cross
+from vftcli.signals.pose import cross, skew
 
 LINK = 10
 """Inertial parameters a link."""
@@ -93,6 +94,24 @@ def torque_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
         levers = np.concatenate([levers, np.zeros((3, 1, samples))], axis=1)
         link_columns(axes, levers, omega, alpha, acceleration, out[: j + 1, j])
     return np.ascontiguousarray(out.transpose(3, 0, 1, 2)).reshape(samples, n, n * LINK)
+
+
+def load_regressor(chain: Chain, q: Array) -> Array:
+    """External joint torque of a load's weight, by its mass and its first moment m·c. (N, n, 4)
+
+    A mass m at c in flange axes pulls with m g₀, and turns by R m c × g₀ about the flange.
+
+    Args:
+        chain: The arm.
+        q: Joint positions. (N, n) [rad]
+    """
+    gravity = np.asarray(chain.gravity)
+    wrench = np.zeros((len(q), 6, 4))
+    wrench[:, :3, 0] = gravity
+    # v × g₀ = −[g₀]× v
+    wrench[:, 3:, 1:] = -skew(gravity) @ link_poses(chain, q).rotation[:, -1]
+    torque: Array = flange_jacobian(chain, q).transpose(0, 2, 1) @ wrench
+    return torque
 
 
 def chain_parameters(chain: Chain) -> Array:

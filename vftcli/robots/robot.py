@@ -6,11 +6,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from vftcli.robots.chain import Chain, Payload
 from vftcli.signals.arrays import Array, check_shape, frozen
 from vftcli.signals.errors import RobotError
+from vftcli.signals.pose import Pose
 
 TORQUE_SOURCES = ("current", "link_torque", "joint_torque")
 
@@ -93,8 +92,12 @@ class Robot:
         payload: The load mounted on the flange, or None.
         payloads: Further loads by name, for ``--payload NAME``.
         gains: Observer name → parameter → number, list or word, as in ``[observers.*]``.
-        document: The whole parsed robot file, for sections that others read (admittance) and for
-            writing a changed profile.
+        tools: Poses of tools in the flange frame, from ``[tool]`` (under "") and ``[tool.NAME]``.
+        sensors: Poses of force/torque sensors in the flange frame, likewise.
+        admittance: The parameters of ``[admittance]``, as the file has them; empty without any.
+        sources: Where the file's numbers come from, in words.
+        published: The publication whose numbers of this arm the tables stand beside, and these.
+        document: The whole parsed robot file, for writing a changed one.
         notes: What a user of the numbers should know.
         path: The file it was loaded from, None for one made in memory.
     """
@@ -112,6 +115,11 @@ class Robot:
     payload: Payload | None = None
     payloads: Mapping[str, Payload] = field(default_factory=dict)
     gains: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    tools: Mapping[str, Pose] = field(default_factory=dict)
+    sensors: Mapping[str, Pose] = field(default_factory=dict)
+    admittance: Mapping[str, Any] = field(default_factory=dict)
+    sources: tuple[str, ...] = ()
+    published: Mapping[str, Any] = field(default_factory=dict)
     document: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     path: Path | None = None
@@ -163,7 +171,3 @@ class Robot:
     def without_friction(self) -> "Robot":
         """Return the robot with no friction model, for ``--friction none``."""
         return replace(self, friction=())
-
-    def with_gravity(self, gravity: Array) -> "Robot":
-        """Return the robot on a base whose gravity vector, in base axes, is `gravity`. [m/s²]"""
-        return replace(self, chain=replace(self.chain, gravity=np.asarray(gravity, dtype=float)))

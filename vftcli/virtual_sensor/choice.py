@@ -7,7 +7,7 @@ from pathlib import Path
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import interval
-from vftcli.virtual_sensor.frames import Mounting, check_frame, own_pose, read_pose
+from vftcli.virtual_sensor.frames import Mounting, check_frame, read_pose
 from vftcli.virtual_sensor.solvers import check_solver
 
 FIT = "fit"
@@ -104,7 +104,7 @@ class WrenchChoice:
         Raises:
             ParameterError: If a pose is malformed or names nothing there is.
         """
-        tool, sensor = own_pose(robot, "tool"), own_pose(robot, "sensor")
+        tool, sensor = robot.tools.get(""), robot.sensors.get("")
         if self.tool is not None:
             tool = read_pose(self.tool, robot, "tool", "--tool")
         if self.sensor_pose is not None and self.sensor_pose != FIT:

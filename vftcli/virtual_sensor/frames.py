@@ -178,33 +178,16 @@ def read_pose(text: str, robot: Robot, section: str, option: str) -> Pose:
 
 
 def named_pose(name: str, robot: Robot, section: str, option: str) -> Pose:
-    """Pose ``[section.NAME]`` (or ``[section]``) of a robot file: keys xyz [m] and rpy [rad]."""
-    table = robot.document.get(section, {})
-    named = {k: v for k, v in table.items() if isinstance(v, dict)}
-    if name not in named:
-        there = ", ".join(named) or "none"
+    """Pose ``[section.NAME]`` of a robot's file.
+
+    Raises:
+        ParameterError: If the file has no such section; the message lists those it has.
+    """
+    poses = {"tool": robot.tools, "sensor": robot.sensors}[section]
+    if not name or name not in poses:
+        there = ", ".join(filter(None, poses)) or "none"
         raise ParameterError(
             f"{option} {name!r}: {robot.name} has no [{section}.{name}]; it has {there}. Give "
             f"numbers x,y,z,roll,pitch,yaw [m, rad], or add the section with xyz and rpy"
         )
-    return section_pose(named[name], f"{robot.name}, [{section}.{name}]")
-
-
-def section_pose(table: dict[str, object], what: str) -> Pose:
-    """The pose that a section's xyz and rpy state."""
-    try:
-        xyz = np.asarray(table.get("xyz", (0.0, 0.0, 0.0)), dtype=np.float64)
-        angles = np.asarray(table.get("rpy", (0.0, 0.0, 0.0)), dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{what}: xyz and rpy are three numbers each") from None
-    if xyz.shape != (3,) or angles.shape != (3,):
-        raise ParameterError(f"{what}: xyz and rpy are three numbers each")
-    return checked_pose(rpy_matrix(angles.tolist()), xyz, what)
-
-
-def own_pose(robot: Robot, section: str) -> Pose | None:
-    """The pose in a robot file's plain ``[tool]`` or ``[sensor]`` section, None without one."""
-    table = robot.document.get(section, {})
-    if isinstance(table, dict) and ("xyz" in table or "rpy" in table):
-        return section_pose(table, f"{robot.name}, [{section}]")
-    return None
+    return poses[name]

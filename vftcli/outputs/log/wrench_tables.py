@@ -19,7 +19,7 @@ PaperBounds = Mapping[str, tuple[float, float]]
 
 def paper_bounds(analyses: "Iterable[Analysis]") -> PaperBounds:
     """What the paper reports of the arms of these logs, from the arms' own profiles."""
-    found = {a.recording.name: a.robot.document.get("published", {}) for a in analyses}
+    found = {a.recording.name: a.robot.published for a in analyses}
     return {
         label: (published["wrench_rmse_N"], published["wrench_rmse_Nm"])
         for label, published in found.items()

@@ -1,15 +1,24 @@
 """The batched regressor against Pinocchio's, and what is built on it."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from vftcli.robots import load_robot
+from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.regressor import (
     chain_parameters,
+    load_regressor,
     torque_regressor,
     with_parameters,
 )
+
+
+def tilted(robot: Robot, gravity: Sequence[float]) -> Robot:
+    """The robot on a base whose gravity vector, in base axes, is `gravity`. [m/s²]"""
+    return replace(robot, chain=replace(robot.chain, gravity=np.array(gravity)))
 
 
 def states(joints, seed, count=40):
@@ -41,12 +50,11 @@ def test_times_parameters_is_inverse_dynamics_without_rotors(name):
 
 
 def test_a_tilted_base_turns_gravity():
-    robot = load_robot("ur5")
-    tilted = robot.with_gravity(np.array([4.0, -3.0, -8.0]))
+    robot = tilted(load_robot("ur5"), [4.0, -3.0, -8.0])
     q, zero = states(6, 3)[0], np.zeros((40, 6))
-    model, data = tilted.model, tilted.model.createData()
+    model, data = robot.model, robot.model.createData()
     expected = [pin.computeGeneralizedGravity(model, data, x).copy() for x in q]
-    gravity = torque_regressor(tilted.chain, q, zero, zero) @ chain_parameters(tilted.chain)
+    gravity = torque_regressor(robot.chain, q, zero, zero) @ chain_parameters(robot.chain)
     np.testing.assert_allclose(gravity, expected, atol=1e-12)
 
 
@@ -57,3 +65,25 @@ def test_parameters_make_the_chain_again(name):
     for key in ("mass", "com", "inertia", "rotor_inertia"):
         # moving a tensor to the origin and back loses digits of m·c², here below 10 kg·m²
         np.testing.assert_allclose(getattr(again, key), getattr(chain, key), atol=1e-14)
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_a_load_on_the_flange_weighs_as_pinocchio_s_last_body(name):
+    """The last link's columns for mass and first moment, moved from the flange; on a tilted base,
+    so that all three components of gravity count."""
+    robot = tilted(load_robot(name), [4.0, -3.0, -8.0])
+    chain = robot.chain
+    model, data = robot.model, robot.model.createData()
+    q, zero = states(robot.joints, 4)[0], np.zeros(robot.joints)
+    rng = np.random.default_rng(5)
+    mass, com = 3.0, rng.uniform(-0.2, 0.2, 3)
+    moved = chain.flange_rotation @ com + chain.flange_translation
+    link = np.array([mass, *(mass * moved)])
+    expected = [
+        # what the drives bear, as a torque from outside
+        -pin.computeJointTorqueRegressor(model, data, x, zero, zero)[:, -10:-6] @ link
+        for x in q
+    ]
+    found = load_regressor(chain, q) @ np.array([mass, *(mass * com)])
+    # sums of some hundred products of numbers of order 10
+    np.testing.assert_allclose(found, expected, atol=1e-12)
