@@ -1,17 +1,20 @@
 """The log doctor on logs made to be ill, and on real ones."""
 
+import json
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vftcli.doctor import Examination, examine
+from vftcli.doctor import Examination, FindingWords, examine, finding_record, in_words
 from vftcli.readers import read, read_first_recording
 from vftcli.robots import Payload, load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import WORDS
 
 
 def moving(robot: str, *, load: float = 0.0, seconds: float = 10.0, seed: int = 0) -> Recording:
@@ -42,7 +45,11 @@ def moving(robot: str, *, load: float = 0.0, seconds: float = 10.0, seed: int = 
 
 
 def names(examination: Examination) -> set[str]:
-    return {finding.name for finding in examination.findings}
+    return {finding.name for finding in told(examination)}
+
+
+def told(examination: Examination) -> list[FindingWords]:
+    return [in_words(finding) for finding in examination.findings]
 
 
 @pytest.mark.parametrize("robot", ["ur5", "ur5e", "ur10e", "panda", "fr3"])
@@ -70,7 +77,7 @@ def test_inverted_effort_is_told_and_what_to_do() -> None:
     log = moving("ur10e")
     assert log.current is not None
     examination = altered(log, current=-log.current)
-    finding = next(f for f in examination.findings if f.name == "effort-sign")
+    finding = next(f for f in told(examination) if f.name == "effort-sign")
     assert "leading minus" in finding.remedy
     assert "inverted" in finding.consequence
     assert "effort-unit" in names(examination)
@@ -80,8 +87,8 @@ def test_inverted_effort_is_told_and_what_to_do() -> None:
 def test_effort_that_is_current_is_told() -> None:
     log = moving("ur5e")
     examination = altered(log, torque=log.current, current=None)
-    told = [f.evidence for f in examination.findings if f.name == "effort-unit"]
-    assert any("as motor current [A] the log fits ur5e" in text for text in told)
+    said = [f.evidence for f in told(examination) if f.name == "effort-unit"]
+    assert any("as motor current [A] the log fits ur5e" in text for text in said)
 
 
 def test_milliamperes_are_told() -> None:
@@ -95,6 +102,36 @@ def test_units_and_signs_of_velocity() -> None:
     assert log.dq is not None
     assert "velocity-unit" in names(altered(log, dq=np.rad2deg(log.dq)))
     assert "velocity-mismatch" in names(altered(log, dq=-log.dq))
+    assert not {"velocity-unit", "velocity-mismatch"} & names(examine(log))
+
+
+def test_velocity_in_radians_beside_positions_in_degrees_is_another_unit() -> None:
+    """The slope is then 1/57.3: told as a unit, not as a velocity that is wrong on every joint."""
+    log = moving("panda")
+    found = names(altered(log, q=np.rad2deg(log.q)))
+    assert "velocity-unit" in found
+    assert "velocity-mismatch" not in found
+
+
+def test_a_finding_holds_its_numbers_for_machines() -> None:
+    log = moving("ur5")
+    gap = log.t + np.where(np.arange(log.samples) > 1000, 0.5, 0.0)
+    (finding,) = [f for f in altered(log, t=gap).findings if f.code == "gaps"]
+    record = finding_record(finding)
+    assert record["values"]["longest_s"] == pytest.approx(0.504)
+    assert record["values"]["at_s"] == pytest.approx(4.0)
+    assert (record["level"], record["severity"], record["name"]) == ("warning", "warning", "gaps")
+    assert json.loads(json.dumps(record)) == record
+
+
+def test_variants_of_a_finding_share_its_name() -> None:
+    """Told to a machine by name, as docs/inspect.md lists them."""
+    text = (Path(__file__).parents[2] / "docs" / "inspect.md").read_text(encoding="utf-8")
+    entries = tomllib.loads((WORDS / "doctor.toml").read_text(encoding="utf-8"))
+    for code, entry in entries.items():
+        name = entry.get("name", code)
+        assert f"`{name}`" in text or name.startswith("zero-"), name
+        assert name in entries
 
 
 def test_signals_that_are_not_there() -> None:
@@ -136,7 +173,7 @@ def test_an_arm_without_profile() -> None:
 def test_every_finding_has_evidence_consequence_and_remedy() -> None:
     log = moving("ur10e", seconds=3.0)
     assert log.current is not None
-    for finding in altered(log, current=-log.current, dq=None).findings:
+    for finding in told(altered(log, current=-log.current, dq=None)):
         assert finding.evidence
         assert finding.consequence
         assert finding.remedy
@@ -195,7 +232,7 @@ def test_panda_exciting_is_a_panda(logs: Path) -> None:
 @pytest.mark.parametrize("name", ["identification", "repeat_a", "repeat_b"])
 def test_ur3_effort_is_inverted(logs: Path, name: str) -> None:
     examination = examine(read(logs / "ur3" / f"{name}.bag"))
-    finding = next(f for f in examination.findings if f.name == "effort-sign")
+    finding = next(f for f in told(examination) if f.name == "effort-sign")
     assert "J1, J2, J3, J4, J5, J6" in finding.evidence
     assert "-tau=effort" in finding.remedy
     turned = examine(read(logs / "ur3" / f"{name}.bag", columns="-tau=effort"))
@@ -204,18 +241,18 @@ def test_ur3_effort_is_inverted(logs: Path, name: str) -> None:
 
 def test_payload_mismatch_of_the_static_log(logs: Path) -> None:
     examination = examine(read(logs / "rtde" / "static_cb3.csv"))
-    finding = next(f for f in examination.findings if f.name == "payload-mismatch")
+    finding = next(f for f in told(examination) if f.name == "payload-mismatch")
     assert "J2" in finding.evidence
     assert "J3" in finding.evidence
 
 
 def test_load_of_the_loaded_log(logs: Path) -> None:
     examination = examine(read(logs / "ur10e" / "load_14harm.csv", columns=TABLE_31))
-    finding = next(f for f in examination.findings if f.name == "unmodelled-load")
+    finding = next(f for f in told(examination) if f.name == "unmodelled-load")
     assert "2.9 kg" in finding.evidence  # 2.805 kg were mounted; the currents say 2.88
     assert finding.severity == "warning"
 
 
 def test_zero_wrench_of_the_bag(logs: Path) -> None:
     examination = examine(read(logs / "franka_bags" / "calib_0108.bag"))
-    assert "zero-wrench" in {finding.name for finding in examination.warnings}
+    assert "zero-wrench" in {in_words(finding).name for finding in examination.warnings}

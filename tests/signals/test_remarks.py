@@ -56,6 +56,6 @@ def test_every_code_stands_once_and_its_templates_can_be_parsed() -> None:
     assert len(codes) == len(set(codes))
     for text in remarks.catalogue():
         for entry in remarks.parsed(text).values():
-            assert set(entry) <= {"short", "long"}
+            assert set(entry) <= {"short", "long", "name", "consequence", "remedy"}
             for template in entry.values():
                 assert list(string.Formatter().parse(template))

@@ -48,6 +48,8 @@ def report_of(examination: "Examination") -> dict[str, Any]:
     """Everything the doctor knows, for machines."""
     from dataclasses import asdict
 
+    from vftcli.doctor import finding_record, in_words
+
     recording = examination.recording
     source = recording.source
     return {
@@ -62,7 +64,7 @@ def report_of(examination: "Examination") -> dict[str, Any]:
         "repairs": list(source.repairs),
         "warnings": [
             *source.warnings,
-            *(str(finding) for finding in examination.warnings),
+            *(str(in_words(finding)) for finding in examination.warnings),
         ],
         "signals": list(recording.signals),
         "clock": source.clock,
@@ -73,7 +75,7 @@ def report_of(examination: "Examination") -> dict[str, Any]:
         "payload_kg": recording.payload_mass,
         "sha256": source.sha256,
         "robots": [asdict(fit) for fit in examination.robots],
-        "findings": [asdict(finding) for finding in examination.findings],
+        "findings": [finding_record(finding) for finding in examination.findings],
     }
 
 
@@ -91,6 +93,8 @@ def largest_step(recording: "Recording") -> float | None:
 
 def lines_of(examination: "Examination") -> list[str]:
     """The report for people."""
+    from vftcli.doctor import in_words
+
     recording = examination.recording
     source = recording.source
     rate, gap = rate_of(recording), largest_step(recording)
@@ -113,7 +117,7 @@ def lines_of(examination: "Examination") -> list[str]:
     ]
     lines += [f"  repair    {repair}" for repair in source.repairs]
     lines += [f"  suspect   {warning}" for warning in source.warnings]
-    for finding in examination.findings:
+    for finding in map(in_words, examination.findings):
         lines += [
             "",
             f"{finding.severity}: {finding.name}: {finding.evidence}.",

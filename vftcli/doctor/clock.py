@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vftcli.doctor.findings import Finding
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
+from vftcli.signals.remarks import Remark, fact, warning
 from vftcli.signals.series import gaps_of
 
 SLOW_RATE = 50.0
@@ -13,127 +13,84 @@ SLOW_RATE = 50.0
 JITTER = 0.05
 """Spread of nine steps in ten, relative to their median, at which a fixed step is visibly wrong."""
 GAP_STEPS = 4.0
+"""A step this many times the median is a gap."""
+LONG_GAP = 0.1
+"""A gap longer than this can hide a whole contact. [s]"""
 MISSED = (1.6, 3.4)
 """Steps this many times the median are one or two samples that were missed."""
 SHORT = 2.0
 """A log shorter than this tells little of noise and nothing of repeated motion. [s]"""
 STALE = 0.01
+"""Share of rows that repeat the one before, from which it is worth telling."""
 
 
-def clock_findings(recording: Recording) -> Iterator[Finding]:
-    """Findings about the clock."""
+def clock_findings(recording: Recording) -> Iterator[Remark]:
+    """Findings about the clock, each check independent of the others."""
     if recording.samples < 3:
-        yield Finding(
-            name="too-short",
-            severity="warning",
-            evidence=f"{recording.samples} samples",
-            consequence="Nothing can be estimated from them",
-            remedy="Record at least some seconds",
-        )
+        yield warning("too-short", samples=recording.samples)
         return
-    yield from _length_and_rate(recording)
-    yield from _jitter(recording)
-    yield from _gaps(recording)
-    yield from _repeats(recording)
-    yield from _stale_rows(recording)
-
-
-def _length_and_rate(recording: Recording) -> Iterator[Finding]:
     if recording.duration < SHORT:
-        yield Finding(
-            name="short",
-            severity="note",
-            evidence=f"the log lasts {recording.duration:.3g} s",
-            consequence="Observers of 10 1/s need half a second to settle",
-            remedy="Record longer, from rest",
-        )
+        yield fact("short", duration_s=recording.duration)
     rate = 1 / recording.median_step
     if rate < SLOW_RATE:
-        yield Finding(
-            name="slow-rate",
-            severity="warning",
-            evidence=f"{rate:.3g} samples a second",
-            consequence="Contacts shorter than a few samples are missed and inertia is misjudged",
-            remedy=(
-                "Record at the controller's rate: 125 Hz (CB3), 500 Hz (e-Series), 1 kHz (Franka)"
-            ),
+        yield warning("slow-rate", rate_Hz=rate)
+    yield from uneven_steps(recording)
+    yield from long_steps(recording)
+    source = recording.source
+    if source.duplicates:
+        share = 100 * source.duplicates / max(source.rows, 1)
+        level = warning if share > 10 else fact
+        yield level(
+            "repeated-stamps", repeats=source.duplicates, rows=source.rows, share_percent=share
         )
+    yield from stale_rows(recording)
 
 
-def _jitter(recording: Recording) -> Iterator[Finding]:
+def uneven_steps(recording: Recording) -> Iterator[Remark]:
+    """Samples that were missed, and steps that vary."""
     steps = np.diff(recording.t)
-    usual = float(np.median(steps))
-    regular = steps[(steps > MISSED[0] * usual) & (steps < MISSED[1] * usual)]
-    missed = int(regular.size)
+    usual = recording.median_step
+    missed = int(np.sum((steps > MISSED[0] * usual) & (steps < MISSED[1] * usual)))
     if missed > 0.001 * len(steps):
-        yield Finding(
-            name="missing-samples",
-            severity="note",
-            evidence=f"{missed} of {len(steps)} steps are two or three sample times long",
-            consequence="Torque between the samples is guessed by a straight line",
-            remedy="Record from the receiving thread, or to a local disk",
-        )
+        yield fact("missing-samples", missed=missed, steps=len(steps))
+    # A gap is no jitter: it is told by its own finding.
     low, high = np.percentile(steps[steps < GAP_STEPS * usual], [5, 95])
     spread = float(high - low) / usual
     if spread > JITTER:
-        yield Finding(
-            name="jitter",
-            severity="note",
-            evidence=(
-                f"steps vary by {100 * spread:.0f} % of their median: nine in ten lie between "
-                f"{1e3 * low:.3g} and {1e3 * high:.3g} ms ({recording.source.clock})"
-            ),
-            consequence="Filters of a fixed step would be wrong; every step is used as recorded",
-            remedy="Record the robot's own clock rather than the host's",
+        yield fact(
+            "jitter",
+            spread_percent=100 * spread,
+            low_ms=1e3 * float(low),
+            high_ms=1e3 * float(high),
+            clock=recording.source.clock,
         )
 
 
-def _gaps(recording: Recording) -> Iterator[Finding]:
+def long_steps(recording: Recording) -> Iterator[Remark]:
+    """Gaps, with the longest of them."""
     steps = np.diff(recording.t)
     gaps = gaps_of(recording.t, GAP_STEPS)
     if gaps.size:
         k = int(gaps[np.argmax(steps[gaps])])
-        yield Finding(
-            name="gaps",
-            severity="warning" if steps[k] > 0.1 else "note",
-            evidence=(
-                f"{gaps.size} steps of more than {GAP_STEPS:g} sample times, the longest "
-                f"{steps[k]:.3g} s at t = {recording.t[k]:.3g} s"
-            ),
-            consequence="Torque between the samples is guessed by a straight line",
-            remedy="Leave that part out with --interval, or record to a local disk",
+        level = warning if steps[k] > LONG_GAP else fact
+        yield level(
+            "gaps",
+            gaps=int(gaps.size),
+            steps=GAP_STEPS,
+            longest_s=float(steps[k]),
+            at_s=float(recording.t[k]),
         )
 
 
-def _repeats(recording: Recording) -> Iterator[Finding]:
-    source = recording.source
-    if source.duplicates:
-        share = 100 * source.duplicates / max(source.rows, 1)
-        yield Finding(
-            name="repeated-stamps",
-            severity="warning" if share > 10 else "note",
-            evidence=f"{source.duplicates} of {source.rows} rows ({share:.2g} %) repeat a stamp",
-            consequence="They were dropped; the steps beside them are longer",
-            remedy="Record from the receiving thread, or raise the recorder's rate",
-        )
-
-
-def _stale_rows(recording: Recording) -> Iterator[Finding]:
+def stale_rows(recording: Recording) -> Iterator[Remark]:
     """Rows that repeat every value of the row before under a new stamp: a packet that was late."""
-    moving = [v for name in JOINT_SIGNALS if (v := getattr(recording, name)) is not None]
     same = np.ones(recording.samples - 1, dtype=bool)
-    for value in moving:
-        same &= (value[1:] == value[:-1]).all(axis=1)
+    for name in JOINT_SIGNALS:
+        if (value := getattr(recording, name)) is not None:
+            same &= (value[1:] == value[:-1]).all(axis=1)
     share = float(same.mean())
+    # Nearly all rows alike is an arm at rest, and so are alike rows without velocity.
     if recording.dq is None or share < STALE or share > 0.9:
         return
-    still = np.abs(recording.dq[1:][same]).max() if same.any() else 0.0
-    if still < 1e-3:
-        return
-    yield Finding(
-        name="stale-rows",
-        severity="note",
-        evidence=f"{same.sum()} rows ({100 * share:.2g} %) repeat the row before under a new stamp",
-        consequence="Velocity and torque stand still for a step, which looks like noise",
-        remedy="Stamp samples with the robot's clock; recorded stamps are used as they are",
-    )
+    if np.abs(recording.dq[1:][same]).max() >= 1e-3:
+        yield fact("stale-rows", stale=int(same.sum()), share_percent=100 * share)

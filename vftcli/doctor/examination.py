@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from vftcli.doctor.clock import clock_findings
-from vftcli.doctor.findings import Finding
 from vftcli.doctor.fit import CLOSE, Evidence, RobotMatch, best_fit, measured, ranking
 from vftcli.doctor.load import load_findings
-from vftcli.doctor.signals import inverted_joints, signal_findings
+from vftcli.doctor.signals import TRAVEL, inverted_joints, is_most, signal_findings
 from vftcli.robots import PROFILES, Robot, load_robot
+from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, fact, warning
 
 MISTAKEN = 0.08
 """Misfit up to which an effort counts as something else than it was taken for.
@@ -34,13 +35,13 @@ class Examination:
     """
 
     recording: Recording
-    findings: tuple[Finding, ...]
+    findings: tuple[Remark, ...]
     robots: tuple[RobotMatch, ...]
 
     @property
-    def warnings(self) -> tuple[Finding, ...]:
+    def warnings(self) -> tuple[Remark, ...]:
         """The findings that can make results wrong."""
-        return tuple(finding for finding in self.findings if finding.severity == "warning")
+        return tuple(finding for finding in self.findings if finding.level == "warning")
 
 
 def examine(recording: Recording, robots: Mapping[str, Robot] | None = None) -> Examination:
@@ -60,109 +61,80 @@ def examine(recording: Recording, robots: Mapping[str, Robot] | None = None) -> 
         *load_findings(recording, best),
         *robot_findings(recording, fits, robots),
     ]
-    findings.sort(key=lambda finding: finding.severity != "warning")
+    findings.sort(key=lambda finding: finding.level != "warning")
     return Examination(recording=recording, findings=tuple(findings), robots=fits)
 
 
 def robot_findings(
     recording: Recording, fits: tuple[RobotMatch, ...], robots: Mapping[str, Robot]
-) -> Iterator[Finding]:
+) -> Iterator[Remark]:
     """Which profile fits, whether the log says another one, or that none does."""
     if not fits:
         counts = sorted({robot.joints for robot in robots.values()})
         if recording.joints not in counts:
-            yield Finding(
-                name="no-profile",
-                severity="warning",
-                evidence=f"the log has {recording.joints} joints; profiles have {counts}",
-                consequence="No built-in profile can be used",
-                remedy="Describe the arm in a TOML file or give its URDF with --robot",
-            )
+            yield warning("no-profile", joint_count=recording.joints, counts=counts)
         return
-    if not fits[0].fits:
+    best = fits[0]
+    if not best.fits:
         yield from mistaken_effort(recording, robots)
-        yield _none_fits(recording, fits)
+        yield no_fit(recording, fits)
         return
-    yield from _contradicted(recording, fits)
-    yield from _load(recording, fits[0], robots[fits[0].robot])
+    hint = recording.robot_hint
+    hinted = next((fit for fit in fits if fit.robot == hint), None)
+    if hinted is not None and hinted.misfit > CLOSE * best.misfit:
+        yield warning(
+            "other-robot", hint=hint, robot=best.robot, best=str(best), hinted=str(hinted)
+        )
+    yield from unmodelled_load(recording, best, robots[best.robot])
 
 
-def _load(recording: Recording, fit: RobotMatch, robot: Robot) -> Iterator[Finding]:
+def unmodelled_load(recording: Recording, fit: RobotMatch, robot: Robot) -> Iterator[Remark]:
     """A load that the drives carry and the profile does not know."""
     drives = best_fit(recording, fit.robot, robot, measured(recording, robot))
     carried = max(fit.load, drives.load if drives is not None else 0.0)
     if carried > TOOL:
-        told = ""
-        if fit.load == 0.0 and recording.target_torque is not None:
-            told = ", of which the controller's own model knows nothing"
-        yield Finding(
-            name="unmodelled-load",
-            severity="warning" if told else "note",
-            evidence=f"the drives carry about {carried:.2g} kg on the flange of {fit.robot}{told}",
-            consequence="Without it a torque that changes with the pose appears as contact",
-            remedy="Describe it in a [payload] section of the robot file",
-        )
+        # Where the controller's own model needs no load and the drives carry one, nobody told it.
+        untold = fit.load == 0.0 and recording.target_torque is not None
+        level = warning if untold else fact
+        code = "unmodelled-load-untold" if untold else "unmodelled-load"
+        yield level(code, load_kg=carried, robot=fit.robot)
 
 
-def _contradicted(recording: Recording, fits: tuple[RobotMatch, ...]) -> Iterator[Finding]:
-    hint = recording.robot_hint
-    hinted = next((fit for fit in fits if fit.robot == hint), None)
-    if hinted is not None and hinted.misfit > CLOSE * fits[0].misfit:
-        yield Finding(
-            name="other-robot",
-            severity="warning",
-            evidence=f"the joints are {hint}'s by name but the torques fit {fits[0]}, not {hinted}",
-            consequence="The wrong profile shows gravity as contact",
-            remedy=f"Check the arm; use --robot {fits[0].robot}",
-        )
-
-
-def mistaken_effort(recording: Recording, robots: Mapping[str, Robot]) -> Iterator[Finding]:
+def mistaken_effort(recording: Recording, robots: Mapping[str, Robot]) -> Iterator[Remark]:
     """An effort that fits a profile once it is taken for something else."""
     for name, robot in robots.items():
         if robot.joints != recording.joints:
             continue
         fit = best_fit(recording, name, robot, hypotheses(recording, robot))
         if fit is not None and fit.fits:
-            yield Finding(
-                name="effort-unit",
-                severity="warning",
-                evidence=f"as {fit.evidence} the log fits {name} ({100 * fit.misfit:.2g} %)",
-                consequence="Taken as it is, every torque is wrong by that factor",
-                remedy="Say what it is with --columns, as in current=effort or -tau=effort",
-            )
+            misfit = 100 * fit.misfit
+            yield warning("effort-unit", evidence=fit.evidence, robot=name, misfit_percent=misfit)
 
 
 def hypotheses(recording: Recording, robot: Robot) -> Iterator[Evidence]:
     """What the effort may be besides what it was taken for."""
     torque, current, constant = recording.torque, recording.current, robot.torque_constant
+    found: dict[str, Array] = {}
     if torque is not None:
-        yield Evidence("torque of the other sign", -torque, MISTAKEN, friction=True)
+        found["torque of the other sign"] = -torque
         if constant is not None:
-            yield Evidence("motor current [A]", torque * constant, MISTAKEN, friction=True)
-            yield Evidence("motor current [mA]", torque * constant / 1e3, MISTAKEN, friction=True)
+            found["motor current [A]"] = torque * constant
+            found["motor current [mA]"] = torque * constant / 1e3
     elif current is not None:
-        yield Evidence("joint torque [N·m]", current, MISTAKEN, friction=True)
+        found["joint torque [N·m]"] = current
         if constant is not None:
-            yield Evidence(
-                "current of the other sign", -current * constant, MISTAKEN, friction=True
-            )
-            yield Evidence("current in mA", current * constant / 1e3, MISTAKEN, friction=True)
+            found["current of the other sign"] = -current * constant
+            found["current in mA"] = current * constant / 1e3
+    for name, taken in found.items():
+        yield Evidence(name, taken, MISTAKEN, friction=True)
 
 
-def _none_fits(recording: Recording, fits: tuple[RobotMatch, ...]) -> Finding:
-    ranked = "; ".join(str(fit) for fit in fits)
-    still = float(np.max(np.ptp(recording.q, axis=0))) < 0.05
+def no_fit(recording: Recording, fits: tuple[RobotMatch, ...]) -> Remark:
+    """That no profile explains the torques, with the likeliest reason."""
     inverted, judged = inverted_joints(recording)
-    reason = "The arm has no profile, its effort is not what it is taken for, or it carries a load"
-    if inverted and len(inverted) >= max(2, round(0.6 * judged)):
-        reason = "The effort's sign is inverted, or the arm has no profile"
-    elif still:
-        reason = "In a single pose an unknown load cannot be told from another arm"
-    return Finding(
-        name="no-robot-fits",
-        severity="warning",
-        evidence=f"no profile explains the torques: {ranked}",
-        consequence="With any of them gravity appears as contact",
-        remedy=f"{reason}. Give the arm's own TOML or URDF with --robot",
-    )
+    code = "no-robot-fits"
+    if inverted and is_most(len(inverted), judged):
+        code = "no-robot-fits-inverted"
+    elif float(np.max(np.ptp(recording.q, axis=0))) < TRAVEL:
+        code = "no-robot-fits-at-rest"
+    return warning(code, ranked="; ".join(str(fit) for fit in fits))

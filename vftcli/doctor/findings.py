@@ -1,17 +1,16 @@
-"""Findings: what the log doctor tells, always with evidence, consequence and remedy."""
+"""Findings: the doctor's remarks, each with its evidence, its consequence and its remedy."""
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
-Severity = Literal["note", "warning"]
+from vftcli.signals.remarks import Remark, Where, as_record, filled, sentence, words
 
 
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """One observation about a log.
+class FindingWords(NamedTuple):
+    """What a finding says.
 
     Attributes:
-        name: Short name, as used in ``--json``.
+        name: Short name; variants of one finding share it.
         severity: A note informs; a warning can make results wrong and fails ``--strict``.
         evidence: What was seen, with numbers.
         consequence: What it does to the results.
@@ -19,7 +18,7 @@ class Finding:
     """
 
     name: str
-    severity: Severity
+    severity: str
     evidence: str
     consequence: str
     remedy: str
@@ -27,3 +26,26 @@ class Finding:
     def __str__(self) -> str:
         """The finding on one line."""
         return f"{self.name}: {self.evidence}. {self.consequence}. {self.remedy}."
+
+
+def in_words(finding: Remark) -> FindingWords:
+    """A finding's words, its numbers filled in."""
+    entry = words(finding.code)
+    return FindingWords(
+        name=entry.get("name", finding.code),
+        severity="warning" if finding.level == "warning" else "note",
+        evidence=sentence(finding),
+        consequence=filled(entry["consequence"], finding),
+        remedy=filled(entry["remedy"], finding),
+    )
+
+
+def finding_record(finding: Remark) -> dict[str, Any]:
+    """A finding for machines: its code and values, and its words."""
+    said = in_words(finding)
+    return {**as_record(finding), **said._asdict(), "message": str(said)}
+
+
+def on_joints(joints: Iterable[int]) -> Where:
+    """The place of a finding about some joints, given by their index from zero."""
+    return Where(joints=tuple(int(j) + 1 for j in joints))

@@ -4,15 +4,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vftcli.doctor.findings import Finding
+from vftcli.doctor.findings import on_joints
 from vftcli.robots import Robot
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, warning
 
 REST = 2e-3
 """Speed below which a joint counts as resting. [rad/s]"""
 MISMATCH = 4.0
 """Difference at rest, on two joints, that stiction hardly explains. [N·m]"""
+USUAL_CONSTANT = 10.0
+"""Torque per current near which every UR's large drives lie. [N·m/A]"""
 RATIO = 0.05
 """Relative difference between the log's own drive constants and the profile's that is reported."""
 
@@ -40,64 +43,57 @@ def drive_constants(recording: Recording) -> Array | None:
     return constants
 
 
-def resting(recording: Recording) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def resting(recording: Recording) -> Mask:
     """Samples in which no joint moves. (T,)"""
     if recording.dq is None:
         return np.zeros(recording.samples, dtype=bool)
     speed = recording.dq if recording.target_dq is None else recording.target_dq
-    return np.asarray(
-        (np.abs(speed) < REST).all(axis=1) & (np.abs(recording.dq) < 5 * REST).all(axis=1)
-    )
+    still = (np.abs(speed) < REST).all(axis=1)
+    return np.asarray(still & (np.abs(recording.dq) < 5 * REST).all(axis=1))
 
 
-def load_findings(recording: Recording, robot: Robot | None) -> Iterator[Finding]:
+def load_findings(recording: Recording, robot: Robot | None) -> Iterator[Remark]:
     """Payload mismatch at rest, and drive constants against the profile that fits best."""
     constants = drive_constants(recording)
-    yield from _payload(recording, constants)
+    yield from payload_mismatch(recording, constants)
     if robot is not None and robot.torque_constant is not None and constants is not None:
-        yield from _constants(constants, robot)
+        ratio = constants / robot.torque_constant - 1
+        wrong = np.flatnonzero(np.abs(ratio) > RATIO)
+        if wrong.size:
+            yield warning(
+                "drive-constants",
+                on_joints(wrong),
+                robot=robot.name,
+                found_Nm_A=constants[wrong].tolist(),
+                profile_Nm_A=np.asarray(robot.torque_constant)[wrong].tolist(),
+                worst_percent=100 * float(np.nanmax(np.abs(ratio))),
+            )
 
 
-def _payload(recording: Recording, constants: Array | None) -> Iterator[Finding]:
+def payload_mismatch(recording: Recording, constants: Array | None) -> Iterator[Remark]:
+    """Drives that carry another current at rest than the controller expects.
+
+    Args:
+        recording: The log.
+        constants: Its own drive constants, NaN where not known. (n,) [N·m/A]
+    """
     rest = resting(recording)
     current, expected = recording.current, recording.target_current
     if current is None or expected is None or rest.sum() < 20:
         return
-    gap = np.mean(current[rest] - expected[rest], axis=0)
+    carried, wanted = np.mean(current[rest], axis=0), np.mean(expected[rest], axis=0)
     known = constants if constants is not None else np.full(recording.joints, np.nan)
-    torque = gap * np.where(np.isfinite(known), known, 10.0)  # near 10 N·m/A on every UR
+    torque = (carried - wanted) * np.where(np.isfinite(known), known, USUAL_CONSTANT)
+    # Of the base no load shows, of the wrist little: shoulder, elbow and the next joint tell.
     heavy = np.flatnonzero(np.abs(torque[1:4]) > MISMATCH) + 1
     if heavy.size < 2:
         return
-    told = ", ".join(
-        f"J{j + 1} {np.mean(current[rest, j]):.3g} A for {np.mean(expected[rest, j]):.3g} A "
-        f"expected ({torque[j]:+.3g} N·m)"
-        for j in heavy
+    untold = recording.payload_mass is None
+    yield warning(
+        "payload-mismatch-untold" if untold else "payload-mismatch",
+        on_joints(heavy),
+        carried_A=carried[heavy].tolist(),
+        expected_A=wanted[heavy].tolist(),
+        extra_Nm=torque[heavy].tolist(),
+        payload_kg=recording.payload_mass,
     )
-    stated = (
-        f"the controller was told of {recording.payload_mass:.3g} kg"
-        if recording.payload_mass is not None
-        else "the log does not say which payload the controller was told of"
-    )
-    yield Finding(
-        name="payload-mismatch",
-        severity="warning",
-        evidence=f"at rest the drives carry {told}; {stated}",
-        consequence="A constant external torque of that size appears in every estimate",
-        remedy="Mount the real load: a [payload] section in the robot file, or --payload NAME",
-    )
-
-
-def _constants(constants: Array, robot: Robot) -> Iterator[Finding]:
-    profile = np.asarray(robot.torque_constant)
-    ratio = constants / profile - 1
-    wrong = np.flatnonzero(np.abs(ratio) > RATIO)
-    if wrong.size:
-        told = ", ".join(f"J{j + 1} {constants[j]:.2f} against {profile[j]:.2f}" for j in wrong)
-        yield Finding(
-            name="drive-constants",
-            severity="warning",
-            evidence=f"target_torque over target_current at rest is {told} N·m/A in {robot.name}",
-            consequence=f"Torques are off by up to {100 * np.nanmax(np.abs(ratio)):.0f} %",
-            remedy="Put the log's own constants into a copy of the profile (torque_constant)",
-        )

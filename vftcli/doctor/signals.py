@@ -1,12 +1,13 @@
 """Findings about the signals: units, signs, saturation, joints that never move, empty fields."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
-from vftcli.doctor.findings import Finding
+from vftcli.doctor.findings import on_joints
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, fact, warning
 from vftcli.signals.series import runs_of
 
 MOVING = 1e-3
@@ -20,65 +21,37 @@ Joints hand energy to one another through gravity, so a single joint may well gi
 """
 ALONE = -0.85
 """The same for a joint whose neighbours' effort is sound."""
+DEGREES = 57.3
+"""Degrees in a radian."""
+LARGE_ANGLE = 13.0
+"""Two turns and a little: no joint of these arms goes further from its zero. [rad]"""
 LARGE_CURRENT = 60.0
 """No joint of these arms draws this much; readings in mA do. [A]"""
 
 
-def signal_findings(recording: Recording) -> Iterator[Finding]:
+def signal_findings(recording: Recording) -> Iterator[Remark]:
     """Findings about the signals, each check independent of the others."""
-    yield from _missing(recording)
-    yield from _units(recording)
-    yield from _velocity(recording)
-    yield from _effort_sign(recording)
-    yield from _still_joints(recording)
-    yield from _saturation(recording)
-    yield from _zeros(recording)
-
-
-def named(joints: Iterable[int]) -> str:
-    """Joints for a sentence, counted from one."""
-    return ", ".join(f"J{int(j) + 1}" for j in joints)
-
-
-def _missing(recording: Recording) -> Iterator[Finding]:
     if recording.dq is None:
-        yield Finding(
-            name="no-velocity",
-            severity="warning",
-            evidence="the log has no joint velocities",
-            consequence="No observer can run",
-            remedy="Record actual_qd (UR) or dq (Franka)",
-        )
+        yield warning("no-velocity")
     if recording.current is None and recording.torque is None:
-        yield Finding(
-            name="no-effort",
-            severity="warning",
-            evidence="the log has neither motor currents nor joint torques",
-            consequence="No observer can run",
-            remedy="Record actual_current (UR) or tau_J (Franka), or name it with --columns",
-        )
+        yield warning("no-effort")
+    yield from odd_units(recording)
+    yield from odd_velocities(recording)
+    yield from inverted_effort(recording)
+    yield from still_joints(recording)
+    yield from saturated_effort(recording)
+    yield from zero_signals(recording)
 
 
-def _units(recording: Recording) -> Iterator[Finding]:
+def odd_units(recording: Recording) -> Iterator[Remark]:
+    """Positions and currents too large for radians and ampere."""
     largest = float(np.max(np.abs(recording.q)))
-    if largest > 13.0:
-        yield Finding(
-            name="degrees",
-            severity="warning",
-            evidence=f"positions reach {largest:.4g}",
-            consequence="Radians of that size are two turns; degrees would be taken for radians",
-            remedy="If they are degrees, say so: --columns q[deg]=…",
-        )
+    if largest > LARGE_ANGLE:
+        yield warning("degrees", largest_rad=largest)
     if recording.current is not None:
         typical = float(np.percentile(np.abs(recording.current), 99))
         if typical > LARGE_CURRENT:
-            yield Finding(
-                name="milliamperes",
-                severity="warning",
-                evidence=f"currents reach {typical:.4g} A",
-                consequence="Torques would be a thousandfold",
-                remedy="If they are mA, say so: --columns current[mA]=…",
-            )
+            yield warning("milliamperes", typical_A=typical)
 
 
 def velocity_slopes(recording: Recording) -> Array:
@@ -104,30 +77,19 @@ def velocity_slopes(recording: Recording) -> Array:
     return np.asarray(slopes)
 
 
-def _velocity(recording: Recording) -> Iterator[Finding]:
+def odd_velocities(recording: Recording) -> Iterator[Remark]:
+    """Logged velocity in another unit than the positions, or of another size or sign."""
     slopes = velocity_slopes(recording)
     known = np.flatnonzero(np.isfinite(slopes))
     if known.size == 0:
         return
-    if np.all(np.abs(slopes[known] - 57.3) < 10) or np.all(np.abs(slopes[known] - 1 / 57.3) < 0.01):
-        yield Finding(
-            name="velocity-unit",
-            severity="warning",
-            evidence=f"velocities are {np.median(slopes[known]):.3g} times dq/dt",
-            consequence="Positions and velocities are in different units",
-            remedy="Say the unit: --columns dq[deg/s]=… or q[deg]=…",
-        )
+    found = slopes[known]
+    if np.all(np.abs(found - DEGREES) < 10) or np.all(np.abs(found - 1 / DEGREES) < 0.01):
+        yield warning("velocity-unit", slope=float(np.median(found)))
         return
-    wrong = known[np.abs(slopes[known] - 1) > 0.3]
+    wrong = known[np.abs(found - 1) > 0.3]
     if wrong.size:
-        told = ", ".join(f"J{j + 1} {slopes[j]:.2f}" for j in wrong)
-        yield Finding(
-            name="velocity-mismatch",
-            severity="warning",
-            evidence=f"logged velocity over differentiated position is {told} (should be 1)",
-            consequence="Momentum is wrong by the same factor",
-            remedy="Check the columns' order, sign and filter; the clock may be the host's",
-        )
+        yield warning("velocity-mismatch", on_joints(wrong), slopes=slopes[wrong].tolist())
 
 
 def work_shares(recording: Recording, effort: Array) -> Array:
@@ -162,81 +124,58 @@ def inverted_joints(recording: Recording) -> tuple[list[int], int]:
     shares = work_shares(recording, effort[1])
     judged = np.flatnonzero(np.isfinite(shares))
     found = [int(j) for j in judged if shares[j] < STRONG]
-    if len(found) < max(2, round(0.6 * judged.size)):  # a few joints only: nearly all their work
+    if not is_most(len(found), judged.size):  # a few joints only: nearly all their work
         found = [j for j in found if shares[j] < ALONE]
     return found, int(judged.size)
 
 
-def _effort_sign(recording: Recording) -> Iterator[Finding]:
+def is_most(count: int, judged: int) -> bool:
+    """Whether so many joints are most of those that could be judged, and not one by chance."""
+    return count >= max(2, round(0.6 * judged))
+
+
+def inverted_effort(recording: Recording) -> Iterator[Remark]:
+    """Effort that takes energy out of a moving arm: friction only takes, so its sign is turned."""
     found, judged = inverted_joints(recording)
     effort = effort_of(recording)
     if not found or effort is None or recording.dq is None:
         return
     name, value = effort
-    shares = work_shares(recording, value)
+    is_current = name == "current"
     forward = recording.dq[:, found[0]] > MOVING
-    mean = float(np.mean(value[forward, found[0]])) if forward.any() else float("nan")
-    unit = "A" if name == "current" else "N·m"
-    whole = len(found) >= max(2, round(0.6 * judged))
-    word = "current" if name == "current" else "tau"
-    yield Finding(
-        name="effort-sign",
-        severity="warning",
-        evidence=(
-            f"the {name} of {named(found)} takes energy out of a moving arm "
-            f"({', '.join(f'{100 * shares[j]:.0f} %' for j in found)} of its gross work; mean "
-            f"{mean:.3g} {unit} while J{found[0] + 1} moves forward)"
-        ),
-        consequence=(
-            "Friction only takes energy, so the sign is inverted"
-            if whole
-            else "Either the sign of these joints is inverted or somebody moved the arm by hand"
-        ),
-        remedy=(
-            f"Turn it with a leading minus: --columns '-{word}=effort' for a bag, or -{word}:"
-            f"{recording.joints} for a table"
-        ),
+    yield warning(
+        "effort-sign" if is_most(len(found), judged) else "effort-sign-of-some",
+        on_joints(found),
+        signal=name,
+        shares_percent=(100 * work_shares(recording, value)[found]).tolist(),
+        mean=float(np.mean(value[forward, found[0]])) if forward.any() else float("nan"),
+        unit="A" if is_current else "N·m",
+        first=found[0] + 1,
+        column="current" if is_current else "tau",
+        width=recording.joints,
     )
 
 
-def _still_joints(recording: Recording) -> Iterator[Finding]:
+def still_joints(recording: Recording) -> Iterator[Remark]:
+    """Joints that never move, or an arm that does not."""
     travel = np.ptp(recording.q, axis=0)
     still = np.flatnonzero(travel < 1e-3)
     if still.size == recording.joints:
-        yield Finding(
-            name="at-rest",
-            severity="note",
-            evidence=f"no joint moves by more than {1e3 * travel.max():.2g} mrad",
-            consequence="Stiction hides torques up to breakaway; nothing can be identified",
-            remedy="Use it for held poses only",
-        )
+        yield fact("at-rest", travel_mrad=1e3 * float(travel.max()))
     elif still.size:
-        yield Finding(
-            name="still-joints",
-            severity="note",
-            evidence=f"{named(still)} never move{'s' if still.size == 1 else ''}",
-            consequence="Their estimate keeps their stiction, and no friction can be identified",
-            remedy="Move every joint in logs that are meant for identification",
-        )
+        yield fact("still-joints" if still.size > 1 else "still-joint", on_joints(still))
 
 
-def _saturation(recording: Recording) -> Iterator[Finding]:
+def saturated_effort(recording: Recording) -> Iterator[Remark]:
+    """Effort that stays at its very extreme."""
     for name in ("current", "torque"):
-        value = getattr(recording, name)
-        if value is None:
-            continue
-        joints = [j for j in range(recording.joints) if _is_clipped(value[:, j])]
-        if joints:
-            yield Finding(
-                name="saturation",
-                severity="warning",
-                evidence=f"{name} of {named(joints)} stays at its very extreme for whole stretches",
-                consequence="The true effort was larger; the estimate is too small there",
-                remedy="Move more slowly, or leave these parts out with --interval",
-            )
+        if (value := getattr(recording, name)) is not None:
+            joints = [j for j in range(recording.joints) if is_clipped(value[:, j])]
+            if joints:
+                yield warning("saturation", on_joints(joints), signal=name)
 
 
-def _is_clipped(value: Array, least: int = 10) -> bool:
+def is_clipped(value: Array, least: int = 10) -> bool:
     """Whether an effort that varies stays exactly at its extreme for several samples in a row."""
     if np.ptp(value) == 0:
         return False
@@ -249,27 +188,13 @@ def _is_clipped(value: Array, least: int = 10) -> bool:
     return False
 
 
-def _zeros(recording: Recording) -> Iterator[Finding]:
+def zero_signals(recording: Recording) -> Iterator[Remark]:
+    """Signals that are zero in every sample, so were not measured."""
     for name in ("current", "torque", "tau_ext", "wrench", "target_torque", "dq"):
         value = getattr(recording, name)
         if value is None or np.any(value):
             continue
-        other = (
-            recording.tau_ext is not None and name == "wrench" and bool(np.any(recording.tau_ext))
-        )
-        yield Finding(
-            name=f"zero-{name.replace('_', '-')}",
-            severity="warning" if name in {"current", "torque", "wrench", "tau_ext"} else "note",
-            evidence=f"{name} is zero in every sample"
-            + (", while tau_ext is not" if other else ""),
-            consequence=(
-                "libfranka reports zeros near singularities; as a reference it would be wrong"
-                if name == "wrench"
-                else "It was not measured, or its recorder was not running"
-            ),
-            remedy=(
-                "Do not use --reference sensor with this log"
-                if name == "wrench"
-                else "Do not rely on it"
-            ),
-        )
+        level = fact if name in {"target_torque", "dq"} else warning
+        others = recording.tau_ext is not None and bool(np.any(recording.tau_ext))
+        beside = "-beside-tau-ext" if name == "wrench" and others else ""
+        yield level(f"zero-{name.replace('_', '-')}{beside}")

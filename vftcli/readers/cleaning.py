@@ -255,7 +255,7 @@ def without_repeats(raw: RawLog, findings: Findings) -> RawLog:
     for value in raw.signals.values():
         changed |= (value[again] != value[again - 1]).any(axis=1)
     findings.duplicates = repeats
-    code = "repeated-stamps" if repeats > 1 else "repeated-stamp"
+    code = "repeats-dropped" if repeats > 1 else "repeat-dropped"
     findings.remarks.append(fact(code, rows=repeats))
     if different := int(changed.sum()):
         findings.remarks.append(caution("repeats-differ", changed=different, repeats=repeats))
@@ -271,7 +271,7 @@ def report_gaps(t: Array, findings: Findings) -> None:
     if gaps.size:
         k = int(gaps[np.argmax(steps[gaps])])
         remark = caution(
-            "gaps" if gaps.size > 1 else "gap",
+            "clock-gaps" if gaps.size > 1 else "clock-gap",
             gaps=int(gaps.size),
             steps=GAP_STEPS,
             longest_s=float(steps[k]),

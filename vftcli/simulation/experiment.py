@@ -66,7 +66,7 @@ class Simulation:
         seen = self.measured
         t = seen.stamp[rows] - seen.stamp[rows[0]]
         duplicates = len(written) - len(rows)
-        repeated = "repeated-stamps" if duplicates > 1 else "repeated-stamp"
+        repeated = "repeats-dropped" if duplicates > 1 else "repeat-dropped"
         remarks = (fact(repeated, rows=duplicates),) if duplicates else ()
         in_current = seen.current is not None
         current = self.vendor.target_current
