@@ -22,7 +22,7 @@ class Densities(NamedTuple):
     """The filter's parameters, one a joint.
 
     Attributes:
-        r: SensorReading noise of the momentum, R. (n,)
+        r: Measurement noise of the momentum, R. (n,)
         q_p: Process noise of the momentum, Q_p. (n,)
         q_tau: Process noise of the external torque, Q_τ. (n,)
         decay: a in A_τ = −a. (n,) [1/s]

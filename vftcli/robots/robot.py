@@ -85,7 +85,7 @@ class Robot:
         torque_constant: Joint torque per motor current, gear included. (n,) [N·m/A]
         friction: One model a joint.
         limits: Joint limits.
-        noise: SensorReading noise.
+        noise: Measurement noise.
         sample_rate_hz: The vendor's own rate, NaN if not given. [Hz]
         ros_state: ROS 2 message in which its driver publishes the whole state, "" where it has none
             but JointState.

@@ -58,7 +58,7 @@ class Disturbance:
         """What each observer's lag leaves out of the contacts, standard deviation. (n,) [N·m]
 
         Args:
-            free: FreeRunTorque samples of the log, used where there is no free run. (T,)
+            free: Unloaded samples of the log, used where there is no free run. (T,)
         """
         everywhere = np.ones(len(self.terms.t), dtype=bool)
         loaded, quiet = Part(self.terms, ~free), Part(self.terms, free)
@@ -138,7 +138,7 @@ def measured(
 
     Args:
         torques: The estimates.
-        free: FreeRunTorque samples. (T,)
+        free: Unloaded samples. (T,)
         rms: Root mean square over a free run, or None to take the spread over `free`. (n,) [N·m]
         disturbance: What tells the lag, or None to leave it out.
     """

@@ -116,7 +116,7 @@ def line_groups(analysis: Analysis) -> dict[str, list[Lines]]:
     if analysis.wrenches:
         axes = [wrench_lines(analysis, k) for k in range(len(AXES))]
         groups["Wrench"] = [*axes, *condition_lines(analysis)]
-    return {**groups, "ArmPoses": motion_lines(analysis)}
+    return {**groups, "Motion": motion_lines(analysis)}
 
 
 def plot_of(lines: Lines) -> Plot:
