@@ -4,7 +4,9 @@ Bounds on real logs are those the first part of the work was asked for; the prot
 stand beside them.
 """
 
+import ast
 import gzip
+import inspect
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -12,17 +14,23 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from typer.testing import CliRunner
 
 import vftcli as vft
+from vftcli import pipeline, readers
+from vftcli.cli import app
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.readers.reader import ReadChoice
+from vftcli.refinement.choice import RefinementChoice
+from vftcli.repetition import free_run
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian
-from vftcli.signals.errors import RobotError
+from vftcli.signals.errors import ParameterError, RobotError
 from vftcli.signals.remarks import Remark
+from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 
 FIXTURE = Path(__file__).parent.parent / "fixtures" / "ur5_circle.csv"
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
@@ -70,6 +78,130 @@ def test_as_printed_differs_and_says_so() -> None:
     assert "as-printed" in {r.code for r in printed.remarks if isinstance(r, Remark)}
     for one, other in zip(printed.estimates, corrected.estimates, strict=True):
         assert np.max(np.abs(one.tau - other.tau)) > 0.1
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Three logs of the circle: two of its cycles, pushed, and then one each, the last ones longer.
+
+    The clocks of the two single cycles are alike; nothing touches the arm in the second log.
+    """
+    folder = tmp_path_factory.mktemp("runs")
+    head, *lines = FIXTURE.read_text(encoding="utf-8").splitlines(keepends=True)
+    stamps = [line.partition(" ")[0] for line in lines]
+    paths = []
+    for name, first, count in (("load", 700, 1000), ("free", 0, 520), ("more", 500, 520)):
+        rows = [line.partition(" ")[2] for line in lines[first : first + count]]
+        path = folder / f"{name}.csv"
+        path.write_text(head + "".join(f"{t} {row}" for t, row in zip(stamps, rows, strict=False)))
+        paths.append(path)
+    return paths
+
+
+def asked(name: str, *free: Path, zero: Path | None = None, **more: object) -> AnalysisChoice:
+    """A choice of reference and free runs, bands measured."""
+    return AnalysisChoice(
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=("gmo", "rts-auto")),
+        reference=ReferenceChoice(name=name),
+        free=FreeChoice(logs=free),
+        wrench=WrenchChoice(zero=ZeroChoice(log=zero)) if zero is not None else None,
+        **more,  # type: ignore[arg-type]
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "reads", "models", "alignments"),
+    [
+        ("compare LOAD --reference two-cycle --free FREE --zero FREE --bands", 2, 2, 1),
+        ("compare LOAD --reference zero --free FREE --free MORE", 3, 3, 2),
+        ("compare LOAD MORE --reference two-cycle --free FREE --bands", 3, 3, 2),
+        ("compare LOAD --reference zero --zero FREE", 2, 2, 1),
+        ("compare LOAD --reference two-cycle --bands --remove-bias free-cycle", 1, 1, 0),
+        ("estimate LOAD --free FREE -o OUT", 2, 2, 1),
+        ("report LOAD --reference two-cycle --free FREE -o OUT", 2, 2, 1),
+        ("tune LOAD --free FREE -o OUT.toml", 2, 2, 1),
+    ],
+)
+def test_every_log_is_read_modelled_and_aligned_once(
+    runs: list[Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    words: str,
+    reads: int,
+    models: int,
+    alignments: int,
+) -> None:
+    """In a command; the same --free F --zero F --bands read F 3 times, modelled it 4 times."""
+    counted = {"read": 0, "dynamics_terms": 0, "align": 0}
+
+    def count(module: object, name: str) -> None:
+        whole = getattr(module, name)
+
+        def wrapped(*args: object, **more: object) -> object:
+            counted[name] += 1
+            return whole(*args, **more)
+
+        monkeypatch.setattr(module, name, wrapped)
+
+    count(readers, "read")
+    count(free_run, "dynamics_terms")
+    count(free_run, "align")
+    names = {"LOAD": runs[0], "FREE": runs[1], "MORE": runs[2], "OUT": tmp_path / "out"}
+    line = words.replace("OUT.toml", str(tmp_path / "gains.toml"))
+    done = CliRunner().invoke(
+        app, [str(names.get(word, word)) for word in [*line.split(), "--robot", "ur5"]]
+    )
+    assert done.exit_code == 0, done.output
+    assert counted == {"read": reads, "dynamics_terms": models, "align": alignments}
+
+
+def test_the_order_of_two_free_runs_on_one_clock_does_not_matter(runs: list[Path]) -> None:
+    """The first was used twice; three rows less of one, and both were used."""
+    load, free, more = runs
+    short = more.with_name("short.csv")
+    short.write_text("".join(more.read_text().splitlines(keepends=True)[:-3]))
+    bias = RefinementChoice(remove_bias="free-cycle")
+    made = [
+        analyse_log(load, asked("zero", *pair, refinement=bias)).estimates
+        for pair in ((free, more), (more, free), (free, short))
+    ]
+    for one, other, shorter in zip(*made, strict=True):
+        np.testing.assert_allclose(other.tau, one.tau, atol=1e-9)
+        covered = np.isclose(shorter.tau, one.tau, atol=0.05).all(axis=1)
+        assert np.mean(covered) > 0.9  # but where the three samples would have been
+
+
+def test_a_free_run_as_long_as_the_log_is_told_from_it(runs: list[Path]) -> None:
+    """Its raw disturbance was taken for the log's: the tuned gains collapsed."""
+    load, free, more = runs
+    one = more.with_name("as_long.csv")
+    one.write_text("".join(free.read_text().splitlines(keepends=True)[:501]))
+    tunings = []
+    for rows in (501, 499):
+        log = load.with_name(f"load{rows}.csv")
+        log.write_text("".join(load.read_text().splitlines(keepends=True)[:rows]))
+        choice = asked("zero", one, refinement=RefinementChoice(remove_bias="free-cycle"))
+        tunings.append(analyse_log(log, choice).tunings["rts-auto"].omega_n)
+    np.testing.assert_allclose(*tunings, rtol=0.1)  # grid of 1.1: two samples change little
+
+
+def test_the_zero_of_a_free_run_and_its_bias_removal_exclude_each_other(runs: list[Path]) -> None:
+    with pytest.raises(ParameterError, match="take it off twice"):
+        asked("zero", zero=runs[1], refinement=RefinementChoice(remove_bias="model"))
+
+
+def test_the_pipeline_is_short_and_imports_nothing_on_its_way() -> None:
+    """Seven verbs on one screen: no branch of `analyse` imports, and it is at most 25 lines."""
+    (function,) = [
+        node
+        for node in ast.parse(inspect.getsource(pipeline.analyse)).body
+        if isinstance(node, ast.FunctionDef)
+    ]
+    code = function.body[1:]  # without its docstring
+    assert sum(node.end_lineno - node.lineno + 1 for node in code) <= 25
+    inner = [child for node in code for child in ast.walk(node)]
+    assert not any(isinstance(node, ast.Import | ast.ImportFrom | ast.If) for node in inner)
 
 
 def test_mujoco_ur5e_with_its_own_model(logs: Path) -> None:

@@ -98,3 +98,18 @@ def test_the_ur3_bags_share_a_part(logs: Path) -> None:
     found = align(first, second)
     assert np.count_nonzero(found.overlap) * first.median_step > 9.8
     assert found.deviation < 7e-3
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("first", "last"), [(0, 1850), (450, 1850), (0, 1400)])
+def test_of_equal_fits_the_longest_overlap_counts(
+    repeated: Make, seed: int, first: int, last: int
+) -> None:
+    """Five periods of 3.7 s: noise alone decided which whole period was taken, a part was lost."""
+    free = repeated(cycles=5.0, seed=seed)
+    loaded = cut(repeated(cycles=5.0, seed=seed + 10, push=0.03), first, last)
+    found = align(loaded, free)
+    assert np.count_nonzero(found.overlap) >= loaded.samples - 40  # noise moves the ends
+    # Any whole period that leaves nothing out is right; the push pulls by its own share.
+    off = (found.shift - free.t[first] + 0.5 * 3.7) % 3.7 - 0.5 * 3.7
+    assert off == pytest.approx(0.0, abs=5e-3)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vftcli.signals.lag import closest_lag, lags, parabola, time_offset
+from vftcli.signals.lag import lag_fit, lags, parabola, time_offset
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -31,7 +31,7 @@ def test_lags_and_offsets_have_one_sign(lag: float) -> None:
     # the ends, which do not overlap, pull a sine's peak by up to a fifth of the 10 ms step
     np.testing.assert_allclose(lags(late, early, 0.01), lag, atol=2e-3)
     assert time_offset(t, late, early).lag == pytest.approx(lag, abs=2e-3)
-    samples = closest_lag(late, early, 0.3)
+    samples = lag_fit(late, early, 0.3).closest
     assert 0.01 * samples == pytest.approx(lag, abs=0.005)  # half a step
 
 
@@ -56,7 +56,7 @@ def test_the_closest_lag_is_that_of_a_plain_search(seed: int) -> None:
             squares[lag] = np.mean([np.sum((late[a] - early[b]) ** 2) for a, b in pairs])
     best = min(squares.values())
     # The FFT's rounding may choose among lags that are equally good.
-    assert squares[int(closest_lag(late, early, 0.3))] == pytest.approx(best, rel=1e-9)
+    assert squares[int(lag_fit(late, early, 0.3).closest)] == pytest.approx(best, rel=1e-9)
 
 
 @given(SEEDS)

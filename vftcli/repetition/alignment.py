@@ -6,7 +6,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.lag import closest_lag
+from vftcli.signals.lag import lag_fit
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import resampled, runs_of
 
@@ -18,6 +18,18 @@ SAME_TRAJECTORY = 0.05
 
 SAME_RATE = 0.01
 """Clocks whose rates differ by more than this share are refused, by less corrected."""
+
+SHORTLIST = 0.15
+"""A shift is worth refining if the logs lie within this share of the motion's own spread."""
+
+ALIKE = 3.0
+"""A shift fits as well as the closest if the logs lie no more than so many times farther apart."""
+
+LEAST_ALIKE = 0.001
+"""Or within this share of the motion's own spread, which no servo repeats better."""
+
+RIVALS = 40
+"""Shifts with a longer overlap that are tried, at most."""
 
 COARSE = 300
 """Instants at which a recording is compared while the shared part is looked for."""
@@ -47,15 +59,15 @@ def align(recording: Recording, free: Recording) -> Alignment:
 
     A coarse shift minimises the mean squared position difference over all overlaps of at least
     `LEAST_OVERLAP`, by FFT on a common uniform clock; it and the ratio of the clocks' rates are
-    then refined on the logs' own clocks by Gauss–Newton steps, robust against contacts.
+    then refined on the logs' own clocks by Gauss–Newton steps, robust against contacts. A motion
+    that repeats fits at every whole period alike: of these shifts the one with most overlap counts.
 
     Raises:
         ReferenceTorqueError: If the two logs are of other arms, not of the same trajectory, or
             their clocks run at rates that differ by more than `SAME_RATE`.
     """
     check_same_arm(recording, free)
-    step = max(recording.median_step, free.median_step)
-    shift, rate = refined(recording, free, coarse_shift(recording, free, step), 1.0)
+    shift, rate = best_fit(recording, free)
     deviation, overlap = deviation_at(recording, free, shift, rate)
     if not deviation <= SAME_TRAJECTORY:
         shared = shared_part(recording, free)
@@ -147,10 +159,8 @@ def explaining_rate(recording: Recording, free: Recording) -> float | None:
         if span < LEAST_OVERLAP:
             continue
         step = max(recording.median_step * rate, free.median_step, free.duration / 4000.0)
-        lag = (
-            closest_lag(uniform(free, step), uniform(recording, step / rate), LEAST_OVERLAP) * step
-        )
-        shift = lag + float(free.t[0] - rate * recording.t[0])
+        fit = lag_fit(uniform(free, step), uniform(recording, step / rate), LEAST_OVERLAP)
+        shift = fit.closest * step + float(free.t[0] - rate * recording.t[0])
         shift, found = refined(recording, free, shift, float(rate))
         if deviation_at(recording, free, shift, found)[0] <= 0.5 * SAME_TRAJECTORY:
             return found
@@ -163,10 +173,35 @@ def uniform(recording: Recording, step: float) -> Array:
     return resampled(t + recording.t[0], recording.t, recording.q)
 
 
-def coarse_shift(recording: Recording, free: Recording, step: float) -> float:
-    """The shift with the smallest mean squared position difference, to one `step`. [s]"""
-    lag = closest_lag(uniform(free, step), uniform(recording, step), LEAST_OVERLAP)
-    return lag * step + float(free.t[0] - recording.t[0])
+def best_fit(recording: Recording, free: Recording) -> tuple[float, float]:
+    """Shift [s] and clock rate at which two logs lie closest; of equal fits the longest overlap."""
+    step = max(recording.median_step, free.median_step)
+    offset = float(free.t[0] - recording.t[0])
+    q = uniform(free, step)
+    fit = lag_fit(q, uniform(recording, step), LEAST_OVERLAP)
+    # The rate starts at that of equal clocks; the steps below find it wherever they start from.
+    best = refined(recording, free, fit.closest * step + offset, 1.0)
+    spread = float(np.sqrt(np.sum(np.var(q, axis=0))))
+    limit = max(ALIKE * distance_moving(recording, free, *best), LEAST_ALIKE * spread)
+    for lag in fit.rivals((SHORTLIST * spread) ** 2)[:RIVALS]:
+        rival = refined(recording, free, lag * step + offset, 1.0)
+        if distance_moving(recording, free, *rival) <= limit:
+            return rival
+    return best
+
+
+def distance_moving(recording: Recording, free: Recording, shift: float, rate: float) -> float:
+    """Lower quartile of the distance of two logs over the samples that move fast. [rad]
+
+    A quarter, because contacts push an arm off its path; fast, because any two rests lie alike.
+    """
+    t = rate * recording.t + shift
+    speed = np.linalg.norm(np.gradient(recording.q, recording.t, axis=0), axis=1)
+    used = (t >= free.t[0]) & (t <= free.t[-1]) & (speed >= 0.5 * np.sqrt(np.mean(speed**2)))
+    if np.count_nonzero(used) < 8:
+        return float("inf")
+    distance = resampled(t[used], free.t, free.q) - recording.q[used]
+    return float(np.quantile(np.linalg.norm(distance, axis=1), 0.25))
 
 
 def refined(

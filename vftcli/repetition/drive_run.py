@@ -8,7 +8,7 @@ from vftcli.repetition.standstill import duration, standing
 from vftcli.robots.drive import drive_torque
 from vftcli.robots.friction import SMOOTHING, friction_torque
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms, dynamics_terms
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import median_step
@@ -49,22 +49,19 @@ class DriveRun:
         return median_step(self.t)
 
 
-def drive_run_of(
-    recording: Recording, robot: Robot, terms: DynamicsTerms | None = None
-) -> DriveRun:
+def drive_run_of(recording: Recording, robot: Robot, terms: DynamicsTerms) -> DriveRun:
     """Evaluate a recording's drive torque and the model's.
 
     Args:
         recording: The recording.
         robot: For drive constants and the model's torque.
-        terms: Its p and μ by the corrected formulas; evaluated here if not given.
+        terms: Its p and μ.
 
     Raises:
         MissingSignalError: If velocities, or both currents and torques, are missing.
         RobotError: If the number of joints differs.
     """
     torque = drive_torque(recording, robot)
-    terms = dynamics_terms(recording, robot) if terms is None else terms
     dq = recording.require("dq")
     standstill_s = duration(recording.t, dq)
     return DriveRun(

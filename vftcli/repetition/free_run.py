@@ -21,7 +21,7 @@ class ModelledRun:
     Attributes:
         recording: The recording.
         robot: The arm, its payload mounted.
-        literal: Whether `terms` are the paper's printed ones.
+        literal: Whether `terms` come from the paper's numeric method; equal to a millionth.
     """
 
     recording: Recording
@@ -35,8 +35,8 @@ class ModelledRun:
 
     @cached_property
     def drive(self) -> DriveRun:
-        """Drive torque and the model's; a reference never follows the printed formulas."""
-        return drive_run_of(self.recording, self.robot, None if self.literal else self.terms)
+        """Drive torque and the model's."""
+        return drive_run_of(self.recording, self.robot, self.terms)
 
 
 class Models:

@@ -115,8 +115,39 @@ def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offs
     return Offset(lag=float((at[best] + shift) * step), correlation=float(value[best]))
 
 
-def closest_lag(late: Array, early: Array, least: float) -> float:
-    """The lag of `late` with the smallest mean squared difference, all columns together. [samples]
+class LagFit(NamedTuple):
+    """How well two series fit at every lag of the first behind the second.
+
+    Attributes:
+        lag: (L,) [samples]
+        difference: Mean squared difference of what overlaps, all columns together; infinite where
+            too little does. (L,)
+        overlap: Samples that overlap. (L,)
+    """
+
+    lag: NDArray[np.int64]
+    difference: Array
+    overlap: NDArray[np.int64]
+
+    @property
+    def closest(self) -> float:
+        """The lag with the smallest difference. [samples]"""
+        return float(self.lag[int(np.argmin(self.difference))])
+
+    def rivals(self, most: float) -> list[float]:
+        """Lags of other valleys whose series overlap longer than at the closest lag, longest first.
+
+        Args:
+            most: Mean squared difference up to which a valley counts.
+        """
+        inner, best = self.difference[1:-1], int(np.argmin(self.difference))
+        valley = (inner <= self.difference[:-2]) & (inner <= self.difference[2:]) & (inner <= most)
+        found = 1 + np.flatnonzero(valley & (self.overlap[1:-1] > self.overlap[best]))
+        return [float(k) for k in self.lag[found[np.argsort(-self.overlap[found])]]]
+
+
+def lag_fit(late: Array, early: Array, least: float) -> LagFit:
+    """How well two series fit at every lag of `late` behind `early`.
 
     Args:
         late: A series. (M, k)
@@ -132,7 +163,7 @@ def closest_lag(late: Array, early: Array, least: float) -> float:
     energy = overlap_energy(x, at, len(y)) + overlap_energy(y, -at, len(x))
     enough = overlap >= max(2, int(least * min(len(x), len(y))))
     mean = np.where(enough, (energy - 2.0 * cross) / np.maximum(overlap, 1), np.inf)
-    return float(at[int(np.argmin(mean))])
+    return LagFit(at, mean, overlap)
 
 
 def overlap_energy(series: Array, lags: NDArray[np.int64], other: int) -> Array:

@@ -1,0 +1,126 @@
+"""What is known to be free beside a log: spans, cycles, other runs, and any of them together."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.readers import read
+from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.free_motion import FreeMotion
+from vftcli.repetition.free_run import FreeRun, ModelledRun
+from vftcli.repetition.two_cycle import partners_in_log, partners_in_logs
+from vftcli.robots import load_robot
+from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.recording import Recording
+
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
+ROBOT = load_robot("ur5")
+
+
+@pytest.fixture(scope="module")
+def circle() -> ModelledRun:
+    """Five circles of 4 s; nothing touches the arm in the first."""
+    return ModelledRun(recording=read(FIXTURE), robot=ROBOT)
+
+
+def part(recording: Recording, start: float, stop: float) -> Recording:
+    """A span of a log as a log of its own, whose clock begins at 0."""
+    span = recording.between(start, stop)
+    source = replace(span.source, t0=span.t[0], label=f"{start:g}")
+    return replace(span, t=span.t - span.t[0], source=source)
+
+
+def motion_of(log: ModelledRun, *free: Recording, choice: FreeChoice) -> FreeMotion:
+    runs = [FreeRun(run=ModelledRun(recording=x, robot=ROBOT), log=log) for x in free]
+    return FreeMotion(log=log, choice=choice, runs=tuple(runs))
+
+
+def codes(remarks: Sequence[object]) -> list[str]:
+    return [getattr(remark, "code", "") for remark in remarks]
+
+
+def test_the_cycle_that_is_named_is_the_one_taken(circle: ModelledRun) -> None:
+    """``--free-cycles 2`` is the second cycle, from 4 to 8 s, and no other."""
+    motion = motion_of(circle, choice=FreeChoice(cycles=(2,)))
+    partners = partners_in_log(motion)
+    (pairing,) = partners.clocks["found"]
+    times = pairing.times[pairing.known]
+    assert times.min() >= 4.0 - 0.02
+    assert times.max() <= 8.0 + 0.02
+    free = circle.recording.t[partners.free]
+    assert (free[0], free[-1]) == (pytest.approx(4.0, abs=0.02), pytest.approx(8.0, abs=0.02))
+    assert not pairing.known[partners.free].any()  # a cycle is not laid under itself
+    np.testing.assert_array_equal(motion.part.own, partners.free)
+
+
+def test_a_cycle_inside_a_free_span_is_free(circle: ModelledRun) -> None:
+    motion = motion_of(circle, choice=FreeChoice(spans=((3.9, 8.1), (19.0, 19.5))))
+    assert motion.free_cycles.numbers == (1,)
+    own = circle.recording.t[motion.part.own]
+    assert own.min() >= 3.9
+    assert np.any((own >= 19.0) & (own <= 19.5))
+    assert codes(motion.part.remarks) == ["free-span", "free-span"]
+
+
+def test_a_span_without_a_whole_cycle_leaves_the_cycles_to_be_found(circle: ModelledRun) -> None:
+    motion = motion_of(circle, choice=FreeChoice(spans=((0.5, 2.0),)))
+    assert motion.part.pairings == ()
+    assert motion.free_cycles.numbers == (0,)  # as found: the first is the free one
+
+
+def test_spans_and_cycles_add_up(circle: ModelledRun) -> None:
+    motion = motion_of(circle, choice=FreeChoice(spans=((0.0, 4.05),), cycles=(3,)))
+    assert motion.free_cycles.numbers == (0, 2)
+    own = circle.recording.t[motion.part.own]
+    assert not np.any((own > 4.1) & (own < 7.9))
+
+
+@pytest.mark.parametrize("spans", [((40.0, 50.0),), ((-1.0, 30.0),)])
+def test_a_span_that_is_no_part_of_the_log_is_refused(
+    circle: ModelledRun, spans: tuple[tuple[float, float], ...]
+) -> None:
+    with pytest.raises(ParameterError, match="it must be a part of the log"):
+        _ = motion_of(circle, choice=FreeChoice(spans=spans)).part
+
+
+def test_a_cycle_that_is_not_there_is_refused(circle: ModelledRun) -> None:
+    with pytest.raises(ReferenceTorqueError, match="no cycle 7; the log holds 5"):
+        _ = motion_of(circle, choice=FreeChoice(cycles=(7,))).part
+
+
+def test_each_run_is_a_piece_with_its_own_pairing(circle: ModelledRun) -> None:
+    log = ModelledRun(recording=part(circle.recording, 8.0, 14.0), robot=ROBOT)
+    same, more = part(circle.recording, 0.0, 4.0), part(circle.recording, 4.0, 8.0)
+    other = replace(same, q=same.q[:, ::-1] + 0.5, source=replace(same.source, t0=99.0))
+    paths = tuple(Path(name) for name in "abc")
+    motion = motion_of(log, same, other, more, choice=FreeChoice(logs=paths))
+    found = motion.part
+    assert [len(piece.pairings) for piece in found.pieces] == [1, 0, 1]
+    assert codes(found.remarks) == ["free-run", "free-run-of-another-motion", "free-run"]
+    assert [pairing.free for pairing in found.pairings] == [
+        motion.runs[0].drive,
+        motion.runs[2].drive,
+    ]
+    assert not found.own.any()
+    assert all(piece.inside.all() for piece in found.pieces)
+
+
+def test_the_covered_time_is_in_seconds(circle: ModelledRun) -> None:
+    """4 s of free run under 6 s of log cover 4 s of it, whatever the sample time."""
+    log = ModelledRun(recording=part(circle.recording, 4.0, 10.0), robot=ROBOT)
+    free = part(circle.recording, 0.0, 4.0)
+    motion = motion_of(log, free, choice=FreeChoice(logs=(Path("a"),)))
+    (remark,) = partners_in_logs(motion).remarks
+    assert remark.values["covered_s"] == pytest.approx(4.0, abs=0.05)
+    assert remark.values["deviation_mrad"] < 3.0  # the arm gives way where it is pushed
+
+
+def test_the_log_itself_is_no_free_run_and_no_zero(circle: ModelledRun) -> None:
+    run = FreeRun(run=ModelledRun(recording=circle.recording, robot=ROBOT), log=circle)
+    with pytest.raises(ReferenceTorqueError, match="is the log itself"):
+        FreeMotion(log=circle, runs=(run,))
+    with pytest.raises(ReferenceTorqueError, match="is the log itself"):
+        FreeMotion(log=circle, zero=run)

@@ -1,0 +1,72 @@
+"""A free run has one owner: read, modelled and aligned once, told from others as an object."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.readers import read
+from vftcli.repetition import free_run as room
+from vftcli.repetition.free_run import FreeRun, ModelledRun, Models
+from vftcli.robots import load_robot
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.recording import Recording
+
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
+ROBOT = load_robot("ur5")
+
+
+@pytest.fixture(scope="module")
+def circle() -> Recording:
+    return read(FIXTURE)
+
+
+def part(recording: Recording, start: float, stop: float) -> Recording:
+    """A span of a log as a log of its own, whose clock begins at 0."""
+    span = recording.between(start, stop)
+    source = replace(span.source, t0=span.t[0], label=f"{start:g}")
+    return replace(span, t=span.t - span.t[0], source=source)
+
+
+def test_a_model_is_made_once_for_a_recording_and_a_robot(circle: Recording) -> None:
+    models = Models()
+    first = models.of(circle, ROBOT)
+    assert models.of(circle, ROBOT) is first
+    assert first.terms is first.terms
+    assert first.drive is first.drive
+    assert models.of(circle, ROBOT, literal=True) is not first
+    assert models.of(circle, load_robot("ur5")) is not first
+    assert models.of(replace(circle), ROBOT) is not first
+
+
+def test_alignment_and_pairing_are_made_once(
+    circle: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+    whole = room.align
+    monkeypatch.setattr(room, "align", lambda *logs: made.append(logs) or whole(*logs))
+    log, free = part(circle, 5.0, 11.0), part(circle, 0.0, 4.0)
+    run = FreeRun(
+        run=ModelledRun(recording=free, robot=ROBOT), log=ModelledRun(recording=log, robot=ROBOT)
+    )
+    assert run.is_same_motion
+    assert run.pairing is run.pairing
+    assert run.alignment.overlap.any()
+    assert len(made) == 1
+    # The circle takes 4 s: the log's sample at t is at the place of t + 5 s of the whole log.
+    known = run.pairing.known
+    off = (run.pairing.times[known] - log.t[known] - 5.0 + 2.0) % 4.0 - 2.0
+    np.testing.assert_allclose(off, 0.0, atol=2e-3)  # a quarter of a sample
+
+
+def test_another_motion_has_no_pairing_and_says_so_each_time(circle: Recording) -> None:
+    log = part(circle, 4.0, 8.0)
+    other = replace(log, q=log.q[:, ::-1] + 0.5, source=replace(log.source, t0=99.0))
+    run = FreeRun(
+        run=ModelledRun(recording=other, robot=ROBOT), log=ModelledRun(recording=log, robot=ROBOT)
+    )
+    assert not run.is_same_motion
+    for _ in range(2):
+        with pytest.raises(ReferenceTorqueError, match="not a free run of the trajectory"):
+            _ = run.pairing
