@@ -153,13 +153,6 @@ def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
 
 NPZ = Reader(
     name="npz",
-    title="NumPy bundle (.npz), panda-py logs among them",
-    recording="np.savez(path, **panda.get_log()) after panda.enable_logging(n).",
-    takes="panda-py: q, dq, tau_J, −tau_ext_hat_filtered, O_F_ext_hat_K. Others by alias.",
-    pitfalls=(
-        "panda-py logs in milliseconds, only while a controller runs, into a ring buffer. Arrays "
-        "of objects are refused."
-    ),
     recognises=lambda file: file.head.startswith(b"PK\x03\x04") and b".npy" in file.head[:4096],
     read=read_npz,
     columns=True,

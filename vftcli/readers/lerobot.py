@@ -82,13 +82,6 @@ def _info(folder: Path) -> dict[str, Any]:
 
 LEROBOT = Reader(
     name="lerobot",
-    title="LeRobot dataset (v2, v3)",
-    recording="lerobot-record; the folder that holds meta/info.json.",
-    takes="timestamp and observation.state as q, of the first episode; more by --columns.",
-    pitfalls=(
-        "float32, 60 Hz or less; a gripper may follow the joints: q=observation.state[0:7]. No "
-        "torques, so no external torque can be estimated."
-    ),
     recognises=lambda file: "meta" in file.entries and (file.path / "meta" / "info.json").is_file(),
     read=read_lerobot,
     columns=True,

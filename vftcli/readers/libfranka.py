@@ -172,13 +172,6 @@ def _column(file: LogFile, states: list[dict[str, Any]], name: str, length: int 
 
 OLD = Reader(
     name="libfranka-csv-old",
-    title="libfranka logToCSV, 0.2.0 to 0.9.0",
-    recording="franka::logToCSV(log) in the handler of a ControlException.",
-    takes="q, dq, tau_J (link side, gravity included), their targets, −tau_ext_hat_filtered.",
-    pitfalls=(
-        "Column names repeat; six significant digits; 50 records by default. The vendor's residual "
-        "is tau_J minus model: its sign is turned."
-    ),
     recognises=lambda file: file.first_line.startswith(b"duration, success rate, q[0]"),
     read=read_old,
     columns=True,
@@ -186,13 +179,6 @@ OLD = Reader(
 
 NEW = Reader(
     name="libfranka-csv",
-    title="libfranka logToCSV, 0.9.1 and later",
-    recording="franka::logToCSV(log) in the handler of a ControlException.",
-    takes="q, dq, tau_J (link side, gravity included), their targets, −tau_ext_hat_filtered.",
-    pitfalls=(
-        "Six significant digits: never differentiate q. 50 records by default. The vendor's "
-        "residual is tau_J minus model: its sign is turned."
-    ),
     recognises=lambda file: file.first_line.startswith(b"time,success_rate,state.q[0]"),
     read=read_new,
     columns=True,
@@ -200,13 +186,6 @@ NEW = Reader(
 
 STATES = Reader(
     name="libfranka-json",
-    title="libfranka robot states, JSON lines",
-    recording="std::cout << robot_state << std::endl, as echo_robot_state does.",
-    takes=(
-        "q, dq, tau_J, their targets, −tau_ext_hat_filtered, O_F_ext_hat_K (as force by the "
-        "robot), m_load."
-    ),
-    pitfalls="Six significant digits; nan and inf are not JSON but are understood and refused.",
     recognises=lambda file: file.first_line.lstrip().startswith(b'{"O_T_EE"'),
     read=read_states,
 )

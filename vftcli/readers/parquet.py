@@ -207,10 +207,6 @@ def refuse_episodes(table: ParquetTable) -> None:
 
 PARQUET = Reader(
     name="parquet",
-    title="Parquet table",
-    recording="polars or pandas; vftcli convert LOG -o x.parquet; one episode of LeRobot.",
-    takes="Columns by alias or by --columns; columns of lists: q=observation.state[0:7].",
-    pitfalls="LeRobot stores float32 at 60 Hz or less. A file of many episodes is refused.",
     recognises=lambda file: file.head.startswith(b"PAR1"),
     read=read_parquet,
     columns=True,

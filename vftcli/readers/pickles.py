@@ -180,13 +180,6 @@ def _read_frankapy(file: LogFile, log: dict[Any, Any], request: ReadChoice) -> R
 
 PICKLE = Reader(
     name="pickle",
-    title="Pickled dictionary of arrays (panda-py, frankapy)",
-    recording="pickle.dump(panda.get_log(), file); frankapy's record_trajectory.py.",
-    takes="As npz. frankapy: q and times only, no torque.",
-    pitfalls=(
-        "Opened by a restricted unpickler: anything but NumPy arrays is refused and nothing is "
-        "executed. Prefer np.savez."
-    ),
     recognises=lambda file: (
         file.head[:1] == b"\x80" and file.head[1:2] in {b"\2", b"\3", b"\4", b"\5"}
     ),

@@ -1,8 +1,9 @@
 """Reader: what a log format is to this package, and the file a reader is handed."""
 
+import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
@@ -163,11 +164,7 @@ class Reader:
     """One log format.
 
     Attributes:
-        name: Name for ``--format``.
-        title: Name for tables.
-        recording: How a user records such a log.
-        takes: Which signals are taken from it, with their meaning.
-        pitfalls: What to look out for.
+        name: Name for ``--format``, and of its words in `formats.toml`.
         recognises: Whether a file's content is of this format.
         read: Reads it.
         general: Whether it takes any table, and is asked only if no other format fits.
@@ -175,14 +172,37 @@ class Reader:
     """
 
     name: str
-    title: str
-    recording: str
-    takes: str
-    pitfalls: str
     recognises: Callable[[LogFile], bool] = field(repr=False)
     read: Callable[[LogFile, ReadChoice], RawLog] = field(repr=False)
     general: bool = False
     columns: bool = False
+
+    @property
+    def title(self) -> str:
+        """What the format is called in tables."""
+        return format_words()[self.name]["title"]
+
+    @property
+    def recording(self) -> str:
+        """How a user records such a log."""
+        return format_words()[self.name]["recording"]
+
+    @property
+    def takes(self) -> str:
+        """Which signals are taken from it, with their meaning."""
+        return format_words()[self.name]["takes"]
+
+    @property
+    def pitfalls(self) -> str:
+        """What to look out for."""
+        return format_words()[self.name]["pitfalls"]
+
+
+@cache
+def format_words() -> dict[str, dict[str, str]]:
+    """The words of every format, by its name."""
+    text = (Path(__file__).parent / "formats.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
 
 
 def looks_like_text(head: bytes) -> bool:

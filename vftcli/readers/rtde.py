@@ -147,45 +147,12 @@ def is_ur_rtde(file: LogFile) -> bool:
     return _has_rtde_names(file.first_line.split(b","))
 
 
-_TAKES = (
-    "actual_q, actual_qd, actual_current [A], their targets, target_moment (the controller's "
-    "inverse dynamics, no friction), actual_TCP_force, joint_temperatures, payload."
-)
-
-OFFICIAL = Reader(
-    name="ur-csv",
-    title="UR official RTDE client, text",
-    recording="record.py of RTDE_Python_Client_Library with its default recipe.",
-    takes=_TAKES,
-    pitfalls=(
-        "Windows writes CR CR LF. Clients before June 2025 drop packets, which leaves gaps. "
-        "A last line cut by Ctrl-C is dropped."
-    ),
-    recognises=is_official,
-    read=read_rtde_text,
-    columns=True,
-)
+OFFICIAL = Reader(name="ur-csv", recognises=is_official, read=read_rtde_text, columns=True)
 
 BINARY = Reader(
     name="ur-binary",
-    title="UR official RTDE client, binary",
-    recording="record.py --binary (from October 2023 on); its default name is robot_data.csv.",
-    takes=_TAKES,
-    pitfalls="The name says .csv; the content decides. A cut last record is dropped.",
     recognises=is_binary,
     read=read_rtde_binary,
 )
 
-UR_RTDE = Reader(
-    name="ur-rtde",
-    title="ur_rtde (SDU) startFileRecording, CSV",
-    recording="RTDEReceiveInterface.startFileRecording(file, variables), timestamp among them.",
-    takes=_TAKES,
-    pitfalls=(
-        "Six decimals only. Rows come from a host thread: stamps repeat (dropped) and double "
-        "steps occur (kept)."
-    ),
-    recognises=is_ur_rtde,
-    read=read_rtde_text,
-    columns=True,
-)
+UR_RTDE = Reader(name="ur-rtde", recognises=is_ur_rtde, read=read_rtde_text, columns=True)

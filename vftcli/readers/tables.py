@@ -189,13 +189,6 @@ def _has_numbers(file: LogFile) -> bool:
 
 HEADED = Reader(
     name="table",
-    title="Table with a header (CSV, TSV)",
-    recording="Any program that writes one row a sample under one line of names.",
-    takes="Columns by alias (q, dq, tau, current, tau_ext, wrench, …) or by --columns.",
-    pitfalls=(
-        "Two columns that could be one signal are refused. Units other than s, rad, A, N·m have "
-        "to be said: q[deg]=…"
-    ),
     recognises=is_headed,
     read=read_text,
     general=True,
@@ -204,10 +197,6 @@ HEADED = Reader(
 
 HEADERLESS = Reader(
     name="headerless",
-    title="Table without a header (CSV, TSV, text)",
-    recording="np.savetxt, identification data sets.",
-    takes="What --columns says, in file order: t,q:6,dq:6,current:6.",
-    pitfalls="--columns is required and must account for every column; _:13 skips thirteen.",
     recognises=is_headerless,
     read=read_text,
     general=True,
@@ -216,10 +205,6 @@ HEADERLESS = Reader(
 
 NPY = Reader(
     name="npy",
-    title="NumPy array (.npy)",
-    recording="np.save of a matrix with one row a sample, or of a structured array.",
-    takes="What --columns says, in file order; a structured array by its field names.",
-    pitfalls="float64 stamps in nanoseconds since 1970 are rounded to 256 ns.",
     recognises=lambda file: file.head.startswith(b"\x93NUMPY"),
     read=read_npy,
     columns=True,
