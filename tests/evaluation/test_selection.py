@@ -39,7 +39,7 @@ def test_noise_is_that_of_the_estimate() -> None:
     shown = float(np.mean(observer.estimate(log).tau[500:].std(axis=0)))
     # 3500 samples with a memory of 50: some 70 independent pieces tell a deviation to 10 %.
     assert found.noise == pytest.approx(shown, rel=0.15)
-    assert found.numbers == 2
+    assert found.parameter_count == 2
     assert found.time > 0
     assert np.isnan(found.rmse)
 

@@ -166,8 +166,10 @@ def test_the_noise_level_gives_innovations_their_expected_variance() -> None:
 
 def test_without_spectra_auto_falls_back_and_says_so() -> None:
     setup = Setup(gains={}, settings={}, joints=2, step=STEP, as_printed=False)
-    observers, notes = build_observers(("kfo-auto", "rts-auto", "kfo-zoh", "kfo-rts"), setup)
-    assert any("kfo-auto: no free part to tune on" in note for note in notes)
+    observers, remarks = build_observers(("kfo-auto", "rts-auto", "kfo-zoh", "kfo-rts"), setup)
+    untuned = [r for r in remarks if r.code == "tuning-without-free-part"]
+    assert [r.where.about for r in untuned] == ["kfo-auto", "rts-auto"]
+    assert str(untuned[0]).startswith("kfo-auto: no free part to tune on")
     loaded, _ = pushed(samples=400)
     filtered, smoothed, by_hand, rts = (o.estimate(loaded.terms) for o in observers)
     assert filtered.name == "kfo-auto"
@@ -179,9 +181,9 @@ def test_tuned_observers_have_nothing_left_to_tune() -> None:
     loaded, free = pushed()
     setup = Setup(gains={}, settings={}, joints=2, step=STEP, as_printed=False)
     setup = setup._replace(spectra=spectra_of(loaded, [free]))
-    observer, notes = OBSERVERS["rts-auto"].build(setup)
-    assert notes == ()
-    assert observer.tuning(STEP, 2).numbers == 0
+    observer, remarks = OBSERVERS["rts-auto"].build(setup)
+    assert remarks == ()
+    assert observer.tuning(STEP, 2).parameter_count == 0
     np.testing.assert_allclose(observer.tuning(STEP, 2).zeta, np.sqrt(0.5))
 
 

@@ -112,7 +112,9 @@ def test_a_long_gap_restarts_the_filter_and_says_so() -> None:
         estimate = observer.estimate(terms)
         np.testing.assert_allclose(estimate.tau[500], 0.0, atol=1e-12)  # afresh
         np.testing.assert_allclose(estimate.tau[-1], tau, rtol=1e-9)
-        assert "restarted from zero after 1 gap" in estimate.remarks[0]
+        (remark,) = estimate.remarks
+        assert (remark.code, remark.level) == ("restarted-after-gap", "caution")
+        assert "restarted from zero after one gap" in str(remark)
 
 
 def test_a_short_gap_is_bridged_without_a_restart() -> None:

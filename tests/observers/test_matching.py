@@ -63,8 +63,10 @@ def test_matched_fdo_and_gmo_are_one_filter() -> None:
     terms = DynamicsTerms(t=t, p=p, mu=mu)
     fdo, gmo = (o.estimate(terms).tau for o in tuned("delay=0.05")[:2])
     assert np.max(np.abs(fdo - gmo)) < 1e-10 * np.max(np.abs(p)) / 0.05
-    _, notes = matched(build_observers(DEFAULT, setup())[0], parse_target("delay=0.05"), setup())
-    assert "one and the same filter" in notes[0]
+    _, remarks = matched(build_observers(DEFAULT, setup())[0], parse_target("delay=0.05"), setup())
+    assert [r.code for r in remarks] == ["delay-matched", "first-order-observers-alike"]
+    assert remarks[0].values["delay_s"] == 0.05
+    assert "one and the same filter" in str(remarks[1])
 
 
 @pytest.mark.parametrize(

@@ -23,14 +23,14 @@ def setup(robot: str, *assignments: str, joints: int = 6, step: float = 0.008) -
 
 
 def test_the_profile_gives_the_papers_gains() -> None:
-    (fdo, gmo, fe, _), notes = build_observers(DEFAULT, setup("ur5"))
+    (fdo, gmo, fe, _), remarks = build_observers(DEFAULT, setup("ur5"))
     assert isinstance(fdo, FilteredDynamicsObserver)
     assert fdo.omega == 10.0
     assert isinstance(gmo, MomentumObserver)
     np.testing.assert_array_equal(gmo.gain, [5, 3, 4, 10, 10, 10])
     assert isinstance(fe, KalmanObserver)
     np.testing.assert_array_equal(fe.r_diag, [0.5, 0.5, 0.5, 1.3, 1.3, 1.3])
-    assert notes == ()
+    assert remarks == ()
 
 
 def test_the_command_line_wins_over_the_profile() -> None:
@@ -43,19 +43,22 @@ def test_the_command_line_wins_over_the_profile() -> None:
 
 
 def test_gains_nobody_gave_take_the_kalman_filters_delay_and_say_so() -> None:
-    (fdo, gmo, fe), notes = build_observers(
+    (fdo, gmo, fe), remarks = build_observers(
         ["fdo", "gmo", "kfo-fe"], setup("panda", joints=7, step=0.001)
     )
     delay = fe.tuning(0.001, 7).delay
     np.testing.assert_allclose(gmo.tuning(0.001, 7).delay, delay, rtol=1e-12)
     np.testing.assert_allclose(1.0 / fdo.omega, np.mean(delay), rtol=1e-12)
-    assert any("gmo.gain was not given" in note for note in notes)
+    assert any(str(remark).startswith("gmo.gain was not given") for remark in remarks)
+    given = {remark.values.get("parameter"): remark.code for remark in remarks}
+    assert given["gmo.gain"] == "gain-from-kalman-delay"
 
 
 def test_a_bare_robot_gets_ten_per_second_and_is_told() -> None:
-    (gmo,), notes = build_observers(["gmo"], setup(""))
+    (gmo,), remarks = build_observers(["gmo"], setup(""))
     np.testing.assert_array_equal(gmo.gain, [10.0] * 6)
-    assert "no gains" in notes[0]
+    assert [remark.code for remark in remarks] == ["gain-from-default"]
+    assert "10" in str(remarks[0])
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ def test_a_profile_reads_back_identically(name, tmp_path):
     assert read.chain.names == robot.chain.names
     assert read.friction == robot.friction
     assert read.gains == robot.gains
-    assert read.notes == robot.notes
+    assert read.remarks == robot.remarks
     assert read.title == robot.title
     assert read.torque_source == robot.torque_source
     assert read.payloads.keys() == robot.payloads.keys()

@@ -39,7 +39,7 @@ def say_notes(analysis: "Analysis") -> None:
     """What the reader of the numbers should know."""
     reference = analysis.reference.remarks if analysis.reference is not None else ()
     own = [f"{e.name}: {note}" for e in analysis.estimates for note in e.remarks]
-    for note in (*analysis.robot.notes, *analysis.remarks, *own, *reference):
+    for note in (*analysis.robot.remarks, *analysis.remarks, *own, *reference):
         say(f"note: {note}")
     if analysis.virtual_sensor is not None:
         say_wrenches(analysis.virtual_sensor)

@@ -65,7 +65,7 @@ def robot_lines(robot: Any) -> list[str]:  # noqa: ANN401
     for observer, gains in robot.gains.items():
         lines.append("")
         lines.extend(f"{observer}.{key} = {value}" for key, value in gains.items())
-    lines += ["", *(f"note: {note}" for note in robot.notes)]
+    lines += ["", *(f"note: {note}" for note in robot.remarks)]
     for source in robot.sources:
         lines.append(
             f"source {source.get('id', '?')}: {source.get('what', '')}: {source.get('ref', '')}"

@@ -37,7 +37,7 @@ class Facts(NamedTuple):
         passed: Share of the drive torque's noise above `FAST` that comes through, mean of joints.
         rmse: Root-mean-square error against the reference, mean of joints, NaN without. [N·m]
         time: Computation time a sample. [s]
-        numbers: Numbers to tune.
+        parameter_count: Numbers to tune.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Facts(NamedTuple):
     passed: float
     rmse: float
     time: float
-    numbers: int
+    parameter_count: int
 
 
 class Advice(NamedTuple):
@@ -108,7 +108,7 @@ def facts_of(
         passed=float(np.mean(np.sqrt(gain[frequency > FAST].mean(axis=0)))),
         rmse=mean_rmse(observer.name, errors),
         time=computation_time(observer, terms),
-        numbers=tuning.numbers,
+        parameter_count=tuning.parameter_count,
     )
 
 

@@ -131,7 +131,7 @@ class AutoTuned:
     def tuning(self, step: float, joints: int) -> Tuning:
         """What the gains mean at a sample time; where the log tuned them, none is left to. [s]"""
         meaning = self.observer.tuning(step, joints)
-        return replace(meaning, numbers=0) if self.curve is not None else meaning
+        return replace(meaning, parameter_count=0) if self.curve is not None else meaning
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""

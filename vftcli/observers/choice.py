@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vftcli.observers import (
+from vftcli.observers.observer import Observer
+from vftcli.observers.settings import Settings
+from vftcli.observers.table import (
     DEFAULT,
     OBSERVERS,
-    Observer,
-    Settings,
     Setup,
     build_observers,
     check_observer,
@@ -17,6 +17,7 @@ from vftcli.observers import (
     sections,
 )
 from vftcli.robots.robot import Robot
+from vftcli.signals.remarks import Remark
 
 if TYPE_CHECKING:
     from vftcli.observers.matching import MatchTarget
@@ -28,7 +29,7 @@ class ObserverChoice:
     """Which observers run, and what their gains are.
 
     Attributes:
-        names: The observers, keys of `vftcli.observers.OBSERVERS`.
+        names: The observers, keys of `vftcli.observers.table.OBSERVERS`.
         settings: Parameters the user sets, which go before every file's.
         gains_file: A file of gains that go before the robot's own, or None.
         match: What every observer is to have alike on every joint, or None.
@@ -90,8 +91,8 @@ class ObserverChoice:
 
     def build(
         self, robot: Robot, step: float, spectra: "Spectra | None" = None
-    ) -> tuple[tuple[Observer, ...], tuple[str, ...]]:
-        """Build the observers for one robot and sample time, with notes on gains nobody gave.
+    ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
+        """Build the observers for one robot and sample time, with remarks on gains nobody gave.
 
         Args:
             robot: The arm, whose file gives the gains that are not set here.
@@ -109,13 +110,13 @@ class ObserverChoice:
             as_printed=self.as_printed,
             spectra=spectra,
         )
-        observers, notes = build_observers(self.names, setup)
+        observers, remarks = build_observers(self.names, setup)
         if self.match is None:
-            return observers, notes
+            return observers, remarks
         from vftcli.observers.matching import matched
 
-        observers, remarks = matched(observers, self.match, setup)
-        return observers, (*notes, *remarks)
+        observers, on_match = matched(observers, self.match, setup)
+        return observers, (*remarks, *on_match)
 
     def gains_over(self, gains: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[str, Any]]:
         """A robot's gains with those of the gains file put over them."""

@@ -52,12 +52,12 @@ class FilteredDynamicsObserver:
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """Run over a whole log from rest at its first sample.
 
-        Past a gap with a > 1 the filter starts afresh, and the estimate's notes say so.
+        Past a gap with a > 1 the filter starts afresh, and the estimate's remarks say so.
         """
         rate = np.full(terms.joints, self.omega)
-        tau, notes = run_first_order(terms, rate, self._coefficients, self._start)
+        tau, remarks = run_first_order(terms, rate, self._coefficients, self._start)
         tau += self.omega * terms.p
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=notes)
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=remarks)
 
     def _coefficients(self, piece: Piece) -> tuple[Array, Array]:
         """(29): Y₁ and Y₂ obey the same recursion, so it is their sum that is run."""
@@ -77,7 +77,7 @@ class FilteredDynamicsObserver:
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """What ω means at a sample time. [s]"""
-        return first_order_tuning(np.full(joints, self.omega), step, numbers=1)
+        return first_order_tuning(np.full(joints, self.omega), step, parameter_count=1)
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Complex gain at `frequency` [Hz]: that of a momentum observer with K = ω. (F, n)"""

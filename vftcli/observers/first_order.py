@@ -10,6 +10,7 @@ from vftcli.observers.recursion import PIECE, Steps, recursion, steps_of
 from vftcli.observers.steady_filter import steady_filter
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, empty_series
+from vftcli.signals.remarks import Remark, caution
 
 
 @dataclass(frozen=True)
@@ -33,11 +34,11 @@ Coefficients = Callable[[Piece], tuple[Array, Array]]
 
 def run_first_order(
     terms: DynamicsTerms, rate: Array, coefficients: Coefficients, start: Callable[[Array], Array]
-) -> tuple[Array, tuple[str, ...]]:
-    """Run y_t = decay_t y_{t−1} + x_t over a log, a piece at a time. (T, n), notes
+) -> tuple[Array, tuple[Remark, ...]]:
+    """Run y_t = decay_t y_{t−1} + x_t over a log, a piece at a time. (T, n), and remarks
 
     Past a gap so long that a > 1 the state would change its sign: there the filter starts afresh,
-    and a note says so. Gains that give a > 1 at the nominal sample time are the user's own choice
+    and a remark says so. Gains that give a > 1 at the nominal sample time are the user's own choice
     and restart nothing.
 
     Args:
@@ -63,11 +64,8 @@ def run_first_order(
         y[span] = scalar_recursion(decay, x, y[first - 1])
     if gaps == 0:
         return y, ()
-    longest = float(np.max(steps.dt))
-    return y, (
-        f"restarted from zero after {gaps} gap{'s' if gaps > 1 else ''} "
-        f"(longest {longest:.3g} s), too long for its gain",
-    )
+    code = "restarted-after-gap" if gaps == 1 else "restarted-after-gaps"
+    return y, (caution(code, gaps=gaps, longest_s=float(np.max(steps.dt))),)
 
 
 def restarts(a: Array, rate: Array, steps: Steps) -> Mask | None:
@@ -88,7 +86,7 @@ def scalar_recursion(decay: Array, x: Array, before: Array) -> Array:
     return recursion(decay.reshape(-1, 1, 1, n), x[:, None, :], start)[:, 0]
 
 
-def first_order_tuning(rate: Array, step: float, numbers: int) -> Tuning:
+def first_order_tuning(rate: Array, step: float, parameter_count: int) -> Tuning:
     """Cutoff, delay 1/rate and −3 dB frequency of a bilinear first-order observer.
 
     The bilinear transform warps frequency: tan(ωTs/2) = rate·Ts/2 at the −3 dB point of the filter
@@ -101,7 +99,7 @@ def first_order_tuning(rate: Array, step: float, numbers: int) -> Tuning:
         delay=1.0 / rate,
         bandwidth=np.arctan(rate * step / 2.0) / (np.pi * step),
         dc_gain=np.ones(n),
-        numbers=numbers,
+        parameter_count=parameter_count,
     )
 
 

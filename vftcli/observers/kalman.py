@@ -160,7 +160,7 @@ class KalmanObserver:
             delay=ratio - step / 2.0,
             bandwidth=omega * np.sqrt(bend + np.sqrt(bend**2 + 1.0)) / (2.0 * np.pi),
             dc_gain=step / (model.a12 + (1.0 - model.a22) * ratio),
-            numbers=3 * joints,
+            parameter_count=3 * joints,
         )
 
     def _counts_step_twice(self) -> bool:

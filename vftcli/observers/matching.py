@@ -6,13 +6,14 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from vftcli.observers import Setup
 from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
 from vftcli.observers.kalman import KalmanObserver
 from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer
+from vftcli.observers.table import Setup
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.remarks import Remark, fact
 
 HALVINGS = 70
 """Bisections of a gain's logarithm: its last digits are those of float64."""
@@ -50,8 +51,8 @@ def parse_target(text: str) -> MatchTarget:
 
 def matched(
     observers: Sequence[Observer], goal: MatchTarget, setup: Setup
-) -> tuple[tuple[Observer, ...], tuple[str, ...]]:
-    """Re-tune observers to one delay or −3 dB bandwidth per joint, with notes on their gains.
+) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
+    """Re-tune observers to one delay or −3 dB bandwidth per joint, with remarks on it.
 
     A first-order observer has one gain to move. A Kalman filter keeps R and Q_p and moves Q_τ,
     which sets its natural frequency. Delay is that behind a slow ramp, 1/K or L₁/L₂ − Ts/2;
@@ -71,7 +72,7 @@ def matched(
             "--match or --as-printed away"
         )
     tuned = tuple(tune(observer, goal, setup) for observer in observers)
-    return tuned, (note(goal, tuned),)
+    return tuned, match_remarks(goal, tuned)
 
 
 def tune(observer: Observer, goal: MatchTarget, setup: Setup) -> Observer:
@@ -159,16 +160,13 @@ KNOBS: dict[type, Knob] = {
 """Observer → its knob: cutoff ω [rad/s], gain K [1/s], or Q_τ. A cutoff is one for all joints."""
 
 
-def note(goal: MatchTarget, observers: Sequence[Observer]) -> str:
-    """What was matched, and why filtered dynamics and momentum observer then agree."""
-    unit = {"delay": "s", "bandwidth": "Hz"}[goal.quantity]
-    text = (
-        f"matched: every observer has a {goal.quantity} of {goal.value:g} {unit} on every joint; "
-        "the gains of the profile and of --set give way, R and Q_p stay"
+def match_remarks(goal: MatchTarget, observers: Sequence[Observer]) -> tuple[Remark, ...]:
+    """What was matched, and that filtered dynamics and momentum observer then agree."""
+    remark = (
+        fact("delay-matched", delay_s=goal.value)
+        if goal.quantity == "delay"
+        else fact("bandwidth-matched", bandwidth_Hz=goal.value)
     )
     if {"fdo", "gmo"} <= {observer.name for observer in observers}:
-        text += (
-            "; fdo and gmo are then one and the same filter (bilinear FDO(ω) ≡ bilinear "
-            "GMO(K = ωI)) and agree to rounding"
-        )
-    return text
+        return remark, fact("first-order-observers-alike")
+    return (remark,)

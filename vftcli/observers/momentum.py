@@ -17,6 +17,7 @@ from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, frozen, handed_over
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.remarks import Remark, Where, warning
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +52,7 @@ class MomentumObserver:
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """Run over a whole log from r = 0 at its first sample.
 
-        Past a gap with a > 1 the filter starts afresh, and the estimate's notes say so.
+        Past a gap with a > 1 the filter starts afresh, and the estimate's remarks say so.
         """
         gain = per_joint(self.gain, terms.joints)
         if self.as_printed:
@@ -66,8 +67,8 @@ class MomentumObserver:
             x -= both
             return (1.0 - a) / (1.0 + a), x
 
-        tau, notes = run_first_order(terms, gain, coefficients, np.zeros_like)
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=notes)
+        tau, remarks = run_first_order(terms, gain, coefficients, np.zeros_like)
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=remarks)
 
     def _as_printed(self, terms: DynamicsTerms, gain: Array) -> ExternalTorque:
         """rᵗ = rᵗ⁻¹ + K(pᵗ−pᵗ⁻¹) − a(μᵗ+μᵗ⁻¹+rᵗ⁻¹+rᵗ⁻²), r⁻¹ = r⁰ = 0: two states a joint."""
@@ -81,16 +82,16 @@ class MomentumObserver:
         with np.errstate(over="ignore", invalid="ignore"):
             tau = recursion(F[0] if len(a) == 1 else F, x, np.zeros((2, n)))[:, 0]
         unstable = np.flatnonzero(np.median(a, axis=0) >= 1.0)
-        notes: tuple[str, ...] = ()
+        remarks: tuple[Remark, ...] = ()
         if len(unstable):
-            joints = ", ".join(f"J{j + 1}" for j in unstable)
-            notes = (f"K·Ts ≥ 2 on {joints}: (35) as printed is unstable there",)
+            joints = tuple(int(j) + 1 for j in unstable)
+            remarks = (warning("unstable-as-printed", Where(joints=joints)),)
         tau = np.where(np.isfinite(tau), tau, np.nan)
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=notes)
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=remarks)
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """What K means at a sample time. [s]"""
-        return first_order_tuning(per_joint(self.gain, joints), step, numbers=joints)
+        return first_order_tuning(per_joint(self.gain, joints), step, parameter_count=joints)
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Complex gain at `frequency` [Hz]. (F, n)"""

@@ -23,7 +23,7 @@ class Tuning:
         delay: Lag behind a slow ramp. (n,) [s]
         bandwidth: Frequency at which the gain has fallen by 3 dB. (n,) [Hz]
         dc_gain: Gain to a constant torque, 1 where unbiased. (n,)
-        numbers: How many numbers there are to tune for an n-joint arm.
+        parameter_count: How many numbers there are to tune for an n-joint arm.
     """
 
     omega_n: Array
@@ -31,11 +31,11 @@ class Tuning:
     delay: Array
     bandwidth: Array
     dc_gain: Array
-    numbers: int
+    parameter_count: int
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            if field.name != "numbers":
+            if field.name != "parameter_count":
                 object.__setattr__(self, field.name, frozen(getattr(self, field.name)))
 
 

@@ -144,7 +144,7 @@ class KalmanSmoother:
             delay=np.zeros(joints),
             bandwidth=causal.omega_n * x / (2.0 * np.pi),
             dc_gain=causal.dc_gain,
-            numbers=causal.numbers,
+            parameter_count=causal.parameter_count,
         )
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:

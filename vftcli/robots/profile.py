@@ -15,6 +15,7 @@ from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, Se
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import Pose, rpy_matrix
+from vftcli.signals.remarks import fact
 
 SCHEMA = 1
 UPRIGHT = (0.0, 0.0, -9.81)
@@ -127,7 +128,8 @@ def assemble(file: RobotFile, joints: Sequence[Mapping[str, Any]], chain: Chain)
         file.refuse(
             "[observers] must hold sections, as [observers.gmo] gain = 10.0", key="observers"
         )
-    notes = doc.get("notes", "")
+    notes = doc.get("notes", ())
+    sentences = (notes,) if isinstance(notes, str) else notes
     return Robot(
         name=str(doc.get("name", file.path.stem)),
         title=str(doc.get("title", doc.get("name", file.path.stem))),
@@ -147,10 +149,10 @@ def assemble(file: RobotFile, joints: Sequence[Mapping[str, Any]], chain: Chain)
         tools=checked_poses(file, "tool"),
         sensors=checked_poses(file, "sensor"),
         admittance=checked_section(file, "admittance"),
-        sources=tuple(str(source) for source in doc.get("sources", ())),
+        sources=tuple(s for s in doc.get("sources", ()) if isinstance(s, dict)),
         published=checked_section(file, "published"),
         document=doc,
-        notes=(notes,) if isinstance(notes, str) and notes else tuple(notes or ()),
+        remarks=tuple(fact("robot-file-note", text=text) for text in sentences if text),
         path=file.path,
     )
 

@@ -10,6 +10,7 @@ from vftcli.robots.chain import Chain, Payload
 from vftcli.signals.arrays import Array, check_shape, frozen
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import Pose
+from vftcli.signals.remarks import Remark
 
 TORQUE_SOURCES = ("current", "link_torque", "joint_torque")
 
@@ -95,10 +96,10 @@ class Robot:
         tools: Poses of tools in the flange frame, from ``[tool]`` (under "") and ``[tool.NAME]``.
         sensors: Poses of force/torque sensors in the flange frame, likewise.
         admittance: The parameters of ``[admittance]``, as the file has them; empty without any.
-        sources: Where the file's numbers come from, in words.
+        sources: Where the file's numbers come from: keys id, what and ref, in words.
         published: The publication whose numbers of this arm the tables stand beside, and these.
         document: The whole parsed robot file, for writing a changed one.
-        notes: What a user of the numbers should know.
+        remarks: What a user of the numbers should know.
         path: The file it was loaded from, None for one made in memory.
     """
 
@@ -118,10 +119,10 @@ class Robot:
     tools: Mapping[str, Pose] = field(default_factory=dict)
     sensors: Mapping[str, Pose] = field(default_factory=dict)
     admittance: Mapping[str, Any] = field(default_factory=dict)
-    sources: tuple[str, ...] = ()
+    sources: tuple[Mapping[str, Any], ...] = ()
     published: Mapping[str, Any] = field(default_factory=dict)
     document: Mapping[str, Any] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     path: Path | None = None
 
     def __post_init__(self) -> None:

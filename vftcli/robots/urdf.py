@@ -13,6 +13,7 @@ from vftcli.robots.robot import Limits, Robot, SensorNoise
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import rotation_onto
+from vftcli.signals.remarks import caution
 
 FREE_JOINTS = (
     "JointModelRUBX",
@@ -60,7 +61,7 @@ def load_urdf(path: Path) -> Robot:
             chain=chain,
             limits=limits,
             noise=SensorNoise(current=nothing, tau=nothing, q=nothing, qd=nothing),
-            notes=(f"no {beside.name} beside the URDF: no drive constants, friction or gains",),
+            remarks=(caution("urdf-alone", file=beside.name),),
             path=path,
         )
     file = RobotFile(beside)

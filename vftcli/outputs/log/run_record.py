@@ -164,7 +164,7 @@ def robot_record(robot: Robot) -> dict[str, Any]:
         "friction": [joint.model for joint in robot.friction] or "none",
         "payload_kg": robot.payload.mass if robot.payload is not None else None,
         "gravity_m_s2": robot.chain.gravity.tolist(),
-        "notes": list(robot.notes),
+        "notes": list(robot.remarks),
     }
 
 
@@ -186,7 +186,7 @@ def observer_record(observer: Observer, tuning: Tuning | None) -> dict[str, Any]
         "delay_s": tuning.delay,
         "bandwidth_hz": tuning.bandwidth,
         "dc_gain": tuning.dc_gain,
-        "numbers_to_tune": tuning.numbers,
+        "numbers_to_tune": tuning.parameter_count,
     }
 
 

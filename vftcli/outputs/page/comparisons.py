@@ -49,7 +49,7 @@ def facts_row(found: Facts) -> tuple[str | float, ...]:
     """One observer's facts in the order and the units of the headings."""
     times = (1e3 * found.response, 1e3 * found.delay)
     rest = (found.noise, found.passed, found.rmse, 1e6 * found.time)
-    return (found.name, *map(float, (*times, *rest)), found.numbers)
+    return (found.name, *map(float, (*times, *rest)), found.parameter_count)
 
 
 def beside_print(comparison: Comparison | None) -> str:

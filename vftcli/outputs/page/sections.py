@@ -144,7 +144,7 @@ def observer_row(analysis: Analysis, name: str) -> tuple[GridCell | str | float 
         return (name, what, *[None] * 5)
     columns = (tuning.omega_n, tuning.zeta, 1e3 * tuning.delay, tuning.bandwidth)
     shown = (GridCell("", html=joint_values(column)) for column in columns)
-    return (name, what, *shown, tuning.numbers)
+    return (name, what, *shown, tuning.parameter_count)
 
 
 def joint_values(values: Array) -> str:

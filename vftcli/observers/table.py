@@ -1,0 +1,262 @@
+"""The table of observers: what each is called, and how it is built from what was given."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+
+from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
+from vftcli.observers.kalman import KalmanObserver
+from vftcli.observers.momentum import MomentumObserver
+from vftcli.observers.observer import Observer, per_joint
+from vftcli.observers.settings import PARAMETERS, Settings, joint_values, merged, parse_settings
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.remarks import Remark, Where, caution, fact
+
+if TYPE_CHECKING:
+    from vftcli.observers.spectra import Spectra
+
+FALLBACK_RATE = 10.0
+"""First-order gain where a robot gives no gains at all. [1/s]"""
+
+
+class Setup(NamedTuple):
+    """What an observer is built from.
+
+    Attributes:
+        gains: The robot file's ``[observers.*]``.
+        settings: The user's ``--set``.
+        joints: Number of joints n.
+        step: Nominal sample time. [s]
+        as_printed: Use the paper's printed formulas.
+        spectra: What the log shows of noise and contact, None where its free part is not known.
+    """
+
+    gains: Mapping[str, Mapping[str, Any]]
+    settings: Settings
+    joints: int
+    step: float
+    as_printed: bool
+    spectra: "Spectra | None" = None
+
+
+Built = tuple[Observer, tuple[Remark, ...]]
+"""An observer, and remarks on gains that nobody gave."""
+
+
+class Entry(NamedTuple):
+    """One line of the observer table.
+
+    Attributes:
+        title: The field's name for it.
+        section: The ``--set`` section its parameters stand in.
+        equations: The paper's equations.
+        summary: What it does, in a sentence.
+        build: Makes it from a Setup, with remarks on gains nobody gave.
+        from_spectra: Whether it takes its gains from the log's spectra.
+    """
+
+    title: str
+    section: str
+    equations: str
+    summary: str
+    build: Callable[[Setup], Built]
+    from_spectra: bool = False
+
+
+def build_fdo(setup: Setup) -> Built:
+    """The filtered dynamics observer, its cutoff given or left over from the Kalman filter."""
+    given = merged("fdo", "fdo", setup.gains, setup.settings)
+    remarks: tuple[Remark, ...] = ()
+    omega = given.get("omega")
+    if omega is None:
+        rate, code = leftover_rate(setup)
+        # One cutoff for all joints: the one with the joints' mean delay.
+        omega = float(1.0 / np.mean(1.0 / rate))
+        remarks = (fact(code, parameter="fdo.omega", gain=omega, unit="rad/s"),)
+    value = joint_values(omega, setup.joints, "fdo.omega")
+    if np.any(value != value[0]):
+        raise ParameterError("fdo.omega takes one cutoff for all joints; gmo.gain takes one each")
+    return FilteredDynamicsObserver(omega=float(value[0]), as_printed=setup.as_printed), remarks
+
+
+def build_gmo(setup: Setup) -> Built:
+    """The momentum observer, its gains given or left over from the Kalman filter."""
+    given = merged("gmo", "gmo", setup.gains, setup.settings)
+    remarks: tuple[Remark, ...] = ()
+    gain = given.get("gain")
+    if gain is None:
+        gain, code = leftover_rate(setup)
+        remarks = (fact(code, parameter="gmo.gain", gain=gain.tolist(), unit="1/s"),)
+    values = joint_values(gain, setup.joints, "gmo.gain")
+    return MomentumObserver(gain=values, as_printed=setup.as_printed), remarks
+
+
+def build_kfo(scheme: str, section: str | None = None) -> Callable[[Setup], Built]:
+    """The builder of a Kalman observer with one discretisation.
+
+    Args:
+        scheme: "fe" or "zoh".
+        section: Its own ``--set`` section, if that is not the observer's name.
+    """
+
+    def build(setup: Setup) -> Built:
+        given = merged("kfo", section or f"kfo-{scheme}", setup.gains, setup.settings)
+        convention = str(given.pop("noise_convention", "density"))
+        values = {
+            key: joint_values(value, setup.joints, f"kfo.{key}")
+            for key, value in given.items()
+            if key in PARAMETERS["kfo"]
+        }
+        observer = KalmanObserver(
+            discretisation=scheme,
+            noise_convention=convention,
+            as_printed=setup.as_printed,
+            **values,
+        )
+        missing = [key for key in ("r_diag", "q_p_diag", "q_tau_diag") if key not in values]
+        if not missing:
+            return observer, ()
+        omega = float(observer.tuning(setup.step, setup.joints).omega_n[0])
+        names = [f"kfo.{key}" for key in missing]
+        code = "kalman-gains-from-default"
+        return observer, (fact(code, parameters=names, omega_n_rad_per_s=omega),)
+
+    return build
+
+
+def build_rts(setup: Setup) -> Built:
+    """The smoother on the zero-order-hold filter, whose process noise leaves no bias on a ramp."""
+    from vftcli.observers.smoother import KalmanSmoother
+
+    kalman, remarks = build_kfo("zoh", "kfo-rts")(setup)
+    return KalmanSmoother(filter=cast("KalmanObserver", kalman)), remarks
+
+
+def build_auto(name: str, by_hand: Callable[[Setup], Built]) -> Callable[[Setup], Built]:
+    """The builder of an observer whose gains come from the log, else from `by_hand`."""
+
+    def build(setup: Setup) -> Built:
+        from vftcli.observers.auto_tuning import AutoTuned, tuned
+
+        if setup.spectra is not None:
+            return tuned(name, setup.spectra), ()
+        observer, remarks = by_hand(setup)
+        fallback = caution("tuning-without-free-part", Where(name), observer=observer.name)
+        return AutoTuned(name=name, observer=observer), (*remarks, fallback)
+
+    return build
+
+
+OBSERVERS: dict[str, Entry] = {
+    "fdo": Entry(
+        "filtered dynamics observer",
+        "fdo",
+        "(19)–(29)",
+        "low-pass filtered equation of motion; one cutoff for all joints",
+        build_fdo,
+    ),
+    "gmo": Entry(
+        "generalised momentum observer",
+        "gmo",
+        "(30)–(35)",
+        "first-order residual of the momentum balance; one gain a joint",
+        build_gmo,
+    ),
+    "kfo-fe": Entry(
+        "disturbance Kalman filter, forward Euler",
+        "kfo",
+        "(36)–(42)",
+        "momentum and a random-walk torque as states; three variances a joint",
+        build_kfo("fe"),
+    ),
+    "kfo-zoh": Entry(
+        "disturbance Kalman filter, zero-order hold",
+        "kfo",
+        "(36)–(40), (43), (44)",
+        "the same with the exact process noise",
+        build_kfo("zoh"),
+    ),
+    "kfo-rts": Entry(
+        "Rauch–Tung–Striebel smoother on kfo-zoh",
+        "kfo",
+        "not in the paper",
+        "the same with the whole log in view: no delay, but it leads before a tap",
+        build_rts,
+    ),
+    "kfo-auto": Entry(
+        "disturbance Kalman filter tuned by the log",
+        "kfo",
+        "not in the paper",
+        "ω_n of each joint from the spectra of the log's free and loaded part",
+        build_auto("kfo-auto", build_kfo("zoh")),
+        from_spectra=True,
+    ),
+    "rts-auto": Entry(
+        "Rauch–Tung–Striebel smoother tuned by the log",
+        "kfo",
+        "not in the paper",
+        "the same for the smoother",
+        build_auto("rts-auto", build_rts),
+        from_spectra=True,
+    ),
+}
+"""Name at the command line → the observer."""
+
+DEFAULT = ("fdo", "gmo", "kfo-fe", "kfo-zoh")
+
+
+def sections() -> dict[str, Sequence[str]]:
+    """The ``--set`` sections and their parameters: shared ones, then each observer's own name."""
+    own = {name: PARAMETERS[entry.section] for name, entry in OBSERVERS.items()}
+    return {**PARAMETERS, **own}
+
+
+def observer_settings(assignments: Sequence[str]) -> Settings:
+    """Read the command line's ``--set`` values.
+
+    Raises:
+        ParameterError: If one is malformed or names nothing there is.
+    """
+    return parse_settings(assignments, sections())
+
+
+def leftover_rate(setup: Setup) -> tuple[Array, str]:
+    """First-order gain where none was given, and the code of the remark on where it is from.
+
+    It is the inverse of the Kalman filter's delay, so that the observers lag alike; `FALLBACK_RATE`
+    where no gains are given at all. (n,) [1/s]
+    """
+    if "kfo" in setup.gains or "kfo" in setup.settings:
+        kalman, _ = build_kfo("fe")(setup)
+        delay = kalman.tuning(setup.step, setup.joints).delay
+        return 1.0 / delay, "gain-from-kalman-delay"
+    return per_joint(FALLBACK_RATE, setup.joints), "gain-from-default"
+
+
+def check_observer(name: str) -> str:
+    """An observer's name as it is.
+
+    Raises:
+        ParameterError: If there is no such observer.
+    """
+    if name not in OBSERVERS:
+        raise ParameterError(f"no observer {name!r}; there is {', '.join(OBSERVERS)}")
+    return name
+
+
+def build_observers(
+    names: Sequence[str], setup: Setup
+) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
+    """Build observers by name, with remarks on gains that nobody gave.
+
+    Raises:
+        ParameterError: If a name or a parameter is not one there is, or is out of range.
+    """
+    made = [OBSERVERS[check_observer(name)].build(setup) for name in dict.fromkeys(names)]
+    # Several observers may miss one and the same gain: that is remarked on once.
+    remarks: list[Remark] = []
+    for _, own in made:
+        remarks += [remark for remark in own if remark not in remarks]
+    return tuple(observer for observer, _ in made), tuple(remarks)
