@@ -1,5 +1,6 @@
 """A small analysis of a simulated arm: made in memory, with hostile names in it."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -71,3 +72,19 @@ def with_wrench(recording: Recording) -> Analysis:
     """The log's estimates with their wrenches in base axes."""
     request = AnalysisChoice(wrench=WrenchChoice(frame="base"), robot=RobotChoice(name="ur5"))
     return analyse(recording, load_robot("ur5"), request)
+
+
+Reworked = Callable[..., Analysis]
+
+
+@pytest.fixture(scope="session")
+def as_if() -> Reworked:
+    """Makes an analysis look as if it were of another recording, or of another arm."""
+
+    def as_if(analysis: Analysis, recording: Recording | None = None, arm: str = "") -> Analysis:
+        log = analysis.motion.log
+        robot = load_robot(arm) if arm else log.robot
+        run = replace(log, recording=recording or log.recording, robot=robot)
+        return replace(analysis, motion=replace(analysis.motion, log=run))
+
+    return as_if

@@ -1,4 +1,5 @@
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,19 +29,21 @@ def test_without_a_reference_there_are_no_error_tables(
     assert found == {"index.html", "recording.rrd", "estimates.parquet", "run.json"}
 
 
-def labelled(analysis: Analysis, label: str) -> Analysis:
+def labelled(analysis: Analysis, label: str, as_if: Callable) -> Analysis:
     """The same run under another label, as a second log of the command would have one."""
     source = replace(analysis.recording.source, label=label)
     assert analysis.errors is not None
     errors = analysis.errors.with_columns(recording=pl.lit(label))
     recording = replace(analysis.recording, source=source)
-    return replace(analysis, recording=recording, errors=errors)
+    return replace(as_if(analysis, recording), errors=errors)
 
 
-def test_several_logs_get_a_folder_each_and_an_index(analysis: Analysis, tmp_path: Path) -> None:
+def test_several_logs_get_a_folder_each_and_an_index(
+    analysis: Analysis, as_if: Callable, tmp_path: Path
+) -> None:
     """Two logs of one file name: folders are numbered, rows bear the labels."""
     labels = ["a/run.csv", "b/run.csv"]
-    analyses = [labelled(analysis, label) for label in labels]
+    analyses = [labelled(analysis, label, as_if) for label in labels]
     text = write_reports(tmp_path / "out", analyses, command="vftcli report a b")
     folders = sorted(p.name for p in (tmp_path / "out").iterdir() if p.is_dir())
     assert folders == ["run", "run-2"]

@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,19 +11,11 @@ import rerun.chunk
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.arm import motion
-from vftcli.outputs.log.rerun_recording import (
-    NEWTON_PER_METRE,
-    finish,
-    force_arrow,
-    line_groups,
-    plot_of,
-    write_rrd,
-)
-from vftcli.outputs.log.rerun_text import drawable
+from vftcli.outputs.log.rerun_recording import force_arrow, line_groups, write_rrd
+from vftcli.outputs.rerun_file import NEWTON_PER_METRE
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian, link_poses
-from vftcli.signals.errors import OutputError
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.frames import mounted
@@ -134,48 +127,12 @@ def test_wrenches_have_their_own_tab(with_wrench: Analysis) -> None:
     np.testing.assert_array_equal(lines[4].values[:, 1], with_wrench.wrenches[1].known[:, 4])
 
 
-def test_a_plot_shows_all_of_its_lines(analysis: Analysis) -> None:
-    lines = line_groups(analysis)["External torque"][0]
-    plot = plot_of(lines)
-    assert plot.low < np.nanmin(lines.values)
-    assert plot.high > np.nanmax(lines.values)
-    empty = plot_of(lines._replace(values=np.full((3, 1), np.nan)))
-    assert empty.low < empty.high
-
-
-@pytest.mark.parametrize(
-    ("text", "drawn"),
-    [
-        ("J2 [N·m] ±0.5 τ²", "J2 [N·m] ±0.5 τ²"),
-        ("Jᵀ ≤ −1 → √2", "J^T <= -1 -> sqrt 2"),
-        ("ṗ = μ", "p = μ"),
-        ("日志.csv\t\x00", "??.csv??"),
-        ("a\nb", "a\nb"),
-    ],
-)
-def test_the_viewer_gets_letters_it_can_draw(text: str, drawn: str) -> None:
-    """Viewer 0.41 stops at a letter its font lacks; Latin-1 and Greek were seen to be drawn."""
-    assert drawable(text) == drawn
-
-
-def test_odd_names_do_no_harm(analysis: Analysis, tmp_path: Path) -> None:
-    source = replace(analysis.recording.source, path=Path("日志 ᵀ.csv"))
-    odd = replace(analysis, recording=replace(analysis.recording, source=source))
+def test_odd_names_do_no_harm(analysis: Analysis, as_if: Callable, tmp_path: Path) -> None:
+    source = replace(analysis.recording.source, path=Path("日志 ᵀ.csv"), label="日志 ᵀ.csv")
+    odd = as_if(analysis, replace(analysis.recording, source=source))
     write_rrd(tmp_path / "odd.rrd", odd)
     for chunk in rerun.chunk.RrdReader(str(tmp_path / "odd.rrd")).stream():
         assert "ᵀ" not in str(chunk.to_record_batch().to_pydict())
-
-
-def test_a_recording_without_its_footer_is_no_recording(tmp_path: Path) -> None:
-    """What a full disk leaves: Rerun's writer may end without an error."""
-
-    class Stream:
-        def flush(self) -> None: ...
-        def disconnect(self) -> None: ...
-
-    (tmp_path / "cut.rrd").write_bytes(b"RRF2" + bytes(1000))
-    with pytest.raises(OutputError, match=r"cut\.rrd cannot be written whole"):
-        finish(Stream(), tmp_path / "cut.rrd")
 
 
 @pytest.mark.parametrize("frame", ["flange", "base", "tool", "sensor"])

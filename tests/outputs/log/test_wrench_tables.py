@@ -1,4 +1,4 @@
-from dataclasses import replace
+from collections.abc import Callable
 
 import numpy as np
 import polars as pl
@@ -13,7 +13,6 @@ from vftcli.outputs.log.wrench_tables import (
     drift_grid,
     paper_bounds,
 )
-from vftcli.robots import load_robot
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.zero import Drift
 
@@ -46,10 +45,10 @@ def test_forces_in_newtons_beside_moments_in_newton_metres(errors: pl.DataFrame)
 
 
 def test_the_paper_s_bounds_stand_below_its_own_arm_only(
-    errors: pl.DataFrame, without_reference: Analysis
+    errors: pl.DataFrame, without_reference: Analysis, as_if: Callable
 ) -> None:
     """They stood below every arm's numbers, a Panda's too."""
-    ur5, panda = (replace(without_reference, robot=load_robot(name)) for name in ("ur5", "panda"))
+    ur5, panda = (as_if(without_reference, arm=name) for name in ("ur5", "panda"))
     label = ur5.recording.name
     named = errors.with_columns(recording=pl.lit(label))
     (shown,) = axis_grids(named, paper_bounds([ur5]))

@@ -4,19 +4,15 @@
 difference, on the timeline `t` in seconds from each log's first sample.
 """
 
-import gc
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from vftcli.identification.result import Identification, Trace
 from vftcli.outputs.grid import escape_markdown
-from vftcli.outputs.log.rerun_blueprint import Tab, grid
-from vftcli.outputs.log.rerun_recording import Lines, plot_of, send_lines
-from vftcli.outputs.log.rerun_text import drawable
 from vftcli.outputs.palette import REFERENCE, SPARE
+from vftcli.outputs.rerun_file import Lines, Tab, rerun_file
 from vftcli.signals.remarks import explanation
 
 
@@ -26,72 +22,30 @@ def write_identification_rrd(path: Path, found: Identification) -> None:
     Args:
         path: Where to; an existing file is replaced.
         found: What to show.
+
+    Raises:
+        OutputError: If it cannot be written whole.
     """
-    import rerun as rr
-
-    tabs = [(trace, *lines_of(trace)) for trace in found.traces]
-    stream = rr.RecordingStream("vftcli")
-    stream.save(str(path), default_blueprint=arrangement(tabs))
-    stream.send_recording_name(drawable(found.robot.name))
-    for trace, torque, residual in tabs:
-        for lines in (*torque, *residual):
-            send_lines(stream, trace.t, lines)
-    words = rr.TextDocument(drawable(summary(found)), media_type="text/markdown")
-    stream.log("/summary", words, static=True)
-    stream.flush()
-    stream.disconnect()
-    del stream
-    gc.collect()  # the footer is written when the last reference goes
+    tabs = [tab for trace in found.traces for tab in tabs_of(trace)]
+    with rerun_file(path, found.robot.name, tabs, {"Summary": summary(found)}):
+        pass  # there is no arm to draw
 
 
-def lines_of(trace: Trace) -> tuple[list[Lines], list[Lines]]:
+def tabs_of(trace: Trace) -> tuple[Tab, Tab]:
     """The plots of one log: torques, and residuals, joint by joint."""
-    name = re.sub(r"[^A-Za-z0-9_.-]", "_", trace.recording.name)
+    # An entity's path may hold no blank; names of files may.
+    entity = re.sub(r"[^A-Za-z0-9_.-]", "_", trace.recording.name)
+    names, colours = ["measured", "predicted"], [REFERENCE, SPARE[1]]
     torque, residual = [], []
     for j in range(trace.measured.shape[1]):
         both = np.column_stack([trace.measured[:, j], trace.predicted[:, j]])
-        torque.append(
-            Lines(
-                f"/torque/{name}/J{j + 1}",
-                f"J{j + 1} drive torque [N·m]",
-                ["measured", "predicted"],
-                [REFERENCE, SPARE[1]],
-                [2.5, 1.5],
-                both,
-            )
-        )
-        residual.append(
-            Lines(
-                f"/residual/{name}/J{j + 1}",
-                f"J{j + 1} measured − predicted [N·m]",
-                ["residual"],
-                [SPARE[0]],
-                [1.5],
-                trace.residual[:, j : j + 1],
-            )
-        )
-    return torque, residual
-
-
-def arrangement(tabs: list[tuple[Trace, list[Lines], list[Lines]]]) -> Any:  # noqa: ANN401
-    """Summary to the left, two tabs a log to the right."""
-    import rerun.blueprint as rrb
-
-    grids = []
-    for trace, torque, residual in tabs:
-        title = f"{trace.recording.name} ({trace.role})"
-        grids.append(grid(Tab(title, tuple(map(plot_of, torque)))))
-        grids.append(grid(Tab(f"{title}: residual", tuple(map(plot_of, residual)))))
-    words = rrb.TextDocumentView(origin="/summary", name="Summary")
-    views = rrb.Horizontal(words, rrb.Tabs(*grids), column_shares=[2, 5]) if grids else words
-    return rrb.Blueprint(
-        views,
-        rrb.TimePanel(timeline="t", state="collapsed", play_state="paused"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.BlueprintPanel(state="collapsed"),
-        auto_views=False,
-        auto_layout=False,
-    )
+        path, title = f"/torque/{entity}/J{j + 1}", f"J{j + 1} drive torque [N·m]"
+        torque.append(Lines(path, title, names, colours, [2.5, 1.5], both))
+        left = trace.residual[:, j : j + 1]
+        path, title = f"/residual/{entity}/J{j + 1}", f"J{j + 1} measured − predicted [N·m]"
+        residual.append(Lines(path, title, ["residual"], [SPARE[0]], [1.5], left))
+    title = f"{trace.recording.name} ({trace.role})"
+    return Tab(title, trace.t, torque), Tab(f"{title}: residual", trace.t, residual)
 
 
 def summary(found: Identification) -> str:

@@ -1,69 +1,41 @@
 """recording.rrd: torques, residuals, motion and the arm, arranged for the Rerun viewer.
 
-Every plot is one entity holding one scalar a line: `/tau_ext/J1` … (every observer, then the
-reference), `/residual/J1` … (every estimate minus the reference), `/drive_torque`, `/q` and `/dq`
-(one line a joint). All of it stands on the timeline `t`, in seconds from the log's first sample.
+Entities: `/tau_ext/J1` … (every observer, then the reference), `/residual/J1` … (every estimate
+minus the reference), `/drive_torque`, `/q` and `/dq` (one line a joint), `/wrench/fx` … where
+wrenches were asked for, `/robot` with the arm and the force on it.
 """
 
-import itertools
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.arm import ArmPoses, capsules, motion
-from vftcli.outputs.files import one_line
+from vftcli.outputs.arm import ArmPoses, motion
 from vftcli.outputs.grid import escape_markdown
-from vftcli.outputs.log.rerun_blueprint import Plot, Scene, Tab, arrangement
-from vftcli.outputs.log.rerun_text import drawable
 from vftcli.outputs.log.run_record import CONVENTIONS, all_remarks
 from vftcli.outputs.log.tables import to_markdown
 from vftcli.outputs.log.wrench_tables import paper_bounds
-from vftcli.outputs.palette import REFERENCE, SPARE, colours_of, rgb
+from vftcli.outputs.palette import REFERENCE, SPARE, colours_of
+from vftcli.outputs.rerun_file import (
+    ARM_RATE,
+    NEWTON_PER_METRE,
+    ArmView,
+    Lines,
+    Tab,
+    rerun_file,
+    send_arm,
+    send_force,
+)
 from vftcli.robots.drive import drive_torque
 from vftcli.signals.arrays import Array
-from vftcli.signals.errors import OutputError
 from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.wrench import AXES, unit_of
 from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
 
-ARM_RATE = 50.0
-"""Poses a second of the arm. [Hz]"""
-
-NEWTON_PER_METRE = 200.0
-"""Length of the force arrow: 200 N are 1 m."""
-
-LINK, JOINT, FORCE = (176, 184, 192), (78, 92, 106), (221, 100, 21)
-"""Colours of links, joints and the force arrow."""
-
-FOOTER, TRAILER = b"RRF2FOOT", 64
-"""A whole recording has this mark in its last bytes."""
-
-Stream = Any
-
-
-class Lines(NamedTuple):
-    """The lines of one plot.
-
-    Attributes:
-        path: The entity.
-        title: What the plot shows, with its unit.
-        names: One a line.
-        colours: ``#rrggbb``, one a line.
-        widths: One a line. [px]
-        values: One column a line. (T, k)
-    """
-
-    path: str
-    title: str
-    names: list[str]
-    colours: list[str]
-    widths: list[float]
-    values: Array
+SHAFT = 0.012
+"""Radius of the force arrow. [m]"""
 
 
 def write_rrd(path: Path, analysis: Analysis) -> None:
@@ -72,37 +44,24 @@ def write_rrd(path: Path, analysis: Analysis) -> None:
     Args:
         path: Where to; an existing file is replaced.
         analysis: What to show.
-    """
-    import rerun as rr
-
-    groups = line_groups(analysis)
-    plots = tuple(Tab(name, tuple(map(plot_of, lines))) for name, lines in groups.items())
-    poses = motion(analysis.robot.chain, analysis.t, analysis.recording.q, ARM_RATE)
-    stream = rr.RecordingStream("vftcli")
-    stream.save(str(path), default_blueprint=arrangement(plots, scene_of(poses)))
-    stream.send_recording_name(drawable(analysis.recording.name))
-    for lines in itertools.chain.from_iterable(groups.values()):
-        send_lines(stream, analysis.t, lines)
-    send_words(stream, analysis)
-    send_arm(stream, analysis, poses)
-    finish(stream, path)
-
-
-def finish(stream: Stream, path: Path) -> None:
-    """Write what is still in memory, and the footer.
 
     Raises:
-        OutputError: If the file is not whole: Rerun writes in a thread of its own.
+        OutputError: If it cannot be written whole.
     """
-    try:
-        stream.flush()
-        stream.disconnect()
-    except RuntimeError as error:
-        raise OutputError(f"{path.name} cannot be written: {one_line(error)}") from None
-    with path.open("rb") as file:
-        file.seek(-min(TRAILER, path.stat().st_size), os.SEEK_END)
-        if FOOTER not in file.read():
-            raise OutputError(f"{path.name} cannot be written whole: is the disk full?")
+    chain, errors = analysis.robot.chain, analysis.errors
+    tabs = [Tab(name, analysis.t, lines) for name, lines in line_groups(analysis).items()]
+    table = to_markdown(errors, paper_bounds([analysis])) if errors is not None else ""
+    words = {
+        "Summary": summary(analysis),
+        "Errors": table or "No reference was given, so no errors can be told.",
+    }
+    poses = motion(chain, analysis.t, analysis.recording.q, ARM_RATE)
+    arrow = force_arrow(analysis, poses, np.searchsorted(analysis.t, poses.t))
+    name = analysis.recording.name
+    with rerun_file(path, name, tabs, words, ArmView("Arm", poses)) as stream:
+        send_arm(stream, "/robot", chain, poses)
+        if arrow is not None:
+            send_force(stream, "/robot/flange_force", poses.t, arrow.origin, arrow.force, SHAFT)
 
 
 def line_groups(analysis: Analysis) -> dict[str, list[Lines]]:
@@ -117,23 +76,6 @@ def line_groups(analysis: Analysis) -> dict[str, list[Lines]]:
         axes = [wrench_lines(analysis, k) for k in range(len(AXES))]
         groups["Wrench"] = [*axes, *condition_lines(analysis)]
     return {**groups, "Motion": motion_lines(analysis)}
-
-
-def plot_of(lines: Lines) -> Plot:
-    """A plot that shows all of its lines."""
-    known = lines.values[np.isfinite(lines.values)]
-    low, high = (known.min(), known.max()) if known.size else (-1.0, 1.0)
-    room = max(0.05 * (high - low), 1e-3)
-    return Plot(lines.path, lines.title, float(low - room), float(high + room))
-
-
-def scene_of(poses: ArmPoses) -> Scene:
-    """An eye that sees the base and all places where the links have been."""
-    corners = poses.translation.reshape(-1, 3)
-    low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
-    centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
-    eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
-    return Scene(tuple(eye.tolist()), tuple(centre.tolist()))
 
 
 TITLES = {"tau_ext": "external torque [N·m]", "residual": "estimate − reference [N·m]"}
@@ -228,35 +170,6 @@ def motion_lines(analysis: Analysis) -> list[Lines]:
     return [Lines(path, title, names, colours, widths, x) for path, title, x in signals]
 
 
-def send_lines(stream: Stream, t: Array, lines: Lines) -> None:
-    """Send one plot: names and colours once, then all samples in one batch."""
-    import rerun as rr
-
-    style = rr.SeriesLines(
-        names=[drawable(name) for name in lines.names],
-        colors=[rgb(c) for c in lines.colours],
-        widths=lines.widths,
-        aggregation_policy=rr.components.AggregationPolicy.MinMax,  # an average hides spikes
-    )
-    stream.log(lines.path, style, static=True)
-    samples, count = lines.values.shape
-    scalars = rr.Scalars.columns(scalars=lines.values.ravel()).partition(np.full(samples, count))
-    stream.send_columns(lines.path, [rr.TimeColumn("t", duration=t)], scalars)
-
-
-def send_words(stream: Stream, analysis: Analysis) -> None:
-    """Send the summary and the error tables as Markdown."""
-    import rerun as rr
-
-    def document(path: str, text: str) -> None:
-        stream.log(path, rr.TextDocument(drawable(text), media_type="text/markdown"), static=True)
-
-    document("/summary", summary(analysis))
-    errors = analysis.errors
-    table = to_markdown(errors, paper_bounds([analysis])) if errors is not None else ""
-    document("/errors", table or "No reference was given, so no errors can be told.")
-
-
 def summary(analysis: Analysis) -> str:
     """Which log, which robot, what the numbers and the arrow mean."""
     recording, robot = analysis.recording, analysis.robot
@@ -288,27 +201,6 @@ def force_source(estimates: Sequence[ExternalTorque]) -> ExternalTorque | None:
     return next(iter([*kalman, *estimates]), None)
 
 
-def send_arm(stream: Stream, analysis: Analysis, poses: ArmPoses) -> None:
-    """Send the arm's shape once and its poses over time."""
-    import rerun as rr
-
-    chain = analysis.robot.chain
-    stream.log("/robot", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    time = rr.TimeColumn("t", duration=poses.t)
-    for j, shapes in enumerate(capsules(chain)):
-        path = f"/robot/link_{j}" if j else "/robot/base"
-        if shapes:
-            stream.log(path, capsule_batch(shapes), static=True)
-        if j:
-            columns = rr.Transform3D.columns(
-                translation=poses.translation[:, j - 1], quaternion=poses.quat_xyzw[:, j - 1]
-            )
-            stream.send_columns(path, [time], columns)
-    arrow = force_arrow(analysis, poses, np.searchsorted(analysis.t, poses.t))
-    if arrow is not None:
-        send_force(stream, poses.t, arrow)
-
-
 def force_arrow(
     analysis: Analysis, poses: ArmPoses, sampled: NDArray[np.intp]
 ) -> ForceArrow | None:
@@ -331,43 +223,3 @@ def force_arrow(
     sensor = VirtualSensor(frame="base")
     drawn = ExternalTorque(name=source.name, t=poses.t, tau=source.tau[sampled])
     return sensor.arrow(sensor.wrench(drawn, poses.q, chain).force, poses.q, chain)
-
-
-def capsule_batch(shapes: Sequence[Any]) -> Any:  # noqa: ANN401 - Rerun is untyped
-    """Capsules in the axes of the link they move with; Rerun's own lie along z from one end."""
-    import rerun as rr
-
-    directions = np.array([shape.direction for shape in shapes])
-    lengths = np.linalg.norm(directions, axis=1)
-    return rr.Capsules3D(
-        lengths=lengths,
-        radii=[shape.radius for shape in shapes],
-        translations=np.array([shape.start for shape in shapes]),
-        quaternions=[turn_from_z(d / s) for d, s in zip(directions, lengths, strict=True)],
-        colors=[JOINT if shape.joint else LINK for shape in shapes],
-        fill_mode="solid",
-    )
-
-
-def turn_from_z(unit: Array) -> Array:
-    """Quaternion (x, y, z, w) that turns z to a unit vector the short way. (4,)"""
-    if unit[2] < -1.0 + 1e-9:
-        return np.array([1.0, 0.0, 0.0, 0.0])
-    turn = np.array([-unit[1], unit[0], 0.0, 1.0 + unit[2]])
-    turned: Array = turn / np.linalg.norm(turn)
-    return turned
-
-
-def send_force(stream: Stream, t: Array, arrow: ForceArrow) -> None:
-    """Send the arrow; where the force is not known there is none."""
-    import rerun as rr
-
-    force = arrow.force
-    told = np.all(np.isfinite(force), axis=1)
-    columns = rr.Arrows3D.columns(
-        origins=arrow.origin[told],
-        vectors=force[told] / NEWTON_PER_METRE,
-        radii=np.full(int(told.sum()), 0.012),
-        colors=np.tile(np.array([*FORCE, 255], dtype=np.uint8), (int(told.sum()), 1)),
-    ).partition(told.astype(int))
-    stream.send_columns("/robot/flange_force", [rr.TimeColumn("t", duration=t)], columns)

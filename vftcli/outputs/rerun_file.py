@@ -1,0 +1,337 @@
+"""A Rerun recording: plots, words and arms in one file that opens arranged.
+
+Every plot is one entity holding one scalar a line, on the timeline `t` in seconds from the log's
+first sample; words are Markdown documents.
+"""
+
+import os
+import unicodedata
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.outputs.arm import ArmPoses, Capsule, capsules
+from vftcli.outputs.files import one_line
+from vftcli.outputs.palette import rgb
+from vftcli.robots.chain import Chain
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import OutputError
+
+ARM_RATE = 50.0
+"""Poses a second of the arm. [Hz]"""
+
+NEWTON_PER_METRE = 200.0
+"""Length of the force arrow: 200 N are 1 m."""
+
+LINK, JOINT, FORCE = "#b0b8c0", "#4e5c6a", "#dd6415"
+"""Colours of links, joints and the force arrow."""
+
+FOOTER, TRAILER = b"RRF2FOOT", 64
+"""A whole recording has this mark in its last bytes."""
+
+Stream = Any
+
+SPELLED = {
+    "ᵀ": "^T",
+    "⁻": "^-",
+    "√": "sqrt ",
+    "≤": "<=",
+    "≥": ">=",
+    "≈": "~",
+    "→": "->",
+    "−": "-",
+    "–": "-",
+    "—": "-",
+    "…": "...",
+    "‘": "'",
+    "’": "'",
+    "“": '"',
+    "”": '"',
+    "∂": "d",
+    "Σ": "sum ",
+    "ẋ": "dx",
+}
+"""How to write what the viewer's font may lack."""
+
+
+class Lines(NamedTuple):
+    """The lines of one plot.
+
+    Attributes:
+        path: The entity.
+        title: What the plot shows, with its unit.
+        names: One a line.
+        colours: ``#rrggbb``, one a line.
+        widths: One a line. [px]
+        values: One column a line, NaN where not known. (T, k)
+    """
+
+    path: str
+    title: str
+    names: Sequence[str]
+    colours: Sequence[str]
+    widths: Sequence[float]
+    values: Array
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lower and upper end of a vertical axis that shows all of them, with some room."""
+        known = self.values[np.isfinite(self.values)]
+        low, high = (known.min(), known.max()) if known.size else (-1.0, 1.0)
+        room = max(0.05 * (high - low), 1e-3)
+        return float(low - room), float(high + room)
+
+
+class Tab(NamedTuple):
+    """Plots shown together.
+
+    Attributes:
+        name: The tab's name.
+        t: Time of their samples. (T,) [s]
+        plots: What they show.
+    """
+
+    name: str
+    t: Array
+    plots: Sequence[Lines]
+
+
+class ArmView(NamedTuple):
+    """The space in which arms stand.
+
+    Attributes:
+        name: What it is called.
+        poses: Where an arm has been, so that the eye sees all of it.
+    """
+
+    name: str
+    poses: ArmPoses
+
+
+@contextmanager
+def rerun_file(
+    path: Path,
+    title: str,
+    tabs: Sequence[Tab],
+    words: Mapping[str, str],
+    view: ArmView | None = None,
+) -> Iterator[Stream]:
+    """Write a recording with its plots and words; yield its stream, to draw arms into it.
+
+    Args:
+        path: Where to; an existing file is replaced.
+        title: Name of the recording.
+        tabs: The plots.
+        words: Name of a document → its Markdown.
+        view: Where arms will be drawn, None if there are none.
+
+    Raises:
+        OutputError: If the file is not whole in the end.
+    """
+    import rerun as rr
+
+    stream = rr.RecordingStream("vftcli")
+    stream.save(str(path), default_blueprint=blueprint(tabs, list(words), view))
+    stream.send_recording_name(drawable(title))
+    for tab in tabs:
+        for lines in tab.plots:
+            send_lines(stream, tab.t, lines)
+    for name, text in words.items():
+        document = rr.TextDocument(drawable(text), media_type="text/markdown")
+        stream.log(f"/{name.lower()}", document, static=True)
+    if view is not None:
+        stream.log("/robot", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    yield stream
+    finish(stream, path)
+
+
+def finish(stream: Stream, path: Path) -> None:
+    """Write what is still in memory, and the footer.
+
+    Raises:
+        OutputError: If the file is not whole: Rerun writes in a thread of its own.
+    """
+    try:
+        stream.flush()
+        stream.disconnect()
+    except RuntimeError as error:
+        raise OutputError(f"{path.name} cannot be written: {one_line(error)}") from None
+    with path.open("rb") as file:
+        file.seek(-min(TRAILER, path.stat().st_size), os.SEEK_END)
+        if FOOTER not in file.read():
+            raise OutputError(f"{path.name} cannot be written whole: is the disk full?")
+
+
+def blueprint(tabs: Sequence[Tab], words: Sequence[str], view: ArmView | None) -> Any:  # noqa: ANN401
+    """How the recording opens: arms and words to the left, plots to the right."""
+    import rerun.blueprint as rrb
+
+    documents = [rrb.TextDocumentView(origin=f"/{name.lower()}", name=name) for name in words]
+    left: Any = rrb.Tabs(*documents, active_tab=0) if len(documents) > 1 else documents[0]
+    if view is not None:
+        left = rrb.Vertical(arm_view(view), left, row_shares=[3, 2])
+    plots = [grid_of(tab) for tab in tabs]
+    shown = rrb.Horizontal(left, rrb.Tabs(*plots, active_tab=0), column_shares=[2, 5])
+    return rrb.Blueprint(
+        shown if plots else left,
+        rrb.TimePanel(timeline="t", state="collapsed", play_state="paused"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def arm_view(view: ArmView) -> Any:  # noqa: ANN401 - Rerun is untyped
+    """The space with an eye that sees the base and all places where the links have been."""
+    import rerun.blueprint as rrb
+
+    corners = view.poses.translation.reshape(-1, 3)
+    low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
+    centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
+    return rrb.Spatial3DView(
+        origin="/robot",
+        contents="/robot/**",
+        name=view.name,
+        eye_controls=rrb.EyeControls3D(position=eye.tolist(), look_target=centre.tolist()),
+        line_grid=rrb.LineGrid3D(visible=True, spacing=0.1),
+    )
+
+
+def grid_of(tab: Tab) -> Any:  # noqa: ANN401 - Rerun is untyped
+    """One tab, in two columns if there are many plots; the first one's legend holds for all."""
+    import rerun.blueprint as rrb
+
+    views = [
+        rrb.TimeSeriesView(
+            origin=lines.path,
+            name=drawable(lines.title),
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=k == 0),
+            axis_x=rrb.archetypes.TimeAxis(link="LinkToGlobal"),
+            axis_y=rrb.ScalarAxis(range=lines.ends),
+        )
+        for k, lines in enumerate(tab.plots)
+    ]
+    return rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=tab.name)
+
+
+def send_lines(stream: Stream, t: Array, lines: Lines) -> None:
+    """Send one plot: names and colours once, then all samples in one batch."""
+    import rerun as rr
+
+    style = rr.SeriesLines(
+        names=[drawable(name) for name in lines.names],
+        colors=[rgb(c) for c in lines.colours],
+        widths=lines.widths,
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,  # an average hides spikes
+    )
+    stream.log(lines.path, style, static=True)
+    samples, count = lines.values.shape
+    scalars = rr.Scalars.columns(scalars=lines.values.ravel()).partition(np.full(samples, count))
+    stream.send_columns(lines.path, [rr.TimeColumn("t", duration=t)], scalars)
+
+
+def send_arm(
+    stream: Stream, path: str, chain: Chain, poses: ArmPoses, ghost: tuple[int, ...] | None = None
+) -> None:
+    """Send an arm's shape once and its poses over time.
+
+    Args:
+        stream: The recording.
+        path: Entity of the arm.
+        chain: Its geometry.
+        poses: Where its links are.
+        ghost: Red, green, blue and opacity of a see-through arm; None for a solid one.
+    """
+    import rerun as rr
+
+    time = rr.TimeColumn("t", duration=poses.t)
+    for j, shapes in enumerate(capsules(chain)):
+        link = f"{path}/link_{j}" if j else f"{path}/base"
+        if shapes:
+            stream.log(link, capsule_batch(shapes, ghost), static=True)
+        if j:
+            columns = rr.Transform3D.columns(
+                translation=poses.translation[:, j - 1], quaternion=poses.quat_xyzw[:, j - 1]
+            )
+            stream.send_columns(link, [time], columns)
+
+
+def capsule_batch(shapes: Sequence[Capsule], ghost: tuple[int, ...] | None) -> Any:  # noqa: ANN401
+    """Capsules in the axes of the link they move with; Rerun's own lie along z from one end."""
+    import rerun as rr
+
+    directions = np.array([shape.direction for shape in shapes])
+    lengths = np.linalg.norm(directions, axis=1)
+    slimmer = 1.0 if ghost is None else 0.8  # ghosts that overlap are told apart
+    return rr.Capsules3D(
+        lengths=lengths,
+        radii=[slimmer * shape.radius for shape in shapes],
+        translations=np.array([shape.start for shape in shapes]),
+        quaternions=[turn_from_z(d / s) for d, s in zip(directions, lengths, strict=True)],
+        colors=[ghost or rgb(JOINT if shape.joint else LINK) for shape in shapes],
+        fill_mode="solid",
+    )
+
+
+def turn_from_z(unit: Array) -> Array:
+    """Quaternion (x, y, z, w) that turns z to a unit vector the short way. (4,)"""
+    if unit[2] < -1.0 + 1e-9:
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    turn = np.array([-unit[1], unit[0], 0.0, 1.0 + unit[2]])
+    turned: Array = turn / np.linalg.norm(turn)
+    return turned
+
+
+def send_force(
+    stream: Stream, path: str, t: Array, origin: Array, force: Array, radius: float
+) -> None:
+    """Send an arrow over time; where the force is not known there is none.
+
+    Args:
+        stream: The recording.
+        path: Entity of the arrow.
+        t: Time. (S,) [s]
+        origin: Where it acts, in base axes. (S, 3) [m]
+        force: In base axes, NaN where not known. (S, 3) [N]
+        radius: Of the arrow's shaft. [m]
+    """
+    import rerun as rr
+
+    known = np.all(np.isfinite(force), axis=1)
+    count = int(known.sum())
+    columns = rr.Arrows3D.columns(
+        origins=origin[known],
+        vectors=force[known] / NEWTON_PER_METRE,
+        radii=np.full(count, radius),
+        colors=np.tile(np.array([*rgb(FORCE), 255], dtype=np.uint8), (count, 1)),
+    ).partition(known.astype(int))
+    stream.send_columns(path, [rr.TimeColumn("t", duration=t)], columns)
+
+
+def drawable(text: str) -> str:
+    """Text in Latin-1 and Greek; further accents are dropped, other letters become "?".
+
+    The viewer stops at the first letter that its font lacks.
+    """
+    spelled = "".join(SPELLED.get(letter, letter) for letter in text)
+    return "".join(letter_drawn(letter) for letter in spelled)
+
+
+def letter_drawn(letter: str) -> str:
+    """One letter, or what stands for it."""
+    if letter == "\n" or has_glyph(letter) or "\u00a0" <= letter <= "\u00ff":
+        return letter
+    parts = [p for p in unicodedata.normalize("NFKD", letter) if not unicodedata.combining(p)]
+    if unicodedata.combining(letter):
+        return ""
+    return "".join(part if has_glyph(part) else "?" for part in parts)
+
+
+def has_glyph(letter: str) -> bool:
+    """Whether a letter is plain ASCII or Greek."""
+    return " " <= letter <= "~" or "\u0391" <= letter <= "\u03c9"
