@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.identification.processing import PreparedLog
+from vftcli.robots.friction import SMOOTHING, coulomb_viscous
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
 
@@ -29,7 +30,7 @@ class Shape(NamedTuple):
     """
 
     terms: tuple[str, ...]
-    smoothing: float = 0.01
+    smoothing: float = SMOOTHING
     stribeck_velocity: float = 0.05
 
     @property
@@ -66,7 +67,7 @@ def round_digits(value: float, digits: int = 7) -> float:
 
 
 def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
-    """One term of a friction shape at every sample. Like `dq`
+    """One term of a friction shape at every sample: the friction law with its coefficient 1.
 
     Args:
         term: Its key.
@@ -74,19 +75,14 @@ def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
         dq: Velocities as recorded. [rad/s]
         load: Absolute gravity torque. [N·m]
     """
-    if term == "offset":
-        return np.ones_like(dq)
-    if term == "viscous":
-        return dq
-    if term == "quadratic":
-        values: Array = dq * np.abs(dq)
-        return values
-    sign: Array = np.tanh(dq / shape.smoothing)
-    if term == "load_coulomb":
-        return sign * load
-    if term == "stribeck":
-        return sign * np.exp(-((dq / shape.stribeck_velocity) ** 2))
-    return sign
+    coefficients = {"coulomb": 0.0, "viscous": 0.0, term: 1.0}
+    return coulomb_viscous(
+        dq,
+        **coefficients,
+        smoothing=shape.smoothing,
+        stribeck_velocity=shape.stribeck_velocity,
+        load=load,
+    )
 
 
 class FrictionColumns:

@@ -1,8 +1,7 @@
 """Logs in, a robot out: the whole way of `vftcli identify`, in the order the data flows."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import polars as pl
@@ -17,8 +16,8 @@ from vftcli.identification.payload import (
     payload_from_pair,
     payload_from_poses,
 )
-from vftcli.identification.processing import PreparedLog, Processing, prepare
-from vftcli.identification.provenance import Provenance, with_provenance
+from vftcli.identification.processing import Processing
+from vftcli.identification.provenance import with_provenance
 from vftcli.identification.result import (
     BASE,
     PARAMETERS,
@@ -26,25 +25,16 @@ from vftcli.identification.result import (
     SHAPE_CHOICES,
     Identification,
     Number,
-    Trace,
     number,
 )
-from vftcli.identification.scoring import (
-    REPEATED,
-    held_out_remarks,
-    predicted_torque,
-    repeated_share,
-    rms,
-)
+from vftcli.identification.scoring import score, score_remarks
 from vftcli.identification.target_method import targets_method
 from vftcli.identification.training import Training, prepare_training
 from vftcli.identification.whole_arm import base_method, consistent_method
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError, ParameterError
 from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, Where, caution, fact
 
 METHODS: dict[str, Callable[[Training], MethodResult]] = {
     "friction": friction_method,
@@ -115,40 +105,30 @@ def identify(
         result = METHODS[method](data)
     new, numbers, remarks = result.robot, [*result.numbers], [*result.remarks]
     scored = [
-        ScoredLog.of(log, role, robot, new, task.processing)
+        score(log, role, robot, new, task.processing)
         for role, some in (("train", train), ("held-out", held_out))
         for log in some
     ]
-    remarks += score_remarks(new, scored)
+    traces = tuple(trace for trace in scored if trace.motion.samples > 1)
+    remarks += score_remarks(new, traces)
     if load is not None:
         new, numbers = with_load(new, load, numbers)
         remarks.append(load.origin)
-    processing = task.processing.settings_record(logs[0].median_step)
-    rows = [row for k, log in enumerate(scored, start=1) for row in log.rows(k)]
-    residuals = pl.DataFrame(rows, schema=RESIDUALS, orient="row")
-    made = Provenance(
-        profile=robot,
-        name=task.name,
-        method=method,
-        logs=tuple(logs) if free is None else (*logs, free),
-        trained=train,
-        processing=processing,
-        residuals=residuals,
-        result=result,
-        load=load,
-    )
-    return Identification(
-        robot=with_provenance(new, made),
+    rows = [row for k, trace in enumerate(traces, start=1) for row in trace.rows(k)]
+    found = Identification(
+        robot=new,
         profile=robot,
         method=method,
-        residuals=residuals,
+        residuals=pl.DataFrame(rows, schema=RESIDUALS, orient="row"),
         parameters=pl.DataFrame(numbers, schema=PARAMETERS, orient="row"),
         shape_choices=shape_choice_table(result.shape_choices),
         base=base_table(result.base),
-        traces=tuple(log.trace for log in scored if log.trace is not None),
-        processing=processing,
+        traces=traces,
+        processing=task.processing.settings_record(logs[0].median_step),
         remarks=tuple(remarks),
     )
+    sources = logs if free is None else [*logs, free]
+    return replace(found, robot=with_provenance(found, task.name, sources, train, load))
 
 
 def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:
@@ -183,79 +163,6 @@ def free_logs(
     if free is not None:
         return (free,)
     return tuple(log for log in logs if not load.carried_by(log))
-
-
-class ScoredLog(NamedTuple):
-    """A log scored under the profile and under the identified robot.
-
-    Attributes:
-        motion: The prepared log.
-        role: "train" or "held-out".
-        trace: Measured and predicted torque; None where nothing moves.
-        before: RMS under the profile. (n,) [N·m]
-    """
-
-    motion: PreparedLog
-    role: str
-    trace: Trace | None
-    before: Array
-
-    @classmethod
-    def of(
-        cls, log: Recording, role: str, profile: Robot, robot: Robot, processing: Processing
-    ) -> "ScoredLog":
-        """Score a log."""
-        motion = prepare(log, profile, processing)
-        if motion.samples < 2:
-            return cls(motion, role, None, np.zeros(motion.joints))
-        expected = predicted_torque(robot, motion)
-        measured = motion.tau * constant_ratio(profile, robot, motion)
-        trace = Trace(log, role, motion.t, motion.dq, measured, expected)
-        return cls(motion, role, trace, rms(motion.tau - predicted_torque(profile, motion)))
-
-    def rows(self, index: int) -> list[tuple[str, int, str, str, int, float, int]]:
-        """Rows of `RESIDUALS`; none where nothing moves."""
-        if self.trace is None:
-            return []
-        sizes = {"identified": rms(self.trace.residual), "profile": self.before}
-        name, samples = self.trace.recording.name, self.motion.samples
-        return [
-            (name, index, self.role, model, j, float(value), samples)
-            for model, values in sizes.items()
-            for j, value in enumerate(values, start=1)
-        ]
-
-
-def constant_ratio(profile: Robot, robot: Robot, motion: PreparedLog) -> Array | float:
-    """New over old drive constants, for torque that was made from currents with the old. (n,)"""
-    old, new = profile.torque_constant, robot.torque_constant
-    if old is None or new is None or motion.recording.current is None:
-        return 1.0
-    from vftcli.robots.drive import uses_current
-
-    ratio: Array = new / old
-    return ratio if uses_current(motion.recording, profile) else 1.0
-
-
-def score_remarks(robot: Robot, scored: Sequence[ScoredLog]) -> list[Remark]:
-    """What the scores mean: repeated trajectories, and joints that are much worse elsewhere."""
-    train = [log for log in scored if log.role == "train"]
-    held_out = [log for log in scored if log.role == "held-out"]
-    remarks = []
-    for test in held_out:
-        for other in train:
-            if (share := repeated_share(other.motion, test.motion)) >= REPEATED:
-                where, name = Where(test.motion.recording.name), other.motion.recording.name
-                values = {"training_log": name, "share_percent": 100.0 * share}
-                remarks.append(caution("repeated-trajectory", where, **values))
-    levels = [rms(log.trace.residual) for log in train if log.trace is not None]
-    if not levels:
-        return remarks
-    level = np.mean(levels, axis=0)
-    for test in held_out:
-        if test.trace is not None:
-            remarks += held_out_remarks(robot, test.motion, test.trace.residual, level)
-    return [*remarks, fact("training-residual", mean_Nm=float(np.mean(level)))]
 
 
 def with_load(robot: Robot, load: LoadFit, numbers: list[Number]) -> tuple[Robot, list[Number]]:

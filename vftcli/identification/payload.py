@@ -15,6 +15,7 @@ from vftcli.identification.processing import (
 )
 from vftcli.robots.chain import Payload
 from vftcli.robots.drive import drive_torque
+from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
@@ -146,7 +147,7 @@ def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> LoadSolution
     at = motion.t + shift
     inside = (at >= free.t[0]) & (at <= free.t[-1])
     extra = (motion.tau - resampled(at, free.t, torque))[inside]
-    sign = motion.filtered(np.tanh(loaded.require("dq") / 0.01))[inside]
+    sign = motion.filtered(np.tanh(loaded.require("dq") / SMOOTHING))[inside]
     q, dq, ddq = motion.q[inside], motion.dq[inside], motion.ddq[inside]
     Y = torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK:][:, :, :STATIC]
     usable = motion.usable[inside].astype(float)

@@ -1,14 +1,13 @@
 """Where every number of an identified robot comes from, as tables of its file."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import polars as pl
 
-from vftcli.identification.base_parameters import BaseParameters
-from vftcli.identification.method_result import MethodResult
 from vftcli.identification.payload import LoadFit, names_of
+from vftcli.identification.result import Identification
 from vftcli.robots.robot import Robot
 from vftcli.robots.writing import robot_document
 from vftcli.signals.recording import Recording
@@ -17,46 +16,35 @@ LINK_METHODS = frozenset({"base", "consistent"})
 """Methods that identify the links too."""
 
 
-class Provenance(NamedTuple):
-    """How a robot came about.
+def with_provenance(
+    found: Identification,
+    name: str,
+    logs: Sequence[Recording],
+    trained: Sequence[Recording],
+    load: LoadFit | None,
+) -> Robot:
+    """The identified robot under its own name, its document telling the source of every number.
 
-    Attributes:
-        profile: The robot it started from.
-        name: Its own name, or "".
-        method: Name of the method.
+    Args:
+        found: What was identified.
+        name: The robot's name; "" makes one from the profile's.
         logs: Every log that was used.
         trained: Those the arm was identified from.
-        processing: Filters and decimation.
-        residuals: RMS per log and joint (`RESIDUALS`).
-        result: What the method found.
         load: The load that was found, or None.
     """
-
-    profile: Robot
-    name: str
-    method: str
-    logs: Sequence[Recording]
-    trained: Sequence[Recording]
-    processing: Mapping[str, Any]
-    residuals: pl.DataFrame
-    result: MethodResult
-    load: LoadFit | None
-
-
-def with_provenance(robot: Robot, made: Provenance) -> Robot:
-    """The robot under its own name, its document telling where every number comes from."""
-    profile, load = made.profile, made.load
+    profile = found.profile
     named = replace(
-        robot,
-        name=made.name or f"{profile.name}-identified",
+        found.robot,
+        name=name or f"{profile.name}-identified",
         title=f"{profile.title or profile.name}, identified",
         path=None,
     )
     document = robot_document(named)
-    new = f"identified ({made.method}) from {', '.join(r.name for r in made.trained)}"
+    new = f"identified ({found.method}) from {', '.join(r.name for r in trained)}"
     old = f"profile {profile.name}"
-    determined = {(n.joint, n.parameter) for n in made.result.numbers if n.determined}
-    links = made.method in LINK_METHODS
+    sure = found.parameters.filter("determined")
+    determined = set(zip(sure["joint"], sure["parameter"], strict=True))
+    links = found.method in LINK_METHODS
     for j, table in enumerate(document["joints"], start=1):
         table["inertial_source"] = new if links else old
         for key in ("rotor_inertia", "torque_constant"):
@@ -64,12 +52,12 @@ def with_provenance(robot: Robot, made: Provenance) -> Robot:
                 changed = (j, key) in determined or (links and key == "rotor_inertia")
                 table[f"{key}_source"] = new if changed else old
     account: dict[str, Any] = {
-        "method": made.method,
+        "method": found.method,
         "profile": profile.name,
-        "logs": [log.name for log in made.logs],
-        "sha256": [log.source.sha256 or "unknown" for log in made.logs],
-        "processing": dict(made.processing),
-        "residuals": residual_tables(made.residuals),
+        "logs": [log.name for log in logs],
+        "sha256": [log.source.sha256 or "unknown" for log in logs],
+        "processing": dict(found.processing),
+        "residuals": residual_tables(found.residuals),
     }
     if load is not None:
         document["payload"]["source"] = str(load.origin)
@@ -79,9 +67,9 @@ def with_provenance(robot: Robot, made: Provenance) -> Robot:
             "com_sd": load.com_sd.tolist(),
             "residual_Nm": load.residual.tolist(),
         }
-    if made.result.base is not None:
-        account["base_parameters"] = base_tables(made.result.base)
-    sources = [source_table(k, log) for k, log in enumerate(made.logs, start=1)]
+    if found.base is not None:
+        account["base_parameters"] = found.base.to_dicts()
+    sources = [source_table(k, log) for k, log in enumerate(logs, start=1)]
     tables = {"sources": [*document.get("sources", ()), *sources], "identification": account}
     return replace(named, document={**document, **tables})
 
@@ -105,12 +93,3 @@ def residual_tables(residuals: pl.DataFrame) -> list[dict[str, Any]]:
         log, role = rows.row(0, named=True)["log"], rows.row(0, named=True)["role"]
         tables.append({"log": log, "role": role, "rms_Nm": [round(v, 4) for v in rows["rms_Nm"]]})
     return tables
-
-
-def base_tables(base: BaseParameters) -> list[dict[str, Any]]:
-    """Base parameters as tables of the robot file; an unknown spread is infinite."""
-    rows = zip(base.names, base.values, base.sd, base.determined, strict=True)
-    return [
-        {"parameter": name, "value": float(value), "sd": float(sd), "determined": ok}
-        for name, value, sd, ok in rows
-    ]

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import polars as pl
 
+from vftcli.identification.processing import PreparedLog
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
@@ -66,6 +67,12 @@ UNITS = {
 """Parameter → its unit."""
 
 
+def root_mean_square(x: Array) -> Array:
+    """Root mean square of each column. (n,)"""
+    value: Array = np.sqrt(np.mean(x**2, axis=0))
+    return value
+
+
 class Number(NamedTuple):
     """One identified number; a row of `PARAMETERS`.
 
@@ -100,20 +107,33 @@ class Trace(NamedTuple):
     """Measured and predicted torque of one log, filtered alike.
 
     Attributes:
-        recording: The log.
+        motion: The prepared log.
         role: "train" or "held-out".
-        t: Time. (M,) [s]
-        dq: Velocities. (M, n) [rad/s]
-        measured: Drive torque. (M, n) [N·m]
+        measured: Drive torque, by the identified drive constants. (M, n) [N·m]
         predicted: What the identified robot expects. (M, n) [N·m]
+        before: RMS of what the profile does not explain. (n,) [N·m]
     """
 
-    recording: Recording
+    motion: PreparedLog
     role: str
-    t: Array
-    dq: Array
     measured: Array
     predicted: Array
+    before: Array
+
+    @property
+    def recording(self) -> Recording:
+        """The log."""
+        return self.motion.recording
+
+    @property
+    def t(self) -> Array:
+        """Time of each sample. (M,) [s]"""
+        return self.motion.t
+
+    @property
+    def dq(self) -> Array:
+        """Velocities. (M, n) [rad/s]"""
+        return self.motion.dq
 
     @property
     def residual(self) -> Array:
@@ -122,9 +142,18 @@ class Trace(NamedTuple):
         return difference
 
     @property
-    def mean_rms(self) -> float:
-        """Mean over the joints of the residual's RMS. [N·m]"""
-        return float(np.mean(np.sqrt(np.mean(self.residual**2, axis=0))))
+    def rms(self) -> Array:
+        """RMS of the residual in each joint. (n,) [N·m]"""
+        return root_mean_square(self.residual)
+
+    def rows(self, index: int) -> list[tuple[str, int, str, str, int, float, int]]:
+        """Rows of `RESIDUALS`, this log being the one of this index."""
+        name, samples = self.recording.name, self.motion.samples
+        return [
+            (name, index, self.role, model, j, float(value), samples)
+            for model, values in (("identified", self.rms), ("profile", self.before))
+            for j, value in enumerate(values, start=1)
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)

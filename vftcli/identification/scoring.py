@@ -1,14 +1,19 @@
 """How well a robot predicts a log's torque, scored as in the docs: filtered, in motion."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from vftcli.identification.excitation import SLOW
 from vftcli.identification.least_squares import fit_column
-from vftcli.identification.processing import PreparedLog, gravity_torque
-from vftcli.robots.friction import friction_torque
+from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
+from vftcli.identification.result import Trace, root_mean_square
+from vftcli.robots.drive import uses_current
+from vftcli.robots.friction import SMOOTHING, friction_torque
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import resampled
 
@@ -56,15 +61,50 @@ def predicted_torque(robot: Robot, motion: PreparedLog) -> Array:
     return total
 
 
-def rms(residual: Array) -> Array:
-    """Root mean square per joint. (n,)"""
-    value: Array = np.sqrt(np.mean(residual**2, axis=0))
-    return value
+def score(log: Recording, role: str, profile: Robot, robot: Robot, processing: Processing) -> Trace:
+    """Measured torque of a log beside what the identified robot and the profile expect.
+
+    Raises:
+        MissingSignalError: If velocities or efforts are missing.
+        RobotError: If the number of joints differs.
+    """
+    motion = prepare(log, profile, processing)
+    if motion.samples < 2:
+        return Trace(motion, role, motion.tau, motion.tau, np.zeros(motion.joints))
+    before = root_mean_square(motion.tau - predicted_torque(profile, motion))
+    measured = motion.tau * constant_ratio(profile, robot, motion)
+    return Trace(motion, role, measured, predicted_torque(robot, motion), before)
 
 
-def held_out_remarks(
-    robot: Robot, motion: PreparedLog, residual: Array, trained: Array
-) -> list[Remark]:
+def constant_ratio(profile: Robot, robot: Robot, motion: PreparedLog) -> Array | float:
+    """New over old drive constants, for torque that was made from currents with the old. (n,)"""
+    old, new = profile.torque_constant, robot.torque_constant
+    if old is None or new is None or not uses_current(motion.recording, profile):
+        return 1.0
+    ratio: Array = new / old
+    return ratio
+
+
+def score_remarks(robot: Robot, traces: Sequence[Trace]) -> list[Remark]:
+    """What the scores mean: repeated trajectories, and joints that are much worse elsewhere."""
+    train = [trace for trace in traces if trace.role == "train"]
+    held_out = [trace for trace in traces if trace.role == "held-out"]
+    remarks = []
+    for test in held_out:
+        for other in train:
+            if (share := repeated_share(other.motion, test.motion)) >= REPEATED:
+                values = {"training_log": other.recording.name, "share_percent": 100.0 * share}
+                where = Where(test.recording.name)
+                remarks.append(caution("repeated-trajectory", where, **values))
+    if not train:
+        return remarks
+    level = np.mean([trace.rms for trace in train], axis=0)
+    for test in held_out:
+        remarks += held_out_remarks(robot, test, level)
+    return [*remarks, fact("training-residual", mean_Nm=float(np.mean(level)))]
+
+
+def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]:
     """What a held-out log's residual looks like where it is much larger than in training.
 
     A load on the flange explains all joints at once and is looked for first; what is left is
@@ -72,24 +112,19 @@ def held_out_remarks(
 
     Args:
         robot: The identified robot.
-        motion: The held-out log.
-        residual: Measured less predicted. (M, n) [N·m]
+        trace: The held-out log.
         trained: RMS of the training logs. (n,) [N·m]
     """
-    sizes, name = rms(residual), motion.recording.name
-    worse = np.flatnonzero(sizes > WORSE * trained).tolist()
+    motion, name = trace.motion, trace.recording.name
+    worse = np.flatnonzero(trace.rms > WORSE * trained).tolist()
     if not worse:
         return []
-    mass, explained = apparent_load(robot, motion, residual)
+    mass, explained = apparent_load(robot, motion, trace.residual)
     if explained > EXPLAINS and abs(mass) > HEAVY:
         share = 100.0 * explained
         return [caution("apparent-load", Where(name), mass_kg=mass, share_percent=share)]
     resting = [j for j in worse if np.count_nonzero(in_motion(motion, j)) < ENOUGH]
-    remarks = [
-        joint_remark(motion, residual, j, float(sizes[j]), float(trained[j]))
-        for j in worse
-        if j not in resting
-    ]
+    remarks = [joint_remark(trace, j, float(trained[j])) for j in worse if j not in resting]
     if resting:
         remarks.append(fact("resting-joints", Where(name, tuple(j + 1 for j in resting))))
     return remarks
@@ -113,26 +148,23 @@ def apparent_load(robot: Robot, motion: PreparedLog, residual: Array) -> tuple[f
     return float(x[0]), 1.0 - float(np.sum((y - A @ x) ** 2) / max(np.sum(y**2), 1e-12))
 
 
-def joint_remark(
-    motion: PreparedLog, residual: Array, j: int, size: float, trained: float
-) -> Remark:
+def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
     """How the residual of joint j (from 0) differs from the training's: by friction, or not.
 
-    Coulomb and viscous friction and an offset are fitted to the residual (M, n) [N·m]; where they
-    explain `EXPLAINS` of it, friction is named as its cause.
+    Coulomb and viscous friction and an offset are fitted to the residual; where they explain
+    `EXPLAINS` of it, friction is named as its cause.
 
     Args:
-        motion: The held-out log.
-        residual: Measured less predicted. (M, n) [N·m]
+        trace: The held-out log.
         j: Joint, from 0.
-        size: RMS of its residual. [N·m]
-        trained: The same in the training logs. [N·m]
+        trained: RMS of its residual in the training logs. [N·m]
     """
+    motion, residual, size = trace.motion, trace.residual, float(trace.rms[j])
     where = Where(motion.recording.name, (j + 1,))
     values = {"rms_Nm": size, "ratio": size / trained}
     dq = motion.recording.require("dq")[:, j]
     used = in_motion(motion, j)
-    sign = np.tanh(dq / 0.01)
+    sign = np.tanh(dq / SMOOTHING)
     A = np.column_stack([motion.filtered(np.column_stack([sign, dq])), np.ones(motion.samples)])
     fit = fit_column(A, residual[:, j], used.astype(float))
     left = float(np.mean(fit.residual[used] ** 2))

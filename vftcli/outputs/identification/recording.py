@@ -53,7 +53,7 @@ def summary(found: Identification) -> str:
     logs = [
         f"- {escape_markdown(t.recording.name)} ({t.role}): sha256 "
         f"{t.recording.source.sha256 or 'unknown'}, mean RMS "
-        f"{t.mean_rms:.3f} N·m"
+        f"{np.mean(t.rms):.3f} N·m"
         for t in found.traces
     ]
     notes = [f"- {escape_markdown(explanation(remark))}" for remark in found.remarks]
