@@ -1,54 +1,105 @@
-"""Zero-phase filtering on uneven clocks."""
+"""From a log to filtered, decimated signals."""
 
 import numpy as np
 import pytest
 
-from vftcli.identification.processing import derivative, zero_phase
-from vftcli.signals.errors import ClockError
+from vftcli.identification.processing import Processing, gravity_torque, prepare, usable_samples
+from vftcli.robots import load_robot
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.recording import Recording
+
+PANDA = load_robot("panda")
 
 
-def uneven(seed, duration=20.0, step=0.01):
-    """A clock of 10 ms median whose steps vary between 5 and 15 ms."""
-    steps = np.random.default_rng(seed).uniform(0.5, 1.5, int(duration / step)) * step
-    return np.concatenate([[0.0], np.cumsum(steps)])
+def log(rate=500.0, seconds=8.0, joints=7):
+    """Half a second of rest, sines of 0.4 Hz, half a second of rest."""
+    t = np.arange(0, seconds, 1 / rate)
+    w = 2 * np.pi * 0.4
+    run = (t > 0.5) & (t < seconds - 0.5)
+    phase = np.arange(joints)
+    angle = w * (np.clip(t, 0.5, seconds - 0.5) - 0.5)[:, None] + phase
+    q = 0.5 * np.sin(angle) - 0.7
+    dq = np.where(run[:, None], 0.5 * w * np.cos(angle), 0.0)
+    return Recording(t=t, q=q, dq=dq, torque=2.0 * q), w
 
 
-@pytest.mark.parametrize("t", [np.arange(0, 20, 0.01), uneven(0)], ids=["even", "uneven"])
-def test_a_slow_sine_passes_without_delay(t):
-    wave = np.sin(2 * np.pi * 0.5 * t)[:, None]
-    inner = (t > 1.0) & (t < t[-1] - 1.0)
-    # linear interpolation between 10 ms samples errs by (ω·dt)²/8 = 1.2e-4, twice
-    np.testing.assert_allclose(zero_phase(t, wave, 8.0)[inner], wave[inner], atol=5e-4)
+def test_a_log_is_cut_to_its_motion_and_decimated_to_six_samples_a_period():
+    recording, _ = log()
+    motion = prepare(recording, PANDA, Processing())
+    # 500 Hz over 6 · 8 Hz is 10.4: every tenth sample
+    assert np.all(np.diff(motion.kept) == 10)
+    assert motion.t[0] == pytest.approx(0.502)
+    assert motion.t[-1] == pytest.approx(7.498, abs=0.021)
+    np.testing.assert_array_equal(motion.t, recording.t[motion.kept])
 
 
-def test_the_cutoff_halves_the_power_twice():
-    t = np.arange(0, 20, 0.002)
-    wave = np.sin(2 * np.pi * 8.0 * t)[:, None]
-    inner = slice(1000, -1000)
-    gain = np.std(zero_phase(t, wave, 8.0)[inner]) / np.std(wave[inner])
-    # −3 dB forwards and −3 dB backwards; the bilinear transform is prewarped at the cutoff
-    assert gain == pytest.approx(0.5, abs=2e-3)
+def test_signals_of_the_band_pass_and_velocity_becomes_acceleration():
+    recording, w = log()
+    motion = prepare(recording, PANDA, Processing())
+    inner = (motion.t > 1.5) & (motion.t < 6.5)
+    angle = w * (motion.t[inner] - 0.5)[:, None] + np.arange(7)
+    # two passes of a Butterworth filter of order 4 take (0.4 / 8)⁸ of the amplitude
+    np.testing.assert_allclose(motion.q[inner], 0.5 * np.sin(angle) - 0.7, atol=1e-5)
+    np.testing.assert_allclose(motion.tau[inner], 2 * motion.q[inner], atol=1e-9)
+    # central differences over 4 ms: (w h)²/6 of it, 2e-5
+    expected = -0.5 * w**2 * np.sin(angle)
+    np.testing.assert_allclose(motion.ddq[inner], expected, atol=2e-4)
+    filtered = motion.filtered(recording.dq)
+    np.testing.assert_allclose(filtered, motion.dq, atol=1e-12)
 
 
-def test_fast_noise_is_removed():
-    t = uneven(1)
-    noise = np.random.default_rng(2).normal(size=(len(t), 2))
-    # white noise keeps the share of its band: 8 of 50 Hz, √0.16 = 0.4, less by interpolation
-    assert np.all(np.std(zero_phase(t, noise, 8.0), axis=0) < 0.42)
+def test_a_log_at_rest_has_no_samples():
+    t = np.arange(0, 4, 0.002)
+    still = np.zeros((len(t), 7))
+    motion = prepare(Recording(t=t, q=still, dq=still, torque=still), PANDA, Processing())
+    assert motion.samples == 0
+    assert list(motion.chunks()) == []
 
 
-def test_a_log_slower_than_the_cutoff_stays_as_it_is():
-    t = np.arange(0, 10, 0.1)
-    wave = np.sin(t)[:, None]
-    assert np.array_equal(zero_phase(t, wave, 8.0), wave)
+def test_chunks_cover_every_sample_once():
+    motion = prepare(log()[0], PANDA, Processing())
+    rows = np.concatenate([np.arange(motion.samples)[span] for span in motion.chunks(100)])
+    np.testing.assert_array_equal(rows, np.arange(motion.samples))
 
 
-def test_too_short_a_log_is_refused():
-    with pytest.raises(ClockError, match="too short for a 8 Hz filter"):
-        zero_phase(np.arange(0, 0.1, 0.01), np.zeros((10, 1)), 8.0)
+def test_long_stops_and_gaps_tell_nothing():
+    t = np.arange(0, 10, 0.01)
+    t[500:] += 0.5  # a gap of half a second, 50 steps
+    dq = np.full((len(t), 2), 0.5)
+    dq[100:129, 0] = 0.0  # 0.28 s: short
+    dq[200:232, 0] = 0.0  # 0.31 s: long
+    usable = usable_samples(t, dq, Processing())
+    lost = np.flatnonzero(~usable[:, 0])
+    # 1/16 s to either side of the gap: 4.9275 to 4.99 and 5.50 to 5.5625
+    gap = list(range(493, 507))
+    assert lost.tolist() == [*range(200, 232), *gap]
+    assert np.flatnonzero(~usable[:, 1]).tolist() == gap
 
 
-def test_the_derivative_of_a_parabola_is_exact_on_an_uneven_clock():
-    t = uneven(3)
-    # second-order differences are exact for parabolas; rounding is 1e-16·400/dt
-    np.testing.assert_allclose(derivative(t, (t**2)[:, None])[:, 0], 2 * t, atol=1e-9)
+@pytest.mark.parametrize(("rate", "stride"), [(1000.0, 20), (500.0, 10), (48.0, 1), (20.0, 1)])
+def test_the_stride_keeps_six_samples_a_period_of_the_cutoff(rate, stride):
+    assert Processing(cutoff=8.0).stride(1 / rate) == stride
+
+
+def test_settings_say_what_was_done():
+    words = Processing(cutoff=4.0).settings_record(0.002)
+    assert words["cutoff_hz"] == 4.0
+    assert words["decimation"] == 20.0  # 500 Hz over 24 Hz
+    assert words["kept_rate_hz"] == 25.0
+
+
+@pytest.mark.parametrize("cutoff", [0.0, -1.0, 1e4])
+def test_impossible_cutoffs_are_refused(cutoff):
+    with pytest.raises(ParameterError, match="it must be positive"):
+        Processing(cutoff=cutoff)
+
+
+def test_gravity_is_pinocchios_chunk_by_chunk():
+    import pinocchio as pin
+
+    q = np.random.default_rng(0).uniform(-2, 2, (5000, 7))
+    torque = gravity_torque(PANDA, q)
+    data = PANDA.model.createData()
+    for k in (0, 1, 2048, 4096, 4999):
+        expected = pin.computeGeneralizedGravity(PANDA.model, data, q[k])
+        np.testing.assert_allclose(torque[k], expected, atol=1e-10)

@@ -1,0 +1,53 @@
+"""Logs made here, prepared without a filter, so that every number in a test has its origin."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from vftcli.identification.processing import PreparedLog, Processing
+from vftcli.signals.recording import Recording
+
+
+def prepared_log(t, q=None, dq=None, ddq=None, tau=None, usable=None, **signals) -> PreparedLog:
+    """A prepared log of exactly these signals; what is not given is zero."""
+    shape = next(x for x in (q, dq, ddq, tau) if x is not None).shape
+    q, dq, ddq, tau = (np.zeros(shape) if x is None else x for x in (q, dq, ddq, tau))
+    return PreparedLog(
+        recording=Recording(t=t, q=q, dq=dq, torque=tau, **signals),
+        processing=Processing(),
+        kept=np.arange(len(t)),
+        t=t,
+        q=q,
+        dq=dq,
+        ddq=ddq,
+        tau=tau,
+        usable=np.ones(shape, dtype=bool) if usable is None else usable,
+    )
+
+
+@pytest.fixture
+def prepared() -> Callable[..., PreparedLog]:
+    """The maker of prepared logs."""
+    return prepared_log
+
+
+def three_sines(seconds=8.0, rate=125.0, joints=6, seed=0, fastest=0.5):
+    """Sums of three sines a joint up to `fastest` Hz: t, q, dq, ddq."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0, seconds, 1 / rate)
+    q, dq, ddq = (np.zeros((len(t), joints)) for _ in range(3))
+    for k in (1, 2, 3):
+        w = 2 * np.pi * fastest * k / 3
+        a, b = rng.uniform(-0.4, 0.4, (2, joints))
+        s, c = np.sin(w * t[:, None]), np.cos(w * t[:, None])
+        q += a * s + b * c
+        dq += w * (a * c - b * s)
+        ddq -= w * w * (a * s + b * c)
+    return t, q, dq, ddq
+
+
+@pytest.fixture
+def sines() -> Callable[..., tuple]:
+    """The maker of motions."""
+    return three_sines

@@ -1,0 +1,76 @@
+"""Friction shapes: one term each of the friction law, filtered like the torque."""
+
+import numpy as np
+import pytest
+
+from vftcli.identification.friction_shapes import FrictionColumns, Shape, round_digits, term_values
+from vftcli.robots.friction import friction_torque
+
+DQ = np.linspace(-1.0, 1.0, 41)
+LOAD = np.linspace(0.0, 8.0, 41)
+
+
+@pytest.mark.parametrize(
+    ("term", "expected"),
+    [
+        ("offset", np.ones(41)),
+        ("viscous", DQ),
+        ("quadratic", DQ * np.abs(DQ)),
+        ("coulomb", np.tanh(DQ / 0.03)),
+        ("load_coulomb", np.tanh(DQ / 0.03) * LOAD),
+        ("stribeck", np.tanh(DQ / 0.03) * np.exp(-((DQ / 0.1) ** 2))),
+    ],
+)
+def test_terms_are_those_of_the_docs(term, expected):
+    values = term_values(term, Shape((term,), 0.03, 0.1), DQ, LOAD)
+    np.testing.assert_allclose(values, expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("terms", "model"),
+    [
+        (("coulomb", "viscous"), "coulomb-viscous"),
+        (("coulomb", "viscous", "offset"), "coulomb-viscous-offset"),
+        (("coulomb", "viscous", "offset", "quadratic"), "coulomb-viscous-quadratic"),
+        (("coulomb", "viscous", "quadratic", "load_coulomb"), "coulomb-viscous-load"),
+        (("coulomb", "viscous", "stribeck", "load_coulomb"), "coulomb-viscous-stribeck"),
+    ],
+)
+def test_columns_times_coefficients_are_the_robot_files_friction(terms, model):
+    shape = Shape(terms, 0.03, 0.1)
+    assert shape.model == model
+    values = 1.0 + 0.25 * np.arange(len(terms))
+    columns = np.stack([term_values(term, shape, DQ, LOAD) for term in terms], axis=1)
+    friction = shape.friction(values)
+    torque = friction_torque([friction], DQ[:, None], LOAD[:, None])[:, 0]
+    np.testing.assert_allclose(columns @ values, torque, atol=1e-12)
+
+
+def test_a_shape_says_its_nonlinear_numbers():
+    shape = Shape(("coulomb", "stribeck"), 0.03, 0.1)
+    assert shape.words == "coulomb + stribeck, smoothing 0.03 rad/s, Stribeck velocity 0.1 rad/s"
+    assert "Stribeck" not in Shape(("coulomb",)).words
+    assert shape.friction(np.array([1.0, 2.0])).parameters["stribeck_velocity"] == 0.1
+    assert "stribeck_velocity" not in Shape(("coulomb",)).friction(np.array([1.0])).parameters
+
+
+def test_columns_are_filtered_and_made_once(prepared):
+    t = np.arange(0, 4, 0.01)
+    dq = 0.5 * np.sin(2 * np.pi * 0.5 * t)[:, None] * [1.0, -1.0]
+    motion = prepared(t, dq=dq)
+    columns = FrictionColumns(motion, np.ones((len(t), 2)))
+    first = columns.column("coulomb", 1, Shape(("coulomb",), 0.01))
+    assert columns.column("coulomb", 1, Shape(("coulomb", "viscous"), 0.01)) is first
+    assert columns.column("coulomb", 1, Shape(("coulomb",), 0.1)) is not first
+    # viscous friction has no smoothing: whatever the shape's, it is one column
+    viscous = columns.column("viscous", 0, Shape(("viscous",), 0.01))
+    assert columns.column("viscous", 0, Shape(("viscous",), 0.1)) is viscous
+    both = columns.joint(0, Shape(("coulomb", "viscous"), 0.01))
+    np.testing.assert_array_equal(both[:, 1], viscous)
+    np.testing.assert_array_equal(both[:, 0], motion.filtered(np.tanh(dq[:, :1] / 0.01))[:, 0])
+    assert columns.joint(0, Shape(())).shape == (len(t), 0)
+
+
+def test_numbers_have_as_many_digits_as_they_mean():
+    assert round_digits(1234567.89) == 1234568.0
+    assert round_digits(0.000123456789, 3) == 0.000123

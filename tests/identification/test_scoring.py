@@ -1,0 +1,133 @@
+"""What a score says: rms, causes of a residual, repeated trajectories."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from vftcli.identification.result import Trace, root_mean_square
+from vftcli.identification.scoring import (
+    apparent_load,
+    held_out_remarks,
+    joint_remark,
+    predicted_torque,
+    repeated_share,
+    rigid_torque,
+    score_remarks,
+)
+from vftcli.robots import Payload, load_robot
+
+UR5 = load_robot("ur5")
+
+
+@pytest.fixture
+def motion(prepared, sines):
+    """Eight seconds of motion of a UR5, without torque."""
+    t, q, dq, ddq = sines()
+    return prepared(t, q=q, dq=dq, ddq=ddq)
+
+
+def trace(motion, residual, role="held-out"):
+    return Trace(motion, role, residual, np.zeros_like(residual), np.zeros(motion.joints))
+
+
+def test_rms_is_the_root_of_the_mean_square():
+    np.testing.assert_allclose(root_mean_square(np.array([[3.0, 1], [-4.0, 1]])), [3.5355339, 1.0])
+
+
+def test_rigid_torque_is_pinocchios_without_rotors(motion):
+    data = UR5.model.createData()
+    plain = UR5.model.copy()
+    plain.armature = np.zeros(6)
+    torque = rigid_torque(UR5, motion)
+    for k in (0, 500, -1):
+        expected = pin.rnea(plain, data, motion.q[k], motion.dq[k], motion.ddq[k])
+        np.testing.assert_allclose(torque[k], expected, atol=1e-9)
+
+
+def test_prediction_adds_rotors_and_filtered_friction(motion):
+    rotors = UR5.chain.rotor_inertia * motion.ddq
+    bare = predicted_torque(UR5.without_friction(), motion)
+    np.testing.assert_allclose(bare, rigid_torque(UR5, motion) + rotors, atol=1e-12)
+    friction = predicted_torque(UR5, motion) - bare
+    values = UR5.friction[0].parameters
+    dq = motion.dq[:, 0]
+    law = values["coulomb"] * np.tanh(dq / values.get("smoothing", 0.01))
+    law = law + values["viscous"] * dq + values.get("quadratic", 0.0) * dq * np.abs(dq)
+    expected = motion.filtered((law + values.get("offset", 0.0))[:, None])[:, 0]
+    np.testing.assert_allclose(friction[:, 0], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("mass", [1.5, -0.8])
+def test_a_load_on_the_flange_is_named(motion, mass):
+    load = Payload(mass=abs(mass), com=np.array([0.0, 0.0, 0.05]), inertia=np.zeros((3, 3)))
+    effect = rigid_torque(UR5.with_payload(load), motion) - rigid_torque(UR5, motion)
+    residual = np.sign(mass) * effect
+    found, share = apparent_load(UR5, motion, residual)
+    # m, m·c alone are fitted; the point mass's own tensor about the last frame is 2e-3 of it
+    assert found == pytest.approx(mass, rel=0.02)
+    assert share > 0.99
+    (remark,) = held_out_remarks(UR5, trace(motion, residual), np.full(6, 0.01))
+    assert remark.code == "apparent-load"
+    assert remark.values["mass_kg"] == found
+
+
+def test_no_remark_where_the_score_is_that_of_the_training(motion):
+    residual = np.ones_like(motion.q)
+    assert held_out_remarks(UR5, trace(motion, residual), np.full(6, 0.67)) == []
+    assert held_out_remarks(UR5, trace(motion, residual), np.full(6, 0.66)) != []  # > 1.5 ×
+
+
+@pytest.mark.parametrize(("sign", "code"), [(1.0, "more-friction"), (-1.0, "less-friction")])
+def test_friction_is_named_as_a_cause(motion, sign, code):
+    dq = motion.dq[:, 2]
+    rubbing = motion.filtered(np.column_stack([np.tanh(dq / 0.01), dq])) @ [1.5, 0.5]
+    residual = np.zeros_like(motion.q)
+    residual[:, 2] = sign * rubbing
+    remark = joint_remark(trace(motion, residual), 2, 0.1)
+    assert (remark.code, remark.where.joints) == (code, (3,))
+    speed = np.sqrt(np.mean(dq[np.abs(dq) > 0.02] ** 2))
+    assert remark.values["speed_rad_s"] == pytest.approx(speed)
+    assert remark.values["friction_Nm"] == pytest.approx(1.5 + 0.5 * speed, rel=1e-6)
+    assert remark.values["share_percent"] == pytest.approx(100.0)
+    assert remark.values["ratio"] == pytest.approx(remark.values["rms_Nm"] / 0.1)
+
+
+def test_noise_has_no_cause(motion):
+    residual = np.random.default_rng(0).standard_normal(motion.q.shape)
+    assert joint_remark(trace(motion, residual), 0, 0.1).code == "larger-residual"
+
+
+def test_joints_that_rest_say_nothing(motion, prepared):
+    dq = motion.dq.copy()
+    dq[:, 4] = 0.0
+    noise = np.random.default_rng(1).standard_normal(dq.shape)
+    still = prepared(motion.t, q=motion.q, dq=dq, ddq=motion.ddq)
+    remarks = held_out_remarks(UR5, trace(still, noise), np.full(6, 0.1))
+    assert [r.where.joints for r in remarks if r.code == "resting-joints"] == [(5,)]
+    assert sum(r.code == "larger-residual" for r in remarks) == 5
+
+
+def test_the_share_of_a_repeated_path(prepared, sines):
+    t, q, dq, _ = sines(seconds=8.0)
+    whole = prepared(t, q=q, dq=dq)
+    half = prepared(t[:500], q=q[:500], dq=dq[:500])
+    assert repeated_share(whole, half) == 1.0
+    # the sines of 1/6, 1/3 and 1/2 Hz repeat after 6 s only
+    assert repeated_share(half, whole) == pytest.approx((500 + 250) / 1000, abs=0.01)
+    # the same places at half the speed are another trajectory, but where it stands nearly still
+    assert repeated_share(whole, prepared(t, q=q, dq=0.5 * dq)) < 0.1
+    near = prepared(t, q=q + 0.009, dq=dq)
+    far = prepared(t, q=q + 0.2, dq=dq)
+    assert repeated_share(whole, near) > 0.9
+    assert repeated_share(whole, far) < 0.1
+    assert repeated_share(replace(half, t=t[:0]), whole) == 0.0
+
+
+def test_a_repeated_log_is_no_test_and_the_training_level_is_said(motion):
+    train = trace(motion, np.full(motion.q.shape, 2.0), "train")
+    remarks = score_remarks(UR5, [train, trace(motion, np.full(motion.q.shape, 2.0))])
+    assert [r.code for r in remarks] == ["repeated-trajectory", "training-residual"]
+    assert remarks[1].values["mean_Nm"] == 2.0
+    assert score_remarks(UR5, []) == []
