@@ -97,7 +97,7 @@ def test_the_wrench_takes_its_band_from_the_joint_torques(frame: str) -> None:
     )
     analysis = analyse_log(fixture, request)
     assert analysis.virtual_sensor is not None
-    assert any("measured on the log's free part" in n for n in analysis.virtual_sensor.notes)
+    assert "band-from-torques" in [remark.code for remark in analysis.virtual_sensor.remarks]
     # the covariance of the filter alone would say another thing
     wrench = analysis.virtual_sensor.wrenches[0]
     assert wrench.sd is not None

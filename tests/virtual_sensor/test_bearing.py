@@ -51,13 +51,14 @@ def test_after_zeroing_the_bearing_weighs_what_it_weighs(log, share, request) ->
     hung = (recording.t > 6.0) & (recording.t < 8.7)
     for wrench in analysis.wrenches:
         assert wrench.force[hung, 2].mean() == pytest.approx(-WEIGHT, rel=share), wrench.name
-    assert not analysis.virtual_sensor.warnings
+    assert not any(r.level == "warning" for r in analysis.virtual_sensor.remarks)
     assert all(drift.removed for drift in analysis.virtual_sensor.drifts)
 
 
 def test_a_zero_under_the_bearing_is_suspected(exact) -> None:
-    warnings = sensed(exact, spans=((6.0, 8.0),)).virtual_sensor.warnings
-    assert "looks like a contact" in warnings[0]
+    remarks = sensed(exact, spans=((6.0, 8.0),)).virtual_sensor.remarks
+    assert remarks[0].code == "zero-far-from-start"
+    assert remarks[0].values["axis"] == "fz"
 
 
 def test_the_unloaded_start_ends_before_the_bearing(exact) -> None:

@@ -11,14 +11,11 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.pose import Pose, adjoint, inverse, rpy_matrix
 from vftcli.virtual_sensor.frames import (
-    FRAMES,
     Mounting,
     check_frame,
     checked_pose,
-    from_base,
     pose_of_numbers,
     read_pose,
-    to_base,
 )
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
@@ -65,17 +62,6 @@ def test_power_does_not_depend_on_the_frame(
     power = float((adjoint(pose) @ wrench) @ moved.vector)
     # products of 50 N and 50 m/s: relative rounding of 1e-13 on sums of up to 1e4
     assert power == pytest.approx(float(wrench @ twist), abs=1e-8)
-
-
-@pytest.mark.parametrize("frame", FRAMES)
-def test_to_base_undoes_from_base(frame: str) -> None:
-    mounting = Mounting(
-        Pose(rpy_matrix((0.3, -0.2, 1.0)), np.array([0.1, 0.0, 0.2])),
-        Pose(rpy_matrix((0, 0.4, 0)), np.zeros(3)),
-    )
-    flange = np.array([rpy_matrix(a) for a in np.random.default_rng(1).uniform(-2, 2, (20, 3))])
-    both = to_base(frame, flange, mounting) @ from_base(frame, flange, mounting)
-    np.testing.assert_allclose(both, np.broadcast_to(np.eye(6), both.shape), atol=EXACT)
 
 
 def sensed(frame: str, mounting: Mounting, robot: str = "ur5", turn: np.ndarray | None = None):

@@ -11,7 +11,7 @@ from vftcli.signals.errors import MissingSignalError, ParameterError
 from vftcli.signals.pose import Pose, rpy_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
-from vftcli.virtual_sensor.frames import Mounting
+from vftcli.virtual_sensor.frames import FRAMES, Mounting, from_base
 from vftcli.virtual_sensor.log_wrench import logged_wrench, placement, sensor_reading_of
 
 UR5 = load_robot("ur5")
@@ -67,6 +67,12 @@ def test_in_base_axes_only_the_moment_moves(point: str, lever: np.ndarray) -> No
     np.testing.assert_array_equal(found[:, :3], READ[:, :3])
     moment = READ[:, 3:] + np.cross(FLANGE @ lever, READ[:, :3])
     np.testing.assert_allclose(found[:, 3:], moment, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_the_answers_frame_undoes_the_logs(frame: str) -> None:
+    back = from_base(frame, FLANGE, MOUNTED) @ in_base(WrenchFrame.parsed(frame))[:, :, None]
+    np.testing.assert_allclose(np.squeeze(back, axis=2), READ, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("axes", ["base", "sensor"])

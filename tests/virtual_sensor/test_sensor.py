@@ -3,14 +3,9 @@
 import numpy as np
 import pytest
 
-from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import Pose, adjoint, inverse, rpy_matrix
-from vftcli.signals.recording import Recording
-from vftcli.signals.wrench import Wrench, WrenchFrame
-from vftcli.virtual_sensor.frames import Mounting
 from vftcli.virtual_sensor.sensor import fit_pose, weigh_tool
-from vftcli.virtual_sensor.vendor import axes_words, check_vendor, fit_axes
 
 POSE = Pose(rpy_matrix((0.1, -0.2, 0.8)), np.array([0.01, -0.02, 0.04]))
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -66,64 +61,3 @@ def test_one_orientation_weighs_nothing() -> None:
     rotation = np.tile(np.eye(3), (20, 1, 1))
     with pytest.raises(ParameterError, match="all in one orientation"):
         weigh_tool(np.zeros((20, 6)), rotation, GRAVITY)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_any_order_and_sign_of_axes_is_recognised(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    P = np.eye(3)[rng.permutation(3)] * rng.choice([-1.0, 1.0], 3)[:, None]
-    ours = pushes(seed=seed)[:, :3]
-    theirs = 1.7 * ours @ P.T + 3.0 + 0.2 * rng.standard_normal(ours.shape)
-    fit = fit_axes(ours, theirs)
-    np.testing.assert_array_equal(fit.matrix, P)
-    assert fit.gain == pytest.approx(1.7, rel=0.01)  # 0.2 N of noise over 400 samples of 20 N
-    assert fit.words == axes_words(P)
-    assert not fit_axes(ours, ours + rng.standard_normal(ours.shape)).derived
-    assert fit_axes(ours, 2.0 * ours @ P.T).derived
-
-
-def log(wrench: np.ndarray, frame: WrenchFrame | None, samples: int = 400) -> Recording:
-    t = np.linspace(0, 10, samples)
-    rng = np.random.default_rng(5)
-    q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.3 * np.sin(
-        np.outer(t, rng.uniform(0.3, 1, 6))
-    )
-    return Recording(t=t, q=q, wrench=wrench, wrench_frame=frame)
-
-
-def ours_in_base(recording: Recording, flange: np.ndarray) -> Wrench:
-    from vftcli.robots.kinematics import link_poses
-    from vftcli.virtual_sensor.frames import to_base
-
-    R = link_poses(load_robot("ur5").chain, recording.q).rotation[:, -1]
-    values = np.einsum("tij,tj->ti", to_base("flange", R, Mounting()), flange)
-    return Wrench(name="x", t=recording.t, values=values, frame="base")
-
-
-@pytest.mark.parametrize(
-    ("axes", "sign", "words"),
-    [
-        ("base", 1.0, "fits base axes, force on the robot"),
-        ("base", -1.0, "fits base axes, force BY the robot"),
-        ("flange", -1.0, "fits flange axes, force BY the robot"),
-    ],
-)
-def test_a_vendors_frame_and_sign_are_told(axes: str, sign: float, words: str) -> None:
-    flange = pushes()
-    ours = ours_in_base(log(flange, None), flange)
-    rng = np.random.default_rng(0)
-    theirs = sign * (flange if axes == "flange" else ours.values)
-    theirs = theirs + 0.5 * rng.standard_normal(theirs.shape)
-    check = check_vendor(
-        log(theirs, WrenchFrame("vendor", "vendor")), ours, load_robot("ur5").chain
-    )
-    assert check is not None
-    assert words in check.sentences()[-1]
-
-
-def test_a_vendors_zeros_are_called_that() -> None:
-    flange = pushes()
-    ours = ours_in_base(log(flange, None), flange)
-    check = check_vendor(log(np.zeros_like(flange), None), ours, load_robot("ur5").chain)
-    assert check is not None
-    assert "exactly zero in every sample" in check.sentences()[0]

@@ -1,16 +1,22 @@
 """Zero drift: removed, reported, and suspected where it is a contact."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.wrench import Wrench
+from vftcli.virtual_sensor.choice import ZeroChoice
 from vftcli.virtual_sensor.zero import (
-    change,
-    loaded_zero,
     unloaded_start,
     without_drift,
+    without_zero,
     zero_drift,
+    zero_moved,
+    zero_spans,
+    zero_warning,
 )
 
 DRIFT = np.array([-0.43166, -0.53348, 0.83768, -0.16294, 0.13407, 0.09103])
@@ -33,13 +39,16 @@ def test_the_drift_is_the_mean_of_the_span_and_its_removal_leaves_the_load() -> 
     np.testing.assert_allclose(drift.mean, DRIFT, atol=0.015)
     clean = without_drift(wrench, drift)
     assert clean.force[wrench.t > 5.5, 2].mean() == pytest.approx(-9.2, rel=0.002)
-    assert "zero drift over 1 to 4.5 s in base axes, removed" in clean.remarks[-1]
+    assert clean.remarks[-1].code == "zero-removed"
+    assert "zero drift over 1 to 4.5 s in base axes, removed" in str(clean.remarks[-1])
 
 
 def test_the_change_between_two_spans_is_told() -> None:
     wrench = hung(noise=0.0)
-    words = change(zero_drift(wrench, (1, 2)), zero_drift(wrench, (6, 7)))
-    assert "fz -9.20000" in words
+    moved = zero_moved(zero_drift(wrench, (1, 2)), zero_drift(wrench, (6, 7)))
+    np.testing.assert_allclose(moved.values["force_N"], [0.0, 0.0, -9.2], atol=1e-12)
+    np.testing.assert_allclose(moved.values["moment_Nm"], np.zeros(3), atol=1e-12)
+    assert moved.where.span == (6, 7)
 
 
 def test_the_unloaded_start_ends_where_the_load_begins() -> None:
@@ -59,10 +68,21 @@ def test_a_log_too_short_or_masked_has_no_unloaded_start() -> None:
 
 def test_a_zero_inside_a_contact_is_suspected_and_an_unloaded_one_is_not() -> None:
     wrench = hung()
-    assert loaded_zero(wrench, zero_drift(wrench, (2.0, 4.0))) == ""
-    words = loaded_zero(wrench, zero_drift(wrench, (6.0, 8.0)))
-    assert "looks like a contact" in words
-    assert "choose an unloaded span" in words
+    assert zero_warning(wrench, zero_drift(wrench, (2.0, 4.0))) == ()
+    (remark,) = zero_warning(wrench, zero_drift(wrench, (6.0, 8.0)))
+    assert (remark.code, remark.level) == ("zero-far-from-start", "warning")
+    assert (remark.values["axis"], remark.values["unit"]) == ("fz", "N")
+    # the load less six standard deviations of .05 N of noise
+    assert remark.values["size"] == pytest.approx(9.2 - 0.3, abs=0.05)
+
+
+def test_a_zero_across_the_begin_of_a_contact_swings() -> None:
+    no_start = replace(hung(), masked=np.arange(1000) < 300)
+    twice = replace(no_start, values=no_start.values + (no_start.values - DRIFT))
+    (remark,) = zero_warning(twice, zero_drift(twice, (4.0, 6.0)))
+    assert (remark.code, remark.values["axis"]) == ("zero-swings", "fz")
+    # 18.4 N exceed the 12 N that are four times a step of load; 9.2 N do not
+    assert zero_warning(no_start, zero_drift(no_start, (4.0, 6.0))) == ()
 
 
 def test_a_zero_outside_the_log_is_refused() -> None:
@@ -73,3 +93,38 @@ def test_a_zero_outside_the_log_is_refused() -> None:
 def test_a_zero_in_a_masked_span_is_refused() -> None:
     with pytest.raises(ParameterError, match="the pose cannot tell the wrench"):
         zero_drift(hung(masked=True), (1.0, 4.0))
+
+
+def test_a_choice_of_spans_is_the_zero_and_the_unloaded_part() -> None:
+    wrench = hung()
+    found = zero_spans(ZeroChoice(spans=((1.0, 2.0), (8.0, 9.0))), wrench)
+    assert found.zero == (1.0, 2.0)
+    np.testing.assert_array_equal(found.chosen(wrench.t), found.unloaded(wrench.t))
+    inside = ((wrench.t >= 1) & (wrench.t <= 2)) | ((wrench.t >= 8) & (wrench.t <= 9))
+    np.testing.assert_array_equal(found.chosen(wrench.t), inside)
+
+
+def test_the_start_is_the_zero_only_where_it_is_chosen() -> None:
+    wrench = hung()
+    chosen = zero_spans(ZeroChoice(start=True), wrench)
+    assert chosen.zero == unloaded_start(wrench)
+    found = zero_spans(ZeroChoice(), wrench)
+    assert found.zero is None
+    assert not found.chosen(wrench.t).any()
+    np.testing.assert_array_equal(found.unloaded(wrench.t), chosen.unloaded(wrench.t))
+
+
+def test_a_start_that_is_not_there_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"--zero start: .*--zero A:B"):
+        zero_spans(ZeroChoice(start=True), hung(masked=True))
+
+
+def test_a_sensors_own_zero_is_removed_by_the_same_choice() -> None:
+    wrench = hung(noise=0.0)
+    clean = without_zero(wrench, ZeroChoice(spans=((1.0, 4.0), (6.0, 7.0))))
+    np.testing.assert_allclose(clean.values, wrench.values - DRIFT, atol=1e-12)
+    by_start = without_zero(wrench, ZeroChoice(start=True))
+    np.testing.assert_allclose(by_start.values, clean.values, atol=1e-12)
+    assert without_zero(wrench, ZeroChoice()) is wrench
+    with pytest.raises(ParameterError, match="in a free run"):
+        without_zero(wrench, ZeroChoice(log=Path("free.csv")))

@@ -8,13 +8,13 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Note, Remark, fact
+from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.log_wrench import logged_wrench
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
-from vftcli.virtual_sensor.zero import zeroed
+from vftcli.virtual_sensor.zero import without_zero
 
 
 class DrivingForce(NamedTuple):
@@ -23,19 +23,19 @@ class DrivingForce(NamedTuple):
     Attributes:
         wrench: Force on the robot, base axes, about the flange point.
         source: Where it comes from.
-        notes: What a reader should know of it.
+        remarks: What a reader should know of it.
     """
 
     wrench: Wrench
     source: Remark
-    notes: tuple[Note, ...]
+    remarks: tuple[Remark, ...]
 
 
 def observed_force(reading: SensorReading) -> DrivingForce:
     """What the virtual sensor makes of the one observer that ran."""
     wrench = reading.wrenches[0]
     source = fact("force-of-observer", observer=wrench.name)
-    return DrivingForce(wrench, source, (*reading.notes, *reading.warnings))
+    return DrivingForce(wrench, source, reading.remarks)
 
 
 def stored_force(
@@ -89,5 +89,5 @@ def truth_force(
 
 def less_zero(wrench: Wrench, source: Remark, choice: WrenchChoice) -> DrivingForce:
     """A wrench that no observer of this run made, its zero removed as it is chosen."""
-    wrench, notes = zeroed(wrench, choice.zero)
-    return DrivingForce(wrench, source, (*wrench.remarks, *notes))
+    wrench = without_zero(wrench, choice.zero)
+    return DrivingForce(wrench, source, wrench.remarks)

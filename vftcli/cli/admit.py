@@ -210,7 +210,7 @@ def replayed(
         source=driving.source,
         force_unstable=control.force_unstable,
     )
-    return replace(result, notes=(*driving.notes, *result.notes)), recording
+    return replace(result, notes=(*driving.remarks, *result.notes)), recording
 
 
 def force_of(

@@ -54,10 +54,8 @@ def say_wrenches(sensed: "SensorReading") -> None:
     say(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.sensor.solver}")
     if sensed.drifts:
         say(terminal(drift_grid(sensed.drifts)).rstrip())
-    for note in sensed.notes:
-        say(f"note: {note}")
-    for warning in sensed.warnings:
-        say(f"warning: {warning}")
+    for remark in sensed.remarks:
+        say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
 
 
 def paths(values: list[Path] | None) -> tuple[Path, ...]:

@@ -12,7 +12,7 @@ from vftcli.evaluation.wrenches import with_contacts, with_wrenches
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.virtual_sensor.detection import ContactScore, judge_contacts
-from vftcli.virtual_sensor.sensor_reading import SensorReading, referred
+from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +58,8 @@ def judge(
     reference = made.torque
     errors = evaluate(recording.name, estimates, reference)
     if sensed is not None:
-        sensed = referred(sensed, reference_wrench(recording, robot, made, sensed.sensor))
+        theirs = reference_wrench(recording, robot, made, sensed.sensor)
+        sensed = with_reference(sensed, theirs, of_sensor=choice.name == "sensor")
         errors = with_wrenches(errors, recording.name, sensed)
     contacts: tuple[ContactScore, ...] = ()
     if choice.contacts:

@@ -31,7 +31,7 @@ def reference_wrench(
     # Plain least squares whatever the estimates' solver is: a reference is not to be smoothed.
     solved = replace(sensor, solver="pinv").wrench(torque, recording.q, robot.chain)
     if reference.wrench is None:
-        return replace(solved, name=torque.name, sd=None, remarks=torque.remarks)
+        return replace(solved, name=torque.name, sd=None, remarks=())
     flange = link_poses(robot.chain, recording.q).rotation[:, -1]
     X = from_base(sensor.frame, flange, sensor.mounting)
     return replace(

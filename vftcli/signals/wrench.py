@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask, check_clock, check_shape, frozen, frozen_mask
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.remarks import Note
+from vftcli.signals.remarks import Remark
 
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 """Names of the six components, force first, as in column names and tables."""
@@ -115,7 +115,7 @@ class Wrench:
     sigma_min: Array | None = None
     masked: Mask | None = None
     null_space: Array | None = None
-    remarks: tuple[Note, ...] = ()
+    remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("t", "values", "sd", "sigma_min", "null_space"):

@@ -124,12 +124,12 @@ def judge_contacts(
             Signal(name=e.name, kind="torque", values=e.tau, least=np.full(e.joints, LEAST_TORQUE))
             for e in estimates
         ]
-    given = measured is not None and bool(measured.drifts)
-    free = measured.free if given and measured is not None else learned_free(reference.t, true)
-    return told(reference.t, signals, free, true)
+    given = measured is not None and measured.drifts
+    free = measured.free if measured is not None and given else learned_free(reference.t, true)
+    return contact_scores(reference.t, signals, free, true)
 
 
-def told(
+def contact_scores(
     t: Array, signals: Iterable[Signal], free: Mask, true: Sequence[ContactInterval]
 ) -> tuple[ContactScore, ...]:
     """Judge every observer's contacts by the true ones.

@@ -108,20 +108,6 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
     return moved
 
 
-def to_base(frame: str, flange: Array, mounting: Mounting) -> Array:
-    """Matrices that take a wrench in a named frame to base axes about the flange point. (T, 6, 6)
-
-    Raises:
-        ParameterError: If there is no such frame, or its pose is not known.
-    """
-    if check_frame(frame) == "base":
-        return np.broadcast_to(np.eye(6), (len(flange), 6, 6))
-    X = np.zeros((len(flange), 6, 6))
-    X[:, :3, :3] = X[:, 3:, 3:] = flange
-    moved: Array = X @ adjoint(mounted(frame, mounting))
-    return moved
-
-
 def checked_pose(rotation: Array, translation: Array, what: str) -> Pose:
     """A pose whose rotation is one.
 

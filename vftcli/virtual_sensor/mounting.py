@@ -1,6 +1,5 @@
 """Where a log's sensor sits and what it weighs, found before it is compared with."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -27,9 +26,6 @@ from vftcli.virtual_sensor.sensor import (
 )
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
-BEST = "kfo-fe"
-"""The observer whose wrench a sensor's pose is fitted to, where it runs."""
-
 
 class MountingFound(NamedTuple):
     """Where tool and sensor sit.
@@ -44,9 +40,15 @@ class MountingFound(NamedTuple):
 
 
 def find_mounting(
-    recording: Recording, robot: Robot, estimates: Sequence[ExternalTorque], choice: WrenchChoice
+    recording: Recording, robot: Robot, disturbance: ExternalTorque, choice: WrenchChoice
 ) -> MountingFound:
     """Tool and sensor poses as asked; the sensor's estimated from the log for ``fit``.
+
+    Args:
+        recording: The log.
+        robot: The arm.
+        disturbance: The torque whose wrench the sensor's reading is laid on.
+        choice: What is asked.
 
     Raises:
         ParameterError: If a pose is malformed, or cannot be found in the log.
@@ -56,10 +58,7 @@ def find_mounting(
     if choice.sensor_pose != FIT:
         return MountingFound(mounting)
     reading = sensor_reading_of(recording, "--sensor-pose fit")
-    if not estimates:
-        raise ParameterError("--sensor-pose fit: no observer runs, so there is nothing to fit to")
-    best = next((e for e in estimates if e.name == BEST), estimates[0])
-    ours = VirtualSensor(frame="flange").wrench(best, recording.q, robot.chain)
+    ours = VirtualSensor(frame="flange").wrench(disturbance, recording.q, robot.chain)
     fit = fit_pose(ours.known, reading)
     return MountingFound(mounting._replace(sensor=fit.pose), (pose_remark(fit),))
 

@@ -4,11 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Mask
+from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.wrench import Wrench
 
 MARGIN = 1.25
 """The threshold stands so far above the largest value of the free part."""
+
+TOLD = 0.001
+"""Share of samples above the threshold up to which nothing is said: chance reaches it."""
 
 
 class Elsewhere(NamedTuple):
@@ -26,6 +30,14 @@ class Elsewhere(NamedTuple):
     above: Mask
     share: float
 
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What it says, nothing where next to no sample lies above the threshold."""
+        if not self.share > TOLD:
+            return ()
+        values = {"share": self.share, "threshold_Nm": self.threshold}
+        return (caution("contact-elsewhere", Where(self.name), **values),)
+
 
 def contact_elsewhere(wrench: Wrench, free: Mask) -> Elsewhere | None:
     """Judge a wrench's null-space channel by its free part, None for an arm of six joints.
@@ -39,10 +51,3 @@ def contact_elsewhere(wrench: Wrench, free: Mask) -> Elsewhere | None:
     threshold = MARGIN * float(np.nanmax(wrench.null_space[free]))
     above: Mask = np.nan_to_num(wrench.null_space) > threshold
     return Elsewhere(wrench.name, threshold, above, float(np.mean(above)))
-
-
-def explained_share(wrench: Wrench, tau: Array) -> float:
-    """Share of the torque's power that a wrench at the flange explains, 1 for six joints."""
-    if wrench.null_space is None:
-        return 1.0
-    return 1.0 - float(np.nansum(wrench.null_space**2) / np.nansum(tau**2))

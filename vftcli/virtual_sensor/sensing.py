@@ -2,20 +2,46 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain as chained
+from typing import Any
+
+import numpy as np
 
 from vftcli.observers.observer import Observer
 from vftcli.repetition.free_motion import FreeMotion
+from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Mask
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.virtual_sensor.free_run_torque import FreeRunTorque, free_run_torque, less_free_run
 from vftcli.virtual_sensor.log_wrench import logged_wrench
+from vftcli.virtual_sensor.mean_disturbance import mean_disturbance
 from vftcli.virtual_sensor.mounting import find_mounting, without_tool_weight
-from vftcli.virtual_sensor.sensor_reading import (
-    FreeRunTorque,
-    SensorReading,
-    free_run_torque,
-    measure,
+from vftcli.virtual_sensor.null_space import contact_elsewhere
+from vftcli.virtual_sensor.sensor_reading import SensorReading
+from vftcli.virtual_sensor.torque_error import (
+    Disturbance,
+    TorqueError,
+    from_band,
+    from_default,
+    from_free_part,
+    given_error,
 )
-from vftcli.virtual_sensor.torque_error import Disturbance
+from vftcli.virtual_sensor.vendor import check_vendor
+from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.zero import (
+    without_drift,
+    zero_drift,
+    zero_moved,
+    zero_spans,
+    zero_warning,
+)
+
+PAYLOAD_SLACK = 0.05
+"""Difference of payloads that is not worth a remark. [kg]"""
 
 
 def sense(
@@ -24,35 +50,125 @@ def sense(
     estimates: Sequence[ExternalTorque],
     choice: WrenchChoice,
 ) -> SensorReading:
-    """The wrenches of a log's estimates, and what is known of them.
+    """Turn estimates into wrenches, remove the zero, and judge them.
+
+    What is asked of the log rather than of an observer (its unloaded start, its sensor's pose, its
+    vendor's convention) is read off the mean disturbance, so that it is the same whichever
+    observers run.
 
     Args:
         motion: The log, its robot, and the free run whose torque is the zero, if there is one.
-        observers: The observers.
-        estimates: Their estimates, in the same order.
+        observers: The observers, whose lag widens the band.
+        estimates: Their torques, in the same order.
         choice: What is asked of the virtual sensor.
 
     Raises:
-        ParameterError: If a frame, solver, pose or zero cannot be used.
+        ParameterError: If a pose or zero interval cannot be used, or cannot be found in the log.
+        MissingSignalError: If the log has no wrench and a sensor's pose or weight is asked for.
         RobotError: If the arm has fewer than six joints.
     """
-    recording, robot = motion.log.recording, motion.log.robot
-    mounting, notes = find_mounting(recording, robot, estimates, choice)
-    unloaded = zero_torque(motion, observers)
-    free = motion.zero.terms if motion.zero is not None else None
-    raw = Disturbance(terms=motion.log.terms, observers=observers, free=free)
-    measured = measure(recording, robot, estimates, choice, unloaded, mounting, raw)
+    recording, robot, terms = motion.log.recording, motion.log.robot, motion.log.terms
+    t, chain = recording.t, robot.chain
+    free_run = free_run_torque(motion.zero, observers) if motion.zero is not None else None
+    (disturbance,) = less_free_run((mean_disturbance(terms),), free_run)
+    raw = VirtualSensor(frame="base").wrench(disturbance, recording.q, chain)
+    mounting, found = find_mounting(recording, robot, disturbance, choice)
+    sensor = VirtualSensor(solver=choice.solver, frame=choice.frame, mounting=mounting)
+    torques = less_free_run(estimates, free_run)
+    zero = zero_spans(choice.zero, raw)
+    quiet = motion.zero.terms if motion.zero is not None else None
+    lags = Disturbance(terms=terms, observers=observers, free=quiet)
+    error = torque_error(choice, torques, zero.chosen(t), free_run, lags)
+    wrenches = sensor.wrenches(torques, recording.q, chain, dict(error.sd))
+    bands = (error.remark,) if error.remark else tuple(r for w in wrenches for r in w.remarks)
+    # Drifts span by span: the first of each observer is its zero.
+    drifts = [[zero_drift(wrench, span) for wrench in wrenches] for span in zero.spans]
+    warnings = tuple(
+        remark
+        for row in drifts
+        for wrench, drift in zip(wrenches, row, strict=True)
+        for remark in zero_warning(wrench, drift)
+    )
+    moved = tuple(
+        zero_moved(first, last)
+        for row in drifts[1:]
+        for first, last in zip(drifts[0], row, strict=True)
+    )
+    if drifts:
+        drifts[0] = [replace(drift, removed=True) for drift in drifts[0]]
+        wrenches = tuple(without_drift(w, d) for w, d in zip(wrenches, drifts[0], strict=True))
+    free = zero.unloaded(t)
+    vendor = check_vendor(recording, raw, chain)
+    elsewhere = tuple(e for w in wrenches if (e := contact_elsewhere(w, free)) is not None)
     logged = None
     if choice.sensor_weight:
-        relieved, found = without_tool_weight(recording, robot.chain, mounting, measured.free)
-        logged = logged_wrench(relieved, robot.chain, mounting)
-        notes += found
-    return replace(measured, logged=logged, notes=(*map(str, notes), *measured.notes))
+        lighter, weight = without_tool_weight(recording, chain, mounting, free)
+        logged = logged_wrench(lighter, chain, mounting)
+        found += weight
+    return SensorReading(
+        sensor=sensor,
+        wrenches=wrenches,
+        masked=raw.hidden,
+        drifts=tuple(chained.from_iterable(drifts)),
+        free=free,
+        logged=logged,
+        vendor=vendor,
+        elsewhere=elsewhere,
+        remarks=(
+            *warnings,
+            *found,
+            *payload_remark(recording, robot),
+            *mask_remark(raw),
+            *moved,
+            *bands,
+            *(() if free_run is None else (free_run.remark,)),
+            *(() if vendor is None else vendor.remarks),
+            *(remark for e in elsewhere for remark in e.remarks),
+        ),
+    )
 
 
-def zero_torque(motion: FreeMotion, observers: Sequence[Observer]) -> FreeRunTorque | None:
-    """What the observers read in the free run of ``--zero LOG``, None without one."""
-    if motion.zero is None:
-        return None
-    estimates = tuple(observer.estimate(motion.zero.terms) for observer in observers)
-    return free_run_torque(motion.zero, estimates)
+def torque_error(
+    choice: WrenchChoice,
+    torques: Sequence[ExternalTorque],
+    free: Mask,
+    free_run: FreeRunTorque | None,
+    disturbance: Disturbance,
+) -> TorqueError:
+    """The torque error behind the band: what was given, else measured, else assumed.
+
+    Args:
+        choice: What is asked.
+        torques: The estimates.
+        free: Samples of the zero spans; none if no zero was given. (T,)
+        free_run: What a free run reads, or None.
+        disturbance: What tells the observers' lag.
+    """
+    if choice.torque_sd is not None:
+        return given_error(choice.torque_sd, torques)
+    if free_run is not None:
+        return from_free_part(torques, free, free_run.rms, disturbance)
+    if np.count_nonzero(free) > 1:
+        return from_free_part(torques, free, None, disturbance)
+    if torques and all(torque.error_sd is not None for torque in torques):
+        return from_band(torques)
+    return from_default(torques, choice.solver)
+
+
+def payload_remark(recording: Recording, robot: Robot) -> tuple[Remark, ...]:
+    """A remark where the controller was told of another load than the robot's file mounts."""
+    told = recording.payload_mass
+    mounted = robot.payload.mass if robot.payload is not None else 0.0
+    if told is None or abs(told - mounted) < PAYLOAD_SLACK:
+        return ()
+    weight = float(np.linalg.norm(robot.chain.gravity)) * (told - mounted)
+    return (caution("payload-differs", told_kg=told, mounted_kg=mounted, weight_N=weight),)
+
+
+def mask_remark(wrench: Wrench) -> tuple[Remark, ...]:
+    """How many samples are masked, and how near to a singularity the arm comes."""
+    count, sigma = int(np.count_nonzero(wrench.hidden)), wrench.sigma_min
+    if not count or sigma is None:
+        return ()
+    values: dict[str, Any] = {"masked": count, "samples": len(sigma), "share": count / len(sigma)}
+    return (caution("pose-hides-wrench", **values, sigma_min_m=float(np.min(sigma))),)

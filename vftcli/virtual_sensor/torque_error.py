@@ -19,6 +19,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import numbers
+from vftcli.signals.remarks import Remark, fact
 from vftcli.virtual_sensor.solvers import TORQUE_SD
 
 OWN = "own"
@@ -83,14 +84,14 @@ class TorqueError:
 
     Attributes:
         sd: Observer → standard deviation. (n,) [N·m]
-        note: Where it comes from, "" where nothing is to be said.
+        remark: Where it comes from, None where the wrenches themselves say it.
     """
 
     sd: Mapping[str, Array]
-    note: str = ""
+    remark: Remark | None = None
 
 
-def stated(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
+def given_error(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
     """The torque error that ``--torque-sd`` states.
 
     Raises:
@@ -109,16 +110,16 @@ def stated(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
     return TorqueError(sd={torque.name: given for torque in torques})
 
 
-def banded(torques: Sequence[ExternalTorque]) -> TorqueError:
+def from_band(torques: Sequence[ExternalTorque]) -> TorqueError:
     """The band that each estimate brings along, measured on the log's free part."""
     sd = {torque.name: torque.error_sd for torque in torques if torque.error_sd is not None}
     return TorqueError(
         sd={name: band[0] if np.all(band == band[0]) else band for name, band in sd.items()},
-        note="the wrenches' bands are the joint torques' own, measured on the log's free part",
+        remark=fact("band-from-torques"),
     )
 
 
-def assumed(torques: Sequence[ExternalTorque], solver: str) -> TorqueError:
+def from_default(torques: Sequence[ExternalTorque], solver: str) -> TorqueError:
     """`TORQUE_SD` for observers without a covariance, and for all where a prior is weighed.
 
     The Kalman filter's own covariance assumes a torque that wanders as fast as its Q_τ says, often
@@ -128,7 +129,7 @@ def assumed(torques: Sequence[ExternalTorque], solver: str) -> TorqueError:
     return TorqueError(sd={e.name: np.full(e.joints, TORQUE_SD) for e in wanted})
 
 
-def measured(
+def from_free_part(
     torques: Sequence[ExternalTorque],
     free: Mask,
     rms: Mapping[str, Array] | None,
@@ -147,5 +148,4 @@ def measured(
     for torque in torques:
         quiet = rms[torque.name] if rms is not None else np.nanstd(torque.tau[free], axis=0)
         sd[torque.name] = np.hypot(quiet, lag.get(torque.name, 0.0))
-    words = "the 95 % band is ± 1.96 sd, from what the estimate reads unloaded and from its lag"
-    return TorqueError(sd=sd, note=words)
+    return TorqueError(sd=sd, remark=fact("band-from-free-part"))

@@ -9,6 +9,7 @@ from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array, frozen
 from vftcli.signals.lag import Offset, time_offset
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import bridged, resampled
 from vftcli.signals.wrench import Wrench
 
@@ -72,7 +73,7 @@ def fit_axes(ours: Array, theirs: Array) -> AxesFit:
     known = np.all(np.isfinite(ours) & np.isfinite(theirs), axis=1)
     x, y = ours[known] - ours[known].mean(axis=0), theirs[known] - theirs[known].mean(axis=0)
     U, _, Vt = np.linalg.svd(y.T @ x)
-    return judged(x, y, permutation(U @ Vt))
+    return fit_signs(x, y, permutation(U @ Vt))
 
 
 def permutation(Q: Array) -> Array:
@@ -84,7 +85,7 @@ def permutation(Q: Array) -> Array:
     return P
 
 
-def judged(x: Array, y: Array, matrix: Array) -> AxesFit:
+def fit_signs(x: Array, y: Array, matrix: Array) -> AxesFit:
     """Gain, correlation and remainder of centred forces under a given matrix."""
     z = x @ matrix.T
     power = float(np.sum(z**2))
@@ -118,37 +119,31 @@ class VendorCheck:
     zeros: float
     at_zeros: float
 
-    def sentences(self) -> tuple[str, ...]:
-        """The findings in words."""
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """The findings."""
         found = []
-        if self.zeros > 0:
-            what = "every sample" if self.zeros == 1.0 else f"{self.zeros:.1%} of the samples"
-            found.append(
-                f"the log's wrench is exactly zero in {what}, where ours reads "
-                f"{self.at_zeros:.2g} N rms: a zero there need not mean no force"
-            )
+        if self.zeros == 1.0:
+            found.append(caution("log-wrench-all-zero", force_N=self.at_zeros))
+        elif self.zeros > 0:
+            found.append(caution("log-wrench-zero", share=self.zeros, force_N=self.at_zeros))
         if self.axes is None or not self.axes.correlation > RESEMBLES:
-            if self.zeros < 1.0:
-                found.append(
-                    "the log's wrench resembles ours in no frame and sign: it sees other contacts, "
-                    "or there is none"
-                )
-            return tuple(found)
-        sign = "force on the robot"
-        if np.trace(self.axes.matrix) < -2.5:
-            sign = "force BY the robot (sign turned)"
-        elif np.trace(self.axes.matrix) < 2.5:
-            sign = f"axes {self.axes.words} of ours"
+            return (*found, *([caution("log-wrench-unlike")] if self.zeros < 1.0 else []))
+        # The trace of a signed permutation is 3 for our own axes and −3 for the opposite ones.
+        turn = {3: "log-wrench-fits", -3: "log-wrench-fits-turned"}
         found.append(
-            f"the log's wrench ({self.said}) fits {self.frame} axes, {sign}, gain "
-            f"{self.axes.gain:.3g}, {self.offset.lag * 1e3:+.0f} ms against ours, correlation "
-            f"{self.axes.correlation:.3f}"
+            fact(
+                turn.get(round(float(np.trace(self.axes.matrix))), "log-wrench-fits-other-axes"),
+                stated=self.said,
+                frame=self.frame,
+                axes=self.axes.words,
+                gain=self.axes.gain,
+                lag_ms=self.offset.lag * 1e3,
+                correlation=self.axes.correlation,
+            )
         )
         if self.axes.derived:
-            found.append(
-                "it is computed from the same torques (correlation above "
-                f"{DERIVED}): not an independent reference"
-            )
+            found.append(caution("log-wrench-derived", correlation=DERIVED))
         return tuple(found)
 
 
@@ -157,7 +152,7 @@ def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorChec
 
     Args:
         recording: The log; its wrench is taken as written, whatever its reader says of it.
-        ours: The virtual sensor's wrench in base axes about the flange point.
+        ours: A virtual wrench in base axes about the flange point, of no delay.
         chain: The arm.
     """
     theirs = recording.wrench

@@ -11,6 +11,7 @@ from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import Mounting, check_frame, from_base, mounted
 from vftcli.virtual_sensor.solvers import (
@@ -90,7 +91,7 @@ class VirtualSensor:
             sigma[span] = parts.sigma_min
             for k, torque in enumerate(torques):
                 tau = torque.tau[span]
-                values[k, span], spread[k, span] = self.solve(parts, X, tau, deviations[k].at(span))
+                values[k, span], spread[k, span] = self.solve(parts, X, tau, deviations[k].sd[span])
                 if n > 6:
                     residual[k, span] = np.linalg.norm(null_space(parts, tau), axis=1)
         masked = sigma < self.least_sigma
@@ -104,7 +105,7 @@ class VirtualSensor:
                 sigma_min=sigma,
                 masked=masked,
                 null_space=handed_over(residual[k].copy()) if n > 6 else None,
-                remarks=deviations[k].notes,
+                remarks=deviations[k].remarks,
             )
             for k, torque in enumerate(torques)
         )
@@ -148,40 +149,30 @@ class ForceArrow(NamedTuple):
     force: Array
 
 
-@dataclass(frozen=True, kw_only=True)
-class Deviation:
+class TorqueDeviation(NamedTuple):
     """Standard deviation of an estimate's joint torques, and where it comes from.
 
     Attributes:
-        sd: One a joint, or one a sample and joint. (n,) or (T, n) [N·m]
-        notes: Where it comes from, one sentence.
+        sd: One a sample and joint. (T, n) [N·m]
+        remarks: Where it comes from.
     """
 
     sd: Array
-    notes: tuple[str, ...]
-
-    def at(self, span: slice) -> Array:
-        """The rows of a chunk. (T, n) or (1, n) [N·m]"""
-        return self.sd[span] if self.sd.ndim == 2 else self.sd[None, :]
+    remarks: tuple[Remark, ...]
 
 
-def deviation_of(torque: ExternalTorque, given: Array | None) -> Deviation:
-    """The torque error a wrench's covariance starts from: given, the observer's own, or stated.
+def deviation_of(torque: ExternalTorque, given: Array | None) -> TorqueDeviation:
+    """The torque error a wrench's covariance starts from: given, the observer's own, or assumed.
 
     Zero is raised to a micronewton-metre, so that weights stay finite.
     """
-    least = 1e-6
+    where = Where(torque.name)
+    sd: Array | float
     if given is not None:
-        words = "the band assumes the torque error that was given"
-        return Deviation(sd=np.maximum(np.asarray(given), least), notes=(words,))
-    if torque.sd is not None:
-        words = "the band is the observer's own covariance; errors of the model are not in it"
-        sd = torque.sd
-        if len(sd) > 1 and np.all(sd == sd[0]):
-            sd = sd[0]
-        return Deviation(sd=np.maximum(sd, least), notes=(words,))
-    words = (
-        f"the observer states no covariance and no unloaded span was given: the band assumes "
-        f"{TORQUE_SD:g} N·m on every joint"
-    )
-    return Deviation(sd=np.full(torque.joints, TORQUE_SD), notes=(words,))
+        sd, remark = given, fact("band-given", where)
+    elif torque.sd is not None:
+        sd, remark = torque.sd, caution("band-of-observer", where)
+    else:
+        sd, remark = TORQUE_SD, caution("band-assumed", where, torque_sd_Nm=TORQUE_SD)
+    least = np.maximum(np.asarray(sd, dtype=np.float64), 1e-6)
+    return TorqueDeviation(np.broadcast_to(least, torque.tau.shape), (remark,))

@@ -1,15 +1,20 @@
 """Zero drift: what the virtual sensor reads unloaded, reported per axis and removed."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.signals.arrays import Array, Mask, frozen
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.remarks import Note
+from vftcli.signals.remarks import Remark, Where, fact, warning
 from vftcli.signals.series import runs_of
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.virtual_sensor.choice import ZeroChoice
+
+Span = tuple[float, float]
+"""First and last time. [s]"""
 
 SETTLING = 1.0
 """Start of a log that is left out of an unloaded start: observers rise from zero. [s]"""
@@ -22,11 +27,6 @@ FORCE_STEP, MOMENT_STEP = 3.0, 0.6
 
 BACK = 0.3
 """An unloaded start ends this long before the load shows: it began to rise earlier. [s]"""
-
-NO_START = (
-    "--zero start: the log has no unloaded start of half a second in a regular pose; give "
-    "the unloaded span as --zero A:B, or a free run as --zero LOG"
-)
 
 SPREADS = 6.0
 """A departure of so many robust standard deviations counts as load."""
@@ -47,7 +47,7 @@ class Drift:
     """
 
     name: str
-    span: tuple[float, float]
+    span: Span
     mean: Array
     sd: Array
     samples: int
@@ -58,19 +58,19 @@ class Drift:
         object.__setattr__(self, "mean", frozen(self.mean))
         object.__setattr__(self, "sd", frozen(self.sd))
 
-    def sentence(self) -> str:
-        """The drift in words, as the paper prints it."""
-        numbers = ", ".join(
-            f"{axis} {value:.5f}" for axis, value in zip(AXES, self.mean, strict=True)
-        )
-        what = "removed" if self.removed else "left in"
-        return (
-            f"{self.name}: zero drift over {self.span[0]:g} to {self.span[1]:g} s in {self.frame} "
-            f"axes, {what} [N, N·m]: {numbers}"
+    @property
+    def remark(self) -> Remark:
+        """The drift as a remark."""
+        return fact(
+            "zero-removed" if self.removed else "zero-left-in",
+            Where(self.name, span=self.span),
+            frame=self.frame,
+            force_N=self.mean[:3].tolist(),
+            moment_Nm=self.mean[3:].tolist(),
         )
 
 
-def zero_drift(wrench: Wrench, span: tuple[float, float]) -> Drift:
+def zero_drift(wrench: Wrench, span: Span) -> Drift:
     """Mean and spread of the known samples in a span.
 
     Raises:
@@ -102,11 +102,11 @@ def without_drift(wrench: Wrench, drift: Drift) -> Wrench:
     """The wrench with the drift subtracted, as a constant in the wrench's own frame."""
     removed = replace(drift, removed=True)
     return replace(
-        wrench, values=wrench.values - drift.mean, remarks=(*wrench.remarks, removed.sentence())
+        wrench, values=wrench.values - drift.mean, remarks=(*wrench.remarks, removed.remark)
     )
 
 
-def zeroed(wrench: Wrench, choice: ZeroChoice) -> tuple[Wrench, tuple[Note, ...]]:
+def without_zero(wrench: Wrench, choice: ZeroChoice) -> Wrench:
     """A wrench less its mean over the first span of a choice, or over its own unloaded start.
 
     For a wrench that no observer made, as a sensor's: a free run tells nothing of its zero.
@@ -119,26 +119,76 @@ def zeroed(wrench: Wrench, choice: ZeroChoice) -> tuple[Wrench, tuple[Note, ...]
             "--zero LOG removes what an observer reads in a free run; for this wrench give the "
             "unloaded span as --zero A:B, or --zero start"
         )
-    if not choice.of_log:
-        return wrench, ()
-    span = choice.spans[0] if choice.spans else unloaded_start(wrench)
-    if span is None:
-        raise ParameterError(NO_START)
-    drift = replace(zero_drift(wrench, span), removed=True)
-    return replace(wrench, values=wrench.values - drift.mean), (drift.sentence(),)
+    chosen = zero_spans(choice, wrench)
+    return without_drift(wrench, zero_drift(wrench, chosen.zero)) if chosen.zero else wrench
 
 
-def change(first: Drift, last: Drift) -> str:
-    """How far the zero moved between two unloaded spans, in words."""
+def zero_moved(first: Drift, last: Drift) -> Remark:
+    """How far the zero moved between two unloaded spans."""
     moved = last.mean - first.mean
-    numbers = ", ".join(f"{axis} {value:+.5f}" for axis, value in zip(AXES, moved, strict=True))
-    return (
-        f"{first.name}: drift from {first.span[0]:g}–{first.span[1]:g} s to "
-        f"{last.span[0]:g}–{last.span[1]:g} s [N, N·m]: {numbers}"
+    return fact(
+        "zero-moved",
+        Where(first.name, span=last.span),
+        first_s=list(first.span),
+        force_N=moved[:3].tolist(),
+        moment_Nm=moved[3:].tolist(),
     )
 
 
-def unloaded_start(wrench: Wrench) -> tuple[float, float] | None:
+class ZeroSpans(NamedTuple):
+    """The unloaded parts of a log.
+
+    Attributes:
+        spans: Those that were chosen: the first is the zero, further ones show its drift. [s]
+        start: The unloaded start that was found where none was chosen. [s]
+    """
+
+    spans: tuple[Span, ...]
+    start: Span | None
+
+    @property
+    def zero(self) -> Span | None:
+        """The span whose mean is removed."""
+        return self.spans[0] if self.spans else None
+
+    def chosen(self, t: Array) -> Mask:
+        """Samples of the chosen spans. (T,)"""
+        return samples_of(t, self.spans)
+
+    def unloaded(self, t: Array) -> Mask:
+        """Samples that are known to be unloaded: of the chosen spans, else of the start. (T,)"""
+        start = () if self.start is None else (self.start,)
+        return samples_of(t, self.spans or start)
+
+
+def zero_spans(choice: ZeroChoice, wrench: Wrench) -> ZeroSpans:
+    """The spans of a choice, and the unloaded start of a wrench where it names none.
+
+    Raises:
+        ParameterError: If the unloaded start is asked for and there is none.
+    """
+    if choice.spans:
+        return ZeroSpans(choice.spans, None)
+    start = unloaded_start(wrench)
+    if not choice.start:
+        return ZeroSpans((), start)
+    if start is None:
+        raise ParameterError(
+            "--zero start: the log has no unloaded start of half a second in a regular pose; give "
+            "the unloaded span as --zero A:B, or a free run as --zero LOG"
+        )
+    return ZeroSpans((start,), None)
+
+
+def samples_of(t: Array, spans: Sequence[Span]) -> Mask:
+    """Samples that lie in any of the spans. (T,)"""
+    inside: Mask = np.zeros(len(t), dtype=bool)
+    for start, stop in spans:
+        inside |= (t >= start) & (t <= stop)
+    return inside
+
+
+def unloaded_start(wrench: Wrench) -> Span | None:
     """The span from the start over which the wrench keeps its first level, None if too short. [s]
 
     That level is the median of the first half second after `SETTLING`; the span ends where a
@@ -171,36 +221,30 @@ def lasting(flags: Mask, t: Array, least: float) -> Mask:
     return kept
 
 
-def loaded_zero(wrench: Wrench, drift: Drift) -> str:
-    """A warning if a zero interval looks like a contact, else "".
+def zero_warning(wrench: Wrench, drift: Drift) -> tuple[Remark, ...]:
+    """A warning if a zero interval looks like a contact; none if it does not.
 
     It does where the wrench changes within it, or lies far from the level of the log's start.
     """
+    where = Where(wrench.name, span=drift.span)
     least = np.repeat([FORCE_STEP, MOMENT_STEP], 3)
-    words = f"zero interval {drift.span[0]:g}:{drift.span[1]:g}"
-    inside = wrench.between(*drift.span)
-    swing = np.percentile(inside, 95, axis=0) - np.percentile(inside, 5, axis=0)
     start = unloaded_start(wrench)
     if start is not None:
         level = zero_drift(wrench, start)
         away = np.abs(drift.mean - level.mean) - SPREADS * level.sd
-        if worst := exceeded(away, least):
-            return (
-                f"{wrench.name}: {words} looks like a contact: {worst} further than the unloaded "
-                f"start at {start[0]:g}–{start[1]:g} s; choose an unloaded span"
-            )
-    if worst := exceeded(swing, 4.0 * least):
-        return (
-            f"{wrench.name}: {words} looks like a contact or a motion: {worst} within it; "
-            "choose an unloaded span"
-        )
-    return ""
+        if worst := largest_excess(away, least):
+            return (warning("zero-far-from-start", where, start_s=list(start), **worst),)
+    inside = wrench.between(*drift.span)
+    swing = np.percentile(inside, 95, axis=0) - np.percentile(inside, 5, axis=0)
+    if worst := largest_excess(swing, 4.0 * least):
+        return (warning("zero-swings", where, **worst),)
+    return ()
 
 
-def exceeded(value: Array, limit: Array) -> str:
-    """The axis that exceeds its limit most, with its value, "" if none does."""
+def largest_excess(value: Array, limit: Array) -> dict[str, object]:
+    """The axis that exceeds its limit most, with its value and unit; empty if none does."""
     share = value / limit
     if not np.any(share > 1.0):
-        return ""
+        return {}
     k = int(np.argmax(share))
-    return f"{AXES[k]} is {value[k]:.3g} {unit_of(k)}"
+    return {"axis": AXES[k], "size": float(value[k]), "unit": unit_of(k)}

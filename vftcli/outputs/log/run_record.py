@@ -230,7 +230,7 @@ def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
         "tool": sensed.sensor.mounting.tool,
         "sensor": sensed.sensor.mounting.sensor,
         "zero_drift": list(sensed.drifts),
-        "warnings": list(sensed.warnings),
+        "warnings": [str(r) for r in sensed.remarks if r.level == "warning"],
     }
 
 
@@ -265,7 +265,7 @@ def all_remarks(analysis: Analysis) -> list[Note]:
     for torque in analysis.torques:
         found += [about(torque.name, n) for n in torque.remarks if str(n) not in of_run]
     if analysis.virtual_sensor is not None:
-        found += [*analysis.virtual_sensor.warnings, *analysis.virtual_sensor.notes]
+        found += analysis.virtual_sensor.remarks
     return list({str(note): note for note in found}.values())
 
 
