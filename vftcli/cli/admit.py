@@ -1,6 +1,6 @@
 """`vftcli admit`: what admittance control would have made of a log's forces."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -31,7 +31,6 @@ Output = Annotated[
 ]
 
 
-@dataclass(frozen=True, kw_only=True)
 class ControllerOptions(Bundle):
     """Which controllers are compared."""
 
@@ -53,7 +52,6 @@ class ControllerOptions(Bundle):
     force_unstable: bool = flag("--force-unstable", "Run settings that are unstable, for study.")
 
 
-@dataclass(frozen=True, kw_only=True)
 class ReleaseOptions(Bundle):
     """A release from rest, without a log."""
 
@@ -68,7 +66,6 @@ class ReleaseOptions(Bundle):
     )
 
 
-@dataclass(frozen=True, kw_only=True)
 class LoopOptions(Bundle):
     """A controller in the loop of a simulation, without a log."""
 
@@ -78,13 +75,12 @@ class LoopOptions(Bundle):
         "No log: run a scenario's contacts against the controller in simulation, then replay the "
         "force it acted on.",
     )
-    seed: int | None = option("--seed", "N", "Seed of everything drawn; the scenario's own if not.")
+    seed: int | None = option(*opt.SEED)
     torque: str = option(
         "--torque", "average|instant", "What the closed loop's sensors report.", "average"
     )
 
 
-@dataclass(frozen=True, kw_only=True)
 class ForceOptions(Bundle):
     """Which force drives the replay, if not an observer's."""
 
@@ -122,8 +118,8 @@ def admit(
         raise typer.BadParameter("give one of LOG, --release AXIS=VALUE, --closed-loop SCENARIO")
     own, others = split_settings(analysis.observers.assignments or ())
     control = ControlChoice.parsed(assignments=own, **controllers.words())
-    observers = replace(analysis.observers, assignments=others)
-    analysis = replace(analysis, observers=observers)
+    observers = analysis.observers.changed(assignments=others)
+    analysis = analysis.changed(observers=observers)
     recording, run = None, None
     if loop.closed_loop is not None:
         result, run = looped(loop, analysis, control)
@@ -151,12 +147,12 @@ def chosen(analysis: opt.AnalysisOptions, log: Path | None = None) -> "AnalysisC
     named = analysis.observers.observer or [OBSERVER]
     if len(named) > 1:
         raise ParameterError("one observer's force drives the replay; give --observer once")
+    observers = analysis.observers.changed(observer=named)
+    choice = analysis.changed(observers=observers).choice(Library([log] if log else []))
     if analysis.wrench.frame not in {None, "base"}:
         raise ParameterError(
             "the replay is in base axes about the flange point; leave --frame away"
         )
-    observers = replace(analysis.observers, observer=named)
-    choice = replace(analysis, observers=observers).choice(Library([log] if log else []))
     return replace(choice, wrench=replace(choice.wrench or WrenchChoice(), frame="base"))
 
 
@@ -193,9 +189,9 @@ def replayed(
         name = (observers.observer or [OBSERVER])[0]
         if (columns := estimates_columns(log, name)) is not None:
             # A table of estimates may hold those of an observer that is none of ours.
-            stored, observers = name, replace(observers, observer=None)
-            reading = replace(analysis.reading, columns=columns)
-            analysis = replace(analysis, reading=reading, observers=observers)
+            stored, observers = name, observers.changed(observer=None)
+            reading = analysis.reading.changed(columns=columns)
+            analysis = analysis.changed(reading=reading, observers=observers)
     choice = chosen(analysis, log)
     recording = choice.library.open(log, choice.read)
     arm = choice.robot.load(recording)

@@ -1,53 +1,77 @@
 """Options in bundles: a command takes one object a bundle, typer sees every option of it.
 
-A bundle is a frozen dataclass of `option`s and `flag`s, or of further bundles. `taken_apart` gives
-typer a function with one parameter an option, and hands the command the bundles put together::
+A bundle is a class of `option`s and `flag`s, or of further bundles. `taken_apart` gives typer a
+function with one parameter an option, and hands the command the bundles put together::
 
     @taken_apart
     def convert_log(log: Log, reading: ReadOptions, force: Force = False) -> None: ...
 """
 
-import dataclasses
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
-from typing import Annotated, Any, ClassVar, Generic, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 
 import typer
 
 Choice = TypeVar("Choice")
 
-HOW = "typer"
-"""Key of a field's metadata under which stands how it is typed."""
+REQUIRED = inspect.Parameter.empty
+"""The default of an option that has to be given."""
+
+
+class DeclaredOption(NamedTuple):
+    """What a bundle's class says of one option.
+
+    Attributes:
+        default: Its value if it is not given, `REQUIRED` if it has to be.
+        typer: How it is typed, and what `--help` says of it.
+    """
+
+    default: object
+    typer: Any
 
 
 def option(name: str, metavar: str, help: str, default: object = None) -> Any:  # noqa: ANN401
-    """One field of a bundle that takes a value.
+    """One option of a bundle that takes a value.
 
     Args:
         name: As it is typed, with its dashes.
         metavar: What its value looks like.
         help: What `--help` says of it.
-        default: Its value if it is not given; ``dataclasses.MISSING`` if it has to be.
+        default: Its value if it is not given, `REQUIRED` if it has to be.
     """
-    how = {HOW: typer.Option(name, metavar=metavar, help=help)}
-    if default is dataclasses.MISSING:
-        return dataclasses.field(metadata=how)
-    return dataclasses.field(default=default, metadata=how)
+    return DeclaredOption(default, typer.Option(name, metavar=metavar, help=help))
 
 
 def flag(name: str, help: str) -> Any:  # noqa: ANN401
-    """One field of a bundle that is given or not."""
-    return dataclasses.field(default=False, metadata={HOW: typer.Option(name, help=help)})
+    """One option of a bundle that is given or not."""
+    return DeclaredOption(False, typer.Option(name, help=help))
 
 
+# No dataclass: making one takes a millisecond, and --help would pay for all of them.
 class Bundle:
-    """Options that belong together."""
+    """Options that belong together, each an attribute."""
+
+    def __init__(self, **values: Any) -> None:  # noqa: ANN401 - options are of every kind
+        vars(self).update(values)
 
     def words(self) -> dict[str, Any]:
-        """Every option by the name of its field."""
-        own: Any = self
-        return {field.name: getattr(self, field.name) for field in dataclasses.fields(own)}
+        """Every option by its name."""
+        return dict(vars(self))
+
+    def changed(self, **values: Any) -> Self:  # noqa: ANN401
+        """The same with other values of some options."""
+        return type(self)(**{**vars(self), **values})
+
+    @classmethod
+    def declared(cls) -> dict[str, Any]:
+        """Name of every option and further bundle → its type."""
+        found: dict[str, Any] = {}
+        for base in reversed(cls.__mro__):
+            found |= inspect.get_annotations(base)
+        found.pop("HOME", None)
+        return found
 
 
 class ChoiceBundle(Bundle, Generic[Choice]):
@@ -72,17 +96,17 @@ class ChoiceBundle(Bundle, Generic[Choice]):
 
 
 def taken_apart(command: Callable[..., None]) -> Callable[..., None]:
-    """Return the command as typer wants it: every field of its bundles a parameter of its own.
+    """Return the command as typer wants it: every option of its bundles a parameter of its own.
 
-    The parameters are called ``BUNDLE_FIELD``, so that bundles need not know each other; what the
-    user types is what the field says.
+    The parameters are called ``BUNDLE_OPTION``, so that bundles need not know each other; what the
+    user types is what the option says.
     """
     own = inspect.signature(command).parameters.values()
 
-    def called(**values: Any) -> None:  # noqa: ANN401 - options are of every kind
+    def called(**values: Any) -> None:  # noqa: ANN401
         command(**{p.name: put_together(p.name, p.annotation, values) for p in own})
 
-    flat = [field for p in own for field in parameters(p.name, p.annotation, p.default)]
+    flat = [single for p in own for single in parameters(p.name, p.annotation, p.default)]
     called.__name__, called.__doc__ = command.__name__, command.__doc__
     # typer asks for the signature; without annotations of its own it finds nothing else.
     called.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
@@ -90,32 +114,31 @@ def taken_apart(command: Callable[..., None]) -> Callable[..., None]:
     return called
 
 
-def parameters(name: str, kind: Any, default: Any) -> Iterator[inspect.Parameter]:  # noqa: ANN401
+def parameters(name: str, kind: Any, default: object) -> Iterator[inspect.Parameter]:  # noqa: ANN401
     """The parameters of one argument of a command: itself, or those of the bundle it is.
 
     Args:
         name: Its name.
         kind: Its annotation, or the bundle.
-        default: Its default, or ``inspect.Parameter.empty``.
+        default: Its default, or `REQUIRED`.
     """
-    if not dataclasses.is_dataclass(kind):
-        keyword = inspect.Parameter.KEYWORD_ONLY
-        yield inspect.Parameter(name, keyword, default=default, annotation=kind)
+    if is_bundle(kind):
+        for own, what in kind.declared().items():
+            yield from parameters(f"{name}_{own}", what, getattr(kind, own, REQUIRED))
         return
-    for field in dataclasses.fields(kind):
-        missing = field.default is dataclasses.MISSING
-        default = inspect.Parameter.empty if missing else field.default
-        how = field.metadata.get(HOW)
-        annotation = field.type if how is None else Annotated[field.type, how]
-        yield from parameters(f"{name}_{field.name}", annotation, default)
+    if isinstance(default, DeclaredOption):
+        kind, default = Annotated[kind, default.typer], default.default
+    yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
 
 
 def put_together(name: str, kind: Any, values: Mapping[str, Any]) -> Any:  # noqa: ANN401
     """One argument of a command from the values that typer parsed: a value, or a bundle of them."""
-    if not (isinstance(kind, type) and dataclasses.is_dataclass(kind)):
+    if not is_bundle(kind):
         return values[name]
-    found = {
-        field.name: put_together(f"{name}_{field.name}", field.type, values)
-        for field in dataclasses.fields(kind)
-    }
-    return kind(**found)
+    declared = kind.declared().items()
+    return kind(**{own: put_together(f"{name}_{own}", what, values) for own, what in declared})
+
+
+def is_bundle(kind: object) -> bool:
+    """Whether the type of an argument is a bundle."""
+    return isinstance(kind, type) and issubclass(kind, Bundle)

@@ -1,6 +1,5 @@
 """`vftcli compare`: errors of the observers against a reference."""
 
-from dataclasses import dataclass
 from typing import Annotated
 
 import typer
@@ -9,7 +8,6 @@ from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, taken_apart
 
 
-@dataclass(frozen=True, kw_only=True)
 class TableOptions(Bundle):
     """The form of the table; one at most."""
 

@@ -1,6 +1,5 @@
 """`vftcli identify`: logs become a robot."""
 
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +12,6 @@ if TYPE_CHECKING:
     from vftcli.identification import Task
 
 
-@dataclass(frozen=True, kw_only=True)
 class TaskOptions(Bundle):
     """What is identified, and how."""
 
@@ -46,7 +44,6 @@ class TaskOptions(Bundle):
         )
 
 
-@dataclass(frozen=True, kw_only=True)
 class ValidationOptions(Bundle):
     """Which logs the new robot is scored on besides those it is made from."""
 
@@ -56,7 +53,6 @@ class ValidationOptions(Bundle):
     )
 
 
-@dataclass(frozen=True, kw_only=True)
 class WithoutLoad(Bundle):
     """The same motion without the load that is sought."""
 
@@ -110,7 +106,7 @@ def identify_robot(
     for file in beside(output).values():
         refuse_existing(file, force)
     choice, chosen = reading.choice(), robot.choice()
-    held_out_choice = replace(reading, interval=validation.interval).choice()
+    held_out_choice = reading.changed(interval=validation.interval).choice()
     validated, without_load = validation.validate or [], free.logs()
     library = Library([*logs, *validated, *without_load])
     train = [library.open(log, choice) for log in logs]

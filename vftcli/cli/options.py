@@ -4,13 +4,12 @@ A room says what its words mean and checks them, in the `parsed` of its choice; 
 they are typed and what `--help` says of them.
 """
 
-from dataclasses import MISSING, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vftcli.cli.bundles import Bundle, ChoiceBundle, flag, option
+from vftcli.cli.bundles import REQUIRED, Bundle, ChoiceBundle, flag, option
 
 if TYPE_CHECKING:
     from vftcli.evaluation.reference_choice import ReferenceChoice
@@ -52,10 +51,10 @@ FREE = (
     "Motion that nobody touched: a free run of the same trajectory, or a span of the log itself. "
     "Repeatable: two free runs measure the floor.",
 )
+SEED = ("--seed", "N", "Seed of everything drawn; the scenario's own if not given.")
 REFERENCE = ("--reference", "REF", "two-cycle, sensor, vendor, zero, or file:PATH.")
 
 
-@dataclass(frozen=True, kw_only=True)
 class ReadOptions(ChoiceBundle["ReadChoice"]):
     """How a log is read, and which part of it."""
 
@@ -75,7 +74,6 @@ class ReadOptions(ChoiceBundle["ReadChoice"]):
     )
 
 
-@dataclass(frozen=True, kw_only=True)
 class RobotOptions(ChoiceBundle["RobotChoice"]):
     """Which arm, and how it is modelled."""
 
@@ -88,7 +86,6 @@ class RobotOptions(ChoiceBundle["RobotChoice"]):
     payload: str | None = option("--payload", "NAME", "Mount a [payload.NAME] of the robot file.")
 
 
-@dataclass(frozen=True, kw_only=True)
 class ObserverOptions(ChoiceBundle["ObserverChoice"]):
     """Which observers run, and with which gains."""
 
@@ -111,7 +108,6 @@ class ObserverOptions(ChoiceBundle["ObserverChoice"]):
     as_printed: bool = flag("--as-printed", "The paper's printed formulas, errata and all.")
 
 
-@dataclass(frozen=True, kw_only=True)
 class FreeOptions(ChoiceBundle["FreeChoice"]):
     """What nobody touched, and how it is laid under the log."""
 
@@ -141,7 +137,6 @@ class FreeOptions(ChoiceBundle["FreeChoice"]):
     )
 
 
-@dataclass(frozen=True, kw_only=True)
 class BiasOptions(ChoiceBundle["RefinementChoice"]):
     """What is taken off the estimates once the whole log is known."""
 
@@ -155,7 +150,6 @@ class BiasOptions(ChoiceBundle["RefinementChoice"]):
     )
 
 
-@dataclass(frozen=True, kw_only=True)
 class RefinementOptions(BiasOptions):
     """What only a complete log allows."""
 
@@ -166,7 +160,6 @@ class RefinementOptions(BiasOptions):
     )
 
 
-@dataclass(frozen=True, kw_only=True)
 class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
     """The Cartesian wrench."""
 
@@ -223,7 +216,6 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
         return super().choice() if self.asks else None
 
 
-@dataclass(frozen=True, kw_only=True)
 class ReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
     """What the estimates are compared with."""
 
@@ -245,14 +237,12 @@ class ReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
         return super().choice() if self.reference is not None else None
 
 
-@dataclass(frozen=True, kw_only=True)
 class RequiredReferenceOptions(ReferenceOptions):
     """The same where nothing can be shown without a reference."""
 
-    reference: str = option(*REFERENCE, MISSING)
+    reference: str = option(*REFERENCE, REQUIRED)
 
 
-@dataclass(frozen=True, kw_only=True)
 class AnalysisOptions(Bundle):
     """All that can be asked of a log but what it is compared with."""
 

@@ -1,0 +1,149 @@
+"""An option means and takes the same in every command that has it."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from vftcli.cli import COMMANDS, main, make_app
+
+FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
+
+READING = {
+    "estimate": ("-o", "out"),
+    "compare": ("--reference", "zero"),
+    "report": ("-o", "out"),
+    "tune": ("-o", "gains.toml"),
+    "admit": (),
+    "identify": ("-o", "robot.toml"),
+    "inspect": (),
+    "convert": ("-o", "log.parquet"),
+}
+"""Command that reads a log → what else it has to be given."""
+
+OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
+       ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
+       ("estimate", "--csv"), ("compare", "--csv")}  # fmt: skip
+"""Options that are a command's own: --set of a scenario, what is written where, and --csv, which
+the contract makes a file of `estimate` and a table of `compare`."""
+
+BAD = {
+    "--interval": ("8:4", "is not A:B with A < B"),
+    "--format": ("excel", "known formats"),
+    "--columns": ("nonsense", "--columns"),
+    "--robot": ("ur9", "no robot 'ur9'"),
+    "--friction": ("some", "there is profile, none"),
+    "--payload": ("bucket", "no payload 'bucket'"),
+    "--observer": ("kalman", "no observer 'kalman'; there is fdo, gmo"),
+    "--set": ("gmo.gain=much", "is not a number or a list"),
+    "--set-file": ("nowhere.toml", "nowhere.toml"),
+    "--match": ("speed=3", "is not delay=S (seconds) or bandwidth=HZ"),
+    "--free": ("nowhere.csv", "nowhere.csv"),
+    "--free-part": ("4", "is not A:B with A < B"),
+    "--free-cycles": ("first", "is not a list of cycle numbers"),
+    "--period": ("-3", "is not a positive time in seconds"),
+    "--alignment": ("odd", "no alignment 'odd'"),
+    "--low-pass": ("-3", "is not a positive cutoff in Hz, none or auto"),
+    "--remove-bias": ("all", "there is none, free-cycle, model"),
+    "--frame": ("world", "world"),
+    "--solver": ("qr", "no solver 'qr'"),
+    "--tool": ("1,2", "--tool"),
+    "--sensor-pose": ("hand", "--sensor-pose"),
+    "--zero": ("nowhere", "is neither A:B in seconds, nor start, nor a log that exists"),
+    "--torque-sd": ("some", "--torque-sd"),
+    "--reference": ("magic", "no reference 'magic'"),
+}
+"""Shared option → a value it does not take, and what the one line on it says."""
+
+
+def parameters(command: str) -> dict[str, Any]:
+    """Name as it is typed → what typer knows of it."""
+    group: Any = typer.main.get_command(make_app())
+    return {p.opts[-1]: p for p in group.commands[command].params}
+
+
+@pytest.fixture
+def complaint(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> Iterator[Callable[..., str]]:
+    """Run a command that is to fail, and return its one line."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(command: str, *words: object) -> str:
+        monkeypatch.setattr("sys.argv", ["vftcli", command, *map(str, words)])
+        with pytest.raises(SystemExit) as stop:
+            main()
+        assert stop.value.code == 1
+        out, err = capsys.readouterr()
+        assert out == ""
+        errors = [line for line in err.splitlines() if line.startswith("error: ")]
+        assert len(errors) == 1, err
+        assert "Traceback" not in err
+        return errors[0]
+
+    yield call
+    assert not any(tmp_path.iterdir())  # nothing half written
+
+
+@pytest.mark.parametrize("option", BAD)
+def test_the_same_bad_value_is_refused_with_the_same_line(
+    option: str, complaint: Callable[..., str]
+) -> None:
+    value, words = BAD[option]
+    lines = {}
+    for command, needed in READING.items():
+        there = parameters(command)
+        if option not in there:
+            continue
+        robot = ("--robot", "ur5") if "--robot" in there and option != "--robot" else ()
+        # A negative number would be taken for an option if it stood alone.
+        lines[command] = complaint(command, FIXTURE, *robot, *needed, f"{option}={value}")
+    assert words in next(iter(lines.values()))
+    assert len(set(lines.values())) == 1, lines
+
+
+def test_every_shared_option_is_tried() -> None:
+    """A new option of several commands needs its bad value here, or is one that takes all."""
+    takes_all = {"--output", "--help", "--json", "--force", "--bands", "--wrench", "--as-printed",
+                 "--sensor-weight", "--contacts", "--reference-columns"}  # fmt: skip
+    count: dict[str, int] = {}
+    for command in READING:
+        for name in parameters(command):
+            if name.startswith("--") and (command, name) not in OWN:
+                count[name] = count.get(name, 0) + 1
+    shared = {name for name, times in count.items() if times > 1}
+    assert shared - takes_all <= set(BAD)
+
+
+def test_a_shared_option_reads_alike_in_every_command() -> None:
+    seen: dict[str, dict[str, tuple[object, ...]]] = {}
+    for command in COMMANDS:
+        for name, p in parameters(command).items():
+            if name.startswith("-") and (command, name) not in OWN:
+                text = (p.help, p.metavar, p.opts, p.is_flag)
+                seen.setdefault(name, {})[command] = text
+    differing = {
+        name: texts for name, texts in seen.items() if len(set(map(str, texts.values()))) > 1
+    }
+    assert not differing
+
+
+@pytest.mark.parametrize("command", READING)
+def test_a_command_that_reads_a_log_reads_it_as_all_do(command: str) -> None:
+    assert set(parameters(command)) >= {"--format", "--columns", "--interval", "--json"}
+
+
+@pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
+def test_a_command_that_estimates_takes_all_that_can_be_asked(command: str) -> None:
+    whole = {*BAD, "--bands", "--wrench", "--as-printed", "--sensor-weight"} - {"--reference"}
+    assert set(parameters(command)) >= whole
+
+
+def test_summaries_are_those_of_the_commands() -> None:
+    """--help shows them without loading a command."""
+    group: Any = typer.main.get_command(make_app())
+    for name, command in COMMANDS.items():
+        assert group.commands[name].help.splitlines()[0] == command.summary
+        assert "Example: vftcli " in group.commands[name].help
