@@ -41,6 +41,8 @@ def test_the_names_of_alignments_are_those_of_the_ladder() -> None:
     [
         ({"alignment": "best"}, "commanded, period, phase, model"),
         ({"alignment": "commanded"}, "add --period S"),
+        ({"period": 0.0}, "--period 0 is not a positive time"),
+        ({"period": float("nan")}, "is not a positive time"),
         ({"free": ["a.csv"], "period": 4.0}, "leave them away with --free"),
         ({"free": ["a.csv"], "free_cycles": "1"}, "leave them away with --free"),
         ({"low_pass": "-3"}, "not a positive cutoff"),

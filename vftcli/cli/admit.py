@@ -75,7 +75,7 @@ class LoopOptions(Bundle):
         "No log: run a scenario's contacts against the controller in simulation, then replay the "
         "force it acted on.",
     )
-    seed: int | None = option(*opt.SEED)
+    seed: int | None = option(*opt.SEED, min=0)
     torque: str = option(
         "--torque", "average|instant", "What the closed loop's sensors report.", "average"
     )

@@ -1,23 +1,22 @@
 """`vftcli bench`: Table II on this machine."""
 
-from typing import Annotated
-
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.bundles import Bundle, flag, option, taken_apart
 
 
-def bench(
-    robot: Annotated[
-        str, typer.Option(opt.ROBOT[0], metavar=opt.ROBOT[1], help=opt.ROBOT[2])
-    ] = "ur5",
-    samples: Annotated[int, typer.Option(min=100, help="Length of the log.")] = 30_060,
-    rounds: Annotated[int, typer.Option(min=1, help="Interleaved repetitions.")] = 7,
-    memory: Annotated[
-        bool, typer.Option("--memory", help="Measure memory too, on a million samples of a Panda.")
-    ] = False,
-    json: opt.Json = False,
-) -> None:
+class BenchOptions(Bundle):
+    """What is measured, and how often."""
+
+    robot: str = option(*opt.ROBOT, "ur5")
+    samples: int = option("--samples", "N", "Length of the log.", 30_060, min=100)
+    rounds: int = option("--rounds", "N", "Interleaved repetitions.", 7, min=1)
+    memory: bool = flag("--memory", "Measure memory too, on a million samples of a Panda.")
+
+
+@taken_apart
+def bench(measured: BenchOptions, json: opt.Json = False) -> None:
     """Time the observers and print the ratios to a bare RNEA loop and to per-sample scripts.
 
     Example: vftcli bench --rounds 3
@@ -26,13 +25,13 @@ def bench(
 
     from vftcli.benchmark import benchmark, memory_per_sample
 
-    result = benchmark(robot, samples, rounds)
-    if memory:
+    result = benchmark(measured.robot, measured.samples, measured.rounds)
+    if measured.memory:
         result["memory_bytes_per_sample"] = memory_per_sample()
     if json:
         typer.echo(json_module.dumps(result, indent=2))
         return
-    typer.echo(f"{result['robot']}, {samples} samples, median of {rounds} rounds")
+    typer.echo(f"{result['robot']}, {measured.samples} samples, median of {measured.rounds} rounds")
     typer.echo(f"{'':<10} {'total':>10} {'per sample':>12} {'paper, its laptop':>18}")
     back = [{"paper_s": None, **row} for row in result["complete_log"]]
     rows = [
@@ -57,7 +56,7 @@ def bench(
         "all of these with dynamics, smoother and tuning included / the four causal ones: "
         f"{ratios['complete_over_core']:.2f}"
     )
-    if memory:
+    if measured.memory:
         typer.echo(
             f"memory beyond the log's own, 1 000 000 samples of a Panda: "
             f"{result['memory_bytes_per_sample']:.0f} B per sample"

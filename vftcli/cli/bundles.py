@@ -32,7 +32,7 @@ class DeclaredOption(NamedTuple):
     typer: Any
 
 
-def option(name: str, metavar: str, help: str, default: object = None) -> Any:  # noqa: ANN401
+def option(name: str, metavar: str, help: str, default: object = None, **limits: float) -> Any:  # noqa: ANN401
     """One option of a bundle that takes a value.
 
     Args:
@@ -40,8 +40,10 @@ def option(name: str, metavar: str, help: str, default: object = None) -> Any:  
         metavar: What its value looks like.
         help: What `--help` says of it.
         default: Its value if it is not given, `REQUIRED` if it has to be.
+        limits: ``min`` and ``max`` of a number, where no room checks it.
     """
-    return DeclaredOption(default, typer.Option(name, metavar=metavar, help=help))
+    how: Any = limits
+    return DeclaredOption(default, typer.Option(name, metavar=metavar, help=help, **how))
 
 
 def flag(name: str, help: str) -> Any:  # noqa: ANN401

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.bundles import Bundle, option, taken_apart
 
 Scenario = Annotated[
     str,
@@ -18,26 +19,24 @@ Scenario = Annotated[
 LogPath = Annotated[
     Path, typer.Option("-o", "--output", metavar="PATH", help="The log file or bag folder.")
 ]
-Seed = Annotated[
-    int | None,
-    typer.Option(min=0, help="Seed of everything drawn; default: the scenario's own."),
-]
-As = Annotated[
-    str,
-    typer.Option(
+
+
+class ExperimentOptions(Bundle):
+    """How the experiment is run, and written."""
+
+    seed: int | None = option(*opt.SEED, min=0)
+    log_format: str = option(
         "--as",
-        metavar="FORMAT",
-        help="rtde, ur-rtde, libfranka, rosbag2 or parquet; default: the vendor's own.",
-    ),
-]
-Settings = Annotated[
-    list[str] | None,
-    typer.Option(
+        "FORMAT",
+        "rtde, ur-rtde, libfranka, rosbag2 or parquet; default: the vendor's own.",
+        "",
+    )
+    settings: opt.Words = option(
         "--set",
-        metavar="KEY=VALUE",
-        help="Repeatable: servo.stiffness=soft, sensing.clock_drift=0.003, duration=8.",
-    ),
-]
+        "KEY=VALUE",
+        "Repeatable: servo.stiffness=soft, sensing.clock_drift=0.003, duration=8.",
+    )
+
 
 WIDTH = 30
 """Width of the progress bar. [characters]"""
@@ -45,14 +44,13 @@ QUICK = 1.0
 """Runs shorter than this show no bar. [s]"""
 
 
+@taken_apart
 def simulate_log(
     scenario: Scenario,
+    experiment: ExperimentOptions,
     output: LogPath = Path(),
-    seed: Seed = None,
-    log_format: As = "",
-    settings: Settings = None,
-    force: opt.Force = False,
     json: opt.Json = False,
+    force: opt.Force = False,
 ) -> None:
     """Simulate an experiment: the log, PATH.truth.parquet and PATH.scenario.toml.
 
@@ -69,14 +67,14 @@ def simulate_log(
         for name, title in listing():
             typer.echo(f"{name:<16} {title}")
         return
-    setup = load_scenario(scenario, settings or ())
+    setup = load_scenario(scenario, experiment.settings or ())
     paths = [output, free_path(output)] if setup.pair else [output]
     check_target(paths, force)
-    runs = simulate_pair(setup, seed, progress_bar())
+    runs = simulate_pair(setup, experiment.seed, progress_bar())
     files = [
         str(file)
         for path, run in zip(paths, runs, strict=True)
-        for file in save(run, path, log_format, force)
+        for file in save(run, path, experiment.log_format, force)
     ]
     if json:
         about = {"scenario": setup.name, "seed": runs[0].seed, "files": files}

@@ -29,8 +29,8 @@ class FreeChoice:
         low_pass: Cutoff of the two-cycle difference [Hz], None for none, or "auto".
 
     Raises:
-        ReferenceTorqueError: If an alignment does not exist or lacks its period, a period or cutoff is
-            not positive, or cycles are named beside other logs.
+        ReferenceTorqueError: If an alignment does not exist or lacks its period, a period or cutoff
+            is not positive, or cycles are named beside other logs.
     """
 
     logs: tuple[Path, ...] = ()
@@ -50,7 +50,9 @@ class FreeChoice:
                 "--period and --free-cycles are for cycles of one log; leave them away with --free"
             )
         if self.period is not None and not self.period > 0.0:
-            raise ReferenceTorqueError(f"--period {self.period:g} is not a positive time in seconds")
+            raise ReferenceTorqueError(
+                f"--period {self.period:g} is not a positive time in seconds"
+            )
         if self.alignment == "commanded" and self.period is None:
             raise ReferenceTorqueError(
                 "alignment commanded needs the commanded period: add --period S"

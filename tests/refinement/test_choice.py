@@ -1,0 +1,28 @@
+"""RefinementChoice: bands, and what is taken off."""
+
+import pytest
+
+from vftcli.refinement.bias import REMOVALS
+from vftcli.refinement.choice import NOTHING, RefinementChoice
+from vftcli.signals.errors import ParameterError
+
+
+def test_nothing_said_needs_no_free_part() -> None:
+    assert RefinementChoice.parsed() == RefinementChoice()
+    assert not RefinementChoice().looks_back
+
+
+def test_bands_and_removal_look_back() -> None:
+    assert RefinementChoice(bands=True).looks_back
+    assert all(
+        RefinementChoice(remove_bias=name).looks_back for name in REMOVALS if name != NOTHING
+    )
+
+
+def test_the_word_for_nothing_is_one_of_the_table() -> None:
+    assert NOTHING in REMOVALS
+
+
+def test_another_removal_is_refused_before_a_log_is_read() -> None:
+    with pytest.raises(ParameterError, match="there is none, free-cycle, model"):
+        RefinementChoice(remove_bias="all")

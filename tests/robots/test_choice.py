@@ -1,0 +1,45 @@
+"""RobotChoice: the arm that is named, or the one the log settles."""
+
+import numpy as np
+import pytest
+
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.errors import ParameterError, RobotError
+from vftcli.signals.recording import Recording
+
+
+def log(joints: int = 6, hint: str | None = None) -> Recording:
+    return Recording(t=np.array([0.0, 0.1]), q=np.zeros((2, joints)), robot_hint=hint)
+
+
+def test_the_named_arm_wins_over_the_log_s() -> None:
+    assert RobotChoice(name="ur5").load(log(hint="ur10e")).name == "ur5"
+    assert RobotChoice().load(log(hint="ur10e")).name == "ur10e"
+
+
+def test_without_either_the_fitting_profiles_are_listed() -> None:
+    with pytest.raises(RobotError, match="choose one with --robot: ur5, ur5e, ur10e, or"):
+        RobotChoice().load(log())
+    with pytest.raises(RobotError, match="choose one with --robot: panda, fr3, or"):
+        RobotChoice().load(log(joints=7))
+
+
+def test_an_arm_that_no_profile_fits_lists_them_all() -> None:
+    with pytest.raises(RobotError, match=r"ur5, ur5e, ur10e, panda, fr3, or .* of 4 joints"):
+        RobotChoice().load(log(joints=4))
+
+
+def test_friction_can_be_left_away() -> None:
+    assert any(f.model != "none" for f in RobotChoice(name="ur5").load(log()).friction)
+    without = RobotChoice.parsed(robot="ur5", friction="none").load(log())
+    assert all(f.model == "none" for f in without.friction)
+
+
+def test_another_friction_is_refused_before_a_log_is_read() -> None:
+    with pytest.raises(ParameterError, match="--friction 'lugre'; there is profile, none"):
+        RobotChoice(friction="lugre")
+
+
+def test_a_payload_that_the_file_has_not_is_refused() -> None:
+    with pytest.raises(RobotError, match="no payload 'bucket'"):
+        RobotChoice(name="ur5", payload="bucket").load(log())
