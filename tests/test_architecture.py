@@ -1,75 +1,290 @@
-"""The architecture is a test: imports point one way, and nothing prints or exits but the CLI."""
+"""The architecture is a test: rooms in one order, no circles, one name for a thing, data not words.
+
+Every rule lists what breaks it, so that a failure names the file.
+"""
 
 import ast
+import tomllib
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 import vftcli
+from vftcli.signals.remarks import WORDS
 
 PACKAGE = Path(vftcli.__file__).parent
 
-LAYERS = [
-    ("signals",),
-    ("readers",),
-    ("robots",),
-    ("repetition",),
-    ("observers",),
-    ("virtual_sensor",),
-    ("refinement", "evaluation", "identification", "simulation", "doctor"),
-    ("admittance",),
-    ("analysis",),
-    ("outputs",),
-    ("pipeline", "benchmark"),
-    ("cli",),
-]
-LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
+ORDER = (
+    "signals",
+    "readers",
+    "robots",
+    "repetition",
+    "observers",
+    "virtual_sensor",
+    "refinement",
+    "evaluation",
+    "identification",
+    "simulation",
+    "doctor",
+    "admittance",
+    "analysis",
+    "outputs",
+    "pipeline",
+    "benchmark",
+    "cli",
+)
+"""Rooms, lowest floor first: a room knows those before it."""
+
+APART = {"refinement", "evaluation", "identification", "simulation", "doctor"}
+"""Rooms that do not know each other, nor does admittance know them."""
+
+KNOWN = {("evaluation", "refinement"), ("admittance", "simulation")}
+"""Pairs of those that do, the first the second."""
+
+FILES = (
+    "cli/",  # asks before it overwrites
+    "outputs/",
+    "readers/",
+    "observers/gains_file.py",
+    "robots/profile.py",
+    "robots/robot.py",
+    "robots/urdf.py",
+    "robots/writing.py",
+    "signals/identity.py",  # the digest of what was read
+    "signals/remarks.py",  # the catalogue of words
+    "simulation/calibration_motions.py",
+    "simulation/load.py",
+    "simulation/saving.py",
+    "simulation/scenario.py",
+    "simulation/schema.py",
+    "simulation/writers/",
+)
+"""Who touches files."""
+
+TOUCHES = {
+    "open", "read_text", "read_bytes", "write_text", "write_bytes", "mkdir", "unlink", "glob",
+    "rglob", "iterdir", "rename", "touch", "read_parquet", "write_parquet", "read_csv",
+    "write_csv", "loadtxt", "savetxt",
+}  # fmt: skip
+"""What a function is called that touches files."""
+
+SENTENCES = {"notes", "remarks", "repairs", "warnings"}
+"""Names of what is read aloud; nothing else may be done with one of its items."""
+
+PARSES = {"partition", "rpartition", "removeprefix", "removesuffix", "startswith", "endswith",
+          "find", "index", "count"}  # fmt: skip
+"""Methods of a text by which code would read a sentence; `split` breaks lines to show them."""
 
 
-def modules() -> list[Path]:
-    return sorted(p for p in PACKAGE.rglob("*.py") if p.parent != PACKAGE or p.stem != "__init__")
+@cache
+def modules() -> dict[str, ast.Module]:
+    """Every file of the package, parsed, by its path in it."""
+    return {
+        str(path.relative_to(PACKAGE)): ast.parse(path.read_text(encoding="utf-8"))
+        for path in sorted(PACKAGE.rglob("*.py"))
+    }
 
 
-def room(path: Path) -> str:
-    """The top-level part of the package a module belongs to."""
-    return path.relative_to(PACKAGE).with_suffix("").parts[0]
+def room(file: str) -> str:
+    """The top-level part of the package that a file belongs to."""
+    return Path(file).with_suffix("").parts[0]
 
 
-def imported(path: Path) -> set[str]:
-    """Top-level parts of the package that a module imports, anywhere in it."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        names = []
+def imported(file: str) -> Iterator[str]:
+    """The files of the package that a file imports, anywhere in it, for types too."""
+    for node in ast.walk(modules()[file]):
+        names: list[str] = []
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            names = [node.module]
-            if node.module == "vftcli":
-                names = [f"vftcli.{alias.name}" for alias in node.names]
-        parts = [name.split(".") for name in names]
-        found |= {p[1] for p in parts if p[0] == "vftcli" and len(p) > 1}
-    return found - {"__version__"}
+            # `from vftcli.robots import kernels` names a file; `… import Robot` its package.
+            each = [f"{node.module}.{alias.name}" for alias in node.names]
+            names = [name if as_file(name) else node.module for name in each]
+        for name in names:
+            if (found := as_file(name)) is not None:
+                yield found
 
 
-@pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(PACKAGE)))
-def test_imports_point_one_way(path: Path) -> None:
-    own = room(path)
-    assert own in LEVEL, f"{own} has no place in the layers"
-    wrong = {n for n in imported(path) if n != own and LEVEL.get(n, 99) >= LEVEL[own]}
-    assert not wrong, f"{own} imports {wrong}, which lie above or beside it"
+def as_file(name: str) -> str | None:
+    """A dotted name's file in the package, None where it is none."""
+    parts = name.split(".")
+    if parts[0] != "vftcli":
+        return None
+    stem = "/".join(parts[1:])
+    return next((f for f in (f"{stem}.py", f"{stem}/__init__.py") if f in modules()), None)
 
 
-SILENT = [path for path in modules() if room(path) != "cli"]
+def functions(file: str) -> Iterator[ast.FunctionDef]:
+    """Every function and method of a file."""
+    for node in ast.walk(modules()[file]):
+        if isinstance(node, ast.FunctionDef):
+            yield node
 
 
-@pytest.mark.parametrize("path", SILENT, ids=lambda p: str(p.relative_to(PACKAGE)))
-def test_only_the_command_line_prints_or_exits(path: Path) -> None:
-    calls = {
-        node.func.id
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
-    }
-    assert not calls & {"print", "exit", "quit"}
+def test_every_room_has_a_place() -> None:
+    assert {room(file) for file in modules()} - {"__init__"} == set(ORDER)
+
+
+def test_rooms_know_only_those_below_them() -> None:
+    wrong = []
+    for file in modules():
+        own = room(file)
+        for other in {room(f) for f in imported(file)} - {own, "__init__"}:
+            beside = other in APART and own in {*APART, "admittance"}
+            if own != "__init__" and (
+                ORDER.index(other) > ORDER.index(own) or (beside and (own, other) not in KNOWN)
+            ):
+                wrong.append(f"{file} knows {other}")
+    assert not wrong
+
+
+def test_no_file_leads_back_to_itself() -> None:
+    """Strongly connected files (Tarjan) of more than one; imports for types count."""
+    graph = {file: set(imported(file)) - {file} for file in modules() if file != "__init__.py"}
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    circles = []
+
+    def visit(file: str) -> None:
+        index[file] = low[file] = len(index)
+        stack.append(file)
+        for other in graph[file] & graph.keys():
+            if other not in index:
+                visit(other)
+            if other in stack:
+                low[file] = min(low[file], low[other])
+        if low[file] == index[file]:
+            circle = stack[stack.index(file) :]
+            del stack[stack.index(file) :]
+            if len(circle) > 1:
+                circles.append(circle)
+
+    for file in graph:
+        if file not in index:
+            visit(file)
+    assert not circles
+
+
+@pytest.mark.xfail(strict=True, reason="a Cell of a log's table and one of a printed table")
+def test_a_class_name_stands_for_one_thing() -> None:
+    names = defaultdict(list)
+    for file, tree in modules().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                names[node.name].append(file)
+    assert not {name: files for name, files in names.items() if len(files) > 1}
+
+
+def test_only_the_command_line_prints_or_exits() -> None:
+    wrong = [
+        f"{file}:{node.lineno}"
+        for file, tree in modules().items()
+        for node in ast.walk(tree)
+        if room(file) != "cli"
+        and isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in {"print", "exit", "quit"}
+    ]
+    assert not wrong
+
+
+def test_only_readers_outputs_and_loaders_touch_files() -> None:
+    wrong = []
+    for file, tree in modules().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and not file.startswith(FILES):
+                # A method `open` may open anything; Path.open is told by the others beside it.
+                bare = getattr(node.func, "id", None)
+                name = bare or getattr(node.func, "attr", None)
+                if name in TOUCHES and (bare or name != "open"):
+                    wrong.append(f"{file}:{node.lineno} {name}")
+    assert not wrong
+
+
+@pytest.mark.xfail(strict=True, reason="notes are not all remarks yet")
+def test_no_code_reads_a_sentence() -> None:
+    assert not [
+        f"{file}: {ast.unparse(node)}"
+        for file, tree in modules().items()
+        for node in ast.walk(tree)
+        if reads_a_sentence(node)
+    ]
+
+
+def reads_a_sentence(node: ast.AST) -> bool:
+    """Whether an expression looks into the words of an error or a remark."""
+    if isinstance(node, ast.Compare):
+        holds = any(isinstance(op, ast.In | ast.NotIn) for op in node.ops)
+        return holds and any(is_text(x) for x in node.comparators)
+    if isinstance(node, ast.Subscript):
+        name = getattr(node.value, "attr", None) or getattr(node.value, "id", None)
+        value = node.slice.operand if isinstance(node.slice, ast.UnaryOp) else node.slice
+        return name in SENTENCES and isinstance(value, ast.Constant | ast.Name)
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+        return node.func.attr in PARSES and is_text(node.func.value)
+    return False
+
+
+def is_text(node: ast.AST) -> bool:
+    """Whether it is the text of an error or a remark: `str(error)`, `str(note)`, `note`."""
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "str":
+        node = node.args[0] if node.args else node
+        return isinstance(node, ast.Name) and node.id in {"error", "note", "remark", "warning"}
+    return isinstance(node, ast.Name) and node.id in {"note", "remark"}
+
+
+def test_a_function_is_asked_for_a_dozen_things_at_most() -> None:
+    """Parameters written by hand: 12 in commands, 10 elsewhere; those of classes are fields."""
+    wrong = []
+    for file in modules():
+        most = 12 if room(file) == "cli" else 10
+        for function in functions(file):
+            a = function.args
+            count = len(a.posonlyargs) + len(a.args) + len(a.kwonlyargs)
+            if count > most:
+                wrong.append(f"{file} {function.name}: {count}")
+    assert not wrong
+
+
+@pytest.mark.xfail(strict=True, reason="the options are not all made from the choices yet")
+def test_a_file_fits_a_few_screens() -> None:
+    lines = {file: (PACKAGE / file).read_text("utf-8").count("\n") for file in modules()}
+    assert not {file: count for file, count in lines.items() if count > 400}
+
+
+def codes() -> Counter[str]:
+    """The code of every remark that the package makes."""
+    return Counter(
+        node.args[0].value
+        for tree in modules().values()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in {"fact", "caution", "warning", "Remark"}
+        and node.args
+        and isinstance(node.args[0], ast.Constant)
+    )
+
+
+def catalogue() -> Counter[str]:
+    """The codes of the catalogue, all rooms together."""
+    each = (tomllib.loads(p.read_text("utf-8")) for p in sorted(WORDS.glob("*.toml")))
+    return Counter(code for words in each for code in words)
+
+
+def test_every_remark_has_its_words_once() -> None:
+    assert not codes().keys() - catalogue().keys()
+    assert not [code for code, count in catalogue().items() if count > 1]
+
+
+def test_no_words_are_left_over() -> None:
+    """A code that stands in no call is named in a table, in full: nothing puts a code together."""
+    text = "\n".join((PACKAGE / file).read_text("utf-8") for file in modules())
+    assert not [code for code in catalogue() if f'"{code}"' not in text]
 
 
 def test_the_command_line_starts_without_heavy_packages() -> None:

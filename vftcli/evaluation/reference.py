@@ -1,4 +1,4 @@
-"""Reference: what estimates are judged by, and the two that need nothing but the log."""
+"""ReferenceLoad: what estimates are judged by, and the two that need nothing but the log."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from vftcli.signals.wrench import Wrench
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reference:
+class ReferenceLoad:
     """What estimates are judged by, on the log's clock.
 
     Attributes:
@@ -24,10 +24,10 @@ class Reference:
     wrench: Wrench | None = None
 
 
-def zero_reference(recording: Recording) -> Reference:
+def zero_reference(recording: Recording) -> ReferenceLoad:
     """No contact at all: the reference of a free motion, exact if the motion really was free."""
     shape = recording.q.shape
-    return Reference(
+    return ReferenceLoad(
         torque=ExternalTorque(
             name="zero",
             t=recording.t,
@@ -38,7 +38,7 @@ def zero_reference(recording: Recording) -> Reference:
     )
 
 
-def vendor_reference(recording: Recording) -> Reference:
+def vendor_reference(recording: Recording) -> ReferenceLoad:
     """The vendor's own estimate in the log, torque on the robot; its error is not known.
 
     Raises:
@@ -46,4 +46,6 @@ def vendor_reference(recording: Recording) -> Reference:
     """
     tau = recording.require("tau_ext")
     remarks = (caution("reference-vendor"),)
-    return Reference(torque=ExternalTorque(name="vendor", t=recording.t, tau=tau, remarks=remarks))
+    return ReferenceLoad(
+        torque=ExternalTorque(name="vendor", t=recording.t, tau=tau, remarks=remarks)
+    )

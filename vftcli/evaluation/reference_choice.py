@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from vftcli.evaluation.reference import Reference, vendor_reference, zero_reference
+from vftcli.evaluation.reference import ReferenceLoad, vendor_reference, zero_reference
 from vftcli.evaluation.reference_file import file_reference
 from vftcli.evaluation.reference_sensor import sensor_reference
 from vftcli.repetition.free_motion import FreeMotion
@@ -79,10 +79,10 @@ class ReferenceSource:
         return self.motion.log.robot
 
 
-REFERENCES: dict[str, Callable[[ReferenceSource], Reference]] = {
+REFERENCES: dict[str, Callable[[ReferenceSource], ReferenceLoad]] = {
     "zero": lambda source: zero_reference(source.recording),
     "vendor": lambda source: vendor_reference(source.recording),
-    "two-cycle": lambda source: Reference(torque=two_cycle_reference(source.motion)),
+    "two-cycle": lambda source: ReferenceLoad(torque=two_cycle_reference(source.motion)),
     "sensor": lambda source: sensor_reference(
         source.recording, source.robot, source.mounting, source.logged
     ),
@@ -90,7 +90,7 @@ REFERENCES: dict[str, Callable[[ReferenceSource], Reference]] = {
 """Name at the command line → what makes it; ``file:PATH`` is the one name with a path in it."""
 
 
-def make_reference(source: ReferenceSource, choice: ReferenceChoice) -> Reference:
+def make_reference(source: ReferenceSource, choice: ReferenceChoice) -> ReferenceLoad:
     """The reference that is asked for, on the log's clock.
 
     Raises:

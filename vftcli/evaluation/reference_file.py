@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.evaluation.reference import Reference
+from vftcli.evaluation.reference import ReferenceLoad
 from vftcli.evaluation.reference_sensor import torque_of
 from vftcli.readers.references import read_reference
 from vftcli.robots.robot import Robot
@@ -26,7 +26,7 @@ def file_reference(
     robot: Robot,
     mounting: Mounting,
     columns: str | None = None,
-) -> Reference:
+) -> ReferenceLoad:
     """External torque, wrench or both from a table whose clock is the log's own.
 
     A file without torques gives those of its wrench, Jᵀ w. A wrench is taken to be in base axes
@@ -57,7 +57,9 @@ def file_reference(
         if wrench is None:
             raise ReferenceTorqueError(f"{path}: it holds neither a torque nor a wrench")
         remarks = (caution("reference-wrench-file", file=path.name), *wrench.remarks)
-        return Reference(torque=torque_of(wrench, recording, robot, name, remarks), wrench=wrench)
+        return ReferenceLoad(
+            torque=torque_of(wrench, recording, robot, name, remarks), wrench=wrench
+        )
     if table.tau.shape[1] != recording.joints:
         raise ReferenceTorqueError(
             f"{path}: {table.tau.shape[1]} torque columns for a log of {recording.joints} joints"
@@ -68,7 +70,7 @@ def file_reference(
         caution("reference-file", file=path.name, covered=covered, samples=recording.samples),
     )
     torque = ExternalTorque(name=name, t=recording.t, tau=tau, remarks=remarks)
-    return Reference(torque=torque, wrench=wrench)
+    return ReferenceLoad(torque=torque, wrench=wrench)
 
 
 def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path) -> Array:

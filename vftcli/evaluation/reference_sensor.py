@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vftcli.evaluation.reference import Reference
+from vftcli.evaluation.reference import ReferenceLoad
 from vftcli.robots.drive import check_joints
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.robot import Robot
@@ -16,7 +16,7 @@ from vftcli.virtual_sensor.log_wrench import logged_wrench
 
 def sensor_reference(
     recording: Recording, robot: Robot, mounting: Mounting = NOTHING, wrench: Wrench | None = None
-) -> Reference:
+) -> ReferenceLoad:
     """τ_ext = J_Fᵀ w of the wrench that the log holds.
 
     Args:
@@ -32,7 +32,9 @@ def sensor_reference(
     check_joints(recording, robot)
     wrench = wrench or logged_wrench(recording, robot.chain, mounting)
     remarks = (caution("reference-sensor"), *wrench.remarks)
-    return Reference(torque=torque_of(wrench, recording, robot, "sensor", remarks), wrench=wrench)
+    return ReferenceLoad(
+        torque=torque_of(wrench, recording, robot, "sensor", remarks), wrench=wrench
+    )
 
 
 def torque_of(

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.evaluation.reference import Reference
+from vftcli.evaluation.reference import ReferenceLoad
 from vftcli.robots.kinematics import link_poses
 from vftcli.robots.robot import Robot
 from vftcli.signals.recording import Recording
@@ -14,7 +14,7 @@ from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 
 def reference_wrench(
-    recording: Recording, robot: Robot, reference: Reference, sensor: VirtualSensor
+    recording: Recording, robot: Robot, reference: ReferenceLoad, sensor: VirtualSensor
 ) -> Wrench:
     """The wrench that estimates are judged by, in the virtual sensor's frame.
 
