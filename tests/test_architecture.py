@@ -39,9 +39,9 @@ ORDER = (
 """Rooms, lowest floor first: a room knows those before it."""
 
 APART = {"refinement", "evaluation", "identification", "simulation", "doctor"}
-"""Rooms that do not know each other, nor does admittance know them."""
+"""Rooms that do not know each other."""
 
-KNOWN = {("evaluation", "refinement"), ("admittance", "simulation")}
+KNOWN = {("evaluation", "refinement")}
 """Pairs of those that do, the first the second."""
 
 FILES = (
@@ -133,10 +133,8 @@ def test_rooms_know_only_those_below_them() -> None:
     for file in modules():
         own = room(file)
         for other in {room(f) for f in imported(file)} - {own, "__init__"}:
-            beside = other in APART and own in {*APART, "admittance"}
-            if own != "__init__" and (
-                ORDER.index(other) > ORDER.index(own) or (beside and (own, other) not in KNOWN)
-            ):
+            beside = {own, other} <= APART and (own, other) not in KNOWN
+            if own != "__init__" and (beside or ORDER.index(other) > ORDER.index(own)):
                 wrong.append(f"{file} knows {other}")
     assert not wrong
 
