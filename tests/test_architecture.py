@@ -167,7 +167,6 @@ def test_no_file_leads_back_to_itself() -> None:
     assert not circles
 
 
-@pytest.mark.xfail(strict=True, reason="a Cell of a log's table and one of a printed table")
 def test_a_class_name_stands_for_one_thing() -> None:
     names = defaultdict(list)
     for file, tree in modules().items():
