@@ -1,6 +1,7 @@
 """The two-cycle difference: the paper's ground truth, from repeated cycles or from a free run."""
 
 from collections.abc import Mapping, Sequence
+from itertools import permutations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -173,11 +174,14 @@ def measured_scale(partners: Partners, chosen: Difference) -> Array | None:
         return None
     if np.any(partners.free):
         return error_ratio(chosen, partners.free & chosen.error.known)
-    first, second = pairings[:2]
-    shared = [pair_runs(first, second)]
-    both = {"found": shared, "commanded": shared}
-    spread = differences(first.free, both, (chosen.rung,), (chosen.cutoff,))[0]
-    return error_ratio(spread, spread.error.known)
+    ratios = []
+    # Every pair both ways round: which run is named first must not decide the floor.
+    for first, second in permutations(pairings, 2):
+        shared = [pair_runs(first, second)]
+        both = {"found": shared, "commanded": shared}
+        spread = differences(first.free, both, (chosen.rung,), (chosen.cutoff,))[0]
+        ratios.append(error_ratio(spread, spread.error.known))
+    return np.asarray(np.sqrt(np.mean(np.square(ratios), axis=0)))
 
 
 def pair_runs(first: Pairing, second: Pairing) -> Pairing:
