@@ -11,8 +11,6 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-import pytest
-
 import vftcli
 from vftcli.signals.remarks import WORDS
 
@@ -203,7 +201,6 @@ def test_only_readers_outputs_and_loaders_touch_files() -> None:
     assert not wrong
 
 
-@pytest.mark.xfail(strict=True, reason="notes are not all remarks yet")
 def test_no_code_reads_a_sentence() -> None:
     assert not [
         f"{file}: {ast.unparse(node)}"
