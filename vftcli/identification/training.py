@@ -21,6 +21,7 @@ from vftcli.identification.least_squares import ColumnFit, fit_column
 from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
 from vftcli.identification.scoring import apparent_load, predicted_torque, rigid_torque
 from vftcli.robots.drive import drive_torque, uses_current
+from vftcli.robots.friction import dry_torque
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
@@ -200,7 +201,7 @@ def fit_without_contacts(
     fits = fit_frictions(data, weights)
     left, remarks = all_residuals(data, fits), list[Remark]()
     for k, (motion, residual) in enumerate(zip(data.motions, left, strict=True)):
-        if found := find_contacts(motion, residual, dry_friction(data, k, fits)):
+        if found := find_contacts(motion, residual, fitted_dry_friction(data, k, fits)):
             weights[k] = weights[k] * outside_contacts(motion, found)[:, None]
             remarks.append(contacts_remark(motion, found))
     if remarks:
@@ -255,14 +256,12 @@ def model_doubts(
             yield remark
 
 
-def dry_friction(data: Training, log: int, fits: Sequence[JointFit | None]) -> Array:
-    """Coulomb torque of each joint along a log, load included. (M, n) [N·m]"""
+def fitted_dry_friction(data: Training, log: int, fits: Sequence[JointFit | None]) -> Array:
+    """Dry friction of each joint along a log by its fit, load included. (M, n) [N·m]"""
     motion, columns = data.motions[log], data.columns[log]
     out = np.zeros(motion.q.shape)
     for j, fit in enumerate(fits):
         if fit is not None:
             values = dict(zip(fit.shape.terms, fit.fit.values, strict=False))
-            load = columns.load[motion.kept, j]
-            out[:, j] = values.get("coulomb", 0.0) + values.get("stribeck", 0.0)
-            out[:, j] += values.get("load_coulomb", 0.0) * load
+            out[:, j] = dry_torque(values, columns.load[motion.kept, j])
     return out

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.refinement.baseline import Baseline, FreeReading
-from vftcli.repetition.drive_run import dry_friction
+from vftcli.robots.friction import dry_friction
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.remarks import Remark, Where, fact
 
@@ -57,7 +57,9 @@ def budget(found: Baseline, reading: FreeReading) -> Budget:
     velocity = [piece.run.recording.require("dq")[piece.inside] for piece in found.pieces]
     by_friction = modelled * friction_share(np.concatenate(velocity), reading.samples)
     # A torque anywhere within ±F_c is F_c/√3 rms.
-    hidden = dry_friction(found.motion.log.robot) ** 2 / 3.0 * found.standing.mean(axis=0)
+    robot = found.motion.log.robot
+    # Stiction may hold any torque up to dry friction: evenly spread, its square is a third.
+    hidden = dry_friction(robot.friction, robot.joints) ** 2 / 3.0 * found.standing.mean(axis=0)
     squares = {
         "noise": noise,
         "friction": by_friction,

@@ -6,7 +6,7 @@ import numpy as np
 
 from vftcli.repetition.standstill import duration, standing
 from vftcli.robots.drive import drive_torque
-from vftcli.robots.friction import SMOOTHING, friction_torque
+from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
@@ -72,15 +72,7 @@ def drive_run_of(recording: Recording, robot: Robot, terms: DynamicsTerms) -> Dr
         torque=torque,
         model=np.gradient(terms.p, recording.t, axis=0) - terms.mu + torque,
         momentum=terms.p,
-        coulomb=dry_friction(robot),
+        coulomb=dry_friction(robot.friction, robot.joints),
         standstill_s=standstill_s,
         standing=standing(recording.t, standstill_s),
     )
-
-
-def dry_friction(robot: Robot) -> Array:
-    """Friction at a speed at which the smoothed sign has settled, as half the step there. (n,)"""
-    slow = np.full((1, robot.joints), 5.0 * SMOOTHING)
-    there, back = (friction_torque(robot.friction, v)[0] for v in (slow, -slow))
-    step: Array = 0.5 * np.abs(there - back)
-    return step

@@ -131,3 +131,32 @@ def friction_torque(
 def stacked(parameters: Sequence[Mapping[str, float]]) -> dict[str, Array]:
     """Turn one mapping a joint into one array a parameter. (n,) each"""
     return {key: np.array([p[key] for p in parameters]) for key in parameters[0]}
+
+
+def dry_friction(friction: Sequence[JointFriction], joints: int) -> Array:
+    """Torque of each joint's dry friction, unloaded: what can hold it at rest. (n,) [N·m]
+
+    Args:
+        friction: One model a joint; empty for a frictionless arm.
+        joints: Number of joints n.
+    """
+    if not friction:
+        return np.zeros(joints)
+    return np.array([float(dry_torque(joint.parameters)) for joint in friction])
+
+
+def dry_torque(parameters: Mapping[str, float], load: Array | float = 0.0) -> Array:
+    """Half the step that one joint's friction makes where its velocity changes sign. Like `load`
+
+    It is taken from the parameters rather than from the friction at some low speed: the smoothing
+    of the sign, the viscous part and the fading of the breakaway torque would then count in it, in
+    each robot another share.
+
+    Args:
+        parameters: A joint's numbers, keys as in `MODELS`.
+        load: Torque the gear carries. [N·m]
+    """
+    coulomb = parameters.get("coulomb", 0.0) + parameters.get("stribeck", 0.0)
+    # A sigmoid runs from one saturation to the other, which lie one amplitude apart.
+    coulomb += 0.5 * abs(parameters.get("amplitude", 0.0))
+    return np.asarray(coulomb + parameters.get("load_coulomb", 0.0) * np.abs(load))
