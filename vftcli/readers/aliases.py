@@ -141,10 +141,15 @@ def _pick_of(table: Table, signal: str, groups: dict[str, Group]) -> Pick | None
             f"{table.path}: the columns of {name} are numbered "
             f"{', '.join(map(str, group.indices[:12]))}, with holes. Name them with --columns."
         )
+    return vendor_pick(signal, name, group.cells)
+
+
+def vendor_pick(signal: str, name: str, cells: tuple[Cell, ...]) -> Pick:
+    """The cells of a vendor's field as a signal; libfranka's residual with its sign turned."""
     turned = name in TURNED
     return Pick(
         signal=signal,
-        cells=group.cells,
+        cells=cells,
         factor=-1.0 if turned else 1.0,
         remark=RESIDUAL_TURNED if turned else None,
     )

@@ -7,23 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import RESIDUAL_TURNED
 from vftcli.readers.columns import parse_columns
+from vftcli.readers.libfranka import read_array_fields
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Cell, Column, Pick, Picks, checked, picked
-from vftcli.readers.tables import ArrayTable, from_table, numpy_array
+from vftcli.readers.table import Column
+from vftcli.readers.tables import ArrayTable, check_npy_header, from_table, numpy_array
 from vftcli.signals.errors import LogError
-from vftcli.signals.wrench import STIFFNESS_FRAME
 
-PANDA_PY = {
-    "q": "q",
-    "dq": "dq",
-    "torque": "tau_J",
-    "tau_ext": "tau_ext_hat_filtered",
-    "wrench": "O_F_ext_hat_K",
-}
-"""Field of Recording → key of panda-py's get_log()."""
+PANDA_PY = ("q", "dq", "tau_J", "tau_ext_hat_filtered", "O_F_ext_hat_K")
+"""The fields of libfranka's state that are taken from panda-py's get_log()."""
 
 
 def read_npz(file: LogFile, request: ReadChoice) -> RawLog:
@@ -51,26 +44,15 @@ def npz_arrays(file: LogFile) -> dict[str, Column]:
                 if member.filename.endswith(".npy"):
                     with bundle.open(member) as stream:
                         content = stream.read(limit + 1)
-                    check_claim(file, content)
+                    member_head = LogFile(path=file.path, head=content)
+                    check_npy_header(member_head, len(content))  # before it is believed
                     arrays[member.filename.removesuffix(".npy")] = numpy_array(file.path, content)
     except (
-        zipfile.BadZipFile,
-        NotImplementedError,
-        RuntimeError,
-        EOFError,
-        OSError,
-        ValueError,
-    ) as e:
+        zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, ValueError,
+    ) as e:  # fmt: skip
         reason = str(e).split("\n")[0][:120]
         raise LogError(f"{file.path}: a damaged .npz file ({reason})") from None
     return arrays
-
-
-def check_claim(file: LogFile, content: bytes) -> None:
-    """Raise a LogError if an array's header claims more than its member holds."""
-    from vftcli.readers.tables import check_npy_header
-
-    check_npy_header(LogFile(path=file.path, head=content), len(content))
 
 
 def read_arrays(file: LogFile, arrays: Mapping[str, Column], request: ReadChoice) -> RawLog:
@@ -89,7 +71,7 @@ def read_arrays(file: LogFile, arrays: Mapping[str, Column], request: ReadChoice
             "name them, as in t[ms]=time,q=q,tau=tau_J."
         )
     if {"q", "time"} <= set(shaped) and {"tau_J", "O_T_EE", "dq"} & set(shaped):
-        return _read_panda_py(table, request)
+        return read_array_fields(table, PANDA_PY, request)
     return from_table(table, request)
 
 
@@ -100,34 +82,6 @@ def _shaped(array: Column) -> Column:
     if array.ndim == 2 and array.shape[1] == 1:
         return array[:, 0]
     return array
-
-
-def _read_panda_py(table: ArrayTable, request: ReadChoice) -> RawLog:
-    """Read panda-py's log: time in milliseconds, the vendor's residual turned."""
-    names = list(table.columns)
-    signals = []
-    for signal, name in PANDA_PY.items():
-        width = table.lists.get(names.index(name)) if name in names else None
-        if width is None:
-            continue
-        turned = signal == "tau_ext"
-        signals.append(
-            Pick(
-                signal=signal,
-                cells=tuple(Cell(names.index(name), j) for j in range(width)),
-                factor=-1.0 if turned else 1.0,
-                remark=RESIDUAL_TURNED if turned else None,
-            )
-        )
-    clock = Pick(signal="t", cells=(Cell(names.index("time")),), factor=1e-3, unit="ms")
-    picks = checked(table, Picks(signals=tuple(signals), clock=clock))
-    return picked(
-        table,
-        picks,
-        request,
-        clock_name="robot clock (milliseconds since start)",
-        wrench_frame=STIFFNESS_FRAME,
-    )
 
 
 def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:

@@ -1,7 +1,7 @@
 """Cleaning: what every log goes through on its way to a Recording. Nothing is repaired silently."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,9 @@ ABSURD_STAMP = 1e19
 ABSURD = 1e9
 """Values as large as this are no measurement in any unit; anywhere in a log they are refused."""
 
+ONE_TURN, TWO_TURNS = 2 * np.pi + 0.1, 13.0
+"""How far a joint goes from its zero, with a little to spare: of seven-joint arms, of any. [rad]"""
+
 GAP_STEPS = 4.0
 """A step this many times the median is reported as a gap."""
 
@@ -34,14 +37,7 @@ SEGMENT_ROWS = 20
 """A stretch between two restarts of the clock that is shorter is not a recording of its own."""
 
 
-@dataclass
-class Findings:
-    """What cleaning did and saw, gathered along the way."""
-
-    remarks: list[Remark] = field(default_factory=list)
-    duplicates: int = 0
-
-
+@np.errstate(all="ignore")  # whatever a damaged file holds is judged, not computed with
 def cleaned(
     raw: RawLog,
     path: Path,
@@ -59,40 +55,19 @@ def cleaned(
         LogError: If a signal holds NaN or infinity, or its unit cannot be radians.
         ClockError: If the clock is not finite, runs backwards, or holds no samples.
     """
-    with np.errstate(all="ignore"):  # whatever a damaged file holds is judged, not computed with
-        return _cleaned(raw, path, format_name, sha256, label)
-
-
-def _cleaned(
-    raw: RawLog, path: Path, format_name: str, sha256: str | Callable[[], str], label: str
-) -> Recording:
     rows = len(raw.stamps)
     if rows == 0:
         raise ClockError(f"{path}: no samples; the log holds a header only.")
     if raw.segment is not None:
         raw = segment_of(raw, raw.segment, path)
-    findings = Findings(list(raw.remarks))
-    raw = without_leading_garbage(raw, findings)
+    raw = without_leading_garbage(raw)
     refuse_unknown_numbers(raw, path)
     refuse_backward_steps(raw, path)
-    raw = without_repeats(raw, findings)
+    fresh = without_repeats(raw)
     if raw.degrees_possible:
-        refuse_degrees(raw.signals["q"], path)
-    t = seconds(raw)
-    report_gaps(t, findings)
-    source = Source(
-        path=path,
-        label=label,
-        format=format_name,
-        sha256=sha256,
-        clock=raw.clock,
-        t0=float(raw.stamps[0]) * raw.tick + raw.origin,
-        t0_ns=_nanoseconds(raw),
-        rows=rows,
-        duplicates=findings.duplicates,
-        remarks=tuple(findings.remarks),
-    )
-    signals = {name: handed_over(np.ascontiguousarray(v)) for name, v in raw.signals.items()}
+        refuse_degrees(fresh, path)
+    t = seconds(fresh)
+    signals = {name: handed_over(np.ascontiguousarray(v)) for name, v in fresh.signals.items()}
     return Recording(
         t=handed_over(t),
         **signals,
@@ -101,7 +76,18 @@ def _cleaned(
         robot_hint=raw.robot_hint,
         payload_mass=raw.payload_mass,
         payload_com=raw.payload_com,
-        source=source,
+        source=Source(
+            path=path,
+            label=label,
+            format=format_name,
+            sha256=sha256,
+            clock=raw.clock,
+            t0=float(raw.stamps[0]) * raw.tick + raw.origin,
+            t0_ns=first_nanosecond(raw),
+            rows=rows,
+            duplicates=len(raw.stamps) - len(fresh.stamps),
+            remarks=(*fresh.remarks, *gaps_in(t)),
+        ),
     )
 
 
@@ -111,20 +97,25 @@ def seconds(raw: RawLog) -> Array:
     return elapsed if raw.tick == 1.0 else elapsed * raw.tick
 
 
-def _nanoseconds(raw: RawLog) -> int | None:
+def first_nanosecond(raw: RawLog) -> int | None:
+    """The first stamp in whole nanoseconds, None where the log does not count them. [ns]"""
     if raw.stamps.dtype.kind not in "iu" or raw.origin:
         return None
     per_tick = round(raw.tick * 1e9)
     return int(raw.stamps[0]) * per_tick if per_tick >= 1 else None
 
 
-def kept(raw: RawLog, keep: Mask | slice) -> RawLog:
-    """Return the log with some of its rows only."""
-    signals = {name: value[keep] for name, value in raw.signals.items()}
-    return replace(raw, stamps=raw.stamps[keep], signals=signals)
+def kept(raw: RawLog, keep: Mask | slice, *remarks: Remark) -> RawLog:
+    """The log with some of its rows only, and what is to be said of the others."""
+    return replace(
+        raw,
+        stamps=raw.stamps[keep],
+        signals={name: value[keep] for name, value in raw.signals.items()},
+        remarks=(*raw.remarks, *remarks),
+    )
 
 
-def without_leading_garbage(raw: RawLog, findings: Findings) -> RawLog:
+def without_leading_garbage(raw: RawLog) -> RawLog:
     """Drop the rows at the start that a misaligned packet left: absurd values, then a time jump.
 
     Without an absurd value nothing is dropped, so that a jump of the clock alone is not hidden.
@@ -139,18 +130,18 @@ def without_leading_garbage(raw: RawLog, findings: Findings) -> RawLog:
     if not absurd.any() or absurd.all():
         return raw
     absurd |= tiny  # tiny values alone are a simulation at rest
-    jump = _last_jump(raw, head.stop)
+    jump = last_jump(raw, head.stop)
     if not absurd[0] and jump == 0:
         return raw  # a lone bad value among good rows of one clock is not a misaligned packet
     count = max(int(np.flatnonzero(absurd)[-1]) + 1, jump)
     if count >= len(raw.stamps) - 1 or absurd[:count].mean() < 0.1:
         return raw
     code = "leading-garbage" if count > 1 else "leading-garbage-row"
-    findings.remarks.append(fact(code, rows=count))
-    return replace(kept(raw, slice(count, None)), first_row=raw.first_row + count)
+    good = kept(raw, slice(count, None), fact(code, rows=count))
+    return replace(good, first_row=raw.first_row + count)
 
 
-def _last_jump(raw: RawLog, rows: int) -> int:
+def last_jump(raw: RawLog, rows: int) -> int:
     """Index of the row after the last backward or enormous step among the first rows, or 0."""
     steps = np.diff(raw.stamps[:rows].astype(np.float64) * raw.tick)
     usual = np.median(np.diff(raw.stamps.astype(np.float64))) * raw.tick
@@ -240,54 +231,51 @@ def segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
         first_row=first + 1,
         last_row=last,
     )
-    taken = kept(raw, slice(first, last))
-    return replace(taken, first_row=raw.first_row + first, remarks=(*raw.remarks, remark))
+    return replace(kept(raw, slice(first, last), remark), first_row=raw.first_row + first)
 
 
-def without_repeats(raw: RawLog, findings: Findings) -> RawLog:
+def without_repeats(raw: RawLog) -> RawLog:
     """Drop rows whose stamp repeats the one before, and say so."""
     fresh = np.concatenate([[True], np.diff(raw.stamps) > 0])
-    repeats = int(len(fresh) - fresh.sum())
-    if repeats == 0:
-        return raw
     again = np.flatnonzero(~fresh)
-    changed = np.zeros(repeats, dtype=bool)
+    if again.size == 0:
+        return raw
+    changed = np.zeros(again.size, dtype=bool)
     for value in raw.signals.values():
         changed |= (value[again] != value[again - 1]).any(axis=1)
-    findings.duplicates = repeats
-    code = "repeats-dropped" if repeats > 1 else "repeat-dropped"
-    findings.remarks.append(fact(code, rows=repeats))
+    remarks = [fact("repeats-dropped" if again.size > 1 else "repeat-dropped", rows=again.size)]
     if different := int(changed.sum()):
-        findings.remarks.append(caution("repeats-differ", changed=different, repeats=repeats))
-    return kept(raw, fresh)
+        remarks.append(caution("repeats-differ", changed=different, repeats=again.size))
+    return kept(raw, fresh, *remarks)
 
 
-def report_gaps(t: Array, findings: Findings) -> None:
-    """Report steps several times the median; they are kept as they are."""
-    if len(t) < 3:
-        return
-    steps = np.diff(t)
+def gaps_in(t: Array) -> tuple[Remark, ...]:
+    """A remark on steps several times the median, which are kept as they are."""
     gaps = gaps_of(t, GAP_STEPS)
-    if gaps.size:
-        k = int(gaps[np.argmax(steps[gaps])])
-        remark = caution(
-            "clock-gaps" if gaps.size > 1 else "clock-gap",
-            gaps=int(gaps.size),
-            steps=GAP_STEPS,
-            longest_s=float(steps[k]),
-            at_s=float(t[k]),
-        )
-        findings.remarks.append(remark)
+    if len(t) < 3 or not gaps.size:
+        return ()
+    steps = np.diff(t)
+    k = int(gaps[np.argmax(steps[gaps])])
+    remark = caution(
+        "clock-gaps" if gaps.size > 1 else "clock-gap",
+        gaps=int(gaps.size),
+        steps=GAP_STEPS,
+        longest_s=float(steps[k]),
+        at_s=float(t[k]),
+    )
+    return (remark,)
 
 
-def refuse_degrees(q: Array, path: Path) -> None:
+def refuse_degrees(raw: RawLog, path: Path) -> None:
     """Raise a LogError if positions of unstated unit can hardly be radians.
 
-    No joint of these arms turns through 13 rad; the seven-joint arms stay within ±2π.
+    The robot is not known yet, and a reader knows no robots: what holds for all must do. No joint
+    goes further than two turns from its zero; those of the arms with seven stay within one.
     """
+    q = raw.signals["q"]
     largest, travel = float(np.max(np.abs(q))), float(np.max(np.ptp(q, axis=0)))
-    limit = 2 * np.pi + 0.1 if q.shape[1] == 7 else 13.0
-    if largest > limit or travel > 13.0:
+    limit = ONE_TURN if q.shape[1] == 7 else TWO_TURNS
+    if largest > limit or travel > TWO_TURNS:
         raise LogError(
             f"{path}: positions reach {largest:.4g} and travel {travel:.4g}, which looks like "
             "degrees. Say the unit with --columns: q[deg]=… or q[rad]=… (q[deg]:"

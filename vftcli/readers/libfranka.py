@@ -2,17 +2,18 @@
 
 import json
 import re
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import RESIDUAL_TURNED
+from vftcli.readers.aliases import vendor_pick
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Cell, Pick, Picks, checked, picked
+from vftcli.readers.table import Cell, Column, Pick, Picks, Table, checked, picked
 from vftcli.readers.tables import ArrayTable
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import STIFFNESS_FRAME
 
 JOINTS = 7
@@ -24,6 +25,8 @@ OLD_GROUPS = ("q", "q_d", "dq", "dq_d", "tau_J", "tau_ext_hat_filtered")
 The names q_d and dq_d come twice (the state's first, then the command's), so position decides.
 """
 
+WRENCH = "O_F_ext_hat_K"
+
 FIELDS = {
     "q": "q",
     "q_d": "target_q",
@@ -31,33 +34,41 @@ FIELDS = {
     "dq_d": "target_dq",
     "tau_J": "torque",
     "tau_ext_hat_filtered": "tau_ext",
+    WRENCH: "wrench",
 }
 """libfranka's name → field of Recording."""
 
-
-def _pick(name: str, cells: tuple[Cell, ...]) -> Pick:
-    turned = name == "tau_ext_hat_filtered"
-    return Pick(
-        signal=FIELDS[name],
-        cells=cells,
-        factor=-1.0 if turned else 1.0,
-        remark=RESIDUAL_TURNED if turned else None,
-    )
+Cells = tuple[Cell, ...]
 
 
-def _read(table: TextTable, groups: dict[str, int], request: ReadChoice) -> RawLog:
-    signals = tuple(
-        _pick(name, tuple(Cell(start + j) for j in range(JOINTS))) for name, start in groups.items()
-    )
-    clock = Pick(signal="t", cells=(Cell(0),), factor=1e-3, unit="ms")
+def read_fields(
+    table: Table,
+    fields: Mapping[str, Cells],
+    time: Cell,
+    request: ReadChoice,
+    **more: Any,  # noqa: ANN401
+) -> RawLog:
+    """Read a table that holds robot states, whatever kind of file it is.
+
+    Args:
+        table: The table.
+        fields: libfranka's name of a field → its cells.
+        time: The cell of the robot's clock. [ms]
+        request: What is wanted.
+        more: Further fields of the RawLog.
+    """
+    signals = tuple(vendor_pick(FIELDS[name], name, cells) for name, cells in fields.items())
+    clock = Pick(signal="t", cells=(time,), factor=1e-3, unit="ms")
     picks = checked(table, Picks(signals=signals, clock=clock))
-    return picked(table, picks, request, clock_name=CLOCK)
+    frame = STIFFNESS_FRAME if WRENCH in fields else None
+    return picked(table, picks, request, clock_name=CLOCK, wrench_frame=frame, **more)
 
 
 def read_old(file: LogFile, request: ReadChoice) -> RawLog:
     """Read a log of libfranka 0.2.0 to 0.9.0, by position."""
     table = TextTable(file)
     names = table.names or ()
+    fields = {}
     for k, name in enumerate(OLD_GROUPS):
         start = 2 + k * JOINTS
         if names[start : start + JOINTS] != tuple(f"{name}[{j}]" for j in range(JOINTS)):
@@ -65,21 +76,44 @@ def read_old(file: LogFile, request: ReadChoice) -> RawLog:
                 f"{file.path}: column {start + 1} should be {name}[0] in a libfranka log up to "
                 "0.9.0. The header was edited: use --format table with --columns."
             )
-    return _read(table, {n: 2 + k * JOINTS for k, n in enumerate(OLD_GROUPS)}, request)
+        fields[name] = cells_from(start)
+    return read_fields(table, fields, Cell(0), request)
 
 
 def read_new(file: LogFile, request: ReadChoice) -> RawLog:
     """Read a log of libfranka 0.9.1 and later, by name."""
     table = TextTable(file)
     names = table.names or ()
-    groups = {}
+    fields = {}
     for name in FIELDS:
-        columns = [f"state.{name}[{j}]" for j in range(JOINTS)]
+        columns = tuple(f"state.{name}[{j}]" for j in range(JOINTS))
         if columns[0] in names:
             start = names.index(columns[0])
-            if list(names[start : start + JOINTS]) == columns:
-                groups[name] = start
-    return _read(table, groups, request)
+            if names[start : start + JOINTS] == columns:
+                fields[name] = cells_from(start)
+    return read_fields(table, fields, Cell(0), request)
+
+
+def cells_from(start: int) -> Cells:
+    """Seven columns in a row."""
+    return tuple(Cell(start + j) for j in range(JOINTS))
+
+
+def read_array_fields(
+    table: ArrayTable,
+    wanted: Iterable[str],
+    request: ReadChoice,
+    **more: Any,  # noqa: ANN401
+) -> RawLog:
+    """Read those of the wanted fields that a table has as a column of lists each, and `time`."""
+    names = list(table.columns)
+    fields = {
+        name: tuple(Cell(names.index(name), j) for j in range(width))
+        for name in wanted
+        if name in names and (width := table.lists.get(names.index(name)))
+    }
+    time = Cell(names.index("time"))
+    return read_fields(table, fields, time, request, **more)
 
 
 NOT_JSON = re.compile(rb"(?<=[\[,:\s])(-?)(nan|inf)(?=[\],}\s])")
@@ -101,22 +135,27 @@ def read_states(file: LogFile, request: ReadChoice) -> RawLog:
     for number, line in numbered:
         if not line.lstrip().startswith(b"{"):
             skipped += 1
-            continue
-        state = _state(line)
-        if state is None and number == numbered[-1][0]:
+        elif (state := state_in(line)) is not None:
+            states.append(state)
+        elif number == numbered[-1][0]:
             cut = True
-            continue
-        if state is None:
+        else:
             raise LogError(f"{file.path}: line {number} is not a robot state in JSON.")
-        states.append(state)
     if not states:
         raise LogError(f"{file.path}: no robot state in any line.")
     remarks = [fact("lines-skipped", lines=skipped)] if skipped else []
     remarks += [fact("line-cut")] if cut else []
-    return _read_states(file, states, tuple(remarks), request)
+    widths = {name: 6 if name == WRENCH else JOINTS for name in FIELDS if name in states[0]}
+    columns = {name: field_of(file, states, name, (width,)) for name, width in widths.items()}
+    columns["time"] = field_of(file, states, "time", ())
+    table = ArrayTable(path=file.path, columns=columns, remarks=tuple(remarks))
+    mass = states[-1].get("m_load")
+    told = float(mass) if isinstance(mass, int | float) else None
+    return read_array_fields(table, FIELDS, request, payload_mass=told)
 
 
-def _state(line: bytes) -> dict[str, Any] | None:
+def state_in(line: bytes) -> dict[str, Any] | None:
+    """The robot state that a line holds, or None."""
     if len(line) > MAX_LINE:
         return None
     text = NOT_JSON.sub(lambda m: m[1] + {b"nan": b"NaN", b"inf": b"Infinity"}[m[2]], line)
@@ -127,45 +166,20 @@ def _state(line: bytes) -> dict[str, Any] | None:
     return state if isinstance(state, dict) else None
 
 
-def _read_states(
-    file: LogFile, states: list[dict[str, Any]], remarks: tuple[Remark, ...], request: ReadChoice
-) -> RawLog:
-    columns = {name: _column(file, states, name, JOINTS) for name in FIELDS if name in states[0]}
-    if "O_F_ext_hat_K" in states[0]:
-        columns["O_F_ext_hat_K"] = _column(file, states, "O_F_ext_hat_K", 6)
-    columns["time"] = _column(file, states, "time", None)
-    table = ArrayTable(path=file.path, columns=columns, remarks=remarks)
-    names = list(columns)
-    signals = [
-        _pick(name, tuple(Cell(names.index(name), j) for j in range(JOINTS)))
-        for name in FIELDS
-        if name in columns
-    ]
-    if "O_F_ext_hat_K" in columns:
-        place = names.index("O_F_ext_hat_K")
-        signals.append(Pick(signal="wrench", cells=tuple(Cell(place, j) for j in range(6))))
-    clock = Pick(signal="t", cells=(Cell(names.index("time")),), factor=1e-3, unit="ms")
-    picks = checked(table, Picks(signals=tuple(signals), clock=clock))
-    mass = states[-1].get("m_load")
-    return picked(
-        table,
-        picks,
-        request,
-        clock_name=CLOCK,
-        wrench_frame=STIFFNESS_FRAME,
-        payload_mass=float(mass) if isinstance(mass, int | float) else None,
-    )
+def field_of(
+    file: LogFile, states: list[dict[str, Any]], name: str, shape: tuple[int, ...]
+) -> Column:
+    """One field of all states. (T, *shape)
 
-
-def _column(file: LogFile, states: list[dict[str, Any]], name: str, length: int | None) -> Any:  # noqa: ANN401
-    """One field of all states as an array. (T,) or (T, length)"""
-    shape = (len(states),) if length is None else (len(states), length)
+    Raises:
+        LogError: If a state lacks it, or has it in another shape.
+    """
     try:
         column = np.array([state[name] for state in states], dtype=np.float64)
     except (KeyError, ValueError, TypeError, OverflowError):
         column = np.empty(0)
-    if column.shape != shape:
-        wanted = "one number" if length is None else f"{length} numbers"
+    if column.shape != (len(states), *shape):
+        wanted = f"{shape[0]} numbers" if shape else "one number"
         raise LogError(f"{file.path}: {name} is not {wanted} in every state.")
     return column
 

@@ -1,0 +1,92 @@
+"""Cleaning: what is dropped at the start, where a clock jumps, and what cannot be radians."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.readers.cleaning import cleaned, last_jump, without_leading_garbage
+from vftcli.readers.reader import RawLog
+from vftcli.signals.errors import LogError
+
+STEP_NS = 2_000_000
+ROWS = 300
+GARBAGE = 3e19
+"""A misread double: far beyond any joint position."""
+
+
+def raw(jumps: dict[int, float] | None = None, *, absurd: tuple[int, ...] = (0,)) -> RawLog:
+    """500 Hz, stamped in nanoseconds; the clock jumps by so many seconds before some rows."""
+    steps = np.full(ROWS, STEP_NS, dtype=np.int64)
+    for row, seconds in (jumps or {}).items():
+        steps[row] += round(seconds * 1e9)
+    q = np.full((ROWS, 6), 0.5)
+    q[list(absurd)] = GARBAGE
+    stamps = 1_700_000_000_000_000_000 + np.cumsum(steps)
+    return RawLog(stamps=stamps, tick=1e-9, clock="test", signals={"q": q})
+
+
+def dropped(log: RawLog) -> int:
+    return ROWS - len(without_leading_garbage(log).stamps)
+
+
+def test_a_lone_absurd_row_at_the_start_goes_alone_whatever_the_stamps_count_in():
+    """Steps are judged in seconds: in nanoseconds each of them would be an enormous jump."""
+    assert dropped(raw()) == 1
+
+
+def test_what_lies_before_the_clocks_last_jump_goes_with_the_garbage():
+    assert dropped(raw({4: 1000.0})) == 4
+    assert dropped(raw({4: -5.0})) == 4
+    assert dropped(raw({4: 1000.0, 8: 1000.0})) == 8
+    assert last_jump(raw({4: 1000.0, 8: 1000.0}), 100) == 8
+
+
+def test_a_pause_is_no_jump():
+    """Up to a minute, and to a thousand steps of a slow log: 30 s here."""
+    assert dropped(raw({4: 30.0})) == 1
+    assert last_jump(raw({4: 30.0}), 100) == 0
+
+
+def test_a_jump_without_garbage_is_left_to_be_told():
+    assert dropped(raw({4: 1000.0}, absurd=())) == 0
+
+
+def test_one_bad_value_among_good_rows_is_not_a_misaligned_packet():
+    assert dropped(raw(absurd=(7,))) == 0
+
+
+def test_rows_after_the_head_are_never_taken_for_garbage():
+    assert dropped(raw({200: 1000.0})) == 1
+
+
+def test_the_source_counts_from_the_first_row_that_is_kept():
+    recording = cleaned(raw({4: 1000.0}), Path("x"), "test")
+    assert recording.samples == ROWS - 4
+    assert recording.source.rows == ROWS
+    assert recording.source.t0_ns == int(raw({4: 1000.0}).stamps[4])
+    assert [r.values["rows"] for r in recording.source.remarks] == [4]
+
+
+@pytest.mark.parametrize(
+    ("joints", "reach", "refused"),
+    [(6, 12.9, False), (6, 13.1, True), (7, 6.3, False), (7, 6.5, True)],
+)
+def test_positions_that_no_joint_reaches_are_refused_as_degrees(joints, reach, refused):
+    """Two turns are 12.6 rad; joints of seven-joint arms stay within one, 6.28 rad."""
+    q = np.zeros((10, joints))
+    q[5, 2] = reach
+    log = RawLog(stamps=np.arange(10.0), clock="test", signals={"q": q}, degrees_possible=True)
+    if refused:
+        with pytest.raises(LogError, match="looks like degrees"):
+            cleaned(log, Path("x"), "test")
+    else:
+        assert cleaned(log, Path("x"), "test").joints == joints
+
+
+def test_a_span_wider_than_two_turns_is_refused_too():
+    q = np.zeros((10, 6))
+    q[3], q[6] = -6.8, 6.8
+    log = RawLog(stamps=np.arange(10.0), clock="test", signals={"q": q}, degrees_possible=True)
+    with pytest.raises(LogError, match=r"travel 13\.6"):
+        cleaned(log, Path("x"), "test")
