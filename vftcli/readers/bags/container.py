@@ -4,7 +4,7 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,49 @@ class Batch:
     offsets: Integers
     lengths: Integers
     times: Integers
+
+
+class MessageRun(NamedTuple):
+    """Messages of one channel that follow one another at one stride, so are equally long.
+
+    Attributes:
+        start: Where the first one's data begin.
+        stride: From one to the next.
+        messages: How many.
+        length: Of each one's data.
+        back: How far before its data the receive time of each stands.
+    """
+
+    start: int
+    stride: int
+    messages: int
+    length: int
+    back: int
+
+
+def batch_of(
+    channel: Channel, buffer: Bytes, runs: Sequence[MessageRun], nanoseconds: bool
+) -> Batch:
+    """One batch of all runs of a channel.
+
+    Args:
+        channel: Whose messages they are.
+        buffer: The bytes they lie in.
+        runs: Where they lie.
+        nanoseconds: Whether a receive time is one count of nanoseconds, or seconds and the rest.
+    """
+    counts = [run.messages for run in runs]
+    offsets = np.concatenate([run.start + run.stride * np.arange(run.messages) for run in runs])
+    back = np.repeat([run.back for run in runs], counts)
+    stamps = buffer[(offsets - back)[:, None] + np.arange(8)]
+    words = stamps.view("<u8" if nanoseconds else "<u4").astype(np.int64)
+    return Batch(
+        channel=channel,
+        buffer=buffer,
+        offsets=offsets,
+        lengths=np.repeat([run.length for run in runs], counts),
+        times=words[:, 0] if nanoseconds else words[:, 0] * 1_000_000_000 + words[:, 1],
+    )
 
 
 @dataclass

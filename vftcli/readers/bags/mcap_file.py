@@ -6,7 +6,6 @@ Format: https://mcap.dev/spec. A record is an opcode, a 64-bit length and the co
 import struct
 import zlib
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +15,8 @@ from vftcli.readers.bags.container import (
     Channel,
     Encoding,
     Ingest,
+    MessageRun,
+    batch_of,
     equal_rows,
     printable,
     type_name,
@@ -32,20 +33,14 @@ HEADER = 9
 """Bytes before a record's content: opcode and length."""
 MESSAGE_HEAD = 22
 """Bytes of a message before its data: channel, sequence, log time, publish time."""
+LOG_TIME = 16
+"""How far before its data a message's log time stands."""
 RUN_AFTER = 3
+"""Messages of one kind in a row after which a longer run is looked for at once."""
 
 ENCODINGS: dict[str, Encoding] = {
     "cdr": "cdr", "ros1": "ros1", "json": "json", "protobuf": "protobuf",
 }  # fmt: skip
-
-
-class MessageRun(NamedTuple):
-    """Messages of one channel at one stride."""
-
-    start: int
-    stride: int
-    messages: int
-    length: int
 
 
 class Catalogue:
@@ -60,16 +55,18 @@ class Catalogue:
         self.loose: dict[int, list[MessageRun]] = {}
         self.ended = self.closed = False
 
-    def schema(self, content: memoryview) -> None:
-        """Take up a schema record."""
+    def take(self, opcode: int, content: memoryview) -> None:
+        """Take up a schema or channel record."""
+        if opcode == CHANNEL:
+            self._channel(content)
+            return
         name, position = self._text(content, 2)
         encoding, position = self._text(content, position)
         size = u32(content, position)
         data = bytes(content[position + 4 : position + 4 + size])
         self.schemas[int(struct.unpack_from("<H", content)[0])] = (name, encoding, data)
 
-    def channel(self, content: memoryview) -> None:
-        """Take up a channel record."""
+    def _channel(self, content: memoryview) -> None:
         number, schema = struct.unpack_from("<HH", content)
         topic, position = self._text(content, 4)
         encoding, _ = self._text(content, position)
@@ -122,7 +119,7 @@ def _record(
     if opcode == MESSAGE:
         _message(content, position, end, catalogue.loose)
     elif opcode in {SCHEMA, CHANNEL}:
-        _take(catalogue, opcode, content[position + HEADER : end])
+        catalogue.take(opcode, content[position + HEADER : end])
     elif opcode == STATISTICS:
         catalogue.counted = u64(content, position + HEADER)
     elif opcode in {DATA_END, FOOTER}:
@@ -151,13 +148,6 @@ def _check_end(catalogue: Catalogue, left: int) -> None:
         ingest.note(fact("chunks-cut", rest_bytes=left) if is_cut else fact("recorder-stopped"))
 
 
-def _take(catalogue: Catalogue, opcode: int, content: memoryview) -> None:
-    if opcode == SCHEMA:
-        catalogue.schema(content)
-    else:
-        catalogue.channel(content)
-
-
 def _message(
     content: memoryview, position: int, end: int, found: dict[int, list[MessageRun]]
 ) -> None:
@@ -166,7 +156,7 @@ def _message(
         raise struct.error
     channel = int(struct.unpack_from("<H", content, position + HEADER)[0])
     start = position + HEADER + MESSAGE_HEAD
-    found.setdefault(channel, []).append(MessageRun(start, end - position, 1, length))
+    found.setdefault(channel, []).append(MessageRun(start, end - position, 1, length, LOG_TIME))
 
 
 def _chunk(content: memoryview, catalogue: Catalogue) -> Iterator[Batch]:
@@ -194,7 +184,7 @@ def _walk(chunk: memoryview, buffer: Bytes, catalogue: Catalogue) -> dict[int, l
         if position + stride > len(chunk):
             raise LogError(f"{catalogue.ingest.path}: a record ends outside its chunk; damaged.")
         if opcode in {SCHEMA, CHANNEL}:
-            _take(catalogue, opcode, chunk[position + HEADER : position + stride])
+            catalogue.take(opcode, chunk[position + HEADER : position + stride])
             position += stride
             continue
         if opcode != MESSAGE:
@@ -206,7 +196,8 @@ def _walk(chunk: memoryview, buffer: Bytes, catalogue: Catalogue) -> dict[int, l
         before, count = (channel, stride), 1
         if alike >= RUN_AFTER:
             count = equal_rows(buffer, position, stride, ((0, HEADER + 2),))
-        run = MessageRun(position + HEADER + MESSAGE_HEAD, stride, count, length - MESSAGE_HEAD)
+        start, size = position + HEADER + MESSAGE_HEAD, length - MESSAGE_HEAD
+        run = MessageRun(start, stride, count, size, LOG_TIME)
         found.setdefault(channel, []).append(run)
         position += stride * count
     return found
@@ -219,8 +210,4 @@ def _yielded(
         if (channel := catalogue.channels.get(number)) is None:
             raise LogError(f"{catalogue.ingest.path}: messages of an unknown channel; damaged.")
         catalogue.messages += sum(run.messages for run in runs)
-        offsets = np.concatenate([r.start + r.stride * np.arange(r.messages) for r in runs])
-        lengths = np.repeat([r.length for r in runs], [r.messages for r in runs])
-        stamps = buffer[(offsets - MESSAGE_HEAD + 6)[:, None] + np.arange(8)]
-        times = stamps.view("<u8")[:, 0].astype(np.int64)
-        yield Batch(channel=channel, buffer=buffer, offsets=offsets, lengths=lengths, times=times)
+        yield batch_of(channel, buffer, runs, nanoseconds=True)

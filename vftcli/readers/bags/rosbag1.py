@@ -12,9 +12,10 @@ import numpy as np
 
 from vftcli.readers.bags.container import (
     Batch,
-    Bytes,
     Channel,
     Ingest,
+    MessageRun,
+    batch_of,
     equal_rows,
     printable,
     type_name,
@@ -179,39 +180,19 @@ def _chunk(
         counts[connection] = sum(run.messages for run in runs)
         if connection not in connections:
             raise LogError(f"{ingest.path}: messages of an unknown connection; damaged.")
-        yield _batch(connections[connection], buffer, runs)
-
-
-class ChunkRun(NamedTuple):
-    """Messages of one connection at one stride."""
-
-    start: int
-    stride: int
-    messages: int
-    length: int
-    time: int
-
-
-def _batch(channel: Channel, buffer: Bytes, runs: list[ChunkRun]) -> Batch:
-    """One batch of all runs of a connection: offsets, lengths and receive times."""
-    offsets = np.concatenate([r.start + r.stride * np.arange(r.messages) for r in runs])
-    lengths = np.repeat([r.length for r in runs], [r.messages for r in runs])
-    back = np.repeat([r.time for r in runs], [r.messages for r in runs])
-    stamps = buffer[(offsets - back)[:, None] + np.arange(8)].view("<u4").astype(np.int64)
-    times = stamps[:, 0] * 1_000_000_000 + stamps[:, 1]
-    return Batch(channel=channel, buffer=buffer, offsets=offsets, lengths=lengths, times=times)
+        yield batch_of(connections[connection], buffer, runs, nanoseconds=False)
 
 
 def _walk(
     chunk: memoryview, connections: dict[int, Channel], ingest: Ingest
-) -> dict[int, list[ChunkRun]]:
+) -> dict[int, list[MessageRun]]:
     """Find the messages of a chunk. Connection → runs of its messages.
 
     Raises:
         LogError: If the chunk's records do not fill it.
     """
     buffer = np.frombuffer(chunk, dtype=np.uint8)
-    found: dict[int, list[ChunkRun]] = {}
+    found: dict[int, list[MessageRun]] = {}
     templates: list[Template] = []
     position, alike, before = 0, 0, (-1, -1)
     while position < len(chunk):
@@ -244,7 +225,7 @@ def _walk(
             count = equal_rows(
                 buffer, position, stride, ((0, template.time), (after, 8 + template.length))
             )
-        run = ChunkRun(data, stride, count, length, data - position - template.time)
+        run = MessageRun(data, stride, count, length, data - position - template.time)
         found.setdefault(template.connection, []).append(run)
         position += stride * count
     return found
