@@ -67,7 +67,7 @@ class TextTable:
         return (fact("row-cut"),) if self._is_cut else ()
 
     @cached_property
-    def _sample(self) -> list[str]:
+    def sample(self) -> list[str]:
         """The first lines that hold something, comments taken off."""
         lines = [decoded(line) for line in self.file.lines[:200]]
         if len(self.file.lines) <= 200 and not self.file.is_whole:
@@ -90,7 +90,7 @@ class TextTable:
     @cached_property
     def separator(self) -> str:
         """The separator that splits the first lines into the same, largest number of cells."""
-        lines = self._sample[:5]
+        lines = self.sample[:5]
         best, most = " " if len(lines[0].split()) > 1 else ",", 1
         for separator in SEPARATORS:
             counts = {len(split_cells(line.strip(" "), separator)) for line in lines[:2]}
@@ -104,21 +104,18 @@ class TextTable:
     @cached_property
     def decimal_comma(self) -> bool:
         """Whether numbers are written 0,5: only where semicolons or tabs separate them."""
-        rows = self._sample[1:3] if len(self._sample) > 1 else self._sample
+        rows = self.sample[1:3] if len(self.sample) > 1 else self.sample
         return self.separator in ";\t" and any(re.search(r"\d,\d", row) for row in rows)
 
-    @cached_property
-    def _first_cells(self) -> list[str]:
-        return self._cells(self._sample[0])
-
-    def _cells(self, line: str) -> list[str]:
+    def cells(self, line: str) -> list[str]:
+        """The cells of one line."""
         line = line.strip(" \r")
         return line.split() if self.separator == " " else split_cells(line, self.separator)
 
     @cached_property
     def names(self) -> tuple[str, ...] | None:
         """The header's names, or None if the first line holds numbers only."""
-        cells = self._first_cells
+        cells = self.cells(self.sample[0])
         numbers = [as_number(cell, decimal_comma=self.decimal_comma) for cell in cells]
         if all(n is not None for n, cell in zip(numbers, cells, strict=True) if cell):
             return None
@@ -127,7 +124,7 @@ class TextTable:
     @cached_property
     def width(self) -> int:
         """Number of columns."""
-        return len(self._first_cells)
+        return len(self.cells(self.sample[0]))
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
         """Parse some columns; a clock of long whole numbers or dates comes back as integers.
@@ -159,14 +156,10 @@ class TextTable:
             separator=self.separator,
             columns=sorted(kinds),
             schema={str(c): kinds.get(c, pl.String) for c in range(self.width)},
-            quote_char='"' if self._quoted else None,
+            quote_char='"' if any('"' in line for line in self.sample) else None,
             decimal_comma=self.decimal_comma,
             glob=False,
         )
-
-    @property
-    def _quoted(self) -> bool:
-        return any('"' in line for line in self._sample)
 
     @property
     def _lines_before_rows(self) -> int:
@@ -182,7 +175,7 @@ class TextTable:
     def _header_is_comment(self) -> bool:
         lines = [decoded(line).removeprefix("\ufeff").strip() for line in self.file.lines[:200]]
         first = next((line for line in lines if not line.startswith("#")), "")
-        return self.names is not None and self._cells(first) != list(self.names)
+        return self.names is not None and self.cells(first) != list(self.names)
 
     def _text(self) -> Any:  # noqa: ANN401 - a path or bytes
         """The table as it can be parsed at once: the path, or bytes where something must go."""
@@ -192,8 +185,10 @@ class TextTable:
         end = self._end()
         if self.file.wrapping is None and end is None:
             return self.path
-        content = self.file.content
-        return _after_lines(bytes(content[:end]), self._lines_before_rows)
+        text = bytes(self.file.content[:end])
+        for _ in range(self._lines_before_rows):
+            text = text.partition(b"\n")[2]
+        return text
 
     def _needs_mending(self, head: bytes) -> bool:
         blank = re.search(rb"(\n|^)[ \t\r]*\n", head) is not None
@@ -241,12 +236,12 @@ class TextTable:
 
     def _ends_inside(self, rows: list[bytes], *, ended: bool) -> bool:
         """Whether the last row lacks cells, or may lack digits of its last number."""
-        last = self._cells(decoded(rows[-1]))
+        last = self.cells(decoded(rows[-1]))
         if len(last) < self.width:
-            return len(self._cells(decoded(rows[-2]))) == self.width or len(rows) == 2
+            return len(self.cells(decoded(rows[-2]))) == self.width or len(rows) == 2
         if ended:
             return False
-        above = [self._cells(decoded(row)) for row in rows[-COMPARED_ROWS - 1 : -1]]
+        above = [self.cells(decoded(row)) for row in rows[-COMPARED_ROWS - 1 : -1]]
         ends = {cells[-1] for cells in above[self.names is not None and len(rows) <= 2 :] if cells}
         decimals = {len(end.partition(".")[2]) for end in ends}
         if "." in last[-1] or "," in last[-1]:
@@ -256,10 +251,8 @@ class TextTable:
     def _clock_kind(self, clock: int) -> Any:  # noqa: ANN401 - a polars type
         import polars as pl
 
-        row = (
-            self._sample[1] if self.names is not None and len(self._sample) > 1 else self._sample[0]
-        )
-        cells = self._cells(row)
+        row = self.sample[1] if self.names is not None and len(self.sample) > 1 else self.sample[0]
+        cells = self.cells(row)
         text = cells[clock] if clock < len(cells) else ""
         if re.fullmatch(r"\d{16,19}", text):
             return pl.Int64
@@ -280,7 +273,7 @@ class TextTable:
         """Look at the table row by row for what the parser could not take."""
         rows = self._mended().split(b"\n")
         for number, row in enumerate(rows, start=1):
-            cells = self._cells(decoded(row))
+            cells = self.cells(decoded(row))
             if len(cells) > self.width:
                 return LogError(
                     f"{self.path}: row {number} has {len(cells)} cells, the first line "
@@ -303,12 +296,6 @@ def decoded(line: bytes) -> str:
         return line.decode("utf-8")
     except UnicodeDecodeError:
         return line.decode("latin-1")
-
-
-def _after_lines(text: bytes, lines: int) -> bytes:
-    for _ in range(lines):
-        text = text.partition(b"\n")[2]
-    return text
 
 
 def _numbers(series: Any, path: Path) -> Column:  # noqa: ANN401 - polars

@@ -22,7 +22,7 @@ EPISODE = "episode_index"
 
 
 class ParquetTable:
-    """A Parquet file; only the columns asked for are decoded.
+    """A Parquet file; only the columns asked for are decoded, and nothing is ever mended.
 
     pyarrow decodes it: on a damaged page polars would end the whole process.
 
@@ -30,6 +30,8 @@ class ParquetTable:
         path: The file.
         names: Column names.
     """
+
+    remarks: tuple[Remark, ...] = ()
 
     def __init__(self, path: Path, source: Any, rows: Any = None) -> None:  # noqa: ANN401
         import pyarrow.parquet as pq
@@ -48,11 +50,6 @@ class ParquetTable:
     def width(self) -> int:
         """Number of columns."""
         return len(self._schema)
-
-    @property
-    def remarks(self) -> tuple[Remark, ...]:
-        """Nothing is ever mended here."""
-        return ()
 
     def told(self) -> dict[str, Any]:
         """What vftcli convert wrote beside the columns; nothing for files of other programs."""

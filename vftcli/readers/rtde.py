@@ -84,12 +84,12 @@ class BinaryTable:
     def __init__(self, file: LogFile) -> None:
         self.path = file.path
         self.lists: dict[int, int] = {}
-        names, types, self._start = _binary_header(file)
+        names, types, start = binary_header(file)
         self.names: tuple[str, ...] | None = names
         self.width = len(names)
         fields = [(str(k), BINARY_TYPES[word]) for k, word in enumerate(types)]
         self._record = np.dtype(fields)
-        self._body = file.content[self._start :]
+        self._body = file.content[start:]
         remarks = []
         size = self._record.itemsize
         if len(self._body) % size and len(self._body) % (size + 1) == 0:
@@ -106,7 +106,12 @@ class BinaryTable:
         return {c: records[str(c)].astype(np.float64) for c in columns}
 
 
-def _binary_header(file: LogFile) -> tuple[tuple[str, ...], list[bytes], int]:
+def binary_header(file: LogFile) -> tuple[tuple[str, ...], list[bytes], int]:
+    """Names and types of the columns, and where the records begin.
+
+    Raises:
+        LogError: If there is not one known type a column.
+    """
     first, end, rest = bytes(file.content[: 1 << 20]).partition(b"\n")
     second, end_too, _ = rest.partition(b"\n")
     names = tuple(first.decode("ascii", errors="replace").split())
@@ -121,13 +126,10 @@ def _binary_header(file: LogFile) -> tuple[tuple[str, ...], list[bytes], int]:
     return names, types, len(first) + len(second) + 2
 
 
-def read_rtde_binary(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read the official client's binary file."""
-    return read_rtde(BinaryTable(file), request)
-
-
-def _has_rtde_names(cells: list[bytes]) -> bool:
-    return any(cell.strip() in {b"actual_q_0", b"target_q_0"} for cell in cells)
+def has_rtde_names(file: LogFile, separator: bytes) -> bool:
+    """Whether the header has RTDE names, so separated."""
+    names = {cell.strip() for cell in file.first_line.split(separator)}
+    return bool(names & {b"actual_q_0", b"target_q_0"})
 
 
 def is_binary(file: LogFile) -> bool:
@@ -137,22 +139,22 @@ def is_binary(file: LogFile) -> bool:
     return bool(words) and words <= set(BINARY_TYPES) and len(first) > 0
 
 
-def is_official(file: LogFile) -> bool:
-    """Whether the header has RTDE names between blanks."""
-    return not is_binary(file) and _has_rtde_names(file.first_line.split(b" "))
-
-
-def is_ur_rtde(file: LogFile) -> bool:
-    """Whether the header has RTDE names between commas."""
-    return _has_rtde_names(file.first_line.split(b","))
-
-
-OFFICIAL = Reader(name="ur-csv", recognises=is_official, read=read_rtde_text, columns=True)
+OFFICIAL = Reader(
+    name="ur-csv",
+    recognises=lambda file: not is_binary(file) and has_rtde_names(file, b" "),
+    read=read_rtde_text,
+    columns=True,
+)
 
 BINARY = Reader(
     name="ur-binary",
     recognises=is_binary,
-    read=read_rtde_binary,
+    read=lambda file, request: read_rtde(BinaryTable(file), request),
 )
 
-UR_RTDE = Reader(name="ur-rtde", recognises=is_ur_rtde, read=read_rtde_text, columns=True)
+UR_RTDE = Reader(
+    name="ur-rtde",
+    recognises=lambda file: has_rtde_names(file, b","),
+    read=read_rtde_text,
+    columns=True,
+)

@@ -125,11 +125,6 @@ def numpy_array(path: Path, content: Any) -> Column:  # noqa: ANN401 - any reada
     return np.asarray(array)
 
 
-def read_text(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read a text table, headed or described."""
-    return from_table(TextTable(file), request)
-
-
 def read_npy(file: LogFile, request: ReadChoice) -> RawLog:
     """Read an .npy file: a matrix with one row a sample, or a structured array."""
     check_npy_header(file, len(file.content))
@@ -167,22 +162,18 @@ def check_npy_header(file: LogFile, size: int) -> None:
         )
 
 
+def read_text(file: LogFile, request: ReadChoice) -> RawLog:
+    """Read a text table, headed or described."""
+    return from_table(TextTable(file), request)
+
+
 def is_headed(file: LogFile) -> bool:
-    """Whether a text file starts with a line of column names."""
-    return bool(file.lines) and TextTable(file).names is not None and _has_numbers(file)
-
-
-def is_headerless(file: LogFile) -> bool:
-    """Whether a text file starts with a line of numbers."""
-    return bool(file.lines) and TextTable(file).names is None
-
-
-def _has_numbers(file: LogFile) -> bool:
-    """Whether the line after the header holds at least one number in as many cells."""
-    table = TextTable(file)
-    if len(table._sample) < 2:
+    """Whether a text file starts with a line of column names, and then one of mostly numbers."""
+    if not file.lines or (table := TextTable(file)).names is None:
+        return False
+    if len(table.sample) < 2:
         return table.width > 1
-    cells = table._cells(table._sample[1])
+    cells = table.cells(table.sample[1])
     numbers = [as_number(cell, decimal_comma=table.decimal_comma) for cell in cells]
     return len(cells) > 1 and sum(n is not None for n in numbers) * 2 >= len(cells)
 
@@ -197,7 +188,7 @@ HEADED = Reader(
 
 HEADERLESS = Reader(
     name="headerless",
-    recognises=is_headerless,
+    recognises=lambda file: bool(file.lines) and TextTable(file).names is None,
     read=read_text,
     general=True,
     columns=True,
