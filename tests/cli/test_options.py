@@ -1,5 +1,6 @@
 """An option means and takes the same in every command that has it."""
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -147,3 +148,17 @@ def test_summaries_are_those_of_the_commands() -> None:
     for name, command in COMMANDS.items():
         assert group.commands[name].help.splitlines()[0] == command.summary
         assert "Example: vftcli " in group.commands[name].help
+
+
+ROOT = Path(__file__).parent.parent.parent
+OF_OTHER_TOOLS = {"--quiet", "--binary", "--storage", "--help", "--all-extras"}
+"""Options in the documents that are those of pip, of ros2 bag, or of all programs."""
+
+
+def test_documents_name_every_option_and_no_other() -> None:
+    files = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    # The changelog also names options that are gone.
+    text = "\n".join(f.read_text("utf-8") for f in files if f.name != "changelog.md")
+    named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)) - OF_OTHER_TOOLS
+    there = {name for c in COMMANDS for name in parameters(c) if name.startswith("--")}
+    assert named - {"--version"} == there

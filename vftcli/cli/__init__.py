@@ -140,15 +140,15 @@ def main() -> None:
     try:
         make_app({asked})()
     except VftError as error:
-        stop(str(error))
+        fail(str(error))
     except MemoryError:
-        stop("out of memory; use --interval to take a part of the log")
+        fail("out of memory; use --interval to take a part of the log")
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             sys.stderr.close()
             raise SystemExit(1) from None
         where = f": {error.filename}" if error.filename else ""
-        stop(f"{error.strerror or error}{where}")
+        fail(f"{error.strerror or error}{where}")
 
 
 def launch() -> None:
@@ -169,7 +169,7 @@ def launch() -> None:
     os._exit(code if isinstance(code, int) else int(code is not None))
 
 
-def stop(message: str) -> None:
+def fail(message: str) -> None:
     """Print one line to stderr and exit with code 1."""
     typer.echo(f"error: {' '.join(message.split())}", err=True)
     raise SystemExit(1)
