@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.observers import DEFAULT, OBSERVERS, KalmanObserver, Observer, Setup
+from vftcli.observers import DEFAULT, KalmanObserver
 from vftcli.observers.auto_tuning import KINDS, tuned
+from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Part, Spectra, spectra_of
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.kernels import momentum_terms
@@ -55,6 +56,11 @@ class Timings:
     def median(self, name: str) -> float:
         """Median over the rounds. [s]"""
         return float(np.median(self.seconds[name]))
+
+    def row(self, name: str, samples: int) -> dict[str, float]:
+        """The time of one name, in all and for each of so many samples."""
+        total = self.median(name)
+        return {"total_s": total, "per_sample_us": total / samples * 1e6}
 
 
 @contextmanager
@@ -207,45 +213,22 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
     """
     robot = load_robot(robot_name)
     recording = circle(robot, samples)
-    setup = Setup(
-        gains=robot.gains,
-        settings={},
-        joints=robot.joints,
-        step=recording.median_step,
-        as_printed=False,
-    )
-    observers = {name: OBSERVERS[name].build(setup)[0] for name in DEFAULT}
     timings = Timings()
     with one_core():
-        run_rounds(timings, robot, recording, observers, setup, rounds)
+        run_rounds(timings, robot, recording, rounds)
     core = timings.median("core")
-    looking_back = [
-        {
-            "name": name,
-            "total_s": timings.median(name),
-            "per_sample_us": timings.median(name) / samples * 1e6,
-        }
-        for name in ("spectra", *LOOKING_BACK)
-    ]
-    rows = [
-        {
-            "name": name,
-            "total_s": timings.median(name),
-            "per_sample_us": timings.median(name) / samples * 1e6,
-            "paper_s": PAPER_TABLE_2.get(name),
-        }
-        for name in observers
-    ]
     return {
         "robot": robot.name,
         "samples": samples,
         "rounds": rounds,
-        "observers": rows,
-        "complete_log": looking_back,
-        "dynamics": {
-            "total_s": timings.median("dynamics"),
-            "per_sample_us": timings.median("dynamics") / samples * 1e6,
-        },
+        "observers": [
+            {"name": name, **timings.row(name, samples), "paper_s": PAPER_TABLE_2.get(name)}
+            for name in DEFAULT
+        ],
+        "complete_log": [
+            {"name": name, **timings.row(name, samples)} for name in ("spectra", *LOOKING_BACK)
+        ],
+        "dynamics": timings.row("dynamics", samples),
         "ratios": {
             "core_over_rnea_loop": core / timings.median("rnea loop"),
             "analytic_script_over_core": timings.median("analytic script") / core,
@@ -255,15 +238,10 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
     }
 
 
-def run_rounds(
-    timings: Timings,
-    robot: Robot,
-    recording: Recording,
-    observers: dict[str, Observer],
-    setup: Setup,
-    rounds: int,
-) -> None:
+def run_rounds(timings: Timings, robot: Robot, recording: Recording, rounds: int) -> None:
     """Run everything once unmeasured, then interleaved for `rounds` rounds."""
+    built, _ = ObserverChoice(names=(*DEFAULT, "kfo-rts")).build(robot, recording.median_step)
+    observers, smoother = dict(zip(DEFAULT, built[:-1], strict=True)), built[-1]
     q, dq = np.array(recording.q), np.array(recording.require("dq"))
     few = min(SCRIPT_SAMPLES, recording.samples)
     short = recording.between(0.0, float(recording.t[few - 1]))
@@ -276,7 +254,6 @@ def run_rounds(
             observer.estimate(terms)
         return terms
 
-    smoother = OBSERVERS["kfo-rts"].build(setup)[0]
     free = recording.t < FREE_SECONDS
 
     def spectra(terms: DynamicsTerms) -> Spectra:
@@ -318,14 +295,7 @@ def memory_per_sample(robot_name: str = "panda", samples: int = 1_000_000) -> fl
 
     robot = load_robot(robot_name)
     recording = circle(robot, samples, rate=1000.0)
-    setup = Setup(
-        gains=robot.gains,
-        settings={},
-        joints=robot.joints,
-        step=recording.median_step,
-        as_printed=False,
-    )
-    observers = [OBSERVERS[name].build(setup)[0] for name in DEFAULT]
+    observers, _ = ObserverChoice().build(robot, recording.median_step)
     tracemalloc.start()
     terms = dynamics_terms(recording, robot)
     estimates = [observer.estimate(terms) for observer in observers]
