@@ -24,7 +24,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
-from vftcli.repetition import free_run
+from vftcli.repetition import alignment, free_run
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian
@@ -146,7 +146,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
 
     count(readers, "read")
     count(free_run, "dynamics_terms")
-    count(free_run, "align")
+    count(alignment, "align")
     names = {"LOAD": runs[0], "FREE": runs[1], "MORE": runs[2], "OUT": tmp_path / "out"}
     line = words.replace("OUT.toml", str(tmp_path / "gains.toml"))
     done = CliRunner().invoke(

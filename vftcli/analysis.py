@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from vftcli.observers.observer import Observer, Tuning
-from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
 
     from vftcli.evaluation.print_table import Comparison
     from vftcli.refinement.refine import Refinement
+    from vftcli.repetition.free_motion import FreeMotion
     from vftcli.signals.wrench import Wrench
     from vftcli.virtual_sensor.detection import ContactScore
     from vftcli.virtual_sensor.sensor_reading import SensorReading
@@ -43,7 +43,7 @@ class Analysis:
         run: The command, versions and conventions, as `run.json` holds them.
     """
 
-    motion: FreeMotion
+    motion: "FreeMotion"
     observers: tuple[Observer, ...]
     estimates: tuple[ExternalTorque, ...]
     tunings: Mapping[str, Tuning]

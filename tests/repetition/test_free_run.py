@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vftcli.readers import read
-from vftcli.repetition import free_run as room
+from vftcli.repetition import alignment as room
 from vftcli.repetition.free_run import FreeRun, ModelledRun, Models
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ReferenceTorqueError

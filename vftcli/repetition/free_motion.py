@@ -2,20 +2,23 @@
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.cycles import Cycles, check_cycles, segment
-from vftcli.repetition.free_cycles import FreeCycles, find_free_cycles
 from vftcli.repetition.free_run import FreeRun, ModelledRun
-from vftcli.repetition.pairing import Pairing, pair_with_cycle
-from vftcli.repetition.periodicity import Period, find_period
 from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.identity import refuse_repeated_runs
 from vftcli.signals.remarks import Remark, Where, fact
+
+# A plain estimate asks for no free motion: what finds it is loaded when it is asked for.
+if TYPE_CHECKING:
+    from vftcli.repetition.cycles import Cycles
+    from vftcli.repetition.free_cycles import FreeCycles
+    from vftcli.repetition.pairing import Pairing
+    from vftcli.repetition.periodicity import Period
 
 SLACK = 0.03
 """A cycle counts as inside a span if it sticks out by no more than this share of itself."""
@@ -33,7 +36,7 @@ class FreePiece(NamedTuple):
 
     run: ModelledRun
     inside: Mask
-    pairings: tuple[Pairing, ...]
+    pairings: tuple["Pairing", ...]
 
 
 class FreePart(NamedTuple):
@@ -50,7 +53,7 @@ class FreePart(NamedTuple):
     remarks: tuple[Remark, ...]
 
     @property
-    def pairings(self) -> tuple[Pairing, ...]:
+    def pairings(self) -> tuple["Pairing", ...]:
         """Where in each free motion that repeats the log's the log's samples belong."""
         return tuple(pairing for piece in self.pieces for pairing in piece.pairings)
 
@@ -80,21 +83,25 @@ class FreeMotion:
             refuse_repeated_runs(self.log.recording, [self.zero.recording])
 
     @cached_property
-    def period(self) -> Period:
+    def period(self) -> "Period":
         """The period of the log's motion.
 
         Raises:
             ReferenceTorqueError: If the log repeats nothing.
         """
+        from vftcli.repetition.periodicity import find_period
+
         return find_period(self.log.recording, self.choice.period)
 
     @cached_property
-    def cycles(self) -> Cycles:
+    def cycles(self) -> "Cycles":
         """The cycles of the log.
 
         Raises:
             ReferenceTorqueError: If the log repeats nothing.
         """
+        from vftcli.repetition.cycles import segment
+
         return segment(self.log.recording, self.period)
 
     @cached_property
@@ -104,6 +111,8 @@ class FreeMotion:
         Raises:
             ReferenceTorqueError: If the log repeats nothing, or has no such cycle.
         """
+        from vftcli.repetition.cycles import check_cycles
+
         check_cycles(self.log.recording, self.cycles, self.choice.cycles)
         slack = SLACK * self.cycles.period
         within = {
@@ -115,18 +124,22 @@ class FreeMotion:
         return tuple(sorted(within | {number - 1 for number in self.choice.cycles}))
 
     @cached_property
-    def free_cycles(self) -> FreeCycles:
+    def free_cycles(self) -> "FreeCycles":
         """The free cycles of the log: those the user says, else those found by what they show.
 
         Raises:
             ReferenceTorqueError: If the log repeats nothing, or has no such cycle.
         """
+        from vftcli.repetition.free_cycles import FreeCycles, find_free_cycles
+
         if self.cycles_given:
             return FreeCycles(self.cycles_given, None)
         return find_free_cycles(self.log.drive, self.cycles)
 
-    def pairings_by(self, period: float, numbers: tuple[int, ...]) -> tuple[Pairing, ...]:
+    def pairings_by(self, period: float, numbers: tuple[int, ...]) -> tuple["Pairing", ...]:
         """The log laid over cycles of its own, counted from 0, by a period. [s]"""
+        from vftcli.repetition.pairing import pair_with_cycle
+
         drive, cycles = self.log.drive, self.cycles
         return tuple(pair_with_cycle(drive, cycles, number, period) for number in numbers)
 

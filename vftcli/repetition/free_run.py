@@ -2,16 +2,20 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vftcli.repetition.alignment import Alignment, align
-from vftcli.repetition.drive_run import DriveRun, drive_run_of
-from vftcli.repetition.pairing import Pairing, pair_with_run
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
+
+# A plain estimate has no free run: what lays one under a log is loaded when it is asked for.
+if TYPE_CHECKING:
+    from vftcli.repetition.alignment import Alignment
+    from vftcli.repetition.drive_run import DriveRun
+    from vftcli.repetition.pairing import Pairing
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,8 +38,10 @@ class ModelledRun:
         return dynamics_terms(self.recording, self.robot, literal=self.literal)
 
     @cached_property
-    def drive(self) -> DriveRun:
+    def drive(self) -> "DriveRun":
         """Drive torque and the model's."""
+        from vftcli.repetition.drive_run import drive_run_of
+
         return drive_run_of(self.recording, self.robot, self.terms)
 
 
@@ -79,12 +85,14 @@ class FreeRun:
         return self.run.terms
 
     @property
-    def drive(self) -> DriveRun:
+    def drive(self) -> "DriveRun":
         """Drive torque along the free run, and the model's."""
         return self.run.drive
 
     @cached_property
-    def _alignment(self) -> Alignment | ReferenceTorqueError:
+    def _alignment(self) -> "Alignment | ReferenceTorqueError":
+        from vftcli.repetition.alignment import align
+
         try:
             return align(self.log.recording, self.recording)
         except ReferenceTorqueError as error:
@@ -93,10 +101,10 @@ class FreeRun:
     @property
     def is_same_motion(self) -> bool:
         """Whether it follows the log's trajectory, or a part of it."""
-        return isinstance(self._alignment, Alignment)
+        return not isinstance(self._alignment, ReferenceTorqueError)
 
     @property
-    def alignment(self) -> Alignment:
+    def alignment(self) -> "Alignment":
         """How it lies on the log.
 
         Raises:
@@ -107,12 +115,14 @@ class FreeRun:
         return self._alignment
 
     @cached_property
-    def pairing(self) -> Pairing:
+    def pairing(self) -> "Pairing":
         """Where in the free run each sample of the log belongs.
 
         Raises:
             ReferenceTorqueError: If it is another motion, of another arm, or on another clock.
         """
+        from vftcli.repetition.pairing import pair_with_run
+
         found = self.alignment
         pairing = pair_with_run(self.log.recording.t, self.drive, found.shift, found.rate)
         return pairing._replace(times=np.where(found.overlap, pairing.times, np.nan))
