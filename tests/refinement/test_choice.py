@@ -26,3 +26,10 @@ def test_the_word_for_nothing_is_one_of_the_table() -> None:
 def test_another_removal_is_refused_before_a_log_is_read() -> None:
     with pytest.raises(ParameterError, match="there is none, free-cycle, model"):
         RefinementChoice(remove_bias="all")
+
+
+def test_what_is_taken_off() -> None:
+    model = RefinementChoice.parsed(remove_bias="model")
+    assert (model.removes_bias, model.at_phase) == (True, False)
+    assert RefinementChoice(remove_bias="free-cycle").at_phase
+    assert not RefinementChoice(bands=True).removes_bias

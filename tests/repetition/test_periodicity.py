@@ -100,3 +100,10 @@ def test_sweeps_of_a_real_arm_are_no_repetition(logs: Path) -> None:
     log = read(logs / "ur10e" / "jointwise_2.csv", columns=columns)
     with pytest.raises(ReferenceTorqueError, match="no repetition"):
         find_period(log)
+
+
+@pytest.mark.parametrize("stated", [12.4, 12.5, 12.55])
+def test_a_stated_period_near_the_end_of_the_log(repeated: Make, stated: float) -> None:
+    """The longest that is allowed, .85 of what moves: one lag is left to look at, and it is."""
+    log = repeated(period=12.5, cycles=14.78 / 12.5)
+    assert find_period(log, stated).seconds == pytest.approx(12.5, rel=1e-3)  # 2.3 s overlap

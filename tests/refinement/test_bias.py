@@ -1,0 +1,146 @@
+"""Bias removal: what is taken off, and what the band says of what is left."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.observers import MomentumObserver
+from vftcli.readers import read
+from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
+from vftcli.refinement.bias import (
+    RANGE,
+    Scale,
+    check_removal,
+    features,
+    fitted,
+    remove_free_cycle,
+    remove_modelled,
+    remove_nothing,
+    ridge,
+)
+from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.free_motion import FreeMotion
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots import load_robot
+from vftcli.signals.errors import ParameterError
+
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
+GMO = MomentumObserver(gain=np.full(6, 20.0))
+
+
+@pytest.fixture(scope="module")
+def log() -> ModelledRun:
+    return ModelledRun(recording=read(FIXTURE), robot=load_robot("ur5"))
+
+
+def banded(found: Baseline, sd: float):
+    """What the observer reads, with a band of one size all over."""
+    estimate = GMO.estimate(found.terms)
+    shape = estimate.tau.shape
+    return free_reading(found, GMO, replace(estimate, error_sd=np.full(shape, sd)))
+
+
+def test_the_band_holds_what_two_free_cycles_leave_of_one_another(log: ModelledRun) -> None:
+    """sd² − rms_free² + left²: with cycles 1 and 2, left is the rms of their difference."""
+    found = baseline_of(FreeMotion(log=log, choice=FreeChoice(cycles=(1, 2))))
+    reading = banded(found, 30.0)
+    (after,) = remove_free_cycle(found, [reading]).estimates
+    own, tau = found.part.own, reading.estimate.tau
+    first, second = (pairing.there(tau) for pairing in found.part.pairings)
+    other = np.where(np.isfinite(first), first, second)[own]
+    left = np.sqrt(np.nanmean((tau[own] - other) ** 2, axis=0))
+    expected = np.sqrt(30.0**2 - reading.rms**2 + left**2)
+    np.testing.assert_allclose(after.error_sd[0], expected, rtol=1e-9)
+    assert np.all(left > 0.05)  # the second cycle is pushed: the difference is not nothing
+    np.testing.assert_allclose(after.tau[own], tau[own] - other, atol=1e-9)
+
+
+def test_one_free_cycle_is_zero_and_keeps_the_band(log: ModelledRun) -> None:
+    found = baseline_of(FreeMotion(log=log, choice=FreeChoice(cycles=(1,))))
+    reading = banded(found, 30.0)
+    removal = remove_free_cycle(found, [reading])
+    (after,) = removal.estimates
+    assert np.all(after.tau[found.part.own] == 0.0)
+    assert np.all(after.error_sd == 30.0)
+    codes = [remark.code for remark in removal.remarks]
+    assert codes[:2] == ["bias-at-phase", "free-cycle-is-zero"]
+
+
+def test_samples_outside_the_free_motion_keep_their_bias(log: ModelledRun) -> None:
+    found = baseline_of(FreeMotion(log=log, choice=FreeChoice(cycles=(1,))))
+    pairing = found.part.pairings[0]
+    cut = pairing._replace(times=np.where(log.recording.t < 12.0, pairing.times, np.nan))
+    piece = found.pieces[0]._replace(pairings=(cut,))
+    found = replace(found, part=found.part._replace(pieces=(piece,)))
+    reading = banded(found, 1.0)
+    removal = remove_free_cycle(found, [reading])
+    late = log.recording.t > 12.0
+    np.testing.assert_array_equal(removal.estimates[0].tau[late], reading.estimate.tau[late])
+    kept = next(remark for remark in removal.remarks if remark.code == "bias-kept-outside")
+    assert kept.values["share"] == pytest.approx(np.mean(late), abs=0.01)  # and the cycles' seams
+
+
+def test_a_bias_without_a_free_part_is_not_removed(log: ModelledRun) -> None:
+    found = replace(baseline_of(FreeMotion(log=log)), part=None)
+    reading = free_reading(found, GMO, GMO.estimate(found.terms))
+    for remove, words in (
+        (remove_free_cycle, "a motion that repeats"),
+        (remove_modelled, "--free"),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            remove(found, [reading])
+    assert remove_nothing(found, [reading]).estimates == (reading.estimate,)
+
+
+def test_the_model_finds_a_friction_that_was_left_out(log: ModelledRun) -> None:
+    """A bias of sign and speed, planted in what the observer reads, is predicted unseen."""
+    found = baseline_of(FreeMotion(log=log, choice=FreeChoice(spans=((0.0, 12.0),))))
+    dq = log.recording.dq
+    planted = 3.0 * np.tanh(dq / 0.05) + 2.0 * dq
+    noise = 0.1 * np.random.default_rng(5).standard_normal(dq.shape)
+    estimate = replace(
+        GMO.estimate(found.terms), tau=planted + noise, error_sd=np.full(dq.shape, 4.0)
+    )
+    removal = remove_modelled(found, [free_reading(found, GMO, estimate)])
+    (after,) = removal.estimates
+    moving = [0, 1, 2, 3, 5]
+    left = np.sqrt(np.mean(after.tau[:, moving] ** 2, axis=0))
+    assert np.all(left < 0.15)  # the noise of 0.1 and what 1501 samples do not tell
+    assert removal.remarks[0].code == "bias-modelled"
+    assert set(removal.remarks[0].where.joints) >= {1, 2, 3, 4, 6}
+    own = planted[found.part.own][:, moving]
+    rms = np.sqrt(np.mean((own + noise[found.part.own][:, moving]) ** 2, axis=0))
+    rid = np.sqrt(np.maximum(16.0 - rms**2, 0.0))
+    assert np.all(after.error_sd[0, moving] >= rid)
+    assert np.all(after.error_sd[0, moving] <= np.sqrt(rid**2 + 0.1))
+
+
+def test_ridge_without_penalty_is_least_squares() -> None:
+    rng = np.random.default_rng(6)
+    X, y = rng.standard_normal((50, 3)), rng.standard_normal(50)
+    exact, *_ = np.linalg.lstsq(np.column_stack([np.ones(50), X]), y, rcond=None)
+    np.testing.assert_allclose(ridge(X, y, 0.0), exact, atol=1e-12)
+    stiff = ridge(X, y, 1e9)
+    np.testing.assert_allclose(stiff, [y.mean(), 0.0, 0.0, 0.0], atol=1e-6)
+
+
+def test_noise_is_not_believed_to_be_a_bias() -> None:
+    rng = np.random.default_rng(7)
+    _, share = fitted(rng.standard_normal((200, 12)), rng.standard_normal((200, 2)))
+    assert np.all(share > 0.95)
+
+
+def test_features_are_held_within_what_the_free_part_showed(log: ModelledRun) -> None:
+    X = features(log.recording)
+    scale = Scale(X.mean(axis=0), X.std(axis=0), np.abs(X).max(axis=0))
+    beyond = np.vstack([10.0 * scale.most, -10.0 * scale.most])
+    np.testing.assert_allclose(scale.applied(beyond), scale.applied(RANGE / 10.0 * beyond))
+    np.testing.assert_allclose(scale.applied(X), (X - scale.mean) / scale.sd)
+
+
+def test_names_of_removals() -> None:
+    assert check_removal("model") == "model"
+    with pytest.raises(ParameterError, match="there is none, free-cycle, model"):
+        check_removal("all")

@@ -1,0 +1,86 @@
+"""What a difference cannot know: the pieces its error is made of, on signals of known size."""
+
+import numpy as np
+import pytest
+
+from vftcli.repetition.error_model import (
+    ErrorModel,
+    band,
+    less_noise,
+    local_rms,
+    noise_of,
+    rms,
+    slope_noise,
+    white,
+)
+
+STEP = 0.008
+T = STEP * np.arange(6000)
+MOVING = np.ones((6000, 1), dtype=bool)
+
+
+def test_the_slope_noise_is_taken_off_as_power() -> None:
+    """A motion error of √20 N·m with a slope noise of 2 N·m in it is 4; none is left of less."""
+    assert less_noise(np.sqrt([20.0]), np.array([2.0])) == pytest.approx(4.0)
+    assert less_noise(np.array([1.0]), np.array([2.0])) == 0.0
+
+
+def test_white_noise_is_measured_under_a_smooth_signal() -> None:
+    rng = np.random.default_rng(1)
+    x = 0.3 * rng.standard_normal((6000, 1)) + 10.0 * np.sin(2 * np.pi * 0.5 * T)[:, None]
+    assert white(x, MOVING) == pytest.approx(0.3, rel=0.05)  # 6000 samples tell 1 %
+    assert noise_of(T, x, MOVING, STEP, None) == pytest.approx(0.3, rel=0.05)
+
+
+@pytest.mark.parametrize("cutoff", [6.0, 12.0])
+def test_what_a_low_pass_leaves_of_white_noise(cutoff: float) -> None:
+    """Measured beside the signal, predicted for the band that passes."""
+    from vftcli.signals.filters import low_pass
+
+    x = np.random.default_rng(2).standard_normal((6000, 1))
+    left = float(np.sqrt(np.mean(low_pass(T, x, cutoff) ** 2)))
+    assert noise_of(T, x, MOVING, STEP, cutoff) == pytest.approx(left, rel=0.1)
+
+
+def test_what_a_differentiated_noise_leaves() -> None:
+    from vftcli.signals.filters import low_pass
+
+    p = np.random.default_rng(3).standard_normal((6000, 1))
+    slope = np.gradient(low_pass(T, p, 8.0), T, axis=0)
+    shown = float(np.sqrt(np.mean(slope[50:-50] ** 2)))
+    assert slope_noise(T, p, MOVING, STEP, 8.0) == pytest.approx(shown, rel=0.1)
+
+
+def test_a_local_mean_square_spans_a_tenth_of_a_second() -> None:
+    x = np.zeros((200, 1))
+    x[100] = 1.0
+    found = local_rms(x, 0.01)[:, 0]
+    assert np.flatnonzero(found).tolist() == list(range(95, 106))
+    assert found[100] == pytest.approx(np.sqrt(1.0 / 11.0))
+
+
+def test_the_rms_of_no_sample_is_that_of_all() -> None:
+    x = np.array([[3.0, 1.0], [4.0, 2.0]])
+    where = np.array([[True, False], [False, False]])
+    np.testing.assert_allclose(rms(x, where), [3.0, np.sqrt(2.5)])
+
+
+def test_the_noise_band_lies_above_the_signal_and_below_half_the_rate() -> None:
+    assert band(0.001, 12.0) == (12.0, 24.0)
+    assert band(0.001, None) == (12.0, 24.0)
+    low, high = band(0.02, 12.0)
+    assert (low, high) == (pytest.approx(11.0), pytest.approx(22.0))  # 0.22 and 0.44 of 50 Hz
+
+
+def test_the_floor_of_a_joint_that_mostly_stands_is_over_all_samples() -> None:
+    sd = np.column_stack([np.full(10, 1.0), np.repeat([1.0, 3.0], 5)])
+    standing = np.zeros((10, 2), dtype=bool)
+    standing[5:, 1] = True
+    model = ErrorModel(sd, standing)
+    np.testing.assert_allclose(model.standing_share, [0.0, 0.5])
+    np.testing.assert_allclose(model.floor, [1.0, 1.0])  # moving half alone
+    assert np.isnan(model.floor_standing[0])
+    assert model.floor_standing[1] == 3.0
+    standing[4:, 1] = True
+    assert ErrorModel(sd, standing).floor[1] == pytest.approx(np.sqrt(5.0))  # all: (5·1 + 5·9)/10
+    assert ErrorModel(sd, standing).trusted_joints.tolist() == [True, False]

@@ -1,0 +1,97 @@
+"""The alignment ladder: what a difference is on each rung, and which one is taken."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vftcli.repetition.drive_run import DriveRun
+from vftcli.repetition.error_model import ErrorModel
+from vftcli.repetition.ladder import WORTH, Difference, difference, differences, most_certain
+from vftcli.repetition.pairing import pair_with_run
+from vftcli.signals.errors import ReferenceTorqueError
+
+T = 0.008 * np.arange(1500)
+
+
+def drive(torque: np.ndarray, model: np.ndarray) -> DriveRun:
+    """One joint that swings, with torques of its own."""
+    q = np.sin(T)[:, None]
+    still = np.zeros_like(q)
+    return DriveRun(
+        name="log",
+        t=T,
+        q=q,
+        dq=np.cos(T)[:, None],
+        torque=torque,
+        model=model,
+        momentum=still,
+        coulomb=np.zeros(1),
+        standstill_s=still,
+        standing=still > 0,
+    )
+
+
+RNG = np.random.default_rng(4)
+PUSH = 5.0 * np.exp(-((T - 6.0) ** 2))[:, None]
+MODEL, FREE_MODEL = RNG.standard_normal((2, len(T), 1))
+
+
+def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off() -> None:
+    """τ + τ_ext is what the model says of each motion: the push comes out exactly."""
+    loaded, free = drive(MODEL - PUSH, MODEL), drive(FREE_MODEL, FREE_MODEL)
+    pairing = pair_with_run(T, free, 0.0)
+    corrected = difference(loaded, [pairing], "model", None)
+    np.testing.assert_allclose(corrected.tau, PUSH, atol=1e-9)
+    plain = difference(loaded, [pairing], "period", None)
+    np.testing.assert_allclose(plain.tau, FREE_MODEL - MODEL + PUSH, atol=1e-9)
+    assert np.all(corrected.floor < plain.floor)
+
+
+def test_rungs_without_their_clock_are_left_out() -> None:
+    loaded = drive(MODEL, MODEL)
+    clocks = {"found": [pair_with_run(T, loaded, 0.0)]}
+    made = differences(loaded, clocks, ("commanded", "period", "model"), (None, 12.0))
+    assert [(d.rung, d.cutoff) for d in made] == [
+        ("period", None),
+        ("period", 12.0),
+        ("model", None),
+        ("model", 12.0),
+    ]
+    assert made[1].remark("alignment-floor").code == "alignment-floor-filtered"
+    assert made[0].remark("alignment-floor").code == "alignment-floor"
+
+
+def test_too_few_partners_are_refused() -> None:
+    loaded = drive(MODEL, MODEL)
+    with pytest.raises(ReferenceTorqueError, match="only 15 samples have a partner"):
+        difference(loaded, [pair_with_run(T, loaded, T[-1] - T[14])], "period", None)
+
+
+def test_the_simpler_of_two_alike_is_taken() -> None:
+    standing = np.zeros((4, 2), dtype=bool)
+
+    def made(rung: str, *floor: float) -> Difference:
+        return Difference(
+            rung, None, np.zeros((4, 2)), ErrorModel(np.tile(floor, (4, 1)), standing)
+        )
+
+    low = made("period", 1.0, 1.0)
+    assert most_certain([low, made("phase", WORTH + 0.01, WORTH + 0.01)]).rung == "period"
+    assert most_certain([low, made("phase", WORTH - 0.01, WORTH - 0.01)]).rung == "phase"
+    better = [low, made("phase", 0.9, 0.9), made("model", 0.9 * WORTH + 0.01, 0.88)]
+    assert most_certain(better).rung == "phase"
+    # A joint that stands decides nothing.
+    stands = replace_standing(made("model", 0.5, 9.0), joint=1)
+    assert most_certain([replace_standing(low, joint=1), stands]).rung == "model"
+
+
+def replace_standing(made: Difference, joint: int) -> Difference:
+    standing = made.error.standing.copy()
+    standing[:, joint] = True
+    return made._replace(error=made.error._replace(standing=standing))
+
+
+def test_a_drive_run_knows_its_step() -> None:
+    assert drive(MODEL, MODEL).step == pytest.approx(0.008)
+    assert replace(drive(MODEL, MODEL), t=2.0 * T).step == pytest.approx(0.016)

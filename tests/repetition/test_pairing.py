@@ -1,0 +1,93 @@
+"""Which instant of a free run belongs to each sample of a log."""
+
+import numpy as np
+import pytest
+
+from vftcli.repetition.cycles import Cycles
+from vftcli.repetition.drive_run import DriveRun
+from vftcli.repetition.pairing import (
+    Pairing,
+    by_phase,
+    in_gap,
+    mean_of,
+    pair_with_cycle,
+    pair_with_run,
+)
+
+T = 0.01 * np.arange(1200)
+
+
+def drive(t: np.ndarray = T, late: float = 0.0) -> DriveRun:
+    """Two joints going round every 4 s, `late` seconds behind."""
+    phase = 2.0 * np.pi * (t[:, None] - late) / 4.0
+    q = np.hstack([np.sin(phase), 0.5 * np.cos(phase)])
+    still = np.zeros_like(q)
+    return DriveRun(
+        name="log",
+        t=t,
+        q=q,
+        dq=np.gradient(q, t, axis=0),
+        torque=still,
+        model=still,
+        momentum=still,
+        coulomb=np.zeros(2),
+        standstill_s=still,
+        standing=still > 0,
+    )
+
+
+@pytest.mark.parametrize("free", [0, 1, 2])
+def test_a_cycle_is_laid_under_all_others_and_not_under_itself(free: int) -> None:
+    cycles = Cycles(period=4.0, begin=0.0, end=12.0)
+    pairing = pair_with_cycle(drive(), cycles, free, 4.0)
+    own = cycles.number(T) == free
+    assert not pairing.known[own].any()
+    assert pairing.known[~own].mean() > 0.98  # but where the cycles touch
+    away = (T[pairing.known] - pairing.times[pairing.known]) / 4.0
+    np.testing.assert_allclose(away, np.rint(away), atol=1e-9)
+    first, last = cycles.span(free)
+    partners = pairing.times[pairing.known]
+    assert np.all((partners >= first) & (partners <= last))
+
+
+def test_a_run_is_laid_by_shift_and_rate_as_far_as_it_goes() -> None:
+    pairing = pair_with_run(T, drive(), 1.0, 1.1)
+    known = T[-1] >= 1.1 * T + 1.0
+    np.testing.assert_array_equal(pairing.known, known)
+    np.testing.assert_allclose(pairing.times[known], 1.1 * T[known] + 1.0)
+
+
+def test_nothing_is_interpolated_across_a_gap() -> None:
+    clock = np.delete(T, slice(300, 320))
+    assert in_gap(clock, np.array([3.05]))[0]
+    assert not in_gap(clock, np.array([2.95, 3.25])).any()
+    assert not in_gap(np.delete(T, slice(300, 304)), np.array([3.02])).any()  # 5 steps are none
+    pairing = pair_with_run(T, drive(clock), 0.0)
+    assert not pairing.known[(T > 2.995) & (T < 3.195)].any()
+
+
+def test_a_signal_is_taken_from_the_paired_instants() -> None:
+    free = drive()
+    there = pair_with_run(T, free, -2.0).there(free.q)
+    assert np.isnan(there[T < 2.0]).all()
+    np.testing.assert_allclose(there[300], free.q[100], atol=1e-9)
+
+
+def test_phase_moves_partners_to_the_nearest_place() -> None:
+    """The log runs 30 ms behind the clock's word; the path says so."""
+    log, free = drive(late=0.03), drive()
+    moved = by_phase(log, pair_with_run(T, free, 0.0))
+    middle = slice(200, 1000)  # the low-pass settles at the ends
+    np.testing.assert_allclose(moved.times[middle] - T[middle], -0.03, atol=1e-3)
+
+
+def test_the_mean_is_over_the_runs_that_are_known() -> None:
+    free = drive()
+    nowhere = Pairing(free, np.full(len(T), np.nan))
+    half = pair_with_run(T, free, 6.0)
+    whole = pair_with_run(T, free, 0.0)
+    x, y = np.full((len(T), 2), 1.0), np.full((len(T), 2), 3.0)
+    mean = mean_of([whole, half, nowhere], [x, y, x])
+    assert np.all(mean[half.known] == 2.0)
+    assert np.all(mean[~half.known] == 1.0)
+    assert np.isnan(mean_of([nowhere], [x])).all()

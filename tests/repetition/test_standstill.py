@@ -1,0 +1,60 @@
+"""Where a joint stands still: stops long enough for stiction, with their moments around."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vftcli.repetition.standstill import BREAKAWAY, LEAST, STILL, duration, standing
+
+STEP = 0.01
+T = STEP * np.arange(400)
+
+
+def speeds(*stops: tuple[int, int]) -> np.ndarray:
+    """A joint at 0.5 rad/s that stops over the samples first to last, both included."""
+    dq = np.full((400, 1), 0.5)
+    for first, last in stops:
+        dq[first : last + 1] = 0.5 * STILL
+    return dq
+
+
+def test_a_stop_lasts_from_its_first_sample_through_its_last() -> None:
+    found = duration(T, speeds((100, 149)))[:, 0]
+    assert np.allclose(found[100:150], 0.5)
+    assert not found[:100].any()
+    assert not found[150:].any()
+
+
+def test_a_long_stop_stands_with_the_moments_around_it() -> None:
+    found = standing(T, duration(T, speeds((100, 149))))[:, 0]
+    around = round(BREAKAWAY / STEP)
+    expected = np.zeros(400, dtype=bool)
+    expected[100 - around : 150 + around] = True
+    # The samples at exactly the break-away time lie on either side of rounding.
+    assert np.count_nonzero(found != expected) <= 2
+
+
+def test_a_reversal_is_no_stop() -> None:
+    short = round(LEAST / STEP) - 2
+    assert not standing(T, duration(T, speeds((100, 100 + short)))).any()
+    assert standing(T, duration(T, speeds((100, 100 + short + 2)))).any()
+
+
+def test_joints_are_told_apart() -> None:
+    both = np.hstack([speeds((100, 149)), speeds()])
+    found = standing(T, duration(T, both))
+    assert found[:, 0].any()
+    assert not found[:, 1].any()
+
+
+@given(st.lists(st.booleans(), min_size=2, max_size=80))
+def test_durations_add_up_to_the_still_samples(still: list[bool]) -> None:
+    """A run of k still samples is said k times to last k steps, whatever the pattern."""
+    t = STEP * np.arange(len(still))
+    dq = np.where(still, 0.0, 1.0)[:, None]
+    found = duration(t, dq)[:, 0]
+    assert np.array_equal(found > 0, still)
+    k, runs = 0, []
+    for value in [*still, False]:
+        k = k + 1 if value else (runs.append(k) or 0)
+    assert np.isclose(found.sum(), STEP * sum(k * k for k in runs))
