@@ -1,67 +1,24 @@
-"""Base parameters and the physically consistent model."""
+"""The physically consistent model."""
 
 import numpy as np
 import pytest
 
-from vftcli.identification.base_parameters import group_parameters
 from vftcli.identification.consistent import (
+    WEIGHTS,
     Problem,
     fit_at,
+    fit_consistent,
     is_physical,
+    nearest_physical,
     pseudo_inertias,
     solve,
     starting_point,
     thicken_links,
 )
 from vftcli.identification.friction_shapes import Shape
-from vftcli.identification.stacking import ParameterColumns, Triangles, least_change, triangle
+from vftcli.identification.stacking import ParameterColumns, Triangles, triangle
 from vftcli.robots import load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor, with_parameters
-
-
-@pytest.mark.parametrize(
-    ("name", "rotor", "rank"),
-    [("ur5", False, 36), ("ur5", True, 40), ("panda", False, 43), ("panda", True, 48)],
-)
-def test_ranks_are_the_published_ones(name, rotor, rank):
-    """UR5 36 of 60 inertial, 58 of 84 with 18 friction numbers; Panda 43 of 70, 69 of 98."""
-    assert len(group_parameters(load_robot(name).chain, rotor).independent) == rank
-
-
-@pytest.mark.parametrize("name", ["ur5", "panda"])
-def test_rotors_of_joints_one_and_two_are_never_separate(name):
-    chain = load_robot(name).chain
-    grouping = group_parameters(chain, True)
-    n = chain.joints
-    for j in (0, 1):
-        alone = 10 * n + j
-        if alone in grouping.independent:
-            row = grouping.carried[grouping.independent.index(alone)]
-            assert np.any(row != 0.0)
-
-
-def test_equal_base_parameters_mean_equal_torque():
-    chain = load_robot("panda").chain
-    grouping = group_parameters(chain, False)
-    phi = chain_parameters(chain)
-    other = phi.copy()
-    rng = np.random.default_rng(0)
-    change = rng.normal(size=len(grouping.dependent))
-    other[list(grouping.dependent)] += change
-    other[list(grouping.independent)] -= grouping.carried @ change
-    np.testing.assert_allclose(grouping.values(other), grouping.values(phi), atol=1e-10)
-    q, dq, ddq = rng.uniform(-2, 2, (3, 50, 7))
-    Y = torque_regressor(chain, q, dq, ddq)
-    # β comes from a triangle of condition 1e3 or so: 1e-12 of torques of 10²
-    np.testing.assert_allclose(Y @ other, Y @ phi, atol=1e-8)
-
-
-def test_names_say_what_is_summed():
-    chain = load_robot("ur5").chain
-    layout = ParameterColumns(chain, True, (Shape(("coulomb",)),) * 6)
-    names = group_parameters(chain, True).sums(layout.names)
-    assert len(set(names)) == 40
-    assert any(" + " in name for name in names)
 
 
 def stacked(chain, phi, noise, seed=0, samples=300):
@@ -182,13 +139,69 @@ def test_pseudo_inertia_of_a_point_mass():
     np.testing.assert_allclose(pseudo_inertias(phi)[0], expected, atol=1e-15)
 
 
-def test_least_squares_leaves_the_start_where_there_is_no_data():
+def test_the_pull_is_the_strongest_of_the_nearly_best():
     chain = load_robot("ur5").chain
-    phi = chain_parameters(perturbed(chain, 8))
-    triangles, state = stacked(chain, phi, noise=0.1)
-    start = chain_parameters(chain)
-    x = least_change(triangles, start)
-    # the first link's mass moves nothing: no motion tells it
-    assert x[0] == pytest.approx(start[0], rel=1e-12)
+    true = chain_parameters(perturbed(chain, 2))
+    triangles, _ = stacked(chain, true, noise=2.0)
+    found = fit_consistent(triangles, chain_parameters(chain))
+    best = min(found.errors.values())
+    near = [weight for weight, error in found.errors.items() if error <= 1.01 * best]
+    assert set(found.errors) == set(WEIGHTS)
+    assert found.weight == max(near)
+    # rows are divided by their noise: the misfit left out is one standard deviation and more by
+    # what 36 parameters of 4/5 of 1800 rows cost
+    assert 1.0 < best < 1.0 + 3 * 36 / 1440
+    start = starting_point(triangles.layout, chain_parameters(chain))
+    np.testing.assert_array_equal(found.x, fit_at(triangles, start, found.weight, start))
+
+
+def test_a_strong_pull_gives_the_profile_back():
+    chain = load_robot("ur5").chain
+    triangles, _ = stacked(chain, chain_parameters(perturbed(chain, 2)), noise=0.5)
+    start = starting_point(triangles.layout, chain_parameters(chain))
+    near = fit_at(triangles, start, 1e12, start)
+    np.testing.assert_allclose(near, start, rtol=1e-4, atol=1e-6)
+
+
+def test_the_nearest_physical_model_is_found_in_ever_weaker_pulls():
+    chain = load_robot("ur5").chain
+    true = chain_parameters(perturbed(chain, 2))
+    triangles, state = stacked(chain, true, noise=0.1)
+    x = nearest_physical(triangles, chain_parameters(chain))
+    assert is_physical(x)
     Y = torque_regressor(chain, *state)
-    assert np.sqrt(np.mean((Y @ (x - phi)) ** 2)) < 0.05  # noise 0.1·√(36/1800), and truncation
+    # 36 parameters of 1800 rows of noise .1 (0.014), and a pull of a hundredth of a count
+    assert np.sqrt(np.mean((Y @ (x - true)) ** 2)) < 0.02
+
+
+def test_correlated_equations_count_less():
+    chain = load_robot("ur5").chain
+    triangles, _ = stacked(chain, chain_parameters(perturbed(chain, 2)), noise=0.5)
+    start = starting_point(triangles.layout, chain_parameters(chain))
+    slow = fit_at(triangles._replace(correlation=100.0), start, 1.0, start)
+    strong = fit_at(triangles, start, 100.0, start)
+    # a hundredth of the equations under a pull of 1 is all of them under one of 100
+    problem = Problem(*triangles.joined(), start, triangles.layout, 100.0)
+    # both stop within a decrement of 1e-3, which is 0.1 of the hundredfold cost
+    assert problem.value(slow) == pytest.approx(problem.value(strong), abs=0.2)
+    assert problem.value(slow) < problem.value(start) - 10.0
+
+
+def test_costs_outside_the_physical_models_are_infinite():
+    chain = load_robot("ur5").chain
+    layout = ParameterColumns(chain, True, (Shape(()),) * 6)
+    start = np.concatenate([thicken_links(chain_parameters(chain)), np.ones(6)])
+    nothing = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
+    problem = Problem(*nothing, start, layout, 2.0)
+    assert problem.value(start) == pytest.approx(0.0, abs=1e-12)
+    bad_link, bad_rotor = start.copy(), start.copy()
+    bad_link[0], bad_rotor[-1] = -1.0, 0.0
+    assert problem.value(bad_link) == problem.value(bad_rotor) == np.inf
+    # rotors: weight · (r − ln r − 1) each, r the ratio to the profile
+    twice = start.copy()
+    twice[-6:] = 2.0
+    assert problem.value(twice) == pytest.approx(2.0 * 6 * (2 - np.log(2) - 1))
+    # links: tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4 with P = 2 P₀ is 4 − 4 ln 2
+    double = start.copy()
+    double[:60] *= 2.0
+    assert problem.value(double) == pytest.approx(2.0 * 6 * (4 - 4 * np.log(2)))

@@ -1,0 +1,193 @@
+"""A load on the flange, on equations whose answer is known."""
+
+import numpy as np
+import pytest
+
+from vftcli.identification.payload import (
+    LoadSolution,
+    NotSameMotionError,
+    find_time_shift,
+    fit_all_joints,
+    load_friction,
+    names_of,
+    payload_from_pair,
+    payload_from_poses,
+    resting_poses,
+    standing,
+)
+from vftcli.identification.processing import gravity_torque
+from vftcli.robots import Payload, load_robot
+from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
+from vftcli.signals.errors import IdentificationError
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import fact
+
+PANDA, UR5 = load_robot("panda"), load_robot("ur5")
+SOURCE = fact("load-from-poses", poses=4)
+
+
+def still(seconds=2.0):
+    """A log at rest."""
+    t = np.arange(0, seconds, 0.01)
+    zero = np.zeros((len(t), 7))
+    return Recording(t=t, q=zero, dq=zero, torque=zero)
+
+
+def solution(mass, com, sd=(0.01, 0.001, 0.002, 0.003)):
+    """A solved load of this mass at `com` in the last link's frame of a Panda."""
+    x = np.array([mass, *(mass * np.array(com))])
+    return LoadSolution(x, np.array(sd), np.zeros(7), (still(),), SOURCE)
+
+
+def test_the_load_is_moved_to_flange_axes():
+    chain = PANDA.chain
+    com = np.array([0.02, -0.01, 0.05])
+    in_link = chain.flange_rotation @ com + chain.flange_translation
+    fit = solution(2.0, in_link).at_flange(PANDA)
+    np.testing.assert_allclose(fit.payload.com, com, atol=1e-12)
+    assert (fit.payload.mass, fit.mass_sd) == (2.0, 0.01)
+    # the Panda's flange is not turned against its last link: sd of m·c over m
+    turned = np.abs(chain.flange_rotation.T) @ np.array([0.0005, 0.001, 0.0015])
+    assert np.sum(fit.com_sd**2) == pytest.approx(np.sum(np.square([0.0005, 0.001, 0.0015])))
+    assert np.all(fit.com_sd <= turned + 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("mass", "sd", "com", "words"),
+    [
+        (-0.1, 0.01, 0.0, "no load can be told"),
+        (1.0, 0.51, 0.0, "no load can be told: mass 1 ± 0.51 kg"),
+        (1.0, 0.49, 1.2, "m from the flange"),
+    ],
+)
+def test_what_cannot_be_a_load_is_refused(mass, sd, com, words):
+    with pytest.raises(IdentificationError, match=words):
+        solution(mass, [0, 0, com], (sd, 0.1, 0.1, 0.1)).at_flange(PANDA)
+
+
+def test_a_log_is_known_as_an_object_not_by_its_name():
+    log, twin = still(), still()
+    fit = solution(1.0, [0, 0, 0])._replace(loaded=(log,)).at_flange(PANDA)
+    assert fit.carried_by(log)
+    assert not fit.carried_by(twin)
+    assert names_of([log, twin]) == "recording, recording"
+
+
+def test_each_joint_counts_by_its_own_residual():
+    rng = np.random.default_rng(0)
+    A = rng.standard_normal((400, 3, 2))
+    x = np.array([1.5, -0.5])
+    noise = rng.standard_normal((400, 3)) * [0.01, 0.01, 10.0]
+    y = np.einsum("knp,p->kn", A, x) + noise
+    # the noisy joint hardly counts: 0.01/√800 = 4e-4
+    np.testing.assert_allclose(fit_all_joints(A, y, np.ones((400, 3))), x, atol=2e-3)
+    usable = np.ones((400, 3))
+    usable[:, 2] = 0.0
+    spoilt = y.copy()
+    spoilt[:, 2] = 1e6
+    np.testing.assert_allclose(fit_all_joints(A, spoilt, usable), x, atol=2e-3)
+
+
+def test_friction_grows_with_the_load_where_the_joint_moves():
+    rng = np.random.default_rng(1)
+    q, sign = rng.uniform(-1, 1, (20, 6)), np.sign(rng.standard_normal((20, 6)))
+    load = Payload(mass=2.0, com=np.zeros(3), inertia=np.zeros((3, 3)))
+    loaded = UR5.with_payload(load)
+    x = (chain_parameters(loaded.loaded_chain) - chain_parameters(UR5.chain))[-LINK:][:4]
+    columns = load_friction(UR5, q, sign, x)
+    growth = np.abs(gravity_torque(loaded, q)) - np.abs(gravity_torque(UR5, q))
+    np.testing.assert_allclose(np.einsum("kjj->kj", columns), growth * sign, atol=1e-9)
+    off = columns.copy()
+    off[:, range(6), range(6)] = 0.0
+    assert not off.any()
+
+
+def swinging(shift=0.0, bend=0.0, seconds=12.0):
+    """A UR5 that swings, its clock later by `shift` [s] and its path bent by `bend` [rad]."""
+    t = np.arange(0, seconds, 0.01)
+    at = t + shift
+    q = 0.4 * np.sin(0.8 * at)[:, None] * [1, 0.7, 0.9, 0.5, 0.6, 0.8] + [0, -1, 1, 0, 0.5, 0]
+    dq = 0.32 * np.cos(0.8 * at)[:, None] * [1, 0.7, 0.9, 0.5, 0.6, 0.8]
+    q[:, 1] += bend * np.sin(3.1 * at)
+    return t, q, dq
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.237, -1.41])
+def test_the_shift_between_two_logs_is_found(prepared, shift):
+    t, q, dq = swinging(shift)
+    motion = prepared(t, q=q, dq=dq)
+    other = Recording(t=t, q=swinging()[1], dq=dq, torque=0 * q)
+    found, distance = find_time_shift(motion, other)
+    # steps of 0.5 ms, interpolation of a 10 ms clock
+    assert found == pytest.approx(shift, abs=5e-4)
+    assert distance < 1e-3
+
+
+def test_another_motion_is_no_pair(prepared):
+    t, q, dq = swinging()
+    bent = Recording(t=t, q=swinging(bend=0.03)[1], dq=dq, torque=0 * q)
+    # .03 rad in one of six joints is .03/√12 = 8.7 mrad rms: more than 5 mrad
+    with pytest.raises(NotSameMotionError, match="not the same motion: positions differ by 8"):
+        find_time_shift(prepared(t, q=q, dq=dq), bent)
+    near = Recording(t=t, q=swinging(bend=0.015)[1], dq=dq, torque=0 * q)
+    assert find_time_shift(prepared(t, q=q, dq=dq), near)[1] == pytest.approx(4.3e-3, rel=0.05)
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_the_heavier_log_of_a_pair_shows_by_itself(swap):
+    load = Payload(mass=1.2, com=np.array([0.03, 0.0, 0.06]), inertia=np.zeros((3, 3)))
+    t, q, dq = swinging()
+    ddq = -(0.8**2) * (q - [0, -1, 1, 0, 0.5, 0])
+    logs = []
+    for robot in (UR5, UR5.with_payload(load)):
+        torque = torque_regressor(UR5.chain, q, dq, ddq) @ chain_parameters(robot.loaded_chain)
+        torque = torque + 5.0 * np.tanh(dq / 0.01) + 8.0 * dq
+        logs.append(Recording(t=t, q=q, dq=dq, current=torque / UR5.torque_constant))
+    free, loaded = logs
+    fit = payload_from_pair(*((loaded, free) if swap else (free, loaded)), UR5)
+    assert fit.carried_by(loaded)
+    assert not fit.carried_by(free)
+    # no noise: what is left is the filter's (0.8/50)⁸ and the shift's 0.5 ms
+    assert fit.payload.mass == pytest.approx(1.2, rel=5e-3)
+    np.testing.assert_allclose(fit.payload.com, load.com, atol=3e-3)
+    assert fit.origin.code == "load-from-pair"
+    assert fit.origin.values["shift_s"] == pytest.approx(0.0, abs=1e-3)
+
+
+def steps(poses, dwell=1.0, load=None):
+    """A UR5 that jumps from pose to pose, moving fast for 0.2 s between them."""
+    count, move = round(dwell / 0.01), 20
+    q = np.repeat(poses, count + move, axis=0)
+    for k in range(1, len(poses)):
+        edge = k * (count + move)
+        share = np.linspace(0, 1, move)[:, None]
+        q[edge - move : edge] = (1 - share) * poses[k - 1] + share * poses[k]
+    torque = gravity_torque(UR5.with_payload(load), q)
+    t = 0.01 * np.arange(len(q))
+    return Recording(t=t, q=q, dq=0 * q, current=torque / UR5.torque_constant)
+
+
+POSES = np.random.default_rng(3).uniform(-1, 1, (5, 6)) + np.array([0, -1, 1, 0, 0, 0])
+
+
+def test_rests_are_averaged_without_their_edges():
+    recording = steps(POSES)
+    q, torque = resting_poses([recording, recording], UR5)
+    np.testing.assert_allclose(q, np.vstack([POSES, POSES]), atol=1e-12)
+    np.testing.assert_allclose(torque[:5], gravity_torque(UR5, POSES), atol=1e-9)
+    assert len(resting_poses([steps(POSES, dwell=0.45)], UR5)[0]) < 5  # shorter than a dwell
+    moving = ~standing(recording)
+    assert moving[100:120].all()
+    assert not moving[130:209].any()  # half a window of 0.2 s inside the rest
+
+
+def test_a_load_is_found_from_poses_and_too_few_are_refused():
+    load = Payload(mass=0.8, com=np.array([0.0, 0.04, 0.07]), inertia=np.zeros((3, 3)))
+    fit = payload_from_poses([steps(POSES, load=load)], UR5)
+    # gravity alone, no noise: exact
+    assert fit.payload.mass == pytest.approx(0.8, abs=1e-6)
+    np.testing.assert_allclose(fit.payload.com, load.com, atol=1e-6)
+    assert fit.origin.values["poses"] == 5
+    for few in (POSES[:3], np.repeat(POSES[:1], 5, axis=0) + 0.01 * np.arange(5)[:, None]):
+        with pytest.raises(IdentificationError, match="a load needs 4 different ones"):
+            payload_from_poses([steps(few, load=load)], UR5)

@@ -1,0 +1,173 @@
+"""What a controller believes, read off targets that were made here."""
+
+import numpy as np
+import pytest
+
+from vftcli.identification.friction_shapes import FrictionColumns
+from vftcli.identification.target_method import gravity_remarks, target_numbers, target_remarks
+from vftcli.identification.targets import (
+    ControllerModel,
+    Estimate,
+    Targets,
+    constant_at_rest,
+    constant_in_motion,
+    controller_friction,
+    controller_models,
+    relative_sd,
+    resolution,
+    rotor_inertia,
+)
+from vftcli.robots import load_robot
+from vftcli.signals.errors import IdentificationError
+
+UR5 = load_robot("ur5")
+K, J, GRAVITY = 10.0, 3.0, 1.001
+KNOWN, UNKNOWN = Estimate(2.0, 0.01, True), Estimate(float("nan"), float("inf"), False)
+
+
+@pytest.fixture
+def targets(prepared, sines) -> Targets:
+    """One joint's targets of a controller of known K, J, gravity and friction, 20 s at 100 Hz."""
+    t, q, dq, ddq = sines(seconds=20.0, rate=100.0, joints=1, seed=3)
+    gravity = 20.0 * np.sin(q)
+    rigid = 2.0 * ddq + gravity
+    moment = rigid + J * ddq + (GRAVITY - 1.0) * gravity
+    friction = 4.0 * np.tanh(dq / 0.01) + 6.0 * dq - 2.0 * dq * np.abs(dq)
+    motion = prepared(t, q=q, dq=dq, ddq=ddq)
+    columns = FrictionColumns(motion, np.abs(gravity))
+    current = (moment + motion.filtered(friction)) / K
+    recording = prepared(t, q=q, dq=dq, target_current=current, target_torque=moment).recording
+    lead = np.gradient(moment, t, axis=0)
+    return Targets(recording, motion, columns, current, moment, lead, rigid, gravity)
+
+
+def test_the_drive_constant_comes_from_currents_that_follow_moments(targets):
+    found = constant_in_motion(0, [targets])
+    # smoothing .01 of the shapes is the friction's own: exact but for the reversals' filter
+    assert found.value == pytest.approx(K, rel=1e-6)
+    assert found.known
+
+
+def test_rotor_and_gravity_come_from_moments_beyond_the_rigid_body(targets):
+    rotor, gravity = rotor_inertia(0, [targets])
+    assert rotor.value == pytest.approx(J, rel=1e-6)
+    assert gravity.value == pytest.approx(GRAVITY, abs=1e-6)
+    assert rotor.known
+    assert gravity.known
+
+
+def test_a_shift_in_time_is_no_inertia(targets):
+    late = targets._replace(moment=targets.moment + 0.002 * targets.lead)
+    rotor, gravity = rotor_inertia(0, [late])
+    # the derivative's column takes it up to second order, numerical differences to 1e-3
+    assert rotor.value == pytest.approx(J, rel=2e-3)
+    assert gravity.value == pytest.approx(GRAVITY, abs=2e-4)
+
+
+def test_friction_is_what_the_current_has_beyond_the_moment(targets):
+    values, sd = controller_friction(0, [targets], K)
+    np.testing.assert_allclose(values, [4.0, 6.0, -2.0], rtol=1e-6)
+    assert np.all(sd < 1e-3)
+    slow = targets._replace(motion=slowed(targets, 0.04))
+    assert controller_friction(0, [slow], K) is None
+
+
+def slowed(targets, fastest):
+    """The motion at other velocities, `fastest` at most."""
+    from dataclasses import replace
+
+    dq = targets.motion.dq
+    return replace(targets.motion, dq=dq * fastest / np.max(np.abs(dq)))
+
+
+def test_a_joint_that_does_not_accelerate_tells_no_rotor(targets):
+    from dataclasses import replace
+
+    still = targets._replace(motion=replace(targets.motion, ddq=0.0 * targets.motion.ddq))
+    assert [e.known for e in rotor_inertia(0, [still])] == [False, False]
+
+
+def resting(prepared, moments, step=1e-3, wobble=0.0):
+    """Rests of a second each at these moments, 0.2 s of motion between; current in steps."""
+    t = np.arange(0, 1.2 * len(moments), 0.01)
+    dq = np.where(t % 1.2 < 1.0, 0.0, 0.5)[:, None]
+    moment = np.array(moments)[(t / 1.2).astype(int)]
+    swing = np.where(dq[:, 0] > 0, 0.02 * np.sin(40 * t), 0.0)  # shows the current's digits
+    current = np.round((moment / K + wobble * np.sin(5 * t) + swing) / step) * step
+    motion = prepared(t, dq=dq, target_current=current[:, None], target_torque=moment[:, None])
+    nothing = 0 * dq
+    return Targets(motion.recording, motion, None, nothing, nothing, nothing, nothing, nothing)
+
+
+def test_at_rest_the_constant_is_moment_over_current(prepared):
+    found = constant_at_rest(0, [resting(prepared, [20.0, -30.0, 10.0])])
+    # rounding of 1 mA on 1 to 3 A
+    assert found.value == pytest.approx(K, rel=1e-3)
+    size = np.sqrt(2.0**2 + 3.0**2 + 1.0**2)
+    assert found.sd == pytest.approx(K * 1e-3 / np.sqrt(12) / size, rel=0.5)
+    assert found.known
+
+
+def test_rests_whose_current_wanders_or_is_small_tell_nothing(prepared):
+    assert not constant_at_rest(0, [resting(prepared, [20.0], wobble=0.1)]).known
+    # below 20 steps of 1 mA
+    assert not constant_at_rest(0, [resting(prepared, [0.19])]).known
+    assert constant_at_rest(0, [resting(prepared, [0.25])]).value == pytest.approx(K, rel=0.03)
+
+
+def test_digits_are_the_smallest_step():
+    assert resolution(np.array([0.1, 0.3, 0.15, 0.3])) == pytest.approx(0.05)
+    assert resolution(np.ones(4)) == 0.0
+
+
+def test_the_surest_estimate_is_that_of_least_relative_spread():
+    assert relative_sd(Estimate(-4.0, 0.2, True)) == pytest.approx(0.05)
+    assert relative_sd(UNKNOWN) == np.inf
+
+
+def test_a_robot_without_constants_has_no_targets():
+    with pytest.raises(IdentificationError, match="no torque constants"):
+        controller_models([], load_robot("panda"))
+
+
+def model(constant=KNOWN, rotor=KNOWN, friction=True, gravity=UNKNOWN):
+    """What a controller believes of a joint."""
+    values = (np.array([1.0, 2.0, 3.0]), np.full(3, 0.1)) if friction else (None, None)
+    return ControllerModel(constant, rotor, *values, gravity)
+
+
+@pytest.mark.parametrize(
+    ("believed", "codes"),
+    [
+        (model(), []),
+        (model(constant=Estimate(9.0, 0.5, False)), ["undetermined-drive-constant"]),
+        (model(constant=UNKNOWN), ["unexcited-drive-constant"]),
+        (model(rotor=UNKNOWN), ["unaccelerated-joint"]),
+        (model(friction=False), ["unexcited-friction"]),
+    ],
+)
+def test_what_the_targets_leave_open_is_told(believed, codes):
+    remarks = target_remarks(2, believed, UR5)
+    assert [r.code for r in remarks] == codes
+    assert all(r.where.joints == (3,) for r in remarks)
+    for remark in remarks:
+        assert str(remark)  # every code has its words, every template its values
+
+
+def test_numbers_stand_beside_the_profiles():
+    numbers = target_numbers(1, model(), UR5)
+    assert [n.parameter for n in numbers] == [
+        *("torque_constant", "rotor_inertia"),
+        *("coulomb", "viscous", "quadratic"),
+    ]
+    assert numbers[0].profile == UR5.torque_constant[1]
+    assert numbers[1].profile == UR5.chain.rotor_inertia[1]
+    assert len(target_numbers(1, model(friction=False), UR5)) == 2
+
+
+def test_gravity_is_averaged_by_its_spread_and_said_where_it_differs():
+    models = [model(gravity=Estimate(1.002, 1e-4, True)), model(gravity=Estimate(1.0, 2e-4, True))]
+    (remark,) = gravity_remarks([*models, model()])
+    assert remark.values["ratio"] == pytest.approx((4 * 1.002 + 1 * 1.0) / 5)
+    assert gravity_remarks([model(gravity=Estimate(1.0002, 1e-4, True))]) == []
+    assert gravity_remarks([model()]) == []

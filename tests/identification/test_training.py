@@ -1,0 +1,265 @@
+"""Training: joints fitted one by one, contacts left out, wrong robots doubted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vftcli.identification.excitation import ContactSpan
+from vftcli.identification.friction_method import friction_method, refuse_sign, rotor_number
+from vftcli.identification.method_result import check_friction, held_joints
+from vftcli.identification.processing import Processing
+from vftcli.identification.training import (
+    all_residuals,
+    contacts_remark,
+    data_of_joint,
+    dry_friction,
+    fit_frictions,
+    fit_without_contacts,
+    model_doubts,
+    prepare_training,
+)
+from vftcli.identification.whole_arm import (
+    base_remark,
+    check_size,
+    initial_columns,
+    whole_arm,
+    with_links,
+    with_vector,
+)
+from vftcli.robots import JointFriction, Payload, load_robot
+from vftcli.robots.friction import friction_torque
+from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.signals.errors import IdentificationError
+from vftcli.signals.recording import Recording
+
+RUBBING = JointFriction(
+    model="coulomb-viscous-offset", parameters={"coulomb": 4.0, "viscous": 6.0, "offset": 0.5}
+)
+UR5 = replace(load_robot("ur5"), friction=(RUBBING,) * 6)
+"""A UR5 with one friction in all joints; the logs are its own."""
+
+
+@pytest.fixture
+def recording(sines):
+    """12 s of its motion, noise of 0.1 N·m."""
+    t, q, dq, ddq = sines(seconds=12.0, seed=2)
+    torque = torque_regressor(UR5.chain, q, dq, ddq) @ chain_parameters(UR5.loaded_chain)
+    torque = torque + UR5.chain.rotor_inertia * ddq + friction_torque(UR5.friction, dq)
+    torque = torque + 0.1 * np.random.default_rng(0).standard_normal(q.shape)
+    return Recording(t=t, q=q, dq=dq, current=torque / UR5.torque_constant)
+
+
+@pytest.fixture
+def data(recording):
+    """That log as training data for its own robot."""
+    return prepare_training([recording], UR5, Processing(), fit_constants=False)
+
+
+@pytest.fixture
+def weights(data):
+    """Weight of every sample: all that is usable."""
+    return [motion.usable.astype(float) for motion in data.motions]
+
+
+def test_the_equation_of_a_joint_is_torque_less_rigid_body(data, weights):
+    given = data_of_joint(data, 1, weights, constant=False)
+    motion = data.motions[0]
+    np.testing.assert_allclose(given.y, motion.tau[:, 1] - data.rigid[0][:, 1])
+    np.testing.assert_array_equal(given.fixed, motion.ddq[:, 1:2])
+    asked = data_of_joint(data, 1, weights, constant=True)
+    np.testing.assert_array_equal(asked.y, motion.tau[:, 1])
+    np.testing.assert_array_equal(asked.fixed[:, 1], data.rigid[0][:, 1])
+    behind_gear = replace(data, robot=replace(UR5, torque_source="link_torque"))
+    assert data_of_joint(behind_gear, 1, weights, constant=False).fixed.shape[1] == 0
+
+
+def test_friction_and_rotor_of_every_joint_are_found(data, weights):
+    fits = fit_frictions(data, weights)
+    for j, found in enumerate(fits):
+        values = dict(zip(found.shape.terms, found.fit.values, strict=False))
+        # noise .1 through the 8 Hz filter on 570 samples; offset and Coulomb share reversals
+        assert values["coulomb"] == pytest.approx(4.0, abs=0.15)
+        assert values["offset"] == pytest.approx(0.5, abs=0.1)
+        J = found.fit.values[len(found.shape.terms)]
+        assert pytest.approx(UR5.chain.rotor_inertia[j], abs=0.05) == J
+    left = all_residuals(data, fits)
+    assert [x.shape for x in left] == [m.tau.shape for m in data.motions]
+    dry = dry_friction(data, 0, fits)
+    np.testing.assert_allclose(dry, 4.0, atol=0.3)
+
+
+def test_residuals_are_cut_apart_log_by_log(recording):
+    logs = [recording, recording.between(0.0, 7.0)]
+    data = prepare_training(logs, UR5, Processing(), fit_constants=False)
+    fits = fit_frictions(data, [m.usable.astype(float) for m in data.motions])
+    first, second = all_residuals(data, fits)
+    assert (len(first), len(second)) == tuple(m.samples for m in data.motions)
+    whole = fits[3].fit.residual
+    np.testing.assert_array_equal(np.concatenate([first[:, 3], second[:, 3]]), whole)
+
+
+def test_drive_constants_need_currents(recording):
+    torque = replace(recording, current=None, torque=recording.q)
+    with pytest.raises(IdentificationError, match="--fit-constants needs motor currents"):
+        prepare_training([torque], UR5, Processing(), fit_constants=True)
+
+
+def test_a_push_is_left_out_of_the_fit(recording):
+    push = np.where((recording.t > 5) & (recording.t < 6), 40.0, 0.0)[:, None] * np.eye(6)[1]
+    pushed = replace(recording, current=recording.current + push / UR5.torque_constant)
+    data = prepare_training([pushed], UR5, Processing(), fit_constants=False)
+    fits, weights, remarks = fit_without_contacts(data, strict=False)
+    assert [r.code for r in remarks] == ["suspected-contacts"]
+    t = data.motions[0].t
+    np.testing.assert_array_equal(weights[0][(t > 5) & (t < 6)], 0.0)
+    assert weights[0][(t < 4.5) | (t > 6.5)].all()
+    clean = fit_without_contacts(
+        prepare_training([recording], UR5, Processing(), fit_constants=False), strict=False
+    )
+    assert clean[2] == []
+    np.testing.assert_allclose(fits[1].fit.values[:2], clean[0][1].fit.values[:2], rtol=0.05)
+
+
+def test_contacts_are_counted_and_timed(data):
+    spans = [ContactSpan(1.0, 2.5, 3, -8.0), ContactSpan(4.0, 4.5, 1, 5.0)]
+    remark = contacts_remark(data.motions[0], spans)
+    assert remark.values["count"] == 2
+    assert remark.values["total_s"] == 2.0
+    assert (remark.values["starts_s"], remark.values["worst_joints"]) == ([1.0, 4.0], [3, 1])
+
+
+def test_an_unknown_load_is_doubted_from_half_a_kilogram_on(recording, sines):
+    _, q, dq, ddq = sines(seconds=12.0, seed=2)
+    for mass, doubted in ((0.4, False), (1.5, True)):
+        load = Payload(mass=mass, com=np.array([0.0, 0.0, 0.05]), inertia=np.zeros((3, 3)))
+        heavier = chain_parameters(UR5.with_payload(load).loaded_chain)
+        extra = torque_regressor(UR5.chain, q, dq, ddq) @ (heavier - chain_parameters(UR5.chain))
+        log = replace(recording, current=recording.current + extra / UR5.torque_constant)
+        data = prepare_training([log], UR5, Processing(), fit_constants=False)
+        ones = [np.ones(m.tau.shape) for m in data.motions]
+        remarks = list(model_doubts(data, [np.zeros(m.tau.shape) for m in data.motions], ones))
+        assert [r.code for r in remarks] == ["unknown-load"] * doubted
+        if doubted:
+            assert remarks[0].values["mass_kg"] == pytest.approx(mass, rel=0.02)
+
+
+def test_strict_methods_refuse_what_others_remark_on(recording):
+    turned = replace(recording, current=-recording.current)
+    data = prepare_training([turned], UR5, Processing(), fit_constants=False)
+    with pytest.raises(IdentificationError, match="Choose another --robot"):
+        fit_without_contacts(data, strict=True)
+    codes = [r.code for r in fit_without_contacts(data, strict=False)[2]]
+    assert codes[-2:] == ["unexplained-torque", "absorbed-doubt"]
+
+
+def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_told(data):
+    fine = JointFriction(model="x", parameters={"coulomb": 1.0, "viscous": 1.0})
+    assert check_friction(0, fine, data) == []
+    pushing = JointFriction(model="x", parameters={"coulomb": -5.0, "viscous": -5.0})
+    with pytest.raises(IdentificationError, match="it would push"):
+        check_friction(0, pushing, data)
+    crossing = JointFriction(model="x", parameters={"coulomb": -2.0, "viscous": 5.0})
+    (remark,) = check_friction(2, crossing, data)
+    speed = np.max(np.abs(data.motions[0].dq[:, 2]))
+    assert remark.where.joints == (3,)
+    assert remark.values["least_Nm"] == pytest.approx(-2.0 + 0.5 * speed)
+
+
+def test_joints_that_are_held_are_told(data):
+    moves = np.array([True, False, True, True, True, True])
+    reverses = np.array([True, False, False, True, True, True])
+    excited = data.excited._replace(moves=moves, reverses=reverses)
+    told = [(r.code, r.where.joints) for r in held_joints(replace(data, excited=excited))]
+    assert told == [("static-joint", (2,)), ("one-way-joint", (3,))]
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "known"), [(1.0, 0.29, True), (1.0, 0.31, False), (-1.0, 0.1, False)]
+)
+def test_a_rotor_inertia_is_known_to_thirty_per_cent(value, sd, known):
+    found = rotor_number(3, value, sd, 2.0)
+    assert (found.joint, found.unit, found.determined) == (4, "kg·m²", known)
+
+
+def test_a_current_that_falls_with_the_torque_is_refused(data):
+    refuse_sign(data, 0, 0.06)
+    with pytest.raises(IdentificationError, match="current of joint 1 does not follow"):
+        refuse_sign(data, 0, 0.05)
+
+
+def test_a_wrong_drive_constant_scales_friction_and_rotor(recording):
+    """Currents of an arm whose K is 1.05 × the profile's: all torques are 1.05 × what is read."""
+    log = replace(recording, current=recording.current / 1.05)
+    data = prepare_training([log], UR5, Processing(), fit_constants=True)
+    found = friction_method(data)
+    K = {n.joint: n for n in found.numbers if n.parameter == "torque_constant"}
+    assert K[2].value == pytest.approx(1.05 * UR5.torque_constant[1], rel=0.01)
+    assert K[2].profile == UR5.torque_constant[1]
+    coulomb = {n.joint: n for n in found.numbers if n.parameter == "coulomb"}
+    assert coulomb[2].value == pytest.approx(4.0, rel=0.05)
+    assert found.robot.torque_constant[1] == pytest.approx(K[2].value, rel=1e-6)
+
+
+def test_the_whole_arm_starts_from_the_profile_and_the_fits(data, weights):
+    fits = fit_frictions(data, weights)
+    layout, start = initial_columns(data, fits)
+    np.testing.assert_array_equal(start[:60], chain_parameters(UR5.loaded_chain))
+    assert start[60 + 1] == fits[1].fit.values[len(fits[1].shape.terms)]
+    np.testing.assert_array_equal(start[layout.frictions[2]], fits[2].fit.values[:-1])
+    held = [None, *fits[1:]]
+    layout, start = initial_columns(data, held)
+    assert layout.shapes[0].terms == ("coulomb", "viscous", "offset")
+    np.testing.assert_array_equal(start[layout.frictions[0]], [4.0, 6.0, 0.5])
+    np.testing.assert_allclose(start[60], UR5.chain.rotor_inertia[0])
+
+
+def test_a_vector_becomes_a_robot_without_its_payload(data, weights):
+    load = Payload(mass=1.0, com=np.zeros(3), inertia=np.zeros((3, 3)))
+    layout, start = initial_columns(data, fit_frictions(data, weights))
+    x = start.copy()
+    x[10], x[60:66] = 9.5, 2.5
+    robot = with_vector(UR5.with_payload(load), layout, x, UR5.friction)
+    assert robot.payload is None
+    assert robot.chain.mass[1] == 9.5
+    np.testing.assert_array_equal(robot.chain.rotor_inertia, 2.5)
+    refined = with_links(data, layout, x)
+    motion = data.motions[0]
+    Y = torque_regressor(UR5.chain, motion.q, motion.dq, motion.ddq)
+    np.testing.assert_allclose(refined.rigid[0], Y @ x[:60], atol=1e-9)
+
+
+def test_whole_arms_say_how_they_were_chosen(data):
+    base, consistent = (whole_arm(data, method) for method in ("base", "consistent"))
+    assert "nearest-physical-model" in {r.code for r in base.remarks}
+    (pull,) = [r for r in consistent.remarks if r.code == "profile-pull"]
+    assert pull.values["weight"] in pull.values["weights"]
+    (opened,) = [r for r in base.remarks if r.code == "undetermined-base-parameters"]
+    assert opened.values["count"] == 40
+    assert opened.values["undetermined"] == 40 - sum(base.base.determined[:40])
+    # one robot made this log: both models predict its torque to the noise
+    motion = data.motions[0]
+    Y = torque_regressor(UR5.chain, motion.q, motion.dq, motion.ddq)
+    for found in (base, consistent):
+        change = Y @ (chain_parameters(found.robot.chain) - chain_parameters(UR5.chain))
+        assert np.sqrt(np.mean(change[:, 1:3] ** 2)) < 0.2
+
+
+def test_open_parameters_are_counted_without_friction(data, weights):
+    layout, _ = initial_columns(data, fit_frictions(data, weights))
+    many = whole_arm(data, "base").base
+    all_open = many._replace(determined=(False,) * len(many.determined))
+    assert base_remark(all_open, layout).values["undetermined"] == 40
+
+
+def test_too_short_logs_are_refused(data, weights):
+    from vftcli.identification.stacking import WeightedLog
+
+    layout, _ = initial_columns(data, fit_frictions(data, weights))
+    few = np.zeros_like(weights[0])
+    few.ravel()[: 4 * layout.size - 1] = 1.0
+    log = WeightedLog(data.motions[0], data.columns[0], few)
+    with pytest.raises(IdentificationError, match="record a longer log"):
+        check_size(layout, [log])
+    few.ravel()[: 4 * layout.size] = 1.0
+    check_size(layout, [log])
