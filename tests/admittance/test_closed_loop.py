@@ -107,7 +107,7 @@ def test_the_loop_s_record_replays_the_loop() -> None:
     # row k of the loop is written after the force of row k: row k + 1 of the replay
     np.testing.assert_allclose(found.motion.x[1:, 1], loop.commanded, atol=1e-9)
     assert not any(
-        "α = 1.6" in note and "cannot be reached" in note for note in map(str, found.notes)
+        "α = 1.6" in note and "cannot be reached" in note for note in map(str, found.remarks)
     )
 
 

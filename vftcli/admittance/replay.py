@@ -12,19 +12,19 @@ from vftcli.admittance.metrics import drags_of, releases_of, rows_of
 from vftcli.admittance.motion import AxisMotion, run
 from vftcli.admittance.parameters import Admittance
 from vftcli.admittance.replay_checks import (
-    motion_notes,
-    moved_note,
-    quiet_note,
-    resting_note,
-    travel_note,
-    unknown_remark,
+    arm_moved,
+    drags_at_rest,
+    implausible_travel,
+    limits_met,
+    nothing_dragged,
+    unknown_force,
 )
 from vftcli.admittance.stability import Verdict, check_stable
 from vftcli.admittance.thresholds import Phases, phases
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.remarks import Note, Remark, fact
+from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import Wrench
 
 RISE = 1e-12
@@ -68,7 +68,7 @@ class Replay:
         logged: Flange deviation of the log's own arm from X_d, None for a release. (T, 6) [m, rad]
         lyapunov: Energies along the run.
         rows: The comparison, one row a controller, axis and drag.
-        notes: What a reader should know, one sentence each.
+        remarks: What a reader should know.
     """
 
     robot: Robot
@@ -84,7 +84,7 @@ class Replay:
     logged: Array | None
     lyapunov: Lyapunov
     rows: tuple[dict[str, Any], ...]
-    notes: tuple[Note, ...]
+    remarks: tuple[Remark, ...]
 
 
 def replay(
@@ -124,14 +124,14 @@ def replay(
     logged = deviation_of(solver, start, q)
     rows = rows_of(controllers, motion, drags, np.nan_to_num(force))
     lyapunov = lyapunov_along(controllers, motion, split.dragged)
-    notes: tuple[Note, ...] = (
-        *unknown_remark(wrench),
+    remarks = (
+        *unknown_force(wrench),
         *complaints,
-        *quiet_note(force, parameters, bool(drags)),
-        *resting_note(drags, logged, parameters.period),
-        *motion_notes(controllers, motion, path, lyapunov.rises),
-        *travel_note(parameters, controllers, motion, path),
-        *moved_note(logged),
+        *nothing_dragged(force, parameters, bool(drags)),
+        *drags_at_rest(drags, logged, parameters.period),
+        *limits_met(controllers, motion, path, lyapunov.rises),
+        *implausible_travel(parameters, controllers, motion, path),
+        *arm_moved(logged),
     )
     return Replay(
         robot=robot,
@@ -147,7 +147,7 @@ def replay(
         logged=logged,
         lyapunov=lyapunov,
         rows=tuple(rows),
-        notes=notes,
+        remarks=remarks,
     )
 
 
@@ -181,7 +181,7 @@ def replay_release(
         raise ParameterError(
             "a release needs a deviation, as --release x=0.3 [m] or --release rz=0.5 [rad]"
         )
-    verdicts, complaints = check_release(x, controllers, force_unstable=force_unstable)
+    verdicts, complaints = check_stable(controllers, force_unstable=force_unstable, release=x)
     solver = FlangeSolver(robot)
     q = solver.check_start(start)
     length = duration or settling(controllers, x)
@@ -205,27 +205,12 @@ def replay_release(
         logged=None,
         lyapunov=lyapunov,
         rows=tuple(rows),
-        notes=(
+        remarks=(
             *complaints,
-            *motion_notes(controllers, motion, path, lyapunov.rises),
-            *travel_note(parameters, controllers, motion, path),
+            *limits_met(controllers, motion, path, lyapunov.rises),
+            *implausible_travel(parameters, controllers, motion, path),
         ),
     )
-
-
-def check_release(
-    x: Array, controllers: Sequence[Controller], *, force_unstable: bool
-) -> tuple[tuple[Verdict, ...], tuple[str, ...]]:
-    """Judge controllers for one release: without a limit it may start inside the escape bound."""
-    verdicts, complaints = check_stable(controllers, force_unstable=True)
-    excused = set()
-    for verdict in verdicts:
-        inside = ~verdict.limited & (np.abs(x) <= verdict.escape)
-        calm = verdict._replace(limited=verdict.limited | inside)
-        excused |= set(verdict.complaints) - set(calm.complaints)
-    if force_unstable or set(complaints) <= excused:
-        return verdicts, complaints
-    return check_stable(controllers, force_unstable=False)
 
 
 def settling(controllers: Sequence[Controller], x: Array) -> float:

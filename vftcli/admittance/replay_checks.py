@@ -1,4 +1,4 @@
-"""Remarks on a replay: what was limited, lost or implausible, one sentence each."""
+"""What was limited, lost or implausible in a replay, as remarks."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from vftcli.admittance.metrics import Drag
 from vftcli.admittance.motion import AxisMotion
 from vftcli.admittance.parameters import AXES, Admittance
 from vftcli.signals.arrays import Array
-from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.wrench import Wrench
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
@@ -19,100 +19,109 @@ Counts = np.ndarray[Any, np.dtype[np.int64]]
 RESTING = (2.0, 0.01)
 """A drag in which the log's arm stays within this distance for so long is told. [s, m]"""
 
+STILL = 0.01
+"""A log whose flange stays this near to its first pose replays as it was: no remark. [m]"""
 
-def unknown_remark(wrench: Wrench) -> tuple[Remark, ...]:
+
+def unknown_force(wrench: Wrench) -> tuple[Remark, ...]:
     """Say so if some samples of the wrench are not known, so that they count as no force."""
     count = int(np.count_nonzero(~np.all(np.isfinite(wrench.known), axis=1)))
     return (caution("force-unknown", samples=count),) if count else ()
 
 
-def quiet_note(wrench: Array, parameters: Admittance, dragged: bool) -> tuple[str, ...]:
-    """Say so if nothing ever passed a threshold."""
+def nothing_dragged(wrench: Array, parameters: Admittance, dragged: bool) -> tuple[Remark, ...]:
+    """Say so if nothing ever passed a threshold, and which axis came nearest to its own.
+
+    Args:
+        wrench: Force at each control period, NaN where unknown. (T, 6) [N, N·m]
+        parameters: The thresholds.
+        dragged: Whether anything did.
+    """
     if dragged or not len(wrench):
         return ()
-    share = np.nanmax(np.abs(np.nan_to_num(wrench)), axis=0) / np.maximum(
-        parameters.threshold, 1e-12
-    )
+    largest = np.max(np.abs(np.nan_to_num(wrench)), axis=0)
+    share = largest / np.maximum(parameters.threshold, 1e-12)
     k = int(np.argmax(share))
-    return (
-        f"no axis ever passes its threshold, so nothing moves; the nearest is {AXES[k]} with "
-        f"{100.0 * share[k]:.0f} % of its {parameters.threshold[k]:g}",
-    )
+    threshold = float(parameters.threshold[k])
+    return (caution("no-drag", axis=AXES[k], share=float(share[k]), threshold=threshold),)
 
 
-def resting_note(drags: Sequence[Drag], logged: Array, period: float) -> tuple[str, ...]:
-    """Say so if an axis is dragged for long while the log's arm stands still."""
-    long, near = round(RESTING[0] / period), RESTING[1]
-    found = []
+def drags_at_rest(drags: Sequence[Drag], logged: Array, period: float) -> tuple[Remark, ...]:
+    """Say so if an axis is dragged for long while the log's arm stands still; its longest drag.
+
+    Args:
+        drags: The drags.
+        logged: Deviation of the log's own flange from its first pose. (T, 6) [m, rad]
+        period: Control period. [s]
+    """
+    longest: dict[str, int] = {}
     for drag in drags:
         part = logged[drag.begin : drag.release, :3]
-        if len(part) <= long:
-            continue
-        apart = np.linalg.norm(part[long:] - part[:-long], axis=1)
-        held = np.max(np.linalg.norm(part - part.mean(axis=0), axis=1)) if apart.size else np.inf
-        if np.any(apart < near) and (held < near or np.median(apart) < near):
-            found.append(
-                f"{AXES[drag.axis]} is above its threshold for {len(part) * period:.1f} s while "
-                "the log's arm stands still: stiction and model errors leave such an offset at "
-                "rest; --zero A:B removes a constant one, a higher threshold ignores it"
-            )
-    return tuple(dict.fromkeys(found))
+        if stands_still(part, round(RESTING[0] / period)):
+            axis = AXES[drag.axis]
+            longest[axis] = max(longest.get(axis, 0), len(part))
+    return tuple(
+        caution("drag-at-rest", axis=axis, duration_s=count * period)
+        for axis, count in longest.items()
+    )
 
 
-def motion_notes(
+def stands_still(place: Array, long: int) -> bool:
+    """Whether a point (T, 3) [m] stays within `RESTING`, throughout or most of the time.
+
+    Args:
+        place: The point.
+        long: Over how many samples it has to stay.
+    """
+    if len(place) <= long:
+        return False
+    near = RESTING[1]
+    apart = np.linalg.norm(place[long:] - place[:-long], axis=1)
+    # Round trips bring a moving arm back to where it was, so one coincidence is not rest.
+    held = np.max(np.linalg.norm(place - place.mean(axis=0), axis=1))
+    return bool(np.any(apart < near) and (held < near or np.median(apart) < near))
+
+
+def limits_met(
     controllers: Sequence[Controller], motion: AxisMotion, path: JointPath, rises: Counts
-) -> tuple[str, ...]:
-    """What went wrong or was limited on the way, one sentence each."""
+) -> tuple[Remark, ...]:
+    """What went wrong or was limited on the way, controller by controller."""
     found = []
     for n, controller in enumerate(controllers):
-        name = controller.name
+        where = Where(controller.name)
         if motion.escaped[n]:
             k = int(np.argmin(np.all(np.isfinite(motion.x[:, n]), axis=1)))
-            found.append(f"{name}: escaped in finite time, {motion.t[k]:.3f} s")
-        if limits := int(np.count_nonzero(np.any(motion.clipped[:, n], axis=1))):
-            found.append(f"{name}: the speed limit acted in {limits} control periods")
+            found.append(warning("motion-escaped", where, time_s=float(motion.t[k])))
+        if acted := int(np.count_nonzero(np.any(motion.clipped[:, n], axis=1))):
+            found.append(fact("speed-limit-acted", where, periods=acted))
         if lost := int(np.count_nonzero(~path.reached[:, n])):
-            first = motion.t[int(np.argmin(path.reached[:, n]))]
-            found.append(
-                f"{name}: {lost} of {len(motion.t)} poses cannot be reached inside the workspace "
-                f"and the joint limits, the first at {first:.3f} s; there the arm waits"
-            )
+            first = float(motion.t[int(np.argmin(path.reached[:, n]))])
+            rows = {"lost": lost, "poses": len(motion.t)}
+            found.append(caution("poses-out-of-reach", where, **rows, first_s=first))
         if path.speed[n] > 1.0:
-            found.append(f"{name}: a joint would need {path.speed[n]:.2g} times its speed limit")
+            found.append(caution("joint-too-fast", where, share=float(path.speed[n])))
         if rises[n]:
-            found.append(
-                f"{name}: W rises by more than 1e-12 of its start in {rises[n]} steps of "
-                "recovery phases"
-            )
+            found.append(warning("energy-rises", where, steps=int(rises[n])))
     return tuple(found)
 
 
-def travel_note(
+def implausible_travel(
     parameters: Admittance, controllers: Sequence[Controller], motion: AxisMotion, path: JointPath
-) -> tuple[str, ...]:
-    """Whether the travel is one that the arm could make."""
-    travel = np.nan_to_num(np.linalg.norm(motion.x[:, :, :3], axis=2), nan=np.inf).max(axis=0)
+) -> tuple[Remark, ...]:
+    """Say so if the travel is none that the arm could make, and what to do under a hard threshold.
+
+    Where every pose is reached the travel is plausible, however long.
+    """
     lost = [n for n in range(len(controllers)) if not np.all(path.reached[:, n])]
     if not lost:
         return ()
-    largest = max(travel[n] for n in lost)
-    soft = (
-        ""
-        if parameters.threshold_mode == "soft"
-        else (
-            " With the hard threshold the whole force enters as soon as it passes; "
-            "--threshold-mode soft lets in only what exceeds it."
-        )
-    )
-    return (f"the travel of up to {largest:.2f} m is implausible: this arm cannot make it.{soft}",)
+    travel = np.nan_to_num(np.linalg.norm(motion.x[:, lost, :3], axis=2), nan=np.inf)
+    hard = parameters.threshold_mode == "hard"
+    code = "travel-implausible-hard" if hard else "travel-implausible"
+    return (caution(code, travel_m=float(travel.max())),)
 
 
-def moved_note(logged: Array) -> tuple[str, ...]:
-    """Say so if the log's arm moved while the replay holds it at its first pose."""
+def arm_moved(logged: Array) -> tuple[Remark, ...]:
+    """Say so if the log's arm moved while the replay holds it at its first pose. (T, 6) [m, rad]"""
     far = float(np.linalg.norm(logged[:, :3], axis=1).max())
-    if far < 0.01:
-        return ()
-    return (
-        f"in the log the flange moves by up to {far:.3f} m; the replay holds the log's first pose "
-        "as its target and uses the force as it was recorded",
-    )
+    return (fact("log-arm-moved", distance_m=far),) if far >= STILL else ()

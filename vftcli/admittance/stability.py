@@ -13,8 +13,9 @@ import numpy as np
 
 from vftcli.admittance.law import Controller
 from vftcli.admittance.parameters import AXES
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.remarks import Remark, Where, warning
 
 DISCRETE_BOUND = 4.0
 """Where 2TsB/M + Ts²K/M has to stay below: det(zI − A) = 0 then has both roots inside |z| = 1."""
@@ -42,26 +43,28 @@ class Verdict(NamedTuple):
     drag: Array
     recovery: Array
     escape: Array
-    limited: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+    limited: Mask
 
-    @property
-    def complaints(self) -> tuple[str, ...]:
-        """What makes it unstable, one sentence each with the number that breaks."""
-        found = []
-        for phase, numbers in (("drag", self.drag), ("recovery", self.recovery)):
-            for k in np.flatnonzero(numbers >= DISCRETE_BOUND):
-                if phase == "recovery" and not self.limited[k]:
-                    continue
-                at = " at the speed limit" if phase == "recovery" else ""
-                found.append(
-                    f"{self.controller.name}, axis {AXES[k]}, {phase} phase{at}: "
-                    f"2TsB/M + Ts²K/M = {numbers[k]:.3g}, and it must be below 4"
-                )
-        escapes = np.flatnonzero(~self.limited & np.isfinite(self.escape))
+    def complaints(self, safe: Mask | None = None) -> tuple[Remark, ...]:
+        """What makes it unstable, with the number that breaks.
+
+        Args:
+            safe: Axes whose lack of a speed limit does not matter, None for none. (6,)
+        """
+        where = Where(self.controller.name)
+        found = [
+            warning("law-unstable-in-drag", where, axis=AXES[k], number=float(self.drag[k]))
+            for k in np.flatnonzero(self.drag >= DISCRETE_BOUND)
+        ]
+        # Without a speed limit the number is infinite, and the escape says what that means.
         found += [
-            f"{self.controller.name}, axis {AXES[k]} has no speed limit: the law escapes in "
-            f"finite time when released at rest from beyond {self.escape[k]:.3g} {UNITS[k]}"
-            for k in escapes
+            warning("law-unstable-at-limit", where, axis=AXES[k], number=float(self.recovery[k]))
+            for k in np.flatnonzero((self.recovery >= DISCRETE_BOUND) & self.limited)
+        ]
+        escapes = ~self.limited & np.isfinite(self.escape) & ~(False if safe is None else safe)
+        found += [
+            warning("law-escapes", where, axis=AXES[k], bound=float(self.escape[k]), unit=UNITS[k])
+            for k in np.flatnonzero(escapes)
         ]
         return tuple(found)
 
@@ -132,26 +135,29 @@ def judge(controller: Controller) -> Verdict:
 
 
 def check_stable(
-    controllers: Sequence[Controller], *, force_unstable: bool = False
-) -> tuple[tuple[Verdict, ...], tuple[str, ...]]:
+    controllers: Sequence[Controller], *, force_unstable: bool = False, release: Array | None = None
+) -> tuple[tuple[Verdict, ...], tuple[Remark, ...]]:
     """Judge controllers before they run, and refuse what would be unstable.
 
     Args:
         controllers: The controllers.
         force_unstable: Run them all the same, for study.
+        release: The deviation of a release from rest, if that is all they are run for: an axis
+            without a speed limit is let pass where it starts inside the escape bound.
+            (6,) [m, rad]
 
     Returns:
-        A verdict for each, and what is wrong with them, one sentence each.
+        A verdict for each, and what is wrong with them, also where that is let pass.
 
     Raises:
         UnstableError: If one is unstable and `force_unstable` is not set.
     """
     verdicts = tuple(judge(controller) for controller in controllers)
-    complaints = tuple(text for verdict in verdicts for text in verdict.complaints)
-    if complaints and not force_unstable:
-        more = f" (and {len(complaints) - 1} more)" if len(complaints) > 1 else ""
+    size = np.full(6, np.inf) if release is None else np.abs(release)
+    grave = [r for verdict in verdicts for r in verdict.complaints(size <= verdict.escape)]
+    if grave and not force_unstable:
+        more = f" (and {len(grave) - 1} more)" if len(grave) > 1 else ""
         raise UnstableError(
-            f"unstable: {complaints[0]}{more}. Change the parameters, or study it with "
-            "--force-unstable."
+            f"unstable: {grave[0]}{more}. Change the parameters, or study it with --force-unstable."
         )
-    return verdicts, complaints
+    return verdicts, tuple(remark for verdict in verdicts for remark in verdict.complaints())

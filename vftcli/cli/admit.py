@@ -206,7 +206,7 @@ def replayed(
         source=driving.source,
         force_unstable=control.force_unstable,
     )
-    return replace(result, notes=(*driving.remarks, *result.notes)), recording
+    return replace(result, remarks=(*driving.remarks, *result.remarks)), recording
 
 
 def force_of(
@@ -306,7 +306,7 @@ def show(result: "Replay", run: "ClosedLoop | None", json: bool) -> None:
         return
     say(f"{result.robot.title or result.robot.name}: {result.source}")
     say(parameter_text(result))
-    for note in result.notes:
+    for note in result.remarks:
         say(f"note: {note}")
     if run is not None:
         say(latency_text(run))

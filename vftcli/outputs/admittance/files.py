@@ -99,7 +99,7 @@ def admittance_record(
         },
         "controllers": [verdict_record(verdict) for verdict in replay.verdicts],
         "conventions": CONVENTIONS,
-        "notes": list(replay.notes),
+        "notes": list(replay.remarks),
         **log_remarks([recording] if recording is not None else []),
     }
 

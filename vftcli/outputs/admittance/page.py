@@ -45,7 +45,7 @@ def render_admittance(
     parts = (
         headline(title, text),
         facts_section(replay),
-        remarks(replay.notes),
+        remarks(replay.remarks),
         closed_loop_section(run),
         comparison_section(replay),
         charts_section(),

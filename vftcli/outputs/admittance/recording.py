@@ -129,7 +129,7 @@ def words(replay: Replay) -> str:
         "Grey: traditional; colours: variable, see the legend of the plots. The orange arrow is "
         f"the force that enters the law; 1 m is {NEWTON_PER_METRE:g} N.",
         "",
-        *(f"- {note}" for note in replay.notes),
+        *(f"- {note}" for note in replay.remarks),
         "",
         "```",
         comparison_text(replay.rows),
