@@ -170,6 +170,16 @@ def test_escape_beyond_the_bound_without_a_limit_and_none_with_one() -> None:
     assert np.abs(held.x[-1, 0, 3]) < 0.01
 
 
+@pytest.mark.parametrize("scale", [0.5, 1.0, 3.0])
+def test_at_small_speed_the_energy_is_that_of_a_mass(scale: float) -> None:
+    """½M_d v²/α² whatever v₀ is: φ(|v|/v₀)·v₀² → ½v²; the next term is v/v₀ ≤ 2e-6 of it."""
+    p = parameters(speed_scale=scale)
+    controller, v = variable(p), np.full(6, 1e-6)
+    found = energy(controller, np.zeros(6), v)
+    expected = 0.5 * np.asarray(p.mass) * v**2 / np.asarray(p.alpha) ** 2
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
+
+
 def test_kinetic_shape_is_smooth_and_bounded() -> None:
     u = np.array([1e-6, 9.9e-4, 1.01e-3, 0.1, 1.0, 50.0])
     exact = 0.25 * (-np.expm1(-2.0 * u) - 2.0 * u * np.exp(-2.0 * u))

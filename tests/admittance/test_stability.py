@@ -109,6 +109,29 @@ def test_unstable_settings_are_refused_with_the_number() -> None:
     check_stable([traditional(free)])  # constant parameters need no limit
 
 
+def test_a_release_is_excused_only_inside_the_escape_bound_of_its_axes() -> None:
+    robot = load_robot("ur5")
+    free = from_table(robot.admittance, "ur5", {"rotation": {"speed_limit": np.inf}})
+    near, far = np.array([0, 0, 0, 0.3, 0, 0]), np.array([0, 0, 0, 0.3, 0.4, 0])
+    _, complaints = check_stable(controllers(free), release=near)
+    assert {remark.code for remark in complaints} == {"law-escapes"}
+    assert {remark.values["axis"] for remark in complaints} == {"rx", "ry", "rz"}
+    with pytest.raises(UnstableError, match=r"axis ry has no speed limit.*beyond 0\.31 rad"):
+        check_stable(controllers(free), release=far)
+
+
+def test_the_printed_bound_is_where_the_discrete_law_becomes_unstable() -> None:
+    """Semi-implicit Euler x' = x + Ts v', v' = v − Ts(Bv + Kx)/M: |roots| = 1 at the number 4."""
+    mass, damping, period = 2.0, 10.0, 0.1
+    for number, stable in ((3.99, True), (4.01, False)):
+        stiffness = (number - 2 * period * damping / mass) * mass / period**2
+        found = discrete_number(*map(np.array, (mass, damping, stiffness)), period)
+        assert found == pytest.approx(number)
+        a, b = period * damping / mass, period * stiffness / mass
+        step = np.array([[1 - period * b, period * (1 - a)], [-b, 1 - a]])
+        assert bool(np.all(np.abs(np.linalg.eigvals(step)) < 1)) == stable
+
+
 def test_the_condition_decides_what_happens() -> None:
     """Just beyond the condition a constant-parameter release grows, just inside it decays."""
     period = 0.008

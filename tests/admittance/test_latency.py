@@ -1,0 +1,75 @@
+"""Latencies of a loop whose times are made up, so that they are known."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vftcli.admittance.closed_loop import ClosedLoop
+from vftcli.admittance.latency import latencies
+from vftcli.admittance.law import controllers
+from vftcli.admittance.parameters import from_table
+from vftcli.robots import load_robot
+
+CONTROLLER = controllers(from_table(load_robot("ur5").admittance, "ur5", {}))[-1]
+PERIOD = CONTROLLER.parameters.period
+LIMIT = CONTROLLER.parameters.threshold
+ROWS = 1000
+
+
+def loop(**changed: Any) -> ClosedLoop:
+    """A push along x in rows 300 to 500, seen 10 rows late, followed 20 rows late."""
+    rows = np.arange(ROWS)
+    truth, estimate, moved = (np.zeros((ROWS, 6)) for _ in range(3))
+    truth[(rows >= 300) & (rows < 500), 0] = 2.0 * LIMIT[0]
+    estimate[(rows >= 310) & (rows < 515), 0] = -1.5 * LIMIT[0]
+    moved[:, 1] = np.clip((rows - 319) * 0.01, 0.0, 1.0)
+    still = np.zeros((ROWS, 6))
+    run = ClosedLoop(
+        controller=CONTROLLER,
+        t=rows * PERIOD,
+        estimate=estimate,
+        truth=truth,
+        dragged=still > 0,
+        commanded=still,
+        q=still,
+        moved=moved,
+        reached=np.ones(ROWS, dtype=bool),
+        zero=np.zeros(6),
+        simulation=None,
+    )
+    return replace(run, **changed)
+
+
+def test_a_push_is_seen_followed_and_withdrawn() -> None:
+    (found,) = latencies(loop())
+    assert found.axis == 0
+    assert found.force == pytest.approx(300 * PERIOD)
+    assert found.detection == pytest.approx(10 * PERIOD)
+    assert found.motion == pytest.approx(20 * PERIOD)  # 10 mm, the first beyond 5
+    assert found.withdrawal == pytest.approx(15 * PERIOD)
+    assert found.rested
+
+
+def test_what_does_not_happen_is_none() -> None:
+    (found,) = latencies(loop(estimate=np.zeros((ROWS, 6)), moved=np.zeros((ROWS, 6))))
+    assert found.detection is None
+    assert found.motion is None
+
+
+def test_an_arm_that_moves_already_did_not_rest() -> None:
+    moved = np.zeros((ROWS, 6))
+    moved[:, 0] = np.arange(ROWS) * PERIOD * 0.01  # 10 mm/s, twice what counts as still
+    (found,) = latencies(loop(moved=moved))
+    assert not found.rested
+
+
+def test_a_second_push_soon_after_is_the_same_one() -> None:
+    truth = np.array(loop().truth)
+    truth[510:600, 0] = 2.0 * LIMIT[0]
+    assert len(latencies(loop(truth=truth))) == 1
+    late = np.array(loop().truth)
+    pause = round(1.0 / PERIOD)
+    late[499 + pause : 520 + pause, 3] = 2.0 * LIMIT[3]
+    assert [one.axis for one in latencies(loop(truth=late))] == [0, 3]
