@@ -1,5 +1,6 @@
 """A small analysis of a simulated arm: made in memory, with hostile names in it."""
 
+import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -64,7 +65,7 @@ def analysis(without_reference: Analysis) -> Analysis:
     reference = ExternalTorque(name="vendor", t=made.t, tau=tau, floor=np.full(6, 0.5))
     errors = evaluate(made.recording.name, made.estimates, reference)
     made = replace(made, reference=reference, errors=errors)
-    return replace(made, run=run_record(made, ["vftcli", "report", HOSTILE]))
+    return replace(made, run=run_record(made, shlex.join(["vftcli", "report", HOSTILE])))
 
 
 @pytest.fixture(scope="session")

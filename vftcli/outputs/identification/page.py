@@ -5,11 +5,15 @@ from html import escape
 from typing import Any
 
 import numpy as np
-import polars as pl
 
 from vftcli.identification.result import Identification, Trace
-from vftcli.outputs.grid import Column, Entry, Grid, html, joint_columns, signed
-from vftcli.outputs.identification.tables import residual_rows
+from vftcli.outputs.grid import html
+from vftcli.outputs.identification.tables import (
+    base_grid,
+    parameter_grid,
+    residual_grid,
+    shape_choice_grid,
+)
 from vftcli.outputs.page.charts import Chart, ChartLine, packed
 from vftcli.outputs.page.shell import (
     bullets,
@@ -19,6 +23,7 @@ from vftcli.outputs.page.shell import (
     headline,
     pairs,
     remarks,
+    soft,
 )
 from vftcli.outputs.palette import SPARE
 
@@ -39,8 +44,6 @@ def render_identification(found: Identification, record: Mapping[str, Any]) -> s
         residual_section(found),
         velocity_section(found),
         parameter_section(found),
-        shape_choice_section(found.shape_choices),
-        base_section(found.base),
         series_section(found),
         "<h2>Signal processing</h2>",
         pairs(found.processing),
@@ -52,23 +55,24 @@ def render_identification(found: Identification, record: Mapping[str, Any]) -> s
 
 def residual_section(found: Identification) -> str:
     """RMS per joint of every log, identified beside profile."""
-    rows: list[tuple[Entry, ...]] = [
-        (*names, *values, float(np.mean(values))) for names, values in residual_rows(found)
-    ]
-    if not rows:
+    if found.residuals.is_empty():
         return ""
-    numbers = (*joint_columns(found.robot.joints, form=signed), Column("mean", form=signed))
-    grid = Grid(
-        title="RMS of measured less predicted torque in N·m, from the first to the last movement",
-        columns=(*words("Log", "Role", "Model"), *numbers),
-        rows=tuple(rows),
-    )
-    return f"<h2>Residuals</h2>{html(grid)}"
+    words = "Measured less predicted torque, from the first to the last movement."
+    return f"<h2>Residuals</h2>{html(residual_grid(found))}{soft(words)}"
 
 
-def words(*heads: str) -> tuple[Column, ...]:
-    """Columns of words."""
-    return tuple(Column(head, words=True) for head in heads)
+def parameter_section(found: Identification) -> str:
+    """The identified numbers; folded away, how friction models competed, and base parameters."""
+    parts = []
+    if not found.parameters.is_empty():
+        parts.append(f"<h2>Identified numbers</h2>{html(parameter_grid(found))}")
+    if not found.shape_choices.is_empty():
+        parts.append(
+            folded("Friction models compared", html(shape_choice_grid(found.shape_choices)))
+        )
+    if found.base is not None:
+        parts.append(folded(f"Base parameters ({len(found.base)})", html(base_grid(found.base))))
+    return "".join(parts)
 
 
 def velocity_section(found: Identification) -> str:
@@ -124,80 +128,6 @@ def scatter(trace: Trace, j: int, speed: float, high: float, colour: str) -> str
     )
 
 
-def parameter_section(found: Identification) -> str:
-    """The identified numbers."""
-    if found.parameters.is_empty():
-        return ""
-    numbers = {"value": "Value", "sd": "sd", "profile": "Profile"}
-    value, sd, profile = (Column(head, form=signed) for head in numbers.values())
-    grid = Grid(
-        title="One row a number",
-        columns=(
-            *words("Number"),
-            Column("Joint"),
-            value,
-            sd,
-            Column("Unit"),
-            profile,
-            Column("Determined"),
-        ),
-        rows=tuple(
-            (
-                row["parameter"],
-                f"J{row['joint']}",
-                row["value"],
-                row["sd"],
-                row["unit"],
-                row["profile"],
-                yes_or_no(row["determined"]),
-            )
-            for row in found.parameters.iter_rows(named=True)
-        ),
-    )
-    return f"<h2>Identified numbers</h2>{html(grid)}"
-
-
-def yes_or_no(truth: bool) -> str:
-    """A truth in words."""
-    return "yes" if truth else "no"
-
-
-def shape_choice_section(choices: pl.DataFrame) -> str:
-    """How the friction models competed, folded away."""
-    if choices.is_empty():
-        return ""
-    grid = Grid(
-        title="RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen",
-        columns=(
-            *words("Friction"),
-            Column("Joint"),
-            Column("RMS [N·m]", form=signed),
-            Column(""),
-        ),
-        rows=tuple(
-            (r["friction"], f"J{r['joint']}", r["cv_rms_Nm"], "chosen" if r["chosen"] else "")
-            for r in choices.iter_rows(named=True)
-        ),
-    )
-    return folded("Friction models compared", html(grid))
-
-
-def base_section(base: pl.DataFrame | None) -> str:
-    """Base parameters, folded away."""
-    if base is None:
-        return ""
-    value, sd = (Column(head, form=signed) for head in ("Value (SI)", "sd"))
-    grid = Grid(
-        title="Weighted least squares, before physical consistency",
-        columns=(*words("Parameter"), value, sd, Column("Determined")),
-        rows=tuple(
-            (r["parameter"], r["value"], r["sd"], yes_or_no(r["determined"]))
-            for r in base.iter_rows(named=True)
-        ),
-    )
-    return folded(f"Base parameters ({len(base)})", html(grid))
-
-
 def series_section(found: Identification) -> str:
     """Where the script draws torques over time."""
     if not found.traces:
@@ -205,7 +135,7 @@ def series_section(found: Identification) -> str:
     name = escape(shown_trace(found).recording.name)
     return (
         f"<h2>Torques over time: {name}</h2>"
-        f'<p class="soft">The Rerun recording holds every log.</p>{chart_places()}'
+        f"{soft('The Rerun recording holds every log.')}{chart_places()}"
     )
 
 

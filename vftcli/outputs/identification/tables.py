@@ -1,7 +1,9 @@
 """Tables of an identification: residuals of every log, identified numbers."""
 
+import polars as pl
+
 from vftcli.identification.result import Identification
-from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal
+from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, signed, terminal
 
 
 def tables_text(found: Identification) -> str:
@@ -16,10 +18,12 @@ def tables_text(found: Identification) -> str:
 
 def residual_grid(found: Identification) -> Grid:
     """RMS of measured less predicted torque, a row for each log, role and model. [N·m]"""
-    rows: list[tuple[Entry, ...]] = [
-        (f"{log}, {role}, {model}", *values, sum(values) / len(values))
-        for (log, role, model), values in residual_rows(found)
-    ]
+    # Two logs of one label are told apart by their place in the command.
+    keys = ("log_index", "log", "role", "model")
+    rows: list[tuple[Entry, ...]] = []
+    for (_, *names), part in found.residuals.group_by(*keys, maintain_order=True):
+        values = part["rms_Nm"].to_list()
+        rows.append((", ".join(map(str, names)), *values, sum(values) / len(values)))
     numbers = (*joint_columns(found.robot.joints), Column("mean"))
     return Grid(
         columns=(
@@ -30,23 +34,14 @@ def residual_grid(found: Identification) -> Grid:
     )
 
 
-def residual_rows(found: Identification) -> list[tuple[tuple[str, str, str], list[float]]]:
-    """Log, role and model, with the RMS of each joint. [N·m]"""
-    # Two logs of one label are told apart by their place in the command.
-    keys = ("log_index", "log", "role", "model")
-    return [
-        ((str(log), str(role), str(model)), part["rms_Nm"].to_list())
-        for (_, log, role, model), part in found.residuals.group_by(*keys, maintain_order=True)
-    ]
-
-
 def parameter_grid(found: Identification) -> Grid:
     """The identified numbers with their spread, and what the profile had."""
     rows = []
     for row in found.parameters.iter_rows(named=True):
         unit = row["unit"] + ("" if row["determined"] else "  (not determined)")
-        numbers = (f"{row[k]:{form}}" for k, form in (("value", ".5g"), ("sd", ".2g")))
-        rows.append((row["parameter"], row["joint"], *numbers, f"{row['profile']:.5g}", unit))
+        # What the profile does not have is "nan" here, so that it is not taken for a zero.
+        texts = [f"{row[k]:{f}}" for k, f in (("value", ".5g"), ("sd", ".2g"), ("profile", ".5g"))]
+        rows.append((row["parameter"], row["joint"], *texts, unit))
     return Grid(
         columns=(
             Column("number", words=True, width=19),
@@ -57,4 +52,38 @@ def parameter_grid(found: Identification) -> Grid:
             Column("unit", words=True),
         ),
         rows=tuple(rows),
+    )
+
+
+def shape_choice_grid(choices: pl.DataFrame) -> Grid:
+    """How the friction models competed on what was left out of the fit."""
+    return Grid(
+        title="RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen",
+        columns=(
+            Column("friction", words=True),
+            Column("joint"),
+            Column("RMS [N·m]"),
+            Column(""),
+        ),
+        rows=tuple(
+            (r["friction"], f"J{r['joint']}", r["cv_rms_Nm"], "chosen" if r["chosen"] else "")
+            for r in choices.iter_rows(named=True)
+        ),
+    )
+
+
+def base_grid(base: pl.DataFrame) -> Grid:
+    """Base parameters as the least squares gave them."""
+    return Grid(
+        title="Weighted least squares, before physical consistency",
+        columns=(
+            Column("parameter", words=True),
+            Column("value (SI)", form=signed),
+            Column("sd", form=signed),
+            Column("determined"),
+        ),
+        rows=tuple(
+            (r["parameter"], r["value"], r["sd"], "yes" if r["determined"] else "no")
+            for r in base.iter_rows(named=True)
+        ),
     )

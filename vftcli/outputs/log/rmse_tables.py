@@ -1,6 +1,6 @@
 """RMSE of joint torques as grids: observers down, joints across, and how sure each number is."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -208,3 +208,33 @@ def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
                     rows=tuple((name, *texts) for name, texts in rows.items()),
                     swatches=True,
                 )
+
+
+def marks_in_words(found: Sequence[Block]) -> str:
+    """What floor, star and dash mean, where they occur."""
+    lines = []
+    if any(table.has_floor for table in found):
+        lines.append("floor: RMSE that the reference itself is known to have")
+    if any(np.any(table.at_floor) for table in found):
+        lines.append(f"*: within {AT_FLOOR:g} × the floor; the reference can tell no more")
+    if any(table.untrusted for table in found):
+        lines.append(f"{DAGGER}: {RESTS}")
+    if any(not np.all(np.isfinite(table.rmse)) for table in found):
+        lines.append("–: no sample where both the estimate and the reference are known")
+    return "".join(f"{text}\n" for text in lines)
+
+
+def marks_on_page(found: Sequence[Block]) -> str:
+    """What the marks of the RMSE table mean, as HTML."""
+    text = (
+        "Torque on the robot about each joint's own axis; bold is the best of its joint; "
+        "the mean is over the joints."
+    )
+    if any(block.has_floor for block in found):
+        text += (
+            " The floor is the error the reference itself is known to have: an RMSE within "
+            f"{AT_FLOOR:g} × the floor is <em>at the floor</em>; the reference can tell no more."
+        )
+    if any(block.untrusted for block in found):
+        text += f" {DAGGER}: {RESTS}."
+    return text

@@ -5,7 +5,7 @@ import json
 import platform
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -45,18 +45,15 @@ PACKAGES = {
 """Package → its module, whose version is recorded if it is loaded; none is imported for it."""
 
 
-def run_record(
-    analysis: Analysis, command: str | Sequence[str], options: Mapping[str, Any] | None = None
-) -> dict[str, Any]:
+def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
     """Everything `run.json` holds.
 
     Args:
         analysis: What was run.
         command: The command line, as the user typed it.
-        options: Further settings to record, by name.
     """
     return {
-        "command": command if isinstance(command, str) else shell_line(command),
+        "command": command,
         "versions": versions(),
         "input": input_record(analysis.recording),
         "robot": robot_record(analysis.robot),
@@ -70,7 +67,6 @@ def run_record(
         "conventions": CONVENTIONS,
         **log_remarks([analysis.recording]),
         "notes": all_remarks(analysis),
-        "options": dict(options or {}),
     }
 
 
@@ -101,13 +97,6 @@ def jsonable(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
         case _ if is_dataclass(value) and not isinstance(value, type):
             return {field.name: jsonable(getattr(value, field.name)) for field in fields(value)}
     return str(value)
-
-
-def shell_line(words: Sequence[str]) -> str:
-    """A command line as one would type it again."""
-    import shlex
-
-    return shlex.join(words)
 
 
 def versions() -> dict[str, str]:
@@ -230,7 +219,7 @@ def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
         "tool": sensed.sensor.mounting.tool,
         "sensor": sensed.sensor.mounting.sensor,
         "zero_drift": list(sensed.drifts),
-        "warnings": [str(r) for r in sensed.remarks if r.level == "warning"],
+        "warnings": [r for r in sensed.remarks if r.level == "warning"],
     }
 
 
@@ -254,7 +243,7 @@ def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
             for e in analysis.estimates
             if e.error_sd is not None
         },
-        "notes": [str(remark) for remark in found.remarks],
+        "notes": list(found.remarks),
     }
 
 

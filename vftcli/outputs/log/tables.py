@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import polars as pl
 
 from vftcli.outputs.grid import (
@@ -17,12 +16,11 @@ from vftcli.outputs.grid import (
     terminal,
 )
 from vftcli.outputs.log.rmse_tables import (
-    AT_FLOOR,
     DAGGER,
     RESTS,
-    Block,
     blocks,
     detail_grids,
+    marks_in_words,
     rmse_grid,
 )
 from vftcli.outputs.log.wrench_tables import PaperBounds, axis_grids, contact_grids
@@ -44,23 +42,9 @@ def to_terminal(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
     found = blocks(errors)
     if not found:
         return "no errors to show: the estimates and the reference have no sample in common\n"
-    joints = "\n".join(terminal(rmse_grid(table)) for table in found) + explanation(found)
+    joints = "\n".join(terminal(rmse_grid(table)) for table in found) + marks_in_words(found)
     below = [*detail_grids(errors), *axis_grids(errors, bounds), *contact_grids(errors)]
     return "\n".join([joints, *map(terminal, below)])
-
-
-def explanation(found: tuple[Block, ...]) -> str:
-    """What floor, star and dash mean, where they occur."""
-    lines = []
-    if any(table.has_floor for table in found):
-        lines.append("floor: RMSE that the reference itself is known to have")
-    if any(np.any(table.at_floor) for table in found):
-        lines.append(f"*: within {AT_FLOOR:g} × the floor; the reference can tell no more")
-    if any(table.untrusted for table in found):
-        lines.append(f"{DAGGER}: {RESTS}")
-    if any(not np.all(np.isfinite(table.rmse)) for table in found):
-        lines.append("–: no sample where both the estimate and the reference are known")
-    return "".join(f"{text}\n" for text in lines)
 
 
 def to_markdown(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:

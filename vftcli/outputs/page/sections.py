@@ -13,12 +13,9 @@ from vftcli.analysis import Analysis
 from vftcli.observers import OBSERVERS
 from vftcli.outputs.grid import Column, Grid, GridCell, html, signed, significant
 from vftcli.outputs.log.rmse_tables import (
-    AT_FLOOR,
-    DAGGER,
-    RESTS,
-    Block,
     blocks,
     detail_grids,
+    marks_on_page,
     rmse_grid,
 )
 from vftcli.outputs.log.run_record import observer_record
@@ -56,7 +53,7 @@ def errors_section(analysis: Analysis) -> str:
         )
     parts = [
         *(html(rmse_grid(block)) for block in found),
-        soft(marks_meaning(found)),
+        soft(marks_on_page(found)),
         *map(html, axis_grids(table, paper_bounds([analysis]))),
         folded(
             "Confidence intervals, lags and significance", "".join(map(html, detail_grids(table)))
@@ -64,22 +61,6 @@ def errors_section(analysis: Analysis) -> str:
         folded("Bias, largest error and correlation", html(bias_grid(table))),
     ]
     return f"<h2>Errors against the reference</h2>{''.join(parts)}"
-
-
-def marks_meaning(found: Sequence[Block]) -> str:
-    """What the marks of the RMSE table mean, as HTML."""
-    text = (
-        "Torque on the robot about each joint's own axis; bold is the best of its joint; "
-        "the mean is over the joints."
-    )
-    if any(block.has_floor for block in found):
-        text += (
-            " The floor is the error the reference itself is known to have: an RMSE within "
-            f"{AT_FLOOR:g} × the floor is <em>at the floor</em>; the reference can tell no more."
-        )
-    if any(block.untrusted for block in found):
-        text += f" {DAGGER}: {RESTS}."
-    return text
 
 
 def bias_grid(table: pl.DataFrame) -> Grid:

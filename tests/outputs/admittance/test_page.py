@@ -1,0 +1,44 @@
+import json
+import re
+
+from vftcli.admittance.replay import Replay
+from vftcli.outputs.admittance.files import admittance_record
+from vftcli.outputs.admittance.page import UNITS, payload, render_admittance
+
+
+def test_the_page_shows_every_part(release: Replay) -> None:
+    record = admittance_record(release, None, None, "vftcli admit --release x=0.1")
+    page = render_admittance(release, record, "<release>")
+    for heading in ("Comparison", "Parameters", "Stability before motion", "Provenance"):
+        assert f"<h2>{heading}</h2>" in page
+    assert "<release>" not in page
+    assert "vftcli admit --release x=0.1" in page
+    data = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    assert data is not None
+    assert json.loads(data.group(1))["labels"] == ["x", "y", "z", "rx", "ry", "rz"]
+
+
+def test_rows_bear_the_name_that_the_legend_has(release: Replay) -> None:
+    record = admittance_record(release, None, None, "")
+    page = render_admittance(release, record, "r")
+    for controller in release.controllers:
+        assert f'data-swatch="{controller.name}"' in page
+
+
+def test_charts_have_the_unit_of_their_axis(push: Replay) -> None:
+    charts = {chart["key"]: chart for chart in payload(push, None)["charts"]}
+    assert list(charts) == ["x", "force", "v", "energy-w", "energy-v"]
+    assert charts["force"]["units"] == ["N"] * 3 + ["N·m"] * 3
+    assert charts["energy-w"]["units"] == ["J"] * 6
+    assert charts["v"]["units"][3] == UNITS["v"][1]
+    assert charts["force"]["band"][:4] == [20.0, 20.0, 20.0, 6.0]
+    names = [line["name"] for line in charts["x"]["series"]]
+    assert names == [controller.name for controller in push.controllers]
+
+
+def test_without_a_drag_the_page_says_so(release: Replay) -> None:
+    from dataclasses import replace
+
+    still = replace(release, rows=())
+    page = render_admittance(still, admittance_record(still, None, None, ""), "r")
+    assert "No axis was dragged." in page

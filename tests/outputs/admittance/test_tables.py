@@ -1,0 +1,80 @@
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+from vftcli.admittance.replay import Replay
+from vftcli.outputs.admittance.tables import (
+    COLUMNS,
+    comparison_csv,
+    comparison_grid,
+    comparison_json,
+    comparison_text,
+    parameter_grid,
+    parameter_text,
+    position_rotation,
+    stability_grid,
+)
+
+
+def test_controllers_stand_under_each_other_by_axis_and_drag(release: Replay) -> None:
+    rows = [dict(row) for row in release.rows]
+    late = [row | {"axis": "z", "drag": 2} for row in rows] + [row | {"axis": "z"} for row in rows]
+    grid = comparison_grid([*late, *rows])
+    keys = list(COLUMNS)
+    axes = [(row[keys.index("axis")], row[keys.index("drag")]) for row in grid.rows]
+    n = len(rows)
+    assert axes == [("x", 1)] * n + [("z", 1)] * n + [("z", 2)] * n
+
+
+def test_an_overshoot_is_printed_in_per_cent_with_a_true_minus(release: Replay) -> None:
+    row = dict(release.rows[0]) | {"overshoot": 0.0523, "peak": -0.1, "idle_s": None}
+    _, line = comparison_text([row]).splitlines()
+    assert {"5.2", "−0.1000", "–"} <= set(line.split())
+    assert comparison_text([]) == "no axis was dragged"
+
+
+def test_rows_for_machines_are_not_rounded(release: Replay) -> None:
+    rows = json.loads(comparison_json(release.rows))
+    assert rows == json.loads(json.dumps(list(release.rows)))
+    read = list(csv.DictReader(io.StringIO(comparison_csv(release.rows))))
+    assert [float(r["peak"]) for r in read] == [row["peak"] for row in release.rows]
+    assert comparison_csv([]).strip().split(",") == list(COLUMNS)
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ([3, 3, 3, 0.1, 0.1, 0.1], "3 / 0.1"),
+        ([1, 2, 3, 4, 4, 4], "1,2,3 / 4"),
+        ([np.inf] * 6, "inf / inf"),
+    ],
+)
+def test_equal_axes_are_told_once(values: list[float], text: str) -> None:
+    assert position_rotation(np.array(values)) == text
+
+
+def test_parameters_of_the_profile(release: Replay) -> None:
+    """Table III of the paper: 3 kg, 5 N·s/m, 8 N/m, threshold 20 N and 6 N·m."""
+    assert parameter_text(release).startswith("M 3 / 0.1, B 5 / 0.3, K 8 / 0.5, ")
+    assert "Ts 8 ms" in parameter_text(release)
+    rows = {row[0]: row[1:] for row in parameter_grid(release).rows}
+    assert rows["x"][:3] == (3.0, 5.0, 8.0)
+    assert rows["x"][-2:] == ("20 N", "0.9 m/s")
+    assert rows["rz"][-2:] == ("6 N·m", "1 rad/s")
+
+
+def test_stability_is_told_of_the_worst_axis(release: Replay) -> None:
+    """The discrete number 2 Ts B/M + Ts² K/M; the traditional controller keeps it in recovery."""
+    p = release.parameters
+    expected = np.max(
+        2 * p.period * p.damping[:3] / p.mass[:3] + p.period**2 * p.stiffness[:3] / p.mass[:3]
+    )
+    first = stability_grid(release).rows[0]
+    assert first[1] == "position"
+    assert first[2] == pytest.approx(expected)
+    assert [row[1] for row in stability_grid(release).rows] == ["position", "rotation"] * len(
+        release.verdicts
+    )
