@@ -131,16 +131,26 @@ def gain_pieces(
 
 
 def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
-    """The gains of `gain_pieces` for a whole log at once. (T, n) each"""
-    pieces = [
-        gains
-        for _, _, gains in gain_pieces(
-            lambda span: Discrete(*(entry[span] for entry in model)), len(model.r), prior, guess
-        )
-    ]
-    l1, l2 = (np.concatenate(parts) for parts in zip(*((g.l1, g.l2) for g in pieces), strict=True))
-    posterior = zip(*(g.posterior for g in pieces), strict=True)
-    return Gains(l1, l2, Covariance(*(np.concatenate(parts) for parts in posterior)))
+    """The gains of `gain_pieces` for a whole log at once. (T, n) each
+
+    Args:
+        model: The models of all samples. (T, n) each
+        prior: Covariance before the first sample's update. (n,)
+        guess: Where blocks of a piece start before they know better. (n,)
+    """
+    shape = np.broadcast_shapes(model.r.shape, prior.p11.shape)
+    whole = empty_gains(shape)
+    pieces = gain_pieces(
+        lambda span: Discrete(*(entry[span] for entry in model)), shape[0], prior, guess
+    )
+    for span, _, gains in pieces:
+        write(whole, span, gains)
+    return whole
+
+
+def empty_gains(shape: tuple[int, ...]) -> Gains:
+    """Gains and covariances to be written to."""
+    return Gains(np.empty(shape), np.empty(shape), Covariance(*(np.empty(shape) for _ in range(3))))
 
 
 def write(out: Gains, span: slice, part: Gains) -> None:
@@ -185,11 +195,7 @@ def blocked(entry: Array, blocks: int, length: int) -> Array:
 
 def run_blocks(model: Discrete, starts: Covariance, length: int) -> Gains:
     """One pass: the covariance recursion of all blocks side by side. (length, blocks, n) each"""
-    shape = model.a12.shape
-    gains = Gains(
-        np.empty(shape), np.empty(shape), Covariance(*(np.empty(shape) for _ in range(3)))
-    )
-    state = starts
+    gains, state = empty_gains(model.a12.shape), starts
     for i in range(length):
         step = update(predict(state, Discrete(*(entry[i] for entry in model))), model.r[i])
         write(gains, slice(i, i + 1), step)

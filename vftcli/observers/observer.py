@@ -1,13 +1,13 @@
 """What every observer is: parameters in, one estimate of the external torque out."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, frozen
+from vftcli.signals.arrays import Array, seal
 from vftcli.signals.external_torque import ExternalTorque
 
 Complex = NDArray[np.complex128]
@@ -34,9 +34,7 @@ class Tuning:
     parameter_count: int
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if field.name != "parameter_count":
-                object.__setattr__(self, field.name, frozen(getattr(self, field.name)))
+        seal(self, "omega_n", "zeta", "delay", "bandwidth", "dc_gain")
 
 
 class Observer(Protocol):

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vftcli.observers.kalman import KalmanObserver, error_filter, momentum_change
-from vftcli.observers.kalman_gains import Covariance, Gains, gain_pieces
+from vftcli.observers.kalman_gains import Covariance, Gains, gain_sequence
 from vftcli.observers.kalman_model import Discrete
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.recursion import Steps, recursion, steps_of
@@ -112,22 +112,10 @@ class KalmanSmoother:
         samples, n = terms.p.shape
         dt = np.full(samples, steps.median) if steps.uniform else steps.dt
         settled = self.filter.steady(steps.median, n)
-        pieces = list(
-            gain_pieces(
-                lambda span: self.filter.model(dt[span, None], n),
-                samples,
-                self.filter.first_prior(settled),
-                settled.gains.posterior,
-            )
-        )
-        model = Discrete(*(np.concatenate(e) for e in zip(*(m for _, m, _ in pieces), strict=True)))
-        l1 = np.concatenate([g.l1 for _, _, g in pieces])
-        l2 = np.concatenate([g.l2 for _, _, g in pieces])
-        posterior = Covariance(
-            *(np.concatenate(e) for e in zip(*(g.posterior for _, _, g in pieces), strict=True))
-        )
+        model = self.filter.model(dt[:, None], n)
+        gains = gain_sequence(model, self.filter.first_prior(settled), settled.gains.posterior)
         # L₁ = P⁻₁₁/S and R = S − P⁻₁₁, so S = R/(1 − L₁).
-        return Gains(l1, l2, posterior), model, model.r / (1.0 - l1)
+        return gains, model, model.r / (1.0 - gains.l1)
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """What the parameters mean: no delay, −3 dB where |H_KFO|² has fallen to 1/√2.

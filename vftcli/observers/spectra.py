@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from vftcli.robots.disturbance import disturbance_stretches
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, Mask, frozen, handed_over
+from vftcli.signals.arrays import Array, Mask, handed_over, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.series import median_step
 from vftcli.signals.spectrum import welch
@@ -54,8 +54,7 @@ class Spectra:
     segments: tuple[int, int]
 
     def __post_init__(self) -> None:
-        for name in ("frequency", "free", "loaded"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+        seal(self, "frequency", "free", "loaded")
 
     @property
     def joints(self) -> int:

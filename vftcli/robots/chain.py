@@ -6,12 +6,12 @@ are moved into these frames once, when a robot is loaded. The batched kernels, t
 the Pinocchio model are all made from this one object.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_shape, frozen
+from vftcli.signals.arrays import Array, check_shape, seal
 from vftcli.signals.errors import RobotError
 
 
@@ -30,8 +30,7 @@ class Payload:
     inertia: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "com", frozen(self.com))
-        object.__setattr__(self, "inertia", frozen(self.inertia))
+        seal(self, "com", "inertia")
         check_shape(self.com, (3,), "com", "the payload")
         check_shape(self.inertia, (3, 3), "inertia", "the payload")
         if why := unphysical(self.mass, self.inertia):
@@ -79,11 +78,9 @@ class Chain:
             "flange_rotation": (3, 3),
             "flange_translation": (3,),
         }
-        for field in fields(self):
-            if field.name in shapes:
-                value = frozen(getattr(self, field.name))
-                object.__setattr__(self, field.name, value)
-                check_shape(value, shapes[field.name], field.name, "the chain")
+        seal(self, *shapes)
+        for name, shape in shapes.items():
+            check_shape(getattr(self, name), shape, name, "the chain")
 
     @property
     def joints(self) -> int:

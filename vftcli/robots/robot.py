@@ -1,13 +1,13 @@
 """Robot: everything known about one arm, whatever file it came from."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from vftcli.robots.chain import Chain, Payload
-from vftcli.signals.arrays import Array, check_shape, frozen
+from vftcli.signals.arrays import Array, check_shape, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import Pose
 from vftcli.signals.remarks import Remark
@@ -49,8 +49,7 @@ class Limits:
     qdd_max: Array
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            object.__setattr__(self, f.name, frozen(getattr(self, f.name)))
+        seal(self, *vars(self))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,8 +69,7 @@ class SensorNoise:
     qd: Array
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            object.__setattr__(self, f.name, frozen(getattr(self, f.name)))
+        seal(self, *vars(self))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +126,7 @@ class Robot:
     def __post_init__(self) -> None:
         n = self.joints
         if self.torque_constant is not None:
-            object.__setattr__(self, "torque_constant", frozen(self.torque_constant))
+            seal(self, "torque_constant")
             check_shape(self.torque_constant, (n,), "torque_constant", self.name)
         if self.friction and len(self.friction) != n:
             raise RobotError(f"{self.name}: {len(self.friction)} friction models for {n} joints")

@@ -14,8 +14,8 @@ from vftcli.signals.arrays import (
     check_clock,
     check_shape,
     empty_series,
-    frozen,
     handed_over,
+    seal,
 )
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.recording import Recording
@@ -36,8 +36,7 @@ class DynamicsTerms:
     mu: Array
 
     def __post_init__(self) -> None:
-        for name in ("t", "p", "mu"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+        seal(self, "t", "p", "mu")
         if self.p.ndim != 2:
             raise ShapeError(f"p has shape {self.p.shape}; expected (T, n)")
         check_clock(self.t, "the dynamics terms")

@@ -47,6 +47,14 @@ def handed_over(value: Array) -> Array:
     return value
 
 
+def seal(owner: object, *names: str) -> None:
+    """Make the named arrays of a frozen dataclass read-only float64 ones; None stays None."""
+    for name in names:
+        if (value := getattr(owner, name)) is not None:
+            # The one way past a frozen dataclass, for its own __post_init__ only.
+            object.__setattr__(owner, name, frozen(value))
+
+
 def frozen_mask(value: ArrayLike) -> Mask:
     """Return a read-only boolean copy: non-zero is true."""
     copy = np.array(value, dtype=np.bool_)

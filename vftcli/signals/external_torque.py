@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask, check_clock, check_shape, frozen, frozen_mask
+from vftcli.signals.arrays import Array, Mask, check_clock, check_shape, frozen_mask, seal
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.remarks import Note
 
@@ -39,9 +39,7 @@ class ExternalTorque:
     remarks: tuple[Note, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("t", "tau", "sd", "floor", "error_sd"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, frozen(getattr(self, name)))
+        seal(self, "t", "tau", "sd", "floor", "error_sd")
         if self.moving is not None:
             object.__setattr__(self, "moving", frozen_mask(self.moving))
         if self.tau.ndim != 2:

@@ -5,7 +5,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask, check_clock, check_shape, frozen, frozen_mask
+from vftcli.signals.arrays import Array, Mask, check_clock, check_shape, frozen_mask, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark
 
@@ -118,9 +118,7 @@ class Wrench:
     remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("t", "values", "sd", "sigma_min", "null_space"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, frozen(getattr(self, name)))
+        seal(self, "t", "values", "sd", "sigma_min", "null_space")
         samples = len(self.t)
         mask = frozen_mask(np.zeros(samples) if self.masked is None else self.masked)
         object.__setattr__(self, "masked", mask)

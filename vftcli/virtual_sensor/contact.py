@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask, frozen
+from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.series import runs_of
 
@@ -56,8 +56,7 @@ class FreeBand:
     half: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "centre", frozen(self.centre))
-        object.__setattr__(self, "half", frozen(self.half))
+        seal(self, "centre", "half")
 
     def score(self, values: Array) -> Array:
         """Largest departure over the columns, in half widths; 0 where nothing is known. (T,)"""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, frozen
+from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import Pose, rpy_angles, skew
 from vftcli.signals.remarks import Remark, fact
@@ -33,7 +33,7 @@ class PoseFit:
     position_sd: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position_sd", frozen(self.position_sd))
+        seal(self, "position_sd")
 
 
 def fit_pose(flange: Array, sensor: Array) -> PoseFit:
@@ -94,8 +94,7 @@ class ToolWeight:
     force_rms: float
 
     def __post_init__(self) -> None:
-        for name in ("com", "zero"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+        seal(self, "com", "zero")
 
     def reading(self, rotation: Array, gravity: Array) -> Array:
         """What the sensor reads of weight and zero. (T, 6) [N, N·m]

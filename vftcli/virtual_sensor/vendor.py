@@ -6,7 +6,7 @@ import numpy as np
 
 from vftcli.robots.chain import Chain
 from vftcli.robots.kinematics import link_poses
-from vftcli.signals.arrays import Array, frozen
+from vftcli.signals.arrays import Array, seal
 from vftcli.signals.lag import Offset, time_offset
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact
@@ -37,8 +37,7 @@ class AxesFit:
     rms: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "matrix", frozen(self.matrix))
-        object.__setattr__(self, "rms", frozen(self.rms))
+        seal(self, "matrix", "rms")
 
     @property
     def derived(self) -> bool:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask, frozen
+from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, fact, warning
 from vftcli.signals.series import runs_of
@@ -55,8 +55,7 @@ class Drift:
     removed: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mean", frozen(self.mean))
-        object.__setattr__(self, "sd", frozen(self.sd))
+        seal(self, "mean", "sd")
 
     @property
     def remark(self) -> Remark:
