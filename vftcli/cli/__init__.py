@@ -76,7 +76,7 @@ COMMANDS = {
         "List the observers, their equations and their parameters.",
     ),
     "formats": ListedCommand(
-        "formats:list_formats",
+        "listings:list_formats",
         "List the log formats: how to record them, what is taken from them, what to look out for.",
     ),
 }

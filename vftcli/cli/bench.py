@@ -21,32 +21,20 @@ def bench(measured: BenchOptions, json: opt.Json = False) -> None:
 
     Example: vftcli bench --rounds 3
     """
-    import json as json_module
-
     from vftcli.benchmark import benchmark, memory_per_sample
+    from vftcli.cli.console import say_json
+    from vftcli.outputs.grid import terminal
+    from vftcli.outputs.listings import bench_grid
 
     result = benchmark(measured.robot, measured.samples, measured.rounds)
     if measured.memory:
         result["memory_bytes_per_sample"] = memory_per_sample()
     if json:
-        typer.echo(json_module.dumps(result, indent=2))
+        say_json(result)
         return
     typer.echo(f"{result['robot']}, {measured.samples} samples, median of {measured.rounds} rounds")
-    typer.echo(f"{'':<10} {'total':>10} {'per sample':>12} {'paper, its laptop':>18}")
-    back = [{"paper_s": None, **row} for row in result["complete_log"]]
-    rows = [
-        {"name": "dynamics", "paper_s": None, **result["dynamics"]},
-        *result["observers"],
-        *back,
-    ]
-    for row in rows:
-        paper = f"{row['paper_s']:.3f} s" if row["paper_s"] else ""
-        typer.echo(
-            f"{row['name']:<10} {row['total_s'] * 1e3:7.2f} ms {row['per_sample_us']:9.3f} µs "
-            f"{paper:>18}"
-        )
+    typer.echo(terminal(bench_grid(result)))
     ratios = result["ratios"]
-    typer.echo("")
     typer.echo(
         f"all observers with dynamics / one bare pin.rnea loop: {ratios['core_over_rnea_loop']:.2f}"
     )

@@ -46,7 +46,7 @@ def compare(
     """
     import polars as pl
 
-    from vftcli.cli.console import say_notes, say_recording
+    from vftcli.cli.console import say_analysis
     from vftcli.evaluation import paired_significance
     from vftcli.evaluation.pooling import PoolMember, evaluate_pooled
     from vftcli.outputs.log import tables
@@ -65,8 +65,7 @@ def compare(
     analyses = []
     for made in analyse_logs(logs, choice):
         if not table.json:
-            say_recording(made.recording)
-            say_notes(made)
+            say_analysis(made)
         analyses.append(made)
     if significance:
         pairs = [

@@ -1,8 +1,8 @@
 """From a command's options to an AnalysisChoice, and the words every command prints alike."""
 
+import json
 import shlex
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
@@ -23,6 +23,11 @@ def say(text: str) -> None:
     typer.echo(text, err=True)
 
 
+def say_json(value: object) -> None:
+    """Print what a command makes to stdout, for machines."""
+    typer.echo(json.dumps(value, indent=2, ensure_ascii=False))
+
+
 def say_recording(recording: "Recording") -> None:
     """One line on what was read, then what was repaired or looks odd."""
     source = recording.source
@@ -35,8 +40,9 @@ def say_recording(recording: "Recording") -> None:
         say(f"  note: {remark}")
 
 
-def say_notes(analysis: "Analysis") -> None:
-    """What the reader of the numbers should know."""
+def say_analysis(analysis: "Analysis") -> None:
+    """What was read, and what the reader of the numbers should know."""
+    say_recording(analysis.recording)
     reference = analysis.reference.remarks if analysis.reference is not None else ()
     own = [f"{e.name}: {note}" for e in analysis.estimates for note in e.remarks]
     for note in (*analysis.robot.remarks, *analysis.remarks, *own, *reference):
@@ -56,20 +62,3 @@ def say_wrenches(sensed: "SensorReading") -> None:
         say(terminal(drift_grid(sensed.drifts)).rstrip())
     for remark in sensed.remarks:
         say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
-
-
-def paths(values: list[Path] | None) -> tuple[Path, ...]:
-    """A repeatable option's values."""
-    return tuple(values or ())
-
-
-def chosen(wanted: dict[str, bool], default: str) -> str:
-    """The one format whose flag is set, or the default.
-
-    Raises:
-        typer.BadParameter: If several are set.
-    """
-    names = [name for name, asked in wanted.items() if asked]
-    if len(names) > 1:
-        raise typer.BadParameter(f"choose one of {', '.join(f'--{name}' for name in names)}")
-    return names[0] if names else default

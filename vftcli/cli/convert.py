@@ -24,14 +24,13 @@ def convert_log(
 
     Example: vftcli convert fixtures/ur5_circle.csv -o ur5_circle.mcap
     """
+    from vftcli.cli.console import say, say_json
     from vftcli.outputs.log.conversion import convert
     from vftcli.readers.library import Library
 
     recording = Library().open(log, reading.choice())
     convert(recording, output, force=force)
     if json:
-        import json as json_module
-
         summary = {
             "output": str(output),
             "format": recording.source.format,
@@ -39,8 +38,8 @@ def convert_log(
             "signals": recording.signals,
             "repairs": [str(repair) for repair in recording.source.repairs],
         }
-        typer.echo(json_module.dumps(summary))
+        say_json(summary)
         return
     for repair in recording.source.repairs:
-        typer.echo(f"repair: {repair}", err=True)
-    typer.echo(f"wrote {recording.samples} samples of {', '.join(recording.signals)}", err=True)
+        say(f"repair: {repair}")
+    say(f"wrote {recording.samples} samples of {', '.join(recording.signals)}")

@@ -30,12 +30,12 @@ def estimate(
     from vftcli.readers.library import Library
 
     extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
-    # Only what is computed with is read of a large log: the rest would double its time.
+    # Of a large log only the columns that are computed with are read; outputs show the others too.
     signals = None if analysis.wrench.asks or extras else frozenset(("dq", "current", "torque"))
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
     reading = Background(lambda: library.open(log, chosen))
 
-    from vftcli.cli.console import command_line, say, say_notes, say_recording
+    from vftcli.cli.console import command_line, say, say_analysis
     from vftcli.outputs.log.estimates import write_estimate_folder
     from vftcli.pipeline import analyse
 
@@ -46,6 +46,5 @@ def estimate(
     if json:
         typer.echo(record)
         return
-    say_recording(recording)
-    say_notes(made)
+    say_analysis(made)
     say(f"wrote {output}")

@@ -1,6 +1,6 @@
-"""`vftcli robots` and `vftcli observers`: what there is, with its sources."""
+"""`vftcli robots`, `vftcli observers`, `vftcli formats`: what there is, with its sources."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -17,62 +17,23 @@ def robots(
 
     Example: vftcli robots ur5
     """
-    import json as json_module
-
+    from vftcli.cli.console import say_json
     from vftcli.outputs.grid import terminal
-    from vftcli.outputs.listings import robots_grid
+    from vftcli.outputs.listings import robot_row, robot_text, robots_grid
     from vftcli.robots import PROFILES, load_robot
 
     if name is None:
         rows = [robot_row(load_robot(profile)) for profile in PROFILES]
         if json:
-            typer.echo(json_module.dumps(rows, indent=2))
-            return
-        typer.echo(terminal(robots_grid(rows)).rstrip("\n"))
+            say_json(rows)
+        else:
+            typer.echo(terminal(robots_grid(rows)), nl=False)
         return
     robot = load_robot(name)
     if json:
-        typer.echo(json_module.dumps(robot.document or robot_row(robot), indent=2))
-        return
-    for line in robot_lines(robot):
-        typer.echo(line)
-
-
-def robot_row(robot: Any) -> dict[str, Any]:  # noqa: ANN401 - avoids importing Robot for --help
-    """One robot in a few words."""
-    models = sorted({f.model for f in robot.friction}) or ["no friction model"]
-    return {
-        "name": robot.name,
-        "title": robot.title,
-        "joints": robot.joints,
-        "torque_source": robot.torque_source,
-        "friction": ", ".join(models),
-        "observers": sorted(robot.gains),
-        "payloads": sorted(robot.payloads),
-    }
-
-
-def robot_lines(robot: Any) -> list[str]:  # noqa: ANN401
-    """One robot in full: joints, drives, friction, gains, sources."""
-    from vftcli.outputs.grid import terminal
-    from vftcli.outputs.listings import joints_grid
-
-    lines = [
-        f"{robot.title} ({robot.name}): {robot.joints} joints, torque from {robot.torque_source}",
-        "",
-        *terminal(joints_grid(robot)).splitlines(),
-    ]
-    for observer, gains in robot.gains.items():
-        lines.append("")
-        lines.extend(f"{observer}.{key} = {value}" for key, value in gains.items())
-    lines += ["", *(f"note: {note}" for note in robot.remarks)]
-    for source in robot.sources:
-        lines.append(
-            f"source {source.get('id', '?')}: {source.get('what', '')}: {source.get('ref', '')}"
-        )
-    if robot.payloads:
-        lines.append(f"payloads: {', '.join(robot.payloads)} (--payload NAME)")
-    return lines
+        say_json(robot.document or robot_row(robot))
+    else:
+        typer.echo(robot_text(robot))
 
 
 def observers(json: opt.Json = False) -> None:
@@ -80,8 +41,7 @@ def observers(json: opt.Json = False) -> None:
 
     Example: vftcli observers
     """
-    import json as json_module
-
+    from vftcli.cli.console import say_json
     from vftcli.observers import OBSERVERS
     from vftcli.observers.settings import PARAMETERS
 
@@ -96,8 +56,39 @@ def observers(json: opt.Json = False) -> None:
         for name, entry in OBSERVERS.items()
     ]
     if json:
-        typer.echo(json_module.dumps(rows, indent=2, ensure_ascii=False))
+        say_json(rows)
         return
     for row in rows:
         typer.echo(f"{row['name']:<8} {row['title']} {row['equations']}")
         typer.echo(f"{'':<8} {row['summary']}; --set {', '.join(row['parameters'])}")
+
+
+def list_formats(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Show one format.")] = None,
+    json: opt.Json = False,
+) -> None:
+    """List the log formats: how to record them, what is taken from them, what to look out for.
+
+    Example: vftcli formats
+    """
+    from vftcli.cli.console import say_json
+    from vftcli.readers import READERS
+    from vftcli.signals.errors import UnknownFormatError
+
+    if name is not None and name not in READERS:
+        raise UnknownFormatError(f"no format {name!r}; there is {', '.join(READERS)}")
+    shown = [READERS[name]] if name else list(READERS.values())
+    if json:
+        keys = ("name", "title", "recording", "takes", "pitfalls", "columns")
+        say_json([{k: getattr(r, k) for k in keys} for r in shown])
+        return
+    for reader in shown:
+        if name is None:
+            typer.echo(f"{reader.name:<18} {reader.title}")
+            continue
+        typer.echo(f"{reader.name}: {reader.title}")
+        typer.echo(f"  record:   {reader.recording}")
+        typer.echo(f"  taken:    {reader.takes}")
+        typer.echo(f"  pitfalls: {reader.pitfalls}")
+    if name is None:
+        typer.echo("\nvftcli formats NAME tells how to record one; gzip and zstd are taken off.")

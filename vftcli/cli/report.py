@@ -31,7 +31,7 @@ def report(
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
     """
-    from vftcli.cli.console import command_line, say, say_notes, say_recording
+    from vftcli.cli.console import command_line, say, say_analysis
     from vftcli.evaluation.print_table import check_published, compare_with
     from vftcli.outputs.log.report import write_report, write_reports
     from vftcli.outputs.log.tables import print_text, to_terminal
@@ -49,8 +49,7 @@ def report(
             beside = compare_with(published, made.errors, made.observers, made.tunings)
         analyses.append(replace(made, published=beside))
         if not json:
-            say_recording(made.recording)
-            say_notes(made)
+            say_analysis(made)
     command = command_line()
     if len(analyses) == 1:
         record = write_report(output, analyses[0], command=command, force=force)

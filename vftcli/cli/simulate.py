@@ -56,8 +56,7 @@ def simulate_log(
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """
-    import json as json_module
-
+    from vftcli.cli.console import say, say_json
     from vftcli.simulation import load_scenario
     from vftcli.simulation.experiment import simulate_pair
     from vftcli.simulation.load import listing
@@ -79,10 +78,10 @@ def simulate_log(
     if json:
         about = {"scenario": setup.name, "seed": runs[0].seed, "files": files}
         about |= {"samples": len(runs[0].measured.rows), "robot": setup.robot}
-        typer.echo(json_module.dumps(about, indent=2))
+        say_json(about)
         return
     for file in files:
-        typer.echo(f"wrote {file}", err=True)
+        say(f"wrote {file}")
 
 
 def progress_bar() -> Callable[[int, int], None] | None:

@@ -45,9 +45,7 @@ def tune_gains(
 
     Example: vftcli tune fixtures/ur5_circle.csv --robot ur5 -o gains.toml
     """
-    import json as json_module
-
-    from vftcli.cli.console import command_line, say, say_recording
+    from vftcli.cli.console import command_line, say, say_json, say_recording
     from vftcli.outputs.files import refuse_existing, write_text
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
@@ -78,7 +76,7 @@ def tune_gains(
     write_text(output, comments + "".join(lines_of(gains_document(tuned))), force)
     if json:
         rows = [jsonable({**line._asdict()}) for line in tuned]
-        typer.echo(json_module.dumps({"goal": goal, "notes": notes, "observers": rows}, indent=2))
+        say_json({"goal": goal, "notes": notes, "observers": rows})
         return
     say_recording(recording)
     for note in notes:

@@ -1,9 +1,9 @@
 """Tables that a command prints and no file holds: robot profiles, gains that were found."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from vftcli.outputs.grid import Column, Grid, joint_columns
+from vftcli.outputs.grid import Column, Grid, joint_columns, terminal
 
 if TYPE_CHECKING:
     from vftcli.refinement.tuning import Tuned
@@ -74,3 +74,54 @@ def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
     joints = joint_columns(len(tuned[0].rate), form=".3g", width=7)
     words = (Column("observer", words=True), Column("", words=True, width=22))
     return Grid(columns=(*words, *joints), rows=tuple(rows))
+
+
+def robot_row(robot: "Robot") -> dict[str, Any]:
+    """One robot in a few words."""
+    models = sorted({f.model for f in robot.friction}) or ["no friction model"]
+    return {
+        "name": robot.name,
+        "title": robot.title,
+        "joints": robot.joints,
+        "torque_source": robot.torque_source,
+        "friction": ", ".join(models),
+        "observers": sorted(robot.gains),
+        "payloads": sorted(robot.payloads),
+    }
+
+
+def robot_text(robot: "Robot") -> str:
+    """One robot in full: joints, drives, friction, gains, sources."""
+    lines = [
+        f"{robot.title} ({robot.name}): {robot.joints} joints, torque from {robot.torque_source}",
+        "",
+        *terminal(joints_grid(robot)).splitlines(),
+    ]
+    for observer, gains in robot.gains.items():
+        lines.append("")
+        lines.extend(f"{observer}.{key} = {value}" for key, value in gains.items())
+    lines += ["", *(f"note: {note}" for note in robot.remarks)]
+    for source in robot.sources:
+        lines.append(
+            f"source {source.get('id', '?')}: {source.get('what', '')}: {source.get('ref', '')}"
+        )
+    if robot.payloads:
+        lines.append(f"payloads: {', '.join(robot.payloads)} (--payload NAME)")
+    return "\n".join(lines)
+
+
+def bench_grid(result: Mapping[str, Any]) -> Grid:
+    """How long dynamics and observers took, with the paper's times on its laptop beside them."""
+    rows = [{"name": "dynamics", **result["dynamics"]}, *result["observers"]]
+    return Grid(
+        columns=(
+            Column("", words=True, width=10),
+            Column("total", unit="ms", form=".2f"),
+            Column("per sample", unit="µs", form=".3f"),
+            Column("paper, its laptop", unit="s", form=".3f"),
+        ),
+        rows=tuple(
+            (row["name"], 1e3 * row["total_s"], row["per_sample_us"], row.get("paper_s"))
+            for row in (*rows, *result["complete_log"])
+        ),
+    )
