@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from vftcli.cli import app
 from vftcli.robots import load_robot
-from vftcli.signals.errors import IdentificationError
+from vftcli.signals.errors import IdentificationError, ParameterError
 
 RUNNER = CliRunner()
 
@@ -65,3 +65,23 @@ def test_what_exists_stays_without_force(excitation, tmp_path):
     assert "--force" in str(result.exception)
     assert page.read_text() == "mine"
     assert list(tmp_path.iterdir()) == [page]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--free", "other.csv"], "is the motion without the load that --find-payload seeks"),
+        (["--find-payload", "--free", "0:4"], "give --free the log without it, once"),
+        (["--find-payload", "--free", "a.csv", "--free", "b.csv"], "from one pair of logs"),
+        (["--method", "guess"], "there is friction, base"),
+        (["--method", "base", "--fit-constants"], "is an option of --method friction"),
+        (["--validate-interval", "4:1"], "is not A:B with A < B"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(words, message, tmp_path):
+    """Nothing is left out without a word: --free without --find-payload had no effect."""
+    command = ["identify", "log.csv", "--robot", "ur5", "-o", str(tmp_path / "r.toml"), *words]
+    result = RUNNER.invoke(app, command)
+    assert isinstance(result.exception, ParameterError)
+    assert message in str(result.exception)
+    assert not list(tmp_path.iterdir())

@@ -58,11 +58,11 @@ class WithoutLoad(Bundle):
 
     free: opt.Words = option(*opt.FREE)
 
-    def logs(self) -> tuple[Path, ...]:
+    def logs(self, find_payload: bool) -> tuple[Path, ...]:
         """The logs that are given, one at most.
 
         Raises:
-            ParameterError: If a span of the log is given, or more than one log.
+            ParameterError: If no load is sought, a span of the log is given, or more than one log.
         """
         from vftcli.repetition.choice import FreeChoice
         from vftcli.signals.errors import ParameterError
@@ -71,6 +71,11 @@ class WithoutLoad(Bundle):
         if chosen.spans or len(chosen.logs) > 1:
             raise ParameterError(
                 "a load is found from one pair of logs: give --free the log without it, once"
+            )
+        if chosen.logs and not find_payload:
+            raise ParameterError(
+                "--free is the motion without the load that --find-payload seeks; free motion to "
+                "identify the arm from is given as LOG"
             )
         return chosen.logs
 
@@ -107,7 +112,7 @@ def identify_robot(
         refuse_existing(file, force)
     choice, chosen = reading.choice(), robot.choice()
     held_out_choice = reading.changed(interval=validation.interval).choice()
-    validated, without_load = validation.validate or [], free.logs()
+    validated, without_load = validation.validate or [], free.logs(asked.find_payload)
     library = Library([*logs, *validated, *without_load])
     train = [library.open(log, choice) for log in logs]
     held_out = [library.open(log, held_out_choice) for log in validated]
