@@ -117,6 +117,25 @@ def test_a_long_gap_restarts_the_filter_and_says_so() -> None:
         assert "restarted from zero after one gap" in str(remark)
 
 
+@pytest.mark.parametrize(("kappa", "restarts"), [(1.5, True), (1.99, True), (2.5, False)])
+def test_gains_that_already_alternate_restart_nothing(kappa: float, restarts: bool) -> None:
+    """From K·Ts = 2 on the user's own gain makes a > 1 in every step: no gap is to blame."""
+    t = np.concatenate([np.arange(50) / RATE, 50 / RATE + 1.0 + np.arange(50) / RATE])
+    terms = DynamicsTerms(t=t, p=np.outer(t, [4.0]), mu=np.zeros((100, 1)))
+    estimate = MomentumObserver(gain=kappa * RATE).estimate(terms)
+    assert [r.code for r in estimate.remarks] == ["restarted-after-gap"] * restarts
+    assert (estimate.tau[50, 0] == 0.0) == restarts
+
+
+def test_several_gaps_are_counted() -> None:
+    t = np.concatenate([k * 2.0 + np.arange(50) / RATE for k in range(3)])
+    terms = DynamicsTerms(t=t, p=np.outer(t, [4.0]), mu=np.zeros((150, 1)))
+    (remark,) = MomentumObserver(gain=10.0).estimate(terms).remarks
+    assert remark.code == "restarted-after-gaps"
+    assert remark.values["gaps"] == 2
+    assert remark.values["longest_s"] == pytest.approx(2.0 - 49 / RATE)
+
+
 def test_a_short_gap_is_bridged_without_a_restart() -> None:
     t = np.delete(np.arange(1000) / RATE, [400, 401])
     tau = np.array([4.0])

@@ -1,0 +1,122 @@
+"""Gains tuned on a log's own spectra: the error they promise is the one that is then measured."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from vftcli.observers import OBSERVERS, Setup, build_observers
+from vftcli.observers.auto_tuning import (
+    KINDS,
+    curve,
+    expected_error,
+    kalman_filter,
+    kalman_smoother,
+    noise_level,
+    tuned,
+)
+from vftcli.observers.spectra import Part, spectra_of
+from vftcli.robots.terms import DynamicsTerms
+
+STEP = 0.008
+
+TermsOf = Callable[..., DynamicsTerms]
+Pushed = Callable[..., tuple[Part, Part]]
+
+
+def low_passed_noise(samples: int, corner: float, seed: int) -> np.ndarray:
+    """A first-order random torque with a corner frequency [rad/s], standard deviation 1."""
+    from scipy.signal import lfilter
+
+    a = np.exp(-corner * STEP)
+    white = np.random.default_rng(seed).normal(0.0, np.sqrt(1 - a * a), (samples, 2))
+    return lfilter([1.0], [1.0, -a], white, axis=0)
+
+
+@pytest.fixture
+def pushed(terms_of: TermsOf) -> Pushed:
+    """Makes a log that is half free, half under a random torque."""
+    return lambda **how: half_pushed(terms_of, **how)
+
+
+def half_pushed(
+    terms_of: TermsOf, samples: int = 8000, scale: float = 5.0, noise: float = 2.0
+) -> tuple[Part, Part]:
+    """Half free, half with a random torque; white torque noise everywhere. Seed 1."""
+    t = STEP * np.arange(samples)
+    free = np.arange(samples) < samples // 2
+    torque = scale * low_passed_noise(samples, 6.0, 1) * ~free[:, None]
+    terms = terms_of(t, torque, noise)
+    return Part(terms, ~free), Part(terms, free)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_expected_error_is_the_measured_one(name: str, pushed: Pushed) -> None:
+    """The spectra predict the rmse that the tuned observer then has against the truth."""
+    loaded, free = pushed()
+    observer = tuned(name, spectra_of(loaded, [free]))
+    assert observer.curve is not None
+    tau = observer.estimate(loaded.terms).tau
+    truth = 5.0 * low_passed_noise(8000, 6.0, 1) * loaded.inside[:, None]
+    inner = loaded.inside.copy()
+    inner[:4200] = False
+    rmse = np.sqrt(np.mean((tau - truth)[inner] ** 2, axis=0))
+    # power of 30 s of a torque with a correlation time of 0.17 s: known to 10 %; the tail of its
+    # spectrum lies under the noise, where (S_d − S_n)₊ sees only a part: the smoother's 10 % more
+    np.testing.assert_allclose(rmse, observer.curve.least, rtol=0.2)
+
+
+def test_tuning_finds_the_best_of_all_natural_frequencies(pushed: Pushed) -> None:
+    loaded, free = pushed()
+    spectra = spectra_of(loaded, [free])
+    found = curve(kalman_filter, spectra)
+    near = [expected_error(kalman_filter, found.best * f, spectra) for f in (0.7, 1.4)]
+    for error in near:
+        assert np.all(np.diag(error) >= found.least)
+
+
+def test_more_noise_calls_for_slower_filters(pushed: Pushed) -> None:
+    best = []
+    for noise in (0.5, 4.0):
+        loaded, free = pushed(noise=noise)
+        best.append(curve(kalman_smoother, spectra_of(loaded, [free])).best)
+    assert np.all(best[1] < best[0])
+
+
+def test_the_noise_level_gives_innovations_their_expected_variance(pushed: Pushed) -> None:
+    """NIS = 1 on the loaded part, which is what R is scaled for."""
+    from vftcli.observers.smoother import innovations
+
+    loaded, free = pushed()
+    spectra = spectra_of(loaded, [free])
+    omega_n = np.array([20.0, 40.0])
+    observer = kalman_filter(omega_n, noise_level(omega_n, spectra))
+    settled, model = observer.steady(STEP, 2), observer.model(STEP, 2)
+    tau = observer.estimate(loaded.terms).tau
+    nu = innovations(tau, settled.gains.l2, model.a22)[4200:]
+    nis = np.mean(nu**2, axis=0) / (settled.prior.p11 + model.r)
+    # variance of the same samples, windowed and not: the rest is the spectrum's own scatter
+    np.testing.assert_allclose(nis, 1.0, rtol=0.1)
+
+
+def test_without_spectra_auto_falls_back_and_says_so(pushed: Pushed) -> None:
+    setup = Setup(gains={}, settings={}, joints=2, step=STEP, as_printed=False)
+    observers, remarks = build_observers(("kfo-auto", "rts-auto", "kfo-zoh", "kfo-rts"), setup)
+    untuned = [r for r in remarks if r.code == "tuning-without-free-part"]
+    assert [r.where.about for r in untuned] == ["kfo-auto", "rts-auto"]
+    assert str(untuned[0]).startswith("kfo-auto: no free part to tune on")
+    loaded, _ = pushed(samples=400)
+    filtered, smoothed, by_hand, rts = (o.estimate(loaded.terms) for o in observers)
+    assert filtered.name == "kfo-auto"
+    np.testing.assert_array_equal(filtered.tau, by_hand.tau)
+    np.testing.assert_array_equal(smoothed.tau, rts.tau)
+
+
+def test_tuned_observers_have_nothing_left_to_tune(pushed: Pushed) -> None:
+    loaded, free = pushed()
+    setup = Setup(gains={}, settings={}, joints=2, step=STEP, as_printed=False)
+    setup = setup._replace(spectra=spectra_of(loaded, [free]))
+    observer, remarks = OBSERVERS["rts-auto"].build(setup)
+    assert remarks == ()
+    assert observer.tuning(STEP, 2).parameter_count == 0
+    np.testing.assert_allclose(observer.tuning(STEP, 2).zeta, np.sqrt(0.5))

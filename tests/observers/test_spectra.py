@@ -1,0 +1,142 @@
+"""Spectra of the raw disturbance: known densities, gaps, and the error they predict."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from vftcli.observers.spectra import Part, Spectra, smoothed, spectra_of
+from vftcli.robots.disturbance import raw_disturbance
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.errors import ParameterError
+
+STEP = 0.008
+
+TermsOf = Callable[..., DynamicsTerms]
+
+
+def test_the_raw_disturbance_of_a_constant_torque_is_that_torque(terms_of: TermsOf) -> None:
+    t = STEP * np.arange(100)
+    d = raw_disturbance(terms_of(t, np.full((100, 2), 3.0)))
+    # differences of a sum of a hundred terms: rounding only
+    np.testing.assert_allclose(d, 3.0, rtol=1e-12)
+
+
+def test_spectra_hold_the_mean_square_and_the_mean(terms_of: TermsOf) -> None:
+    """Parseval: the density summed over frequency is the power, a constant's included."""
+    t = STEP * np.arange(4000)
+    torque = 2.0 + np.random.default_rng(5).normal(0.0, 0.5, (4000, 2))
+    terms = terms_of(t, torque)
+    half = np.arange(4000) < 2000
+    found = spectra_of(Part(terms, ~half), [Part(terms, half)])
+    power = found.free.sum(axis=0) * found.width
+    d = raw_disturbance(terms)[: 2000 - 1]
+    # the window weighs samples unevenly: 8 segments of noise of variance 0.12 on a mean of 2
+    np.testing.assert_allclose(power, np.mean(d**2, axis=0), rtol=0.03)
+
+
+def test_white_noise_has_a_flat_spectrum_of_the_known_height() -> None:
+    """One-sided density of white d with variance s² is 2s²Ts."""
+    rng = np.random.default_rng(7)
+    t = STEP * np.arange(40_000)
+    d = rng.normal(0.0, 0.4, (40_000, 1))
+    p = np.cumsum(STEP * d, axis=0)
+    terms = DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))
+    half = np.arange(len(t)) < len(t) // 2
+    found = spectra_of(Part(terms, ~half), [Part(terms, half)])
+    # about 80 half-overlapping segments: each bin to 15 %, their mean over 240 bins to 1 %
+    assert np.mean(found.free[2:-2]) == pytest.approx(2 * 0.16 * STEP, rel=0.02)
+    # free and loaded are alike, so hardly anything is external
+    assert found.external.sum() < 0.1 * found.loaded.sum()
+
+
+def test_an_uneven_clock_has_the_spectrum_of_its_median_step(terms_of: TermsOf) -> None:
+    rng = np.random.default_rng(11)
+    t = np.cumsum(STEP * rng.uniform(0.9, 1.1, 6000))
+    torque = 3.0 * np.sin(2 * np.pi * 2.0 * t)[:, None]
+    terms = terms_of(t, torque)
+    half = np.arange(len(t)) < 3000
+    found = spectra_of(Part(terms, ~half), [Part(terms, half)])
+    peak = found.frequency[np.argmax(found.loaded[:, 0])]
+    assert peak == pytest.approx(2.0, abs=found.width)
+    # 4.5 by Parseval; the resampling averages over a step, sinc²(2 Hz · 8 ms) = 0.999
+    assert found.loaded.sum() * found.width == pytest.approx(4.5, rel=0.03)
+
+
+def test_a_part_too_short_for_a_spectrum_is_refused(terms_of: TermsOf) -> None:
+    terms = terms_of(STEP * np.arange(100), np.zeros((100, 1)))
+    few = np.arange(100) < 20
+    with pytest.raises(ParameterError, match="needs 32 samples in a row; the loaded part has 79"):
+        spectra_of(Part(terms, ~few), [Part(terms, few)])
+
+
+def test_no_segment_reaches_across_a_gap(terms_of: TermsOf) -> None:
+    t = np.concatenate([STEP * np.arange(60), 10.0 + STEP * np.arange(25)])
+    t += np.random.default_rng(0).uniform(0, 1e-4, len(t))
+    terms = terms_of(t, np.ones((85, 1)))
+    few = np.arange(85) >= 60
+    with pytest.raises(ParameterError, match=r"free part 2[34]"):
+        spectra_of(Part(terms, ~few), [Part(terms, few)])
+
+
+def test_the_spectra_predict_the_error_of_a_perfect_and_of_a_dead_observer() -> None:
+    f = np.linspace(0.0, 10.0, 11)
+    noise, both = np.ones((11, 1)), np.full((11, 1), 3.0)
+    spectra = Spectra(frequency=f, free=noise, loaded=both, step=0.05, segments=(1, 1))
+    one, none = np.ones((11, 1), complex), np.zeros((11, 1), complex)
+    assert spectra.missed(one)[0] == 0.0
+    assert spectra.passed(none)[0] == 0.0
+    # 11 bins of 1 Hz, S_τ = 2 and S_n = 1
+    assert spectra.missed(none)[0] == pytest.approx(22.0)
+    assert spectra.passed(one)[0] == pytest.approx(11.0)
+
+
+def flat_spectra(free: float = 1.0, loaded: float = 3.0) -> Spectra:
+    """Eleven bins of 1 Hz, of one density each."""
+    f = np.linspace(0.0, 10.0, 11)
+    return Spectra(
+        frequency=f,
+        free=np.full((11, 1), free),
+        loaded=np.full((11, 1), loaded),
+        step=0.05,
+        segments=(1, 1),
+    )
+
+
+@pytest.mark.parametrize(
+    ("response", "missed", "passed"),
+    [(0.5, 0.25, 0.25), (1j, 2.0, 1.0), (-1.0, 4.0, 1.0), (2.0, 1.0, 4.0), (0.6 + 0.8j, 0.8, 1.0)],
+)
+def test_power_goes_with_the_square_of_the_complex_response(
+    response: complex, missed: float, passed: float
+) -> None:
+    """|1 − H|² of S_τ = 2 and |H|² of S_n = 1 over 11 Hz; a delay turns H without changing |H|."""
+    spectra, H = flat_spectra(), np.full((11, 1), response, complex)
+    assert spectra.missed(H)[0] == pytest.approx(22.0 * missed)
+    assert spectra.passed(H)[0] == pytest.approx(11.0 * passed)
+
+
+def test_less_than_the_free_part_is_no_external_torque() -> None:
+    assert not flat_spectra(free=3.0, loaded=1.0).external.any()
+
+
+def test_the_floor_is_the_quietest_octave_s_level_below_it() -> None:
+    """Friction at low frequencies, noise above: the floor is the noise throughout."""
+    f = np.arange(101) * 0.5
+    free = np.where(f < 5.0, 100.0, 1.0)[:, None]
+    spectra = Spectra(frequency=f, free=free, loaded=free, step=0.01, segments=(1, 1))
+    # averages over a fifth of the frequency reach from 6 Hz down to 4.8
+    np.testing.assert_allclose(spectra.floor[f >= 6.5], 1.0)
+    assert np.all(spectra.floor < 100.0)
+    assert spectra.floor[0, 0] == pytest.approx(1.0)
+
+
+def test_neighbours_are_averaged_over_a_fifth_of_the_frequency() -> None:
+    spectrum = np.arange(50.0)[:, None]
+    np.testing.assert_allclose(smoothed(spectrum)[:40], spectrum[:40])  # a straight line stays
+    spike = np.zeros((50, 1))
+    spike[20] = 9.0
+    found = smoothed(spike)[:, 0]
+    assert found[20] == pytest.approx(1.0)  # 4 neighbours either side
+    assert found[4] == 0.0
+    assert np.flatnonzero(found).tolist() == list(range(17, 26))

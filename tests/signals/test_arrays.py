@@ -1,0 +1,102 @@
+"""Arrays at the door of a type: read-only, float64, of the right shape, on a clock that runs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vftcli.signals.arrays import (
+    check_clock,
+    check_shape,
+    frozen,
+    frozen_mask,
+    handed_over,
+    is_uniform,
+    median,
+    seal,
+)
+from vftcli.signals.errors import ClockError, ShapeError
+
+
+def test_a_frozen_copy_does_not_follow_its_origin() -> None:
+    origin = np.zeros(3)
+    copy = frozen(origin)
+    origin[0] = 1.0
+    assert copy[0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        copy[0] = 2.0
+
+
+def test_what_nobody_can_write_to_is_not_copied() -> None:
+    whole = frozen(np.arange(6.0))
+    assert frozen(whole) is whole
+    assert frozen(whole[::2]).base is not None  # a view of sealed memory stays one
+    writable = np.arange(6.0)
+    view = writable[::2]
+    view.setflags(write=False)
+    assert not np.shares_memory(frozen(view), writable)  # its owner could still change it
+
+
+def test_handing_over_seals_the_owner_too() -> None:
+    owner = np.zeros((2, 3))
+    assert handed_over(owner.T).base is owner
+    assert not owner.flags.writeable
+
+
+@dataclass(frozen=True)
+class Sealed:
+    values: object
+    maybe: object = None
+
+    def __post_init__(self) -> None:
+        seal(self, "values", "maybe")
+
+
+def test_a_type_seals_its_arrays_and_leaves_what_is_none() -> None:
+    made = Sealed([1, 2, 3])
+    assert isinstance(made.values, np.ndarray)
+    assert made.values.dtype == np.float64
+    assert not made.values.flags.writeable
+    assert made.maybe is None
+
+
+def test_a_mask_is_boolean() -> None:
+    mask = frozen_mask(np.array([0.0, 2.0, -1.0]))
+    assert mask.tolist() == [False, True, True]
+    assert not mask.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("t", "error", "words"),
+    [
+        ([[0.0, 1.0]], ShapeError, "one-dimensional"),
+        ([0.0, np.nan, 1.0], ClockError, "not finite at sample 1"),
+        ([0.0, 1.0, 1.0], ClockError, "stops increasing at sample 2 .1.000000 s, then 1.000000"),
+        ([0.0, 2.0, 1.0], ClockError, "clock of a log stops increasing at sample 2"),
+    ],
+)
+def test_a_clock_that_does_not_run_is_refused(t: list[float], error: type, words: str) -> None:
+    with pytest.raises(error, match=words):
+        check_clock(np.array(t), "a log")
+
+
+def test_another_shape_is_named() -> None:
+    with pytest.raises(ShapeError, match=r"tau of gmo has shape \(2, 3\); expected \(3, 2\)"):
+        check_shape(np.zeros((2, 3)), (3, 2), "tau", "gmo")
+
+
+@given(st.lists(st.floats(-1e9, 1e9), min_size=1, max_size=50))
+def test_the_median_is_numpy_s(values: list[float]) -> None:
+    assert median(np.array(values)) == np.median(values)
+
+
+def test_even_clocks_are_told_from_jittering_ones() -> None:
+    t = 0.008 * np.arange(100)
+    assert is_uniform(t)
+    assert is_uniform(np.round(t, 9))
+    assert is_uniform(t[:1])
+    t[50] += 1e-4
+    assert not is_uniform(t)
+    assert is_uniform(t, tolerance=0.05)
