@@ -72,7 +72,7 @@ def group_parameters(chain: Chain, rotor: bool) -> Grouping:
     R, order = qr(flat, mode="r", pivoting=True)
     diagonal = np.abs(np.diag(R))
     rank = int(np.count_nonzero(diagonal > RANK_TOLERANCE * diagonal[0]))
-    beta = np.linalg.solve(R[:rank, :rank], R[:rank, rank:])
+    beta = np.asarray(np.linalg.solve(R[:rank, :rank], R[:rank, rank:]), dtype=np.float64)
     beta[np.abs(beta) < 1e-9] = 0.0
     first = np.argsort(order[:rank])
     return Grouping(tuple(order[:rank][first].tolist()), tuple(order[rank:].tolist()), beta[first])

@@ -1,5 +1,7 @@
 """Filters without phase shift on clocks that may be uneven, and how much white noise they pass."""
 
+from typing import Literal
+
 import numpy as np
 
 from vftcli.signals.arrays import Array, is_uniform
@@ -8,6 +10,9 @@ from vftcli.signals.series import median_step, resampled
 
 ORDER = 2
 """Order of the Butterworth filter; run forwards and backwards it attenuates twice as much."""
+
+Kind = Literal["lowpass", "bandpass"]
+"""What a filter lets pass."""
 
 UNEVEN = 0.05
 """Steps that differ from their median by a larger share are resampled: by less, the error of a
@@ -68,7 +73,7 @@ def even_clock(t: Array, step: float) -> Array:
 
 
 def design(
-    step: float, cutoff: float | tuple[float, float], kind: str, order: int = ORDER
+    step: float, cutoff: float | tuple[float, float], kind: Kind, order: int = ORDER
 ) -> Array:
     """Second-order sections of a Butterworth filter for a sample time. [s]
 
@@ -86,7 +91,7 @@ def design(
     return sections
 
 
-def passed(step: float, cutoff: float | tuple[float, float], kind: str, slope: int = 0) -> float:
+def passed(step: float, cutoff: float | tuple[float, float], kind: Kind, slope: int = 0) -> float:
     """Mean square of white noise of unit variance behind the filter, differentiated `slope` times.
 
     Args:
