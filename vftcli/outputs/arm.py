@@ -62,6 +62,7 @@ def capsules(chain: Chain) -> list[list[Capsule]]:
     shapes: list[list[Capsule]] = []
     for j in range(n + 1):
         shapes.append([])
+        # A joint is a short thick cylinder about its axis, which is z of the link that it moves.
         if j > 0:
             half = 1.1 * radii[j]
             axis = np.array([0.0, 0.0, 2.0 * half])
@@ -73,6 +74,7 @@ def capsules(chain: Chain) -> list[list[Capsule]]:
 
 def motion(chain: Chain, t: Array, q: Array, rate: float) -> ArmPoses:
     """Poses of all links at about `rate` samples a second. [Hz]"""
+    # At least each sample: a slow log is drawn as it is.
     every = max(1, int(len(t) / max(float(t[-1] - t[0]) * rate, 1.0)))
     t, q = t[::every], np.ascontiguousarray(q[::every])
     poses = link_poses(chain, q)

@@ -39,6 +39,7 @@ def decimated(t: Array, values: Array, stretches: int) -> list[Line]:
         stretches: Number of stretches the log is cut into.
     """
     gaps = gaps_of(t, GAP_STEPS)
+    # Two samples a stretch would be all of them: nothing to leave out.
     if len(t) <= 2 * stretches:
         everything = np.arange(len(t))
         return [broken(t, column, everything, gaps) for column in values.T]
@@ -46,6 +47,7 @@ def decimated(t: Array, values: Array, stretches: int) -> list[Line]:
     ends = np.array([0, len(t) - 1], dtype=np.intp)
     lines = []
     for j, column in enumerate(values.T):
+        # Samples beside a gap stay, or a line would be drawn up to the wrong place.
         index = np.unique(np.concatenate([ends, low[:, j], high[:, j], gaps, gaps + 1]))
         lines.append(broken(t, column, index, gaps))
     return lines
@@ -54,6 +56,7 @@ def decimated(t: Array, values: Array, stretches: int) -> list[Line]:
 def extremes(values: Array, stretches: int) -> tuple[Index, Index]:
     """Sample numbers of the lowest and highest known value of every stretch. (stretches, n)"""
     samples, n = values.shape
+    # Rounded up, so that no sample is left over; the last stretch is filled with unknowns.
     width = -(-samples // stretches)
     count = -(-samples // width)
     padded = np.full((count * width, n), np.nan)
@@ -61,6 +64,7 @@ def extremes(values: Array, stretches: int) -> tuple[Index, Index]:
     cut = padded.reshape(count, width, n)
     unknown = np.isnan(cut)
     start = (np.arange(count) * width)[:, None]
+    # argmin of a stretch without a known value is its first sample, which is NaN: a break.
     low = np.where(unknown, np.inf, cut).argmin(axis=1) + start
     high = np.where(unknown, -np.inf, cut).argmax(axis=1) + start
     return low, high
@@ -71,6 +75,7 @@ def broken(t: Array, column: Array, index: Index, gaps: Index) -> Line:
     x, y = t[index], column[index]
     if gaps.size:
         after = np.searchsorted(index, gaps, side="right")
+        # One NaN between the two samples is enough to break the line there.
         middle = 0.5 * (t[gaps] + t[gaps + 1])
         x, y = np.insert(x, after, middle), np.insert(y, after, np.nan)
     return Line(x, y)

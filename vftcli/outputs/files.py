@@ -25,10 +25,12 @@ def atomic(path: Path, force: bool = False) -> Iterator[Path]:
         OutputError: If the file exists and `force` is not set, or it cannot be written.
     """
     path = Path(path)
+    # A device cannot be replaced: `-o /dev/stdout` is written to as it is.
     if path.is_char_device() or path.is_fifo():
         yield path
         return
     refuse_existing(path, force)
+    # What a link points to is replaced, not the link.
     target = path.resolve() if path.is_symlink() else path
     temporary = target.with_name(f".{os.urandom(4).hex()}.{target.name}")
     try:
@@ -86,6 +88,7 @@ class OutputFolder:
         try:
             self.made = make_folders(self.path)
             check_writable(self.path)
+            # Inside the folder, so that the files only change their names when they are moved.
             self.temporary = self.path / f".{os.urandom(4).hex()}.partial"
             self.temporary.mkdir()
         except OSError as error:
@@ -123,6 +126,7 @@ class OutputFolder:
         targets = [self.path / file.relative_to(self.temporary) for file in files]
         stale = {self.path / name for name in self.names}.difference(targets)
         with kept_aside([*targets, *stale], self.temporary / "earlier"):
+            # Renaming within a file system is atomic for each file.
             for file, target in zip(files, targets, strict=True):
                 target.parent.mkdir(parents=True, exist_ok=True)
                 file.replace(target)

@@ -149,7 +149,7 @@ class Grid:
 
     @property
     def cells(self) -> list[list[GridCell]]:
-        """Every entry as text."""
+        """Every entry as text, row by row."""
         return [[c.cell(x) for c, x in zip(self.columns, row, strict=True)] for row in self.rows]
 
 
@@ -203,6 +203,7 @@ def latex(grid: Grid) -> str:
     r"""A table as a ``tabular`` of the package booktabs, its title as a comment above."""
     comments = [", ".join(text for text in (grid.title, grid.quantity) if text), *grid.notes]
     count = sum(not column.words for column in grid.columns)
+    # Booktabs has no vertical rules; words to the left, numbers to the right.
     spec = "".join("l" if column.words else "r" for column in grid.columns)
     heads = [column.symbol or escape_latex(column.head) for column in grid.columns]
     heads[0] = heads[0][:1].upper() + heads[0][1:]
@@ -227,7 +228,7 @@ def latex(grid: Grid) -> str:
 
 
 def latex_line(texts: Sequence[str]) -> str:
-    """One row of a tabular."""
+    """Entries as one row of a LaTeX tabular."""
     return rf"{' & '.join(texts)} \\"
 
 

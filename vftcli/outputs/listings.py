@@ -66,6 +66,7 @@ def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
             "delay [ms]": 1e3 * line.delay,
             "expected rmse [N·m]": line.rmse,
         }
+        # Without a threshold there is no alarm to count.
         if with_alarms and line.alarms is not None:
             values["false alarms [1/h]"] = line.alarms.round(3)
         for what, numbers in values.items():

@@ -29,6 +29,7 @@ def colours_of(estimates: Sequence[ExternalTorque]) -> dict[str, str]:
     """One colour for each estimate's name; two get the same only when there are no more."""
     names = [estimate.name for estimate in estimates]
     taken = {COLOURS[name] for name in names if name in COLOURS}
+    # An estimate without a colour of its own does not get one that another has.
     free = [colour for colour in SPARE if colour not in taken] or list(SPARE)
     others = [name for name in names if name not in COLOURS]
     spare = {name: free[k % len(free)] for k, name in enumerate(others)}
@@ -36,5 +37,5 @@ def colours_of(estimates: Sequence[ExternalTorque]) -> dict[str, str]:
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
-    """Red, green and blue of ``#rrggbb``."""
+    """Red, green and blue of ``#rrggbb``, each from 0 to 255."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)

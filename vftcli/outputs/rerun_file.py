@@ -161,6 +161,7 @@ def finish(stream: Stream, path: Path) -> None:
         raise OutputError(f"{path.name} cannot be written: {one_line(error)}") from None
     with path.open("rb") as file:
         file.seek(-min(TRAILER, path.stat().st_size), os.SEEK_END)
+        # Rerun writes in a thread, whose error on a full disk reaches nobody.
         if FOOTER not in file.read():
             raise OutputError(f"{path.name} cannot be written whole: is the disk full?")
 
@@ -190,6 +191,7 @@ def arm_view(view: ArmView) -> Any:  # noqa: ANN401 - Rerun is untyped
     import rerun.blueprint as rrb
 
     corners = view.poses.translation.reshape(-1, 3)
+    # The base stands at the origin and shall be seen too.
     low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
     centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
     eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
@@ -280,6 +282,7 @@ def capsule_batch(shapes: Sequence[Capsule], ghost: tuple[int, ...] | None) -> A
 
 def turn_from_z(unit: Array) -> Array:
     """Quaternion (x, y, z, w) that turns z to a unit vector the short way. (4,)"""
+    # Straight down every turn by half is as short; the formula below would divide by zero.
     if unit[2] < -1.0 + 1e-9:
         return np.array([1.0, 0.0, 0.0, 0.0])
     turn = np.array([-unit[1], unit[0], 0.0, 1.0 + unit[2]])
@@ -323,7 +326,7 @@ def drawable(text: str) -> str:
 
 
 def letter_drawn(letter: str) -> str:
-    """One letter, or what stands for it."""
+    """One letter if the font has it; else what it is made of, or "?"."""
     if letter == "\n" or has_glyph(letter) or "\u00a0" <= letter <= "\u00ff":
         return letter
     parts = [p for p in unicodedata.normalize("NFKD", letter) if not unicodedata.combining(p)]

@@ -1,15 +1,12 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.log import mcap_output
-from vftcli.outputs.log.description import urdf_text
-from vftcli.outputs.log.mcap_output import write_mcap
-from vftcli.robots import PROFILES, load_robot
+from vftcli.outputs.log.mcap_output import ros_name, stamps_of, write_mcap
 from vftcli.robots.drive import drive_torque
+from vftcli.signals.recording import Recording, Source
 
 
 @pytest.fixture(scope="module")
@@ -60,18 +57,21 @@ def test_stamps_are_the_logs_own(messages: dict[str, list], analysis: Analysis) 
     assert [stamp for stamp, _ in messages["/joint_states"]] == expected.tolist()
 
 
-@pytest.mark.parametrize("name", PROFILES)
-def test_the_urdf_is_the_arm(name: str, tmp_path: Path) -> None:
-    """Read back through Pinocchio, the flange is where it was; 12 printed digits."""
-    from vftcli.robots.kinematics import link_poses
+@pytest.mark.parametrize(
+    ("name", "shown"), [("kfo-fe", "kfo_fe"), ("größe", "gr__e"), ("rts auto 2", "rts_auto_2")]
+)
+def test_names_as_ros_allows_them(name: str, shown: str) -> None:
+    assert ros_name(name) == shown
 
-    robot = load_robot(name)
-    path = tmp_path / "arm.urdf"
-    path.write_text(urdf_text(robot, robot.chain.names), encoding="utf-8")
-    back = load_robot(path)
-    q = np.random.default_rng(7).uniform(-2.0, 2.0, (20, robot.joints))
-    found, expected = link_poses(back.chain, q), link_poses(robot.chain, q)
-    np.testing.assert_allclose(found.translation, expected.translation, atol=1e-10)
-    np.testing.assert_allclose(found.rotation[:, -1], expected.rotation[:, -1], atol=1e-10)
-    np.testing.assert_allclose(back.chain.mass, robot.chain.mass, rtol=1e-10)
-    np.testing.assert_allclose(back.chain.inertia, robot.chain.inertia, atol=1e-10)
+
+def test_stamps_that_ros_cannot_count_begin_at_zero() -> None:
+    t = np.array([0.0, 0.5])
+
+    def stamps(t0: float) -> list[int]:
+        return stamps_of(Recording(t=t, q=np.zeros((2, 1)), source=Source(t0=t0))).tolist()
+
+    assert stamps(100.25) == [100_250_000_000, 100_750_000_000]
+    assert stamps(-1.0) == [0, 500_000_000]
+    last = 2.0**31 - 1  # seconds that a signed word of 32 bits can hold
+    assert stamps(last)[0] == (2**31 - 1) * 10**9
+    assert stamps(last + 0.75) == [0, 500_000_000]

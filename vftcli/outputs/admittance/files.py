@@ -51,6 +51,7 @@ def motion_table(replay: Replay) -> "pl.DataFrame":
     for k, name in enumerate(FORCES):
         columns[f"force/{name}"] = padded(replay.wrench[:, k])
     for n, controller in enumerate(replay.controllers):
+        # A slash would make one more level of the column's name.
         label = controller.name.replace(" ", "").replace("/", "-")
         for k, axis in enumerate(AXES):
             columns[f"x/{label}/{axis}"] = motion.x[:, n, k]
@@ -70,7 +71,7 @@ def padded(column: Array) -> Array:
 
 
 def title_of(recording: Recording | None, run: ClosedLoop | None) -> str:
-    """What the page is called."""
+    """What the page is called: the log, the simulated scenario, or a release."""
     if run is not None and run.simulation is not None:
         return f"{run.simulation.scenario.name}, closed loop"
     return recording.name if recording is not None else "release"
@@ -79,7 +80,7 @@ def title_of(recording: Recording | None, run: ClosedLoop | None) -> str:
 def admittance_record(
     replay: Replay, recording: Recording | None, run: ClosedLoop | None, command: str
 ) -> dict[str, Any]:
-    """Everything `run.json` holds."""
+    """Everything that `run.json` of a replay holds."""
     p = replay.parameters
     return {
         "command": command,

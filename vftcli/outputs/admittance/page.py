@@ -125,7 +125,7 @@ def charts_section() -> str:
 
 
 def payload(replay: Replay, run: ClosedLoop | None) -> dict[str, Any]:
-    """What the page's script draws."""
+    """The charts with their units, as the page's script takes them."""
     t = replay.motion.t
     return {
         "joints": 6,
@@ -141,6 +141,7 @@ def payload(replay: Replay, run: ClosedLoop | None) -> dict[str, Any]:
 
 def colours(replay: Replay) -> list[str]:
     """The page's ink for the traditional controller, a colour for each variable one."""
+    # Every variable controller its own colour, again from the start when there are no more.
     spare = iter(SPARE * len(replay.controllers))
     return [next(spare) if c.kind == "variable" else "ink" for c in replay.controllers]
 

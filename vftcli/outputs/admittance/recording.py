@@ -59,7 +59,7 @@ def write_ghosts(path: Path, replay: Replay, title: str) -> None:
 
 
 def send_path(stream: Stream, path: str, points: Array, colour: str) -> None:
-    """Send the path of a flange. (S, 3) [m]"""
+    """Draw where a flange has been as one line in base axes. (S, 3) [m]"""
     import rerun as rr
 
     strip = rr.LineStrips3D([points], colors=[rgb(colour)], radii=[0.002])
@@ -117,11 +117,12 @@ def line_groups(replay: Replay, paint: list[str]) -> dict[str, list[Lines]]:
 
 def finite(values: Array) -> Array:
     """Values with NaN for what has run away."""
+    # Beyond that the viewer's axis would show nothing of the others.
     return np.where(np.abs(values) < 1e6, values, np.nan)
 
 
 def words(replay: Replay) -> str:
-    """What is shown, in Markdown."""
+    """Source, parameters, remarks and comparison of the replay, in Markdown."""
     lines = [
         f"# Admittance replay: {replay.robot.title or replay.robot.name}",
         f"{replay.source}. {parameter_text(replay)}.",

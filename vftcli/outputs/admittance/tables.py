@@ -49,7 +49,7 @@ def comparison_csv(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def comparison_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The comparison for a terminal."""
+    """The comparison of all controllers as text for a terminal."""
     return terminal(comparison_grid(rows)).rstrip("\n") if rows else "no axis was dragged"
 
 
@@ -65,6 +65,7 @@ def comparison_grid(
         name_of: What a row's controller is called.
         title: Of the table.
     """
+    # Sorting keeps the order of the controllers within a drag.
     ordered = sorted(rows, key=lambda row: (AXES.index(row["axis"]), row["drag"]))
     keys = list(COLUMNS)[1:]
     return Grid(
@@ -129,7 +130,7 @@ def latency_text(run: ClosedLoop) -> str:
 
 
 def parameter_text(replay: Replay) -> str:
-    """The parameters in use, one line."""
+    """Mass, damping, stiffness, threshold and control period in use, on one line."""
     p = replay.parameters
     named = {
         "M": p.mass,

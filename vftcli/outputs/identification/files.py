@@ -56,6 +56,7 @@ def write_identification(
     Raises:
         OutputError: If one exists and `force` is not set, or cannot be written.
     """
+    # One folder for all four, so that they appear together or not at all.
     names = {kind: file.name for kind, file in beside(path).items()}
     record = identification_record(found, logs, command)
     heading = [f"{found.robot.title}; written by vftcli identify, keys: docs/robots.md.", command]

@@ -90,14 +90,16 @@ def velocity_section(found: Identification) -> str:
 
 
 def coloured(traces: Sequence[Trace]) -> list[tuple[Trace, str]]:
-    """Each log with its colour."""
+    """Each log with the colour of its dots."""
     return [(trace, SPARE[k % len(SPARE)]) for k, trace in enumerate(traces)]
 
 
 def velocity_plot(traces: Sequence[Trace], j: int) -> str:
-    """One joint's plot as SVG."""
+    """SVG of one joint: residual over velocity, each log in its colour."""
+    # One scale for all logs of a joint, or their dots could not be compared.
     speed = max(float(np.max(np.abs(t.dq[:, j]))) for t in traces) or 1.0
     sizes = np.concatenate([np.abs(t.residual[:, j]) for t in traces])
+    # A few samples at reversals are far off; they are drawn at the edge.
     high = float(np.quantile(sizes, 0.995)) or 1.0
     dots = "".join(scatter(t, j, speed, high, colour) for t, colour in coloured(traces))
     middle, centre = HEIGHT / 2, (WIDTH + EDGE) / 2
@@ -121,6 +123,7 @@ def scatter(trace: Trace, j: int, speed: float, high: float, colour: str) -> str
     pick = np.unique(np.linspace(0, len(trace.t) - 1, DOTS).astype(int))
     x = EDGE + (WIDTH - EDGE) * (trace.dq[pick, j] / speed + 1.0) / 2.0
     y = HEIGHT / 2 * (1.0 - np.clip(trace.residual[pick, j] / high, -1.0, 1.0))
+    # One path of strokes without length: 600 circles a log and joint would make a slow page.
     path = "".join(f"M{a:.1f} {b:.1f}h.01" for a, b in zip(x, y, strict=True))
     return (
         f'<path d="{path}" stroke="{colour}" stroke-width="2.4" stroke-linecap="round" '
@@ -141,6 +144,7 @@ def series_section(found: Identification) -> str:
 
 def shown_trace(found: Identification) -> Trace:
     """The log that is drawn over time: the first held-out one, else the first."""
+    # A log that the fit has not seen shows how well it predicts.
     held = [t for t in found.traces if t.role == "held-out"]
     return (held or list(found.traces))[0]
 
@@ -164,7 +168,7 @@ def payload(found: Identification) -> dict[str, Any]:
 
 
 def provenance_section(record: Mapping[str, Any]) -> str:
-    """Command, versions and digests."""
+    """The command, digests of all logs, versions: what is needed to make it again."""
     lines = [f"{log.get('path')}: sha256 {log.get('sha256')}" for log in record.get("inputs", ())]
     command = f"<pre>{escape(str(record.get('command', '')))}</pre>"
     return f"<h2>Provenance</h2>{command}{bullets(lines)}{pairs(record.get('versions', {}))}"

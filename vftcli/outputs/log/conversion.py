@@ -43,6 +43,7 @@ def columns_of(recording: Recording) -> Iterator[tuple[str, Any]]:
     The names are among the aliases of the table reader, so that the file reads back.
     """
     yield "t", recording.t
+    # Whole numbers: a float of today's date in seconds is exact to 240 ns only.
     yield "t_src_ns", source_stamps(recording)
     for name in JOINT_SIGNALS:
         if (value := getattr(recording, name)) is not None:
@@ -89,6 +90,7 @@ def topics(recording: Recording) -> Iterator[OutputTopic]:
     names = recording.joint_names or tuple(f"joint_{j + 1}" for j in range(recording.joints))
     effort = recording.torque if recording.torque is not None else recording.current
     yield joint_topic("/joint_states", names, recording.q, recording.dq, effort)
+    # JointState has no field for these: each gets a topic whose effort it is.
     for name in JOINT_SIGNALS:
         value = getattr(recording, name)
         if value is not None and name not in {"q", "dq"}:

@@ -39,7 +39,7 @@ def urdf_text(robot: Robot, names: tuple[str, ...]) -> str:
 
 
 def link(name: str, shapes: list[Capsule], inertial: str) -> str:
-    """One link with what it looks like."""
+    """A link as URDF: its mass and the cylinders that show it."""
     visuals = "".join(
         f"<visual>{origin(s.start + 0.5 * s.direction, rotation_onto(s.direction))}<geometry>"
         f'<cylinder radius="{s.radius:.6g}" length="{np.linalg.norm(s.direction):.9g}"/>'

@@ -31,6 +31,7 @@ def estimates_table(analysis: Analysis) -> "pl.DataFrame":
     import polars as pl
 
     table = pl.DataFrame(dict(columns(analysis)))
+    # Only columns that need it: to fill all of a long log takes longer than to write it.
     unknown = [s.name for s in table if s.dtype == pl.Float64 and s.is_nan().any()]
     return table.with_columns(pl.col(unknown).fill_nan(None)) if unknown else table
 
@@ -69,6 +70,7 @@ def wrench_columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
         yield from per_axis(f"wrench/{wrench.name}", wrench.known)
         if wrench.known_sd is not None:
             yield from per_axis(f"wrench_sd/{wrench.name}", wrench.known_sd)
+        # By plain least squares nothing can be said there; a bounded solver says something finite.
         if bounded and wrench.hidden.any():
             yield from per_axis(f"wrench_masked/{wrench.name}", masked_only(wrench))
         if wrench.null_space is not None:

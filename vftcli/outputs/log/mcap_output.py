@@ -71,6 +71,7 @@ def write_mcap(path: Path, analysis: Analysis) -> None:
         path: Where to; an existing file is replaced.
         analysis: What to write.
     """
+    # The log's own names, so that the URDF moves with its /joint_states.
     names = analysis.recording.joint_names or analysis.robot.chain.names
     description = urdf_text(analysis.robot, names)
     write_topics(path, stamps_of(analysis.recording), topics(analysis, names), description)
@@ -104,6 +105,7 @@ def source_stamps(recording: Recording) -> Nanoseconds:
 def stamps_of(recording: Recording) -> Nanoseconds:
     """The log's own stamps, from 0 where ROS cannot count them. (T,) [ns]"""
     stamps = source_stamps(recording)
+    # A log may count from any time, even below zero; a viewer needs stamps that ROS can hold.
     countable = stamps[0] >= 0 and stamps[-1] // 10**9 <= LAST_STAMP
     return stamps if countable else stamps - stamps[0]
 
@@ -130,6 +132,7 @@ def write_topics(
             body = serialised("std_msgs/String", {"data": description}, 1)
             writer.add_message(number, int(stamps[0]), body.tobytes(), int(stamps[0]))
         channels = [channel(writer, topic.name, topic.kind) for topic in found]
+        # In blocks: all messages of an hour at 1 kHz at once would not fit in memory.
         for start in range(0, len(stamps), BLOCK):
             span = slice(start, start + BLOCK)
             bodies = [topic.messages(stamps, span) for topic in found]
@@ -140,6 +143,6 @@ def write_topics(
 
 
 def channel(writer: Any, topic: str, kind: str) -> int:  # noqa: ANN401 - mcap is untyped
-    """Register a topic; return its number."""
+    """Register a topic with its type's definition; return its channel number."""
     schema = writer.register_schema(long_name(kind), "ros2msg", schema_text(kind).encode())
     return int(writer.register_channel(topic, "cdr", schema))

@@ -54,6 +54,7 @@ def write_reports(
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     places = sub_folders(analyses)
+    # All names that any log may have are declared, so that --force removes stale ones.
     below = [f"{place}/{name}" for place in places for name in FILES]
     with OutputFolder(path, force, ["index.html", "run.json", *ERROR_TABLES, *below]) as folder:
         records = [
@@ -71,6 +72,7 @@ def write_reports(
 def fill(folder: OutputFolder, place: str, analysis: Analysis, command: str) -> dict[str, Any]:
     """Write one log's files; return its record."""
     record = run_record(analysis, command)
+    # The page shows the record that is written beside it, not one of its own.
     analysis = replace(analysis, run=record)
     put(folder / f"{place}index.html", render(analysis))
     write_rrd(folder / f"{place}recording.rrd", analysis)
@@ -81,7 +83,8 @@ def fill(folder: OutputFolder, place: str, analysis: Analysis, command: str) -> 
 
 
 def put(path: Path, text: str) -> None:
-    """Write text as it is, on every system."""
+    """Write text with the same bytes on every system."""
+    # On Windows the same bytes as elsewhere: digests of outputs can be compared.
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
@@ -116,6 +119,6 @@ def combined(analyses: Sequence[Analysis]) -> "pl.DataFrame | None":
 
 
 def listed(texts: Sequence[str]) -> str:
-    """JSON texts as one JSON array."""
+    """Texts of JSON objects put together as one JSON array."""
     together = ",\n".join(text.rstrip("\n") for text in texts)
     return f"[\n{together}\n]\n"

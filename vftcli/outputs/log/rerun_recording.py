@@ -124,6 +124,7 @@ def band_lines(analysis: Analysis, j: int) -> Iterator[tuple[str, Array, str]]:
 def wrench_lines(analysis: Analysis, k: int) -> Lines:
     """One axis of every wrench, the reference first."""
     colours = colours_of(analysis.estimates)
+    # The reference first: it is drawn below the others, and thicker.
     found = sorted(analysis.wrenches, key=lambda wrench: wrench.name != "reference")
     title = f"{AXES[k]} in {found[0].frame} axes [{unit_of(k)}]"
     return Lines(
@@ -221,5 +222,6 @@ def force_arrow(
         (wrench,) = (w for w in analysis.virtual_sensor.wrenches if w.name == source.name)
         return analysis.virtual_sensor.sensor.arrow(wrench.force[sampled], poses.q, chain)
     sensor = VirtualSensor(frame="base")
+    # At the drawn poses only: fifty a second, not every sample.
     drawn = ExternalTorque(name=source.name, t=poses.t, tau=source.tau[sampled])
     return sensor.arrow(sensor.wrench(drawn, poses.q, chain).force, poses.q, chain)

@@ -49,6 +49,7 @@ class Block(NamedTuple):
     @property
     def best(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
         """The smallest RMSE of each joint, and what prints the same. (observers, joints)"""
+        # Compared as printed, so that two equal texts in one column are both bold.
         least = np.where(np.isfinite(self.rmse), self.rmse, np.inf).min(axis=0)
         shown = [[significant(value) for value in row] for row in self.rmse]
         best = np.array([significant(value) for value in least])
@@ -101,6 +102,7 @@ def block(rows: pl.DataFrame) -> Block:
         at = joints.index(row["joint"])
         rmse[observers.index(row["observer"]), at] = nan_or(row["rmse_Nm"])
         floor[at] = nan_or(row["reference_floor_Nm"])
+    # Joints may differ in how many samples have a reference.
     counts = rows["samples"].drop_nulls().to_list() or [0]
     doubtful = rows.filter(~pl.col("reference_trusted").fill_null(True))["joint"].unique().sort()
     return Block(
@@ -116,7 +118,7 @@ def block(rows: pl.DataFrame) -> Block:
 
 
 def nan_or(value: float | None) -> float:
-    """A number, NaN for null."""
+    """A number of the table as a float; null, which polars has for unknown, as NaN."""
     return float("nan") if value is None else float(value)
 
 
@@ -160,7 +162,7 @@ def rmse_cell(value: float, best: bool, at_floor: bool) -> GridCell:
 
 
 def interval_text(row: dict[str, Any]) -> str:
-    """The RMSE's 95 % interval."""
+    """The ends of the RMSE's 95 % interval, a dash where it is not known."""
     low, high = row["rmse_low_Nm"], row["rmse_high_Nm"]
     return DASH if low is None or high is None else f"{significant(low)}–{significant(high)}"
 

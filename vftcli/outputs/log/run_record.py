@@ -113,7 +113,7 @@ def versions() -> dict[str, str]:
 
 
 def input_record(recording: Recording) -> dict[str, Any]:
-    """Which log it was and what is in it."""
+    """Which log it was, told by path and digest, and what signals it holds."""
     source = recording.source
     return {
         "path": str(source.path) if source.path is not None else None,
@@ -143,6 +143,7 @@ def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
 
 def robot_record(robot: Robot) -> dict[str, Any]:
     """Which robot it was taken to be. A built-in profile is told by its name, not its path."""
+    # Its path would be another on every machine; name and digest say as much.
     built_in = robot.path is not None and Path(vftcli.__file__).parent in robot.path.parents
     return {
         "name": robot.name,
@@ -181,6 +182,7 @@ def observer_record(observer: Observer, tuning: Tuning | None) -> dict[str, Any]
 
 def parameters(observer: Observer) -> dict[str, Any]:
     """An observer's parameters by name, as JSON can hold them."""
+    # What ran is the observer inside, with the gains that the log chose.
     if isinstance(observer, AutoTuned):
         return parameters(observer.observer)
     if not is_dataclass(observer):
@@ -193,7 +195,7 @@ def parameters(observer: Observer) -> dict[str, Any]:
 
 
 def reference_record(reference: ExternalTorque | None) -> dict[str, Any] | None:
-    """What the estimates were judged by."""
+    """What the estimates were judged by, its own error and remarks on it; None without one."""
     if reference is None:
         return None
     return {
@@ -250,6 +252,7 @@ def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
 def all_remarks(analysis: Analysis) -> list[Note]:
     """Remarks of the run, of every estimate and of the reference, each once."""
     found: list[Note] = [*analysis.remarks]
+    # Compared by their words: values may be arrays, which do not compare as one truth.
     of_run = set(map(str, found))
     for torque in analysis.torques:
         found += [about(torque.name, n) for n in torque.remarks if str(n) not in of_run]

@@ -85,11 +85,13 @@ def pair_row(row: dict[str, Any]) -> tuple[str | float, ...]:
     """The entries of one pair: a difference above zero says that the second is the better."""
     difference, low, high, p = (row[k] for k in ("difference_Nm", "low_Nm", "high_Nm", "p"))
     names = (row["observer"], row["other"])
+    # First RMSE less second: above zero the second observer is the better.
     if difference > 0:
         names = names[::-1]
     else:
         low, high = -high, -low
     interval = f"{significant(low)} to {significant(high)}"
+    # A blank keeps the digits of those without a star below the others.
     star = "*" if p < SURE else " "
     by = abs(float(difference))
     return (row["recording"], f"J{row['joint']}", *names, by, interval, f"{p:.3f}{star}")

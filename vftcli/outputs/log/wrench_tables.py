@@ -28,7 +28,7 @@ def paper_bounds(analyses: "Iterable[Analysis]") -> PaperBounds:
 
 
 def axis_columns() -> tuple[Column, ...]:
-    """One column an axis, in its unit."""
+    """Columns fx to mz, forces in newtons and moments in newton-metres."""
     letters = ("F_x", "F_y", "F_z", "M_x", "M_y", "M_z")
     return tuple(
         Column(axis, unit_of(axis), symbol=f"${letter}$")
@@ -42,11 +42,13 @@ def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Itera
         recording, reference = str(group["recording"][0]), str(group["reference"][0])
         found: dict[str, dict[str, float | None]] = {}
         for row in group.iter_rows(named=True):
+            # A force axis has its number in newtons, a moment axis in newton-metres; never both.
             value = row["rmse_N"] if row["rmse_N"] is not None else row["rmse_Nm"]
             found.setdefault(str(row["observer"]), {})[str(row["axis"])] = value
         rows: list[tuple[str | float | None, ...]] = [
             (name, *(values.get(axis) for axis in AXES)) for name, values in found.items()
         ]
+        # The paper compares with a sensor; beside a simulated truth its bounds mean nothing.
         if reference == "sensor" and recording in (bounds or {}):
             force, moment = (bounds or {})[recording]
             rows.append(("paper, UR5", *[f"< {force:g}"] * 3, *[f"< {moment:g}"] * 3))

@@ -86,7 +86,7 @@ def packed_over_frequency(
 
 
 def frame_of(chart: Chart) -> dict[str, Any]:
-    """Everything of a chart but its lines."""
+    """A chart's name, title, unit and band: what holds for all of its lines."""
     return {
         "key": chart.key,
         "title": chart.title,
@@ -98,22 +98,24 @@ def frame_of(chart: Chart) -> dict[str, Any]:
 
 
 def style_of(line: ChartLine) -> dict[str, Any]:
-    """How a line looks."""
+    """A line's name, colour and dashes, as the script takes them."""
     return {"name": line.name, "colour": line.colour, "dashed": line.dashed}
 
 
 def packed_line(line: Line) -> dict[str, str]:
-    """A line's times and values."""
+    """A line's points: both coordinates as base64 float32."""
     return {"x": base64_float32(line.t), "y": base64_float32(line.y)}
 
 
 def base64_float32(values: Array) -> str:
     """Little-endian float32 as base64: seven digits are more than a screen can show."""
+    # Text of numbers would be three times as long, and slower to read.
     return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
 
 
 def known(values: Array | None) -> list[float | None] | None:
     """Numbers for JSON, None where they are not known."""
+    # JSON has no NaN; a band of unknowns only is no band.
     if values is None or not np.any(np.isfinite(values)):
         return None
     return [float(value) if np.isfinite(value) else None for value in values]

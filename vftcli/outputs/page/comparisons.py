@@ -22,6 +22,7 @@ HEADS = (
 
 def selection_guide(analysis: Analysis) -> str:
     """Which observer for what, by what was computed on this log."""
+    # Measured here and now: the time a sample takes is that of this machine.
     found = facts(analysis.observers, analysis.tunings, analysis.terms, analysis.errors)
     if not found:
         return ""
@@ -57,6 +58,7 @@ def beside_print(comparison: Comparison | None) -> str:
     if comparison is None:
         return ""
     columns = [Column("observer", words=True)]
+    # Print and computation stand side by side, joint by joint, or nobody compares them.
     for j in range(1, len(comparison.floor) + 1):
         columns += [Column(f"J{j} print", form=".2f"), Column("here")]
     rows: list[tuple[str | float, ...]] = []

@@ -61,7 +61,7 @@ def render_index(analyses: Sequence[tuple[str, Analysis]]) -> str:
 
 
 def index_row(folder: str, analysis: Analysis) -> tuple[GridCell | str | float | None, ...]:
-    """One log in the overview."""
+    """One log's entries in the overview: its name links to its own page."""
     recording, reference = analysis.recording, analysis.reference
     found = blocks(analysis.errors) if analysis.errors is not None else ()
     best, floor = DASH, DASH
@@ -83,5 +83,5 @@ def index_row(folder: str, analysis: Analysis) -> tuple[GridCell | str | float |
 
 
 def link(folder: str, name: str) -> str:
-    """A link to a report in a sub-folder."""
+    """HTML of a link to the report in a sub-folder; both texts may hold any letter."""
     return f'<a href="{escape(quote(folder))}/index.html">{escape(name)}</a>'

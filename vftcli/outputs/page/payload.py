@@ -27,7 +27,7 @@ QUIETEST = 1e-12
 
 
 def payload(analysis: Analysis) -> dict[str, Any]:
-    """Everything the script is given."""
+    """Charts, their labels and their common span, as the page's script takes them."""
     t = analysis.t
     wrenches = [*wrench_charts(analysis), *condition_charts(analysis)]
     return {
@@ -46,7 +46,7 @@ def is_decimated(analysis: Analysis) -> bool:
 
 
 def time_charts(analysis: Analysis) -> Iterator[Chart]:
-    """The charts over time, top to bottom."""
+    """The charts over time, top to bottom: torque, its error, what the log measured."""
     estimates = estimate_series(analysis)
     floor = analysis.reference.floor if analysis.reference is not None else None
     label = "± floor of the reference"
@@ -54,6 +54,7 @@ def time_charts(analysis: Analysis) -> Iterator[Chart]:
     yield Chart("tau", "External torque on the robot", "N·m", (*reference, *estimates), height=1.5)
     if analysis.reference is not None:
         truth = analysis.reference.tau
+        # The ribbon is about the estimate; about its error it would say nothing new.
         errors = tuple(s._replace(values=s.values - truth, half=None) for s in estimates)
         yield Chart("error", "Estimate − reference", "N·m", errors, floor, label)
     yield from motion_charts(analysis)
@@ -83,6 +84,7 @@ def reference_series(analysis: Analysis) -> tuple[ChartLine, ...]:
     whole = ChartLine(legend_name(analysis, "reference"), tau)
     if moving is None or np.all(moving | ~np.isfinite(tau)):
         return (whole,)
+    # Drawn once more on top, so that the untrusted part stands out and the line stays whole.
     resting = np.where(moving, np.nan, tau)
     return (whole, ChartLine("reference while the joint rests", resting, RESTING))
 
@@ -136,6 +138,7 @@ def responses(analysis: Analysis) -> list[dict[str, Any]]:
     gains, phases, delays = [], [], []
     for observer in analysis.observers:
         response = observer.frequency_response(frequency, step, n)
+        # Unwrapped, or a delay would jump by a period wherever the phase passes −180°.
         phase = np.degrees(np.unwrap(np.angle(response), axis=0))
         style = (colours[observer.name], observer.name in DASHED)
         decibel = 20.0 * np.log10(np.maximum(np.abs(response), QUIETEST))

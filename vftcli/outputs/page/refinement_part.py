@@ -34,6 +34,7 @@ def budget_grid(found: Refinement) -> Grid:
     rows = [
         (budget.name, cause, values)
         for budget in found.budgets
+        # Stiction at rest is a bound, not a cause that adds up: the sum leaves it out.
         for cause, values in (*budget.parts.items(), ("all but stiction at rest", budget.total))
     ]
     return joint_grid("observer", "cause", rows)

@@ -131,6 +131,7 @@ def observer_row(analysis: Analysis, name: str) -> tuple[GridCell | str | float 
 def joint_values(values: Array) -> str:
     """One number where all joints agree to three digits, else one line a run of equal joints."""
     texts = [significant(float(value)) for value in values]
+    # Compared as printed: what cannot be told apart on the page is one value.
     if len(set(texts)) == 1:
         return texts[0]
     numbered = groupby(enumerate(texts, start=1), key=itemgetter(1))
@@ -139,20 +140,21 @@ def joint_values(values: Array) -> str:
 
 
 def joint_range(joints: Sequence[int]) -> str:
-    """J2, or J1–J3."""
+    """Neighbouring joints as one text: J2, or J1–J3."""
     return f"J{joints[0]}" if len(joints) == 1 else f"J{joints[0]}–J{joints[-1]}"
 
 
 def parameter_row(analysis: Analysis, name: str) -> str:
     """One observer's parameters as they were used."""
     observer = next(o for o in analysis.observers if o.name == name)
+    # The record has parameters as JSON can hold them, also those of a wrapped observer.
     used = observer_record(observer, None)["parameters"]
     text = "; ".join(f"{key} = {value_text(value)}" for key, value in used.items())
     return f"<dt>{escape(name)}</dt><dd>{escape(text)}</dd>"
 
 
 def value_text(value: Any) -> str:  # noqa: ANN401 - whatever JSON can hold
-    """A parameter's value, short."""
+    """A parameter's value with six digits; of a list whose items are equal one is shown."""
     match value:
         case bool():
             return "yes" if value else "no"

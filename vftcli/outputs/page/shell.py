@@ -26,6 +26,7 @@ def document(title: str, body: str, data: Mapping[str, Any] | None = None) -> st
         data: What the script draws, None for a page without charts.
     """
     script = ""
+    # JSON in an element of its own cannot run, so that a name in a log cannot either.
     if data is not None:
         script = (
             f'<script type="application/json" id="data">{script_json(data)}</script>'
@@ -48,6 +49,7 @@ def asset(name: str) -> str:
 
 def script_json(data: Mapping[str, Any]) -> str:
     """JSON for a ``<script type="application/json">``: nothing in it can end the element."""
+    # "<" could begin "</script>"; the two separators end a line in JavaScript but not in JSON.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
 
@@ -75,7 +77,7 @@ def pairs(table: Mapping[str, Any]) -> str:
 
 
 def bullets(lines: Iterable[Note]) -> str:
-    """A list; of a remark its long words."""
+    """A bullet list; of a remark it shows the long words."""
     items = "".join(f"<li>{escape(in_full(line))}</li>" for line in lines)
     return f'<ul class="plain">{items}</ul>'
 
@@ -148,7 +150,7 @@ def input_facts(source: Mapping[str, Any] | None) -> dict[str, Any]:
 
 
 def robot_facts(robot: Mapping[str, Any]) -> dict[str, Any]:
-    """Which robot it was taken to be."""
+    """Which robot profile was used, and the digest of its file."""
     return {
         "Robot": f"{robot.get('name')} ({robot.get('file') or 'built in'})",
         "Robot sha256": robot.get("sha256") or "–",
@@ -156,5 +158,5 @@ def robot_facts(robot: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def in_full(note: Note) -> str:
-    """A remark's long words."""
+    """A note in full: a remark's long words, or the sentence as it is."""
     return explanation(note) if isinstance(note, Remark) else note

@@ -25,6 +25,7 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
     sensed = analysis.virtual_sensor
     if sensed is None or not sensed.wrenches:
         return
+    # σ_min and the mask follow from the pose, so that every observer has the same.
     first, colours = sensed.wrenches[0], colours_of(analysis.estimates)
     if first.sigma_min is not None:
         least = np.array([sensed.sensor.least_sigma])
@@ -99,7 +100,7 @@ def masked_words(sensed: SensorReading) -> str:
 
 
 def contact_grid(contacts: tuple[ContactScore, ...]) -> Grid:
-    """How each observer tells contacts."""
+    """Contacts found and missed, false alarms and delays of each observer."""
     heads = ("contacts", "missed", "false alarms/h", "mean delay [s]", "longest [s]")
     rows: list[tuple[Entry, ...]] = []
     for score in contacts:

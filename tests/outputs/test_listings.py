@@ -1,0 +1,52 @@
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.outputs.grid import terminal
+from vftcli.outputs.listings import friction_words, joints_grid, robots_grid, tuned_grid
+from vftcli.robots import load_robot
+
+
+class Line(NamedTuple):
+    """What `tune` finds for one observer, as far as the table shows it."""
+
+    observer: str
+    rate: np.ndarray
+    delay: np.ndarray
+    rmse: np.ndarray
+    alarms: np.ndarray | None
+
+
+def test_one_robot_joint_by_joint() -> None:
+    """First joint of the Panda: 4.971 kg, no torque constant, 87 N·m."""
+    lines = terminal(joints_grid(load_robot("panda"))).splitlines()
+    assert len(lines) == 9
+    assert lines[1].split() == ["kg", "kg·m²", "N·m/A", "N·m"]
+    assert lines[2].split()[:5] == ["joint1", "4.971", "0.000", "-", "87.0"]
+    assert lines[0].index("tau_max") + len("tau_max") == lines[2].index("87.0") + len("87.0")
+
+
+def test_friction_is_told_with_its_numbers_and_how_far_to_trust_it() -> None:
+    text = friction_words(load_robot("panda"), 0)
+    assert text.startswith("sigmoid (amplitude 0.54615, ")
+    assert text.endswith("; published")
+
+
+def test_the_list_of_robots_has_no_heading() -> None:
+    row = {"name": "ur5", "title": "UR5", "joints": 6, "torque_source": "current", "friction": "x"}
+    (line,) = terminal(robots_grid([row])).splitlines()
+    assert line.split() == ["ur5", "UR5", "6", "joints", "current", "x"]
+
+
+def test_gains_that_were_found() -> None:
+    two = np.array([140.0, 1.5])
+    line = Line("gmo", two, 1e-3 * two, 0.5 * two, np.array([0.12345, 2.0]))
+    assert terminal(tuned_grid([line], with_alarms=True)).splitlines() == [  # type: ignore[list-item]
+        "observer                               J1       J2",
+        "gmo       ω [rad/s]                   140      1.5",
+        "          delay [ms]                  140      1.5",
+        "          expected rmse [N·m]          70     0.75",
+        "          false alarms [1/h]        0.123        2",
+    ]
+    quiet = terminal(tuned_grid([line], with_alarms=False))  # type: ignore[list-item]
+    assert "alarms" not in quiet
