@@ -208,7 +208,7 @@ def operating_curve(
     duration = float(t[-1] - t[0])
     points = []
     for threshold in thresholds:
-        told = detection(contacts(t, score, threshold), true, duration)
-        found = 1.0 - told.missed / told.contacts if told.contacts else float("nan")
-        points.append(Operating(threshold, found, told.false_alarms_per_h, told.mean_delay))
+        counts = detection(contacts(t, score, threshold), true, duration)
+        found = 1.0 - counts.missed / counts.contacts if counts.contacts else float("nan")
+        points.append(Operating(threshold, found, counts.false_alarms_per_h, counts.mean_delay))
     return tuple(points)

@@ -12,14 +12,7 @@ from vftcli.virtual_sensor.null_space import Elsewhere
 from vftcli.virtual_sensor.solvers import SCALE
 from vftcli.virtual_sensor.vendor import VendorCheck
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
-from vftcli.virtual_sensor.zero import (
-    Drift,
-    without_drift,
-    zero_drift,
-)
-
-PAYLOAD_SLACK = 0.05
-"""Difference of payloads that is not worth a remark. [kg]"""
+from vftcli.virtual_sensor.zero import Drift, without_drift, zero_drift
 
 
 @dataclass(frozen=True, kw_only=True)

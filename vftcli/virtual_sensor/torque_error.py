@@ -8,37 +8,21 @@ d = Δp/Δt − ½(μᵗ + μᵗ⁻¹) over the loaded and the free part.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Part, spectra_of
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import numbers
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.virtual_sensor.solvers import TORQUE_SD
 
 OWN = "own"
 """The word for the observers' own covariance as the torque error."""
-
-
-class Responsive(Protocol):
-    """An observer whose frequency response is known."""
-
-    @property
-    def name(self) -> str:
-        """Its name at the command line."""
-        ...
-
-    def frequency_response(
-        self, frequency: Array, step: float, joints: int
-    ) -> NDArray[np.complex128]:
-        """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +36,7 @@ class Disturbance:
     """
 
     terms: DynamicsTerms
-    observers: Sequence[Responsive]
+    observers: Sequence[Observer]
     free: DynamicsTerms | None = None
 
     def lag(self, free: Mask) -> Mapping[str, Array]:
@@ -120,13 +104,15 @@ def from_band(torques: Sequence[ExternalTorque]) -> TorqueError:
 
 
 def from_default(torques: Sequence[ExternalTorque], solver: str) -> TorqueError:
-    """`TORQUE_SD` for observers without a covariance, and for all where a prior is weighed.
+    """`TORQUE_SD` for all observers where a prior is weighed; else each states or assumes its own.
 
     The Kalman filter's own covariance assumes a torque that wanders as fast as its Q_τ says, often
     tens of N·m; against it the prior of the MAP solver would win everywhere.
     """
-    wanted = [e for e in torques if e.sd is None or solver == "map"]
-    return TorqueError(sd={e.name: np.full(e.joints, TORQUE_SD) for e in wanted})
+    if solver != "map":
+        return TorqueError(sd={})
+    sd = {torque.name: np.full(torque.joints, TORQUE_SD) for torque in torques}
+    return TorqueError(sd=sd, remark=caution("band-assumed-for-prior", torque_sd_Nm=TORQUE_SD))
 
 
 def from_free_part(

@@ -1,0 +1,53 @@
+"""What drives a replay: an observer's torque of a file, the log's sensor, or the truth."""
+
+import numpy as np
+import pytest
+
+from vftcli.admittance.driving_force import sensor_force, stored_force
+from vftcli.robots import load_robot
+from vftcli.robots.kinematics import flange_jacobian
+from vftcli.signals.errors import MissingSignalError, ParameterError
+from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import WrenchFrame
+from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
+
+UR5 = load_robot("ur5")
+T = np.arange(0.0, 4.0, 0.01)
+Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.2 * np.sin(np.outer(T, np.arange(1, 7) / 3))
+WRENCH = np.where(T[:, None] > 2.0, 10.0, 0.0) + np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
+BASE = WrenchFrame("base", "flange")
+
+
+def choice(**zero: object) -> WrenchChoice:
+    return WrenchChoice(frame="base", zero=ZeroChoice(**zero))  # type: ignore[arg-type]
+
+
+def test_a_stored_torque_is_turned_into_its_wrench_and_zeroed() -> None:
+    tau = np.einsum("tij,ti->tj", flange_jacobian(UR5.chain, Q), WRENCH)
+    log = Recording(t=T, q=Q, tau_ext=tau)
+    found = stored_force(log, UR5, choice(spans=((0.0, 1.9),)), "kfo-fe")
+    expected = np.where(T[:, None] > 2.0, 10.0, 0.0) * np.ones(6)
+    np.testing.assert_allclose(found.wrench.known, expected, atol=1e-8)  # κ(J)² times rounding
+    assert found.source.values == {"observer": "kfo-fe"}
+    assert [remark.code for remark in found.remarks] == ["zero-removed"]
+    with pytest.raises(MissingSignalError):
+        stored_force(Recording(t=T, q=Q), UR5, choice(), "kfo-fe")
+
+
+def test_the_logs_sensor_drives_as_the_log_states_it() -> None:
+    log = Recording(
+        t=T, q=Q, wrench=-WRENCH, wrench_frame=WrenchFrame("base", "flange", "by-robot")
+    )
+    found = sensor_force(log, UR5, choice())
+    np.testing.assert_array_equal(found.wrench.values, WRENCH)
+    assert found.remarks == ()
+    assert "BY the robot" in found.source.values["frame"]
+    unstated = sensor_force(Recording(t=T, q=Q, wrench=WRENCH), UR5, choice())
+    assert unstated.source.values["frame"] == "frame not stated"
+    assert [r.code for r in unstated.remarks] == ["wrench-frame-unstated", "sensor-pose-unstated"]
+
+
+def test_no_free_run_zeroes_a_sensor(tmp_path) -> None:
+    log = Recording(t=T, q=Q, wrench=WRENCH, wrench_frame=BASE)
+    with pytest.raises(ParameterError, match="in a free run"):
+        sensor_force(log, UR5, choice(log=tmp_path))

@@ -1,0 +1,97 @@
+"""Every observer's contacts against the true ones: limits, free part, settling."""
+
+import numpy as np
+import pytest
+
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.wrench import Wrench
+from vftcli.virtual_sensor.contact import contacts
+from vftcli.virtual_sensor.detection import (
+    LEAST_TORQUE,
+    judge_contacts,
+    learned_free,
+    true_intervals,
+    wrench_limits,
+)
+from vftcli.virtual_sensor.sensor_reading import SensorReading
+from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.zero import zero_drift
+
+T = np.arange(0.0, 20.0, 0.01)
+
+
+def push(height: float, start: float = 5.0, stop: float = 7.0) -> np.ndarray:
+    return np.where((start <= T) & (stop > T), height, 0.0)
+
+
+def test_a_score_beyond_one_is_a_contact_and_one_below_is_none() -> None:
+    """The default threshold is 1: 1.3 half widths of the free band are one contact."""
+    assert len(contacts(T, push(1.3))) == 1
+    assert contacts(T, push(0.99)) == ()
+
+
+def test_true_contacts_exceed_their_limits_on_any_axis() -> None:
+    truth = np.zeros((len(T), 6))
+    truth[:, 1], truth[:, 4] = push(1.1), push(0.3, 10.0, 11.0)
+    truth[:, 2], truth[0, 0] = push(0.9, 14.0, 15.0), np.nan
+    found = true_intervals(T, truth, wrench_limits())
+    assert [(round(c.start, 1), round(c.stop, 1)) for c in found] == [(5.0, 7.0), (10.0, 11.0)]
+
+
+def reference(height: float, floor: np.ndarray | None = None) -> ExternalTorque:
+    tau = np.zeros((len(T), 2))
+    tau[:, 0] = push(height)
+    return ExternalTorque(name="truth", t=T, tau=tau, floor=floor)
+
+
+def test_a_reference_with_a_floor_calls_only_what_exceeds_five_times_it_a_contact() -> None:
+    estimate = ExternalTorque(name="gmo", t=T, tau=reference(2.0).tau)
+    (one,) = judge_contacts([estimate], None, reference(2.0))
+    assert one.detection.contacts == 1
+    (none,) = judge_contacts([estimate], None, reference(2.0, np.array([0.5, np.nan])))
+    assert none.detection.contacts == 0
+
+
+def test_a_free_band_of_torques_is_never_narrower_than_half_a_newton_metre() -> None:
+    estimate = ExternalTorque(name="gmo", t=T, tau=reference(0.9 * LEAST_TORQUE).tau)
+    (score,) = judge_contacts([estimate], None, reference(2.0))
+    assert score.detection.missed == 1
+
+
+def test_settling_is_no_contact() -> None:
+    tau = reference(2.0).tau + np.exp(-5.0 * T)[:, None] * 50.0
+    (score,) = judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, reference(2.0))
+    assert score.detection.false_alarms == 0
+    assert [round(c.start, 1) for c in score.found] == [5.0]
+
+
+def reading(values: np.ndarray, zero: tuple[float, float] | None) -> SensorReading:
+    wrench = Wrench(name="gmo", t=T, values=values, frame="base")
+    free = (zero[0] <= T) & (zero[1] >= T) if zero else np.zeros(len(T), dtype=bool)
+    return SensorReading(
+        sensor=VirtualSensor(frame="base"),
+        wrenches=(wrench,),
+        masked=wrench.hidden,
+        drifts=(zero_drift(wrench, zero),) if zero else (),
+        free=free,
+    )
+
+
+def test_contacts_are_told_from_wrenches_where_there_are_some() -> None:
+    values = np.zeros((len(T), 6))
+    values[:, 2] = push(8.0)
+    values[:, 0] = push(5.0, 12.0, 18.0)  # within the zero span, so part of its band
+    (before,) = judge_contacts([], reading(values, None), reference(2.0))
+    assert before.signal == "wrench"
+    assert (before.detection.missed, before.detection.false_alarms) == (0, 1)
+    (zeroed,) = judge_contacts([], reading(values, (11.0, 19.0)), reference(2.0))
+    assert (zeroed.detection.missed, zeroed.detection.false_alarms) == (0, 0)
+
+
+def test_the_free_part_lasts_from_settling_to_the_first_contact() -> None:
+    true = contacts(T, push(3.0))
+    np.testing.assert_array_equal(learned_free(T, true), (T >= 1.0) & (true[0].start > T))
+    assert learned_free(T, ())[-2]
+    with pytest.raises(ParameterError, match=r"begins at 1.05 s.*--zero A:B"):
+        learned_free(T, contacts(T, push(3.0, 1.05)))

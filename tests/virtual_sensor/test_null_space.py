@@ -1,0 +1,42 @@
+"""The null-space channel: a threshold learned where nothing touches the arm."""
+
+import numpy as np
+import pytest
+
+from vftcli.signals.wrench import Wrench
+from vftcli.virtual_sensor.null_space import MARGIN, contact_elsewhere
+
+
+def wrench(null_space: np.ndarray | None) -> Wrench:
+    t = np.arange(1000.0)
+    return Wrench(name="gmo", t=t, values=np.zeros((1000, 6)), frame="base", null_space=null_space)
+
+
+FREE = np.arange(1000) < 500
+
+
+def test_a_contact_elsewhere_is_what_exceeds_the_free_part() -> None:
+    residual = np.full(1000, 0.8)
+    residual[100], residual[600:650], residual[700:800], residual[10] = 1.0, 2.0, MARGIN, np.nan
+    found = contact_elsewhere(wrench(residual), FREE)
+    assert found is not None
+    assert found.threshold == pytest.approx(MARGIN)
+    np.testing.assert_array_equal(np.flatnonzero(found.above), np.arange(600, 650))
+    assert found.share == pytest.approx(0.05)
+    (remark,) = found.remarks
+    assert (remark.code, remark.where.about) == ("contact-elsewhere", "gmo")
+    assert remark.values == {"share": 0.05, "threshold_Nm": found.threshold}
+
+
+def test_a_stray_sample_is_no_contact() -> None:
+    residual = np.ones(1000)
+    residual[999] = 5.0
+    found = contact_elsewhere(wrench(residual), FREE)
+    assert found is not None
+    assert found.above.sum() == 1
+    assert found.remarks == ()
+
+
+def test_there_is_no_verdict_without_a_channel_or_a_free_part() -> None:
+    assert contact_elsewhere(wrench(None), FREE) is None
+    assert contact_elsewhere(wrench(np.ones(1000)), np.zeros(1000, dtype=bool)) is None
