@@ -20,7 +20,7 @@ def rows() -> dict[str, str]:
 def test_every_format_has_its_row(name: str) -> None:
     reader = READERS[name]
     cells = [cell.strip() for cell in rows()[name].strip("|").split(" | ")]
-    texts = [reader.title, reader.recording, reader.takes, reader.pitfalls]
+    texts = [reader.words[key] for key in ("title", "recording", "takes", "pitfalls")]
     assert cells[1:] == [text.replace("|", "\\|") for text in texts]
 
 

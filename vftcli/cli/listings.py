@@ -79,16 +79,15 @@ def list_formats(
         raise UnknownFormatError(f"no format {name!r}; there is {', '.join(READERS)}")
     shown = [READERS[name]] if name else list(READERS.values())
     if json:
-        keys = ("name", "title", "recording", "takes", "pitfalls", "columns")
-        say_json([{k: getattr(r, k) for k in keys} for r in shown])
+        say_json([{"name": r.name, **r.words, "columns": r.columns} for r in shown])
         return
     for reader in shown:
         if name is None:
-            typer.echo(f"{reader.name:<18} {reader.title}")
+            typer.echo(f"{reader.name:<18} {reader.words['title']}")
             continue
-        typer.echo(f"{reader.name}: {reader.title}")
-        typer.echo(f"  record:   {reader.recording}")
-        typer.echo(f"  taken:    {reader.takes}")
-        typer.echo(f"  pitfalls: {reader.pitfalls}")
+        typer.echo(f"{reader.name}: {reader.words['title']}")
+        typer.echo(f"  record:   {reader.words['recording']}")
+        typer.echo(f"  taken:    {reader.words['takes']}")
+        typer.echo(f"  pitfalls: {reader.words['pitfalls']}")
     if name is None:
         typer.echo("\nvftcli formats NAME tells how to record one; gzip and zstd are taken off.")

@@ -178,24 +178,9 @@ class Reader:
     columns: bool = False
 
     @property
-    def title(self) -> str:
-        """What the format is called in tables."""
-        return format_words()[self.name]["title"]
-
-    @property
-    def recording(self) -> str:
-        """How a user records such a log."""
-        return format_words()[self.name]["recording"]
-
-    @property
-    def takes(self) -> str:
-        """Which signals are taken from it, with their meaning."""
-        return format_words()[self.name]["takes"]
-
-    @property
-    def pitfalls(self) -> str:
-        """What to look out for."""
-        return format_words()[self.name]["pitfalls"]
+    def words(self) -> Mapping[str, str]:
+        """What a user reads of it: title, recording (how to), takes (which signals), pitfalls."""
+        return format_words()[self.name]
 
 
 @cache

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.readers.columns import ColumnSpec, Item
+from vftcli.readers.columns import SIGNALS, ColumnSpec, Item
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
@@ -131,13 +131,12 @@ def picked(
         clock=words,
         signals=arrays,
         remarks=(*remarks, *more.pop("remarks", ())),
-        constants=tuple(_last(loaded[column]) for column in picks.constants),
+        constants=tuple(
+            float(column[-1]) if len(column) else float("nan")
+            for column in (loaded[c] for c in picks.constants)
+        ),
         **more,
     )
-
-
-def _last(column: Column) -> float:
-    return float(column[-1]) if len(column) else float("nan")
 
 
 def _stacked(pick: Pick, loaded: Mapping[int, Column]) -> Array:
@@ -250,8 +249,6 @@ def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
 
 
 def _pick(item: Item, cells: tuple[Cell, ...]) -> Pick:
-    from vftcli.readers.columns import SIGNALS
-
     wrench = item.signal == "wrench"
     return Pick(
         signal=SIGNALS.get(item.signal, item.signal),
