@@ -1,11 +1,11 @@
-"""Drive torque and the model's, and what a slow joint keeps back."""
+"""Drive torque and the model's, and where a joint stands."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from vftcli.repetition.drive_run import drive_run_of, dry_friction
+from vftcli.repetition.drive_run import drive_run_of
 from vftcli.robots import load_robot
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.recording import Recording
@@ -41,11 +41,3 @@ def test_a_joint_that_stands_is_marked() -> None:
     run = drive_run_of(log, ROBOT, dynamics_terms(log, ROBOT))
     assert run.standstill_s[600, 2] == pytest.approx(0.6)
     assert run.standing[600].tolist() == [False, False, True, False, False, False]
-
-
-def test_dry_friction_is_half_the_step_at_a_slow_speed() -> None:
-    """Of the UR5's file at .05 rad/s: Coulomb's torque and little of the viscous one's."""
-    parts = [(joint.parameters["coulomb"], joint.parameters["viscous"]) for joint in ROBOT.friction]
-    expected = [coulomb + 0.05 * viscous for coulomb, viscous in parts]
-    np.testing.assert_allclose(dry_friction(ROBOT), expected, rtol=3e-3)  # the quadratic part
-    assert not dry_friction(ROBOT.without_friction()).any()
