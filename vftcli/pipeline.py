@@ -61,6 +61,11 @@ class AnalysisChoice:
         return self.wrench.zero.log if self.wrench is not None else None
 
     @property
+    def free_logs(self) -> set[Path]:
+        """Every log of a free run, whatever it is for: one file may serve several options."""
+        return {*self.free.logs} | ({self.zero_log} if self.zero_log is not None else set())
+
+    @property
     def looks_back(self) -> bool:
         """Whether anything is asked that needs the complete log and its free part."""
         asked = self.refinement.looks_back or self.free.is_asked
@@ -73,12 +78,9 @@ def analyse_logs(logs: Iterable[Path], choice: AnalysisChoice) -> Iterator["Anal
     Raises:
         ParameterError: If two of them are the same run.
     """
-    models, robots = Models(), dict[str | None, Robot]()
+    models = Models()
     for recording in choice.library.open_logs(list(logs), choice.read):
-        name = choice.robot.name or recording.robot_hint
-        if name not in robots:
-            robots[name] = choice.robot.load(recording)
-        yield analyse(recording, robots[name], choice, models)
+        yield analyse(recording, models.robot(choice.robot, recording), choice, models)
 
 
 def analyse_log(path: Path, choice: AnalysisChoice) -> "Analysis":
@@ -109,18 +111,12 @@ def read(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Mod
     """Read the log's free runs, each once."""
     literal = choice.observers.as_printed
     log = models.of(recording, robot, literal=literal)
-    paths = {*choice.free.logs, choice.zero_log} - {None}
-    runs = {}
-    for path in paths:
-        if path is not None:
-            free = choice.library.open(path, choice.read.whole)
-            runs[path] = FreeRun(run=models.of(free, robot, literal=literal), log=log)
-    return FreeMotion(
-        log=log,
-        choice=choice.free,
-        runs=tuple(runs[path] for path in choice.free.logs),
-        zero=runs[choice.zero_log] if choice.zero_log is not None else None,
-    )
+    runs: dict[Path | None, FreeRun] = {}
+    for path in choice.free_logs:
+        free = choice.library.open(path, choice.read.whole)
+        runs[path] = FreeRun(run=models.of(free, robot, literal=literal), log=log)
+    given = tuple(runs[path] for path in choice.free.logs)
+    return FreeMotion(log=log, choice=choice.free, runs=given, zero=runs.get(choice.zero_log))
 
 
 def model(motion: FreeMotion, choice: AnalysisChoice) -> "Baseline | None":
@@ -181,10 +177,4 @@ def judge(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
 
     sensed = analysis.virtual_sensor
     found = judgement.judge(analysis.motion, analysis.estimates, sensed, choice.reference)
-    return replace(
-        analysis,
-        reference=found.reference,
-        errors=found.errors,
-        virtual_sensor=found.virtual_sensor,
-        contacts=found.contacts,
-    )
+    return replace(analysis, **found._asdict())

@@ -1,7 +1,7 @@
 """From estimates and wrenches to how they compare with a reference: one table of errors."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import polars as pl
 
@@ -15,9 +15,8 @@ from vftcli.virtual_sensor.detection import ContactScore, judge_contacts
 from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference
 
 
-@dataclass(frozen=True, kw_only=True)
-class Judgement:
-    """How the estimates of one log compare with a reference.
+class Judgement(NamedTuple):
+    """How the estimates of one log compare with a reference; fields of `vftcli.Analysis`.
 
     Attributes:
         reference: What they are judged by.

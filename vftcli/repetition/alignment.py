@@ -125,8 +125,8 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
 
 def near(q: Array, t: Array, free: Recording) -> Mask:
     """Whether positions lie within `SAME_TRAJECTORY` of the free run at instants of its clock."""
-    distance = np.max(np.abs(resampled(t, free.t, free.q) - q), axis=1)
-    return np.asarray((t >= free.t[0]) & (t <= free.t[-1]) & (distance <= SAME_TRAJECTORY))
+    apart = np.max(np.abs(resampled(t, free.t, free.q, np.inf) - q), axis=1)
+    return np.asarray(apart <= SAME_TRAJECTORY)
 
 
 def misfit(recording: Recording, free: Recording, shift: float, deviation: float) -> str:
