@@ -1,7 +1,7 @@
 """Repeated motions without dynamics, and the simulated circle with its truth."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ import polars as pl
 import pytest
 
 from vftcli.readers import read
+from vftcli.repetition.drive_run import DriveRun
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 
@@ -64,5 +65,30 @@ def repeated() -> Callable[..., Recording]:
         q = q + 5e-5 * rng.standard_normal(q.shape)
         dq = np.gradient(q, t, axis=0)
         return Recording(t=t, q=q, dq=np.where(np.abs(dq) < 0.008, 0.0, dq))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def drive_of() -> Callable[..., DriveRun]:
+    """A drive run of some signals; those that are not given are zero."""
+
+    def make(t: Array, q: Array, dq: Array, **signals: Array) -> DriveRun:
+        still = np.zeros_like(q)
+        names = ("torque", "model", "momentum", "standstill_s")
+        given = {name: signals.get(name, still) for name in names}
+        return DriveRun(name="log", t=t, q=q, dq=dq, coulomb=still[0], standing=still > 0, **given)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def part_of() -> Callable[[Recording, float, float], Recording]:
+    """A span of a log as a log of its own, whose clock begins at 0."""
+
+    def make(recording: Recording, start: float, stop: float) -> Recording:
+        span = recording.between(start, stop)
+        source = replace(span.source, t0=span.t[0], label=f"{start:g}")
+        return replace(span, t=span.t - span.t[0], source=source)
 
     return make

@@ -1,6 +1,6 @@
 """What is known to be free beside a log: spans, cycles, other runs, and any of them together."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,19 +18,13 @@ from vftcli.signals.recording import Recording
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 ROBOT = load_robot("ur5")
+Make = Callable[[Recording, float, float], Recording]
 
 
 @pytest.fixture(scope="module")
 def circle() -> ModelledRun:
     """Five circles of 4 s; nothing touches the arm in the first."""
     return ModelledRun(recording=read(FIXTURE), robot=ROBOT)
-
-
-def part(recording: Recording, start: float, stop: float) -> Recording:
-    """A span of a log as a log of its own, whose clock begins at 0."""
-    span = recording.between(start, stop)
-    source = replace(span.source, t0=span.t[0], label=f"{start:g}")
-    return replace(span, t=span.t - span.t[0], source=source)
 
 
 def motion_of(log: ModelledRun, *free: Recording, choice: FreeChoice) -> FreeMotion:
@@ -91,9 +85,9 @@ def test_a_cycle_that_is_not_there_is_refused(circle: ModelledRun) -> None:
         _ = motion_of(circle, choice=FreeChoice(cycles=(7,))).part
 
 
-def test_each_run_is_a_piece_with_its_own_pairing(circle: ModelledRun) -> None:
-    log = ModelledRun(recording=part(circle.recording, 8.0, 14.0), robot=ROBOT)
-    same, more = part(circle.recording, 0.0, 4.0), part(circle.recording, 4.0, 8.0)
+def test_each_run_is_a_piece_with_its_own_pairing(part_of: Make, circle: ModelledRun) -> None:
+    log = ModelledRun(recording=part_of(circle.recording, 8.0, 14.0), robot=ROBOT)
+    same, more = part_of(circle.recording, 0.0, 4.0), part_of(circle.recording, 4.0, 8.0)
     other = replace(same, q=same.q[:, ::-1] + 0.5, source=replace(same.source, t0=99.0))
     paths = tuple(Path(name) for name in "abc")
     motion = motion_of(log, same, other, more, choice=FreeChoice(logs=paths))
@@ -108,10 +102,10 @@ def test_each_run_is_a_piece_with_its_own_pairing(circle: ModelledRun) -> None:
     assert all(piece.inside.all() for piece in found.pieces)
 
 
-def test_the_covered_time_is_in_seconds(circle: ModelledRun) -> None:
+def test_the_covered_time_is_in_seconds(part_of: Make, circle: ModelledRun) -> None:
     """4 s of free run under 6 s of log cover 4 s of it, whatever the sample time."""
-    log = ModelledRun(recording=part(circle.recording, 4.0, 10.0), robot=ROBOT)
-    free = part(circle.recording, 0.0, 4.0)
+    log = ModelledRun(recording=part_of(circle.recording, 4.0, 10.0), robot=ROBOT)
+    free = part_of(circle.recording, 0.0, 4.0)
     motion = motion_of(log, free, choice=FreeChoice(logs=(Path("a"),)))
     (remark,) = partners_in_logs(motion).remarks
     assert remark.values["covered_s"] == pytest.approx(4.0, abs=0.05)

@@ -1,5 +1,6 @@
 """A free run has one owner: read, modelled and aligned once, told from others as an object."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,18 +16,12 @@ from vftcli.signals.recording import Recording
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 ROBOT = load_robot("ur5")
+Make = Callable[[Recording, float, float], Recording]
 
 
 @pytest.fixture(scope="module")
 def circle() -> Recording:
     return read(FIXTURE)
-
-
-def part(recording: Recording, start: float, stop: float) -> Recording:
-    """A span of a log as a log of its own, whose clock begins at 0."""
-    span = recording.between(start, stop)
-    source = replace(span.source, t0=span.t[0], label=f"{start:g}")
-    return replace(span, t=span.t - span.t[0], source=source)
 
 
 def test_a_model_is_made_once_for_a_recording_and_a_robot(circle: Recording) -> None:
@@ -41,12 +36,12 @@ def test_a_model_is_made_once_for_a_recording_and_a_robot(circle: Recording) -> 
 
 
 def test_alignment_and_pairing_are_made_once(
-    circle: Recording, monkeypatch: pytest.MonkeyPatch
+    part_of: Make, circle: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = []
     whole = room.align
     monkeypatch.setattr(room, "align", lambda *logs: made.append(logs) or whole(*logs))
-    log, free = part(circle, 5.0, 11.0), part(circle, 0.0, 4.0)
+    log, free = part_of(circle, 5.0, 11.0), part_of(circle, 0.0, 4.0)
     run = FreeRun(
         run=ModelledRun(recording=free, robot=ROBOT), log=ModelledRun(recording=log, robot=ROBOT)
     )
@@ -60,8 +55,10 @@ def test_alignment_and_pairing_are_made_once(
     np.testing.assert_allclose(off, 0.0, atol=2e-3)  # a quarter of a sample
 
 
-def test_another_motion_has_no_pairing_and_says_so_each_time(circle: Recording) -> None:
-    log = part(circle, 4.0, 8.0)
+def test_another_motion_has_no_pairing_and_says_so_each_time(
+    part_of: Make, circle: Recording
+) -> None:
+    log = part_of(circle, 4.0, 8.0)
     other = replace(log, q=log.q[:, ::-1] + 0.5, source=replace(log.source, t0=99.0))
     run = FreeRun(
         run=ModelledRun(recording=other, robot=ROBOT), log=ModelledRun(recording=log, robot=ROBOT)

@@ -1,5 +1,6 @@
 """The alignment ladder: what a difference is on each rung, and which one is taken."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,22 +15,14 @@ from vftcli.signals.errors import ReferenceTorqueError
 T = 0.008 * np.arange(1500)
 
 
-def drive(torque: np.ndarray, model: np.ndarray) -> DriveRun:
+Make = Callable[..., DriveRun]
+
+
+@pytest.fixture
+def drive(drive_of: Make) -> Make:
     """One joint that swings, with torques of its own."""
-    q = np.sin(T)[:, None]
-    still = np.zeros_like(q)
-    return DriveRun(
-        name="log",
-        t=T,
-        q=q,
-        dq=np.cos(T)[:, None],
-        torque=torque,
-        model=model,
-        momentum=still,
-        coulomb=np.zeros(1),
-        standstill_s=still,
-        standing=still > 0,
-    )
+    q, dq = np.sin(T)[:, None], np.cos(T)[:, None]
+    return lambda torque, model: drive_of(T, q, dq, torque=torque, model=model)
 
 
 RNG = np.random.default_rng(4)
@@ -37,7 +30,7 @@ PUSH = 5.0 * np.exp(-((T - 6.0) ** 2))[:, None]
 MODEL, FREE_MODEL = RNG.standard_normal((2, len(T), 1))
 
 
-def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off() -> None:
+def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off(drive: Make) -> None:
     """τ + τ_ext is what the model says of each motion: the push comes out exactly."""
     loaded, free = drive(MODEL - PUSH, MODEL), drive(FREE_MODEL, FREE_MODEL)
     pairing = pair_with_run(T, free, 0.0)
@@ -48,7 +41,7 @@ def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off() -> No
     assert np.all(corrected.floor < plain.floor)
 
 
-def test_rungs_without_their_clock_are_left_out() -> None:
+def test_rungs_without_their_clock_are_left_out(drive: Make) -> None:
     loaded = drive(MODEL, MODEL)
     clocks = {"found": [pair_with_run(T, loaded, 0.0)]}
     made = differences(loaded, clocks, ("commanded", "period", "model"), (None, 12.0))
@@ -62,7 +55,7 @@ def test_rungs_without_their_clock_are_left_out() -> None:
     assert made[0].remark("alignment-floor").code == "alignment-floor"
 
 
-def test_too_few_partners_are_refused() -> None:
+def test_too_few_partners_are_refused(drive: Make) -> None:
     loaded = drive(MODEL, MODEL)
     with pytest.raises(ReferenceTorqueError, match="only 15 samples have a partner"):
         difference(loaded, [pair_with_run(T, loaded, T[-1] - T[14])], "period", None)
@@ -92,6 +85,6 @@ def replace_standing(made: Difference, joint: int) -> Difference:
     return made._replace(error=made.error._replace(standing=standing))
 
 
-def test_a_drive_run_knows_its_step() -> None:
+def test_a_drive_run_knows_its_step(drive: Make) -> None:
     assert drive(MODEL, MODEL).step == pytest.approx(0.008)
     assert replace(drive(MODEL, MODEL), t=2.0 * T).step == pytest.approx(0.016)

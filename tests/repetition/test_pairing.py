@@ -1,5 +1,7 @@
 """Which instant of a free run belongs to each sample of a log."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -17,27 +19,23 @@ from vftcli.repetition.pairing import (
 T = 0.01 * np.arange(1200)
 
 
-def drive(t: np.ndarray = T, late: float = 0.0) -> DriveRun:
+Make = Callable[..., DriveRun]
+
+
+@pytest.fixture
+def drive(drive_of: Make) -> Make:
     """Two joints going round every 4 s, `late` seconds behind."""
-    phase = 2.0 * np.pi * (t[:, None] - late) / 4.0
-    q = np.hstack([np.sin(phase), 0.5 * np.cos(phase)])
-    still = np.zeros_like(q)
-    return DriveRun(
-        name="log",
-        t=t,
-        q=q,
-        dq=np.gradient(q, t, axis=0),
-        torque=still,
-        model=still,
-        momentum=still,
-        coulomb=np.zeros(2),
-        standstill_s=still,
-        standing=still > 0,
-    )
+
+    def make(t: np.ndarray = T, late: float = 0.0) -> DriveRun:
+        phase = 2.0 * np.pi * (t[:, None] - late) / 4.0
+        q = np.hstack([np.sin(phase), 0.5 * np.cos(phase)])
+        return drive_of(t, q, np.gradient(q, t, axis=0))
+
+    return make
 
 
 @pytest.mark.parametrize("free", [0, 1, 2])
-def test_a_cycle_is_laid_under_all_others_and_not_under_itself(free: int) -> None:
+def test_a_cycle_is_laid_under_all_others_and_not_under_itself(drive: Make, free: int) -> None:
     cycles = Cycles(period=4.0, begin=0.0, end=12.0)
     pairing = pair_with_cycle(drive(), cycles, free, 4.0)
     own = cycles.number(T) == free
@@ -50,14 +48,14 @@ def test_a_cycle_is_laid_under_all_others_and_not_under_itself(free: int) -> Non
     assert np.all((partners >= first) & (partners <= last))
 
 
-def test_a_run_is_laid_by_shift_and_rate_as_far_as_it_goes() -> None:
+def test_a_run_is_laid_by_shift_and_rate_as_far_as_it_goes(drive: Make) -> None:
     pairing = pair_with_run(T, drive(), 1.0, 1.1)
     known = T[-1] >= 1.1 * T + 1.0
     np.testing.assert_array_equal(pairing.known, known)
     np.testing.assert_allclose(pairing.times[known], 1.1 * T[known] + 1.0)
 
 
-def test_nothing_is_interpolated_across_a_gap() -> None:
+def test_nothing_is_interpolated_across_a_gap(drive: Make) -> None:
     clock = np.delete(T, slice(300, 320))
     assert in_gap(clock, np.array([3.05]))[0]
     assert not in_gap(clock, np.array([2.95, 3.25])).any()
@@ -66,14 +64,14 @@ def test_nothing_is_interpolated_across_a_gap() -> None:
     assert not pairing.known[(T > 2.995) & (T < 3.195)].any()
 
 
-def test_a_signal_is_taken_from_the_paired_instants() -> None:
+def test_a_signal_is_taken_from_the_paired_instants(drive: Make) -> None:
     free = drive()
     there = pair_with_run(T, free, -2.0).there(free.q)
     assert np.isnan(there[T < 2.0]).all()
     np.testing.assert_allclose(there[300], free.q[100], atol=1e-9)
 
 
-def test_phase_moves_partners_to_the_nearest_place() -> None:
+def test_phase_moves_partners_to_the_nearest_place(drive: Make) -> None:
     """The log runs 30 ms behind the clock's word; the path says so."""
     log, free = drive(late=0.03), drive()
     moved = by_phase(log, pair_with_run(T, free, 0.0))
@@ -81,7 +79,7 @@ def test_phase_moves_partners_to_the_nearest_place() -> None:
     np.testing.assert_allclose(moved.times[middle] - T[middle], -0.03, atol=1e-3)
 
 
-def test_the_mean_is_over_the_runs_that_are_known() -> None:
+def test_the_mean_is_over_the_runs_that_are_known(drive: Make) -> None:
     free = drive()
     nowhere = Pairing(free, np.full(len(T), np.nan))
     half = pair_with_run(T, free, 6.0)

@@ -67,16 +67,15 @@ def align(recording: Recording, free: Recording) -> Alignment:
             their clocks run at rates that differ by more than `SAME_RATE`.
     """
     check_same_arm(recording, free)
-    shift, rate = best_fit(recording, free)
-    deviation, overlap = deviation_at(recording, free, shift, rate)
-    if not deviation <= SAME_TRAJECTORY:
+    found = lying_at(recording, free, *best_fit(recording, free))
+    if not found.deviation <= SAME_TRAJECTORY:
         shared = shared_part(recording, free)
         if shared is None:
-            raise ReferenceTorqueError(misfit(recording, free, shift, deviation))
-        shift, rate, deviation, overlap = shared
-    if abs(rate - 1.0) > SAME_RATE:
-        raise ReferenceTorqueError(other_rate(recording, free, rate))
-    return Alignment(shift, rate, deviation, overlap)
+            raise ReferenceTorqueError(misfit(recording, free, found))
+        found = shared
+    if abs(found.rate - 1.0) > SAME_RATE:
+        raise ReferenceTorqueError(other_rate(recording, free, found.rate))
+    return found
 
 
 def check_same_arm(recording: Recording, free: Recording) -> None:
@@ -107,20 +106,17 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     span = recording.duration + free.duration
     step = max(0.02, span / 5000.0)
     shifts = free.t[0] - recording.t[-1] + np.arange(0.0, span, step)
-    found = [float(np.sum(path * near(q, t + shift, free))) for shift in shifts]
-    best = float(shifts[int(np.argmax(found))])
-    if max(found) < LEAST_OVERLAP * float(np.sum(path)):
+    shared = [float(np.sum(path * near(q, t + shift, free))) for shift in shifts]
+    best = float(shifts[int(np.argmax(shared))])
+    if max(shared) < LEAST_OVERLAP * float(np.sum(path)):
         return None
     shift, rate = refined(recording, free, best, 1.0)
     matched = near(recording.q, rate * recording.t + shift, free)
-    overlap = np.zeros(recording.samples, dtype=bool)
+    long = np.zeros(recording.samples, dtype=bool)
     for start, stop in runs_of(matched):
-        overlap[start:stop] = recording.t[stop - 1] - recording.t[start] >= 1.0
-    there = resampled(rate * recording.t[overlap] + shift, free.t, free.q)
-    if not len(there):
-        return None
-    deviation = float(np.sqrt(np.mean((there - recording.q[overlap]) ** 2)))
-    return Alignment(shift, rate, deviation, overlap)
+        long[start:stop] = recording.t[stop - 1] - recording.t[start] >= 1.0
+    found = lying_at(recording, free, shift, rate, long)
+    return found if np.isfinite(found.deviation) else None
 
 
 def near(q: Array, t: Array, free: Recording) -> Mask:
@@ -129,15 +125,15 @@ def near(q: Array, t: Array, free: Recording) -> Mask:
     return np.asarray(apart <= SAME_TRAJECTORY)
 
 
-def misfit(recording: Recording, free: Recording, shift: float, deviation: float) -> str:
+def misfit(recording: Recording, free: Recording, found: Alignment) -> str:
     """One line on why two logs do not fit: other clocks if that explains it, else other motions."""
     rate = explaining_rate(recording, free)
     if rate is not None:
         return other_rate(recording, free, rate)
     return (
         f"{free.name} is not a free run of the trajectory in {recording.name}: at the best "
-        f"shift ({shift:.3f} s) the joint positions still differ by {deviation:.3g} rad rms "
-        f"(at most {SAME_TRAJECTORY:g}); give a log of the same motion with --free"
+        f"shift ({found.shift:.3f} s) the joint positions still differ by {found.deviation:.3g} "
+        f"rad rms (at most {SAME_TRAJECTORY:g}); give a log of the same motion with --free"
     )
 
 
@@ -162,7 +158,7 @@ def explaining_rate(recording: Recording, free: Recording) -> float | None:
         fit = lag_fit(uniform(free, step), uniform(recording, step / rate), LEAST_OVERLAP)
         shift = fit.closest * step + float(free.t[0] - rate * recording.t[0])
         shift, found = refined(recording, free, shift, float(rate))
-        if deviation_at(recording, free, shift, found)[0] <= 0.5 * SAME_TRAJECTORY:
+        if lying_at(recording, free, shift, found).deviation <= 0.5 * SAME_TRAJECTORY:
             return found
     return None
 
@@ -245,13 +241,19 @@ def gauss_newton_step(
     return (c * e - b * f) / determinant - rate * middle, rate
 
 
-def deviation_at(
-    recording: Recording, free: Recording, shift: float, rate: float = 1.0
-) -> tuple[float, Mask]:
-    """Rms position difference at a shift [rad], and the samples that overlap. (T,)"""
+def lying_at(
+    recording: Recording, free: Recording, shift: float, rate: float, within: Mask | None = None
+) -> Alignment:
+    """How two logs lie at a shift [s] and rate, over what overlaps, or only `within` of it. (T,)
+
+    The deviation is infinite where fewer than two samples are left.
+    """
     t = rate * recording.t + shift
     overlap = (t >= free.t[0]) & (t <= free.t[-1])
-    if np.count_nonzero(overlap) < 2:
-        return float("inf"), overlap
-    there = resampled(t[overlap], free.t, free.q)
-    return float(np.sqrt(np.mean((there - recording.q[overlap]) ** 2))), overlap
+    if within is not None:
+        overlap &= within
+    deviation = float("inf")
+    if np.count_nonzero(overlap) >= 2:
+        there = resampled(t[overlap], free.t, free.q)
+        deviation = float(np.sqrt(np.mean((there - recording.q[overlap]) ** 2)))
+    return Alignment(shift, rate, deviation, overlap)
