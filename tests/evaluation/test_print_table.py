@@ -37,7 +37,7 @@ def errors(scale: float = 1.0, joints: int = 6) -> pl.DataFrame:
 
 def test_sizes_and_winners_are_told() -> None:
     found = compare_with("table1", errors(1.5), OBSERVERS, TUNINGS)
-    text = " ".join(found.remarks)
+    text = " ".join(map(str, found.remarks))
     assert found.names == ("fdo", "gmo", "kfo-fe")
     assert "median 1.50" in text
     assert "J4 (gmo in print, kfo-fe here)" in text
@@ -49,7 +49,7 @@ def test_the_discrete_reading_is_told() -> None:
     kalman = KalmanObserver(noise_convention="discrete")
     observers = (*OBSERVERS[:2], kalman)
     tunings = {**TUNINGS, kalman.name: kalman.tuning(STEP, 6)}
-    text = " ".join(compare_with("table1", errors(), observers, tunings).remarks)
+    text = " ".join(map(str, compare_with("table1", errors(), observers, tunings).remarks))
     assert "noise_convention=discrete: a delay of 39 ms on J1" in text
 
 
@@ -68,3 +68,30 @@ def test_what_cannot_be_compared() -> None:
         check_published("table1", None)
     with pytest.raises(ParameterError, match="6 joints, the log has 7"):
         compare_with("table1", errors(joints=7), OBSERVERS, TUNINGS)
+
+
+def test_fdo_and_gmo_are_one_filter_to_a_millionth() -> None:
+    """They agree on J4 to J6; a gap of two millionths on J5 is two filters' already."""
+    table = errors()
+    off = (pl.col("observer") == "gmo") & (pl.col("joint") == 5)
+    rmse = pl.when(off).then(pl.col("rmse_Nm") * (1.0 + 2e-6)).otherwise(pl.col("rmse_Nm"))
+    found = compare_with("table1", table.with_columns(rmse), OBSERVERS, TUNINGS)
+    remark = next(r for r in found.remarks if r.code == "print-one-filter")
+    assert remark.where.joints == (4, 6)
+    # The largest printed difference there: J4, 1.5379 − 1.2939 N·m.
+    assert remark.values["printed_Nm"] == pytest.approx(0.2440)
+
+
+def test_floors_and_unknown_errors_stand_in_their_joints() -> None:
+    table = errors().with_columns(
+        pl.when(pl.col("joint") == 2).then(None).otherwise(pl.col("rmse_Nm")).alias("rmse_Nm"),
+        pl.when(pl.col("joint") == 3)
+        .then(None)
+        .otherwise(0.1 * pl.col("joint"))
+        .alias("reference_floor_Nm"),
+    )
+    found = compare_with("table1", table, OBSERVERS, TUNINGS)
+    assert np.isnan(found.ours["fdo"][1])
+    assert np.isfinite(np.delete(found.ours["fdo"], 1)).all()
+    assert found.floor[[0, 1, 3, 4, 5]] == pytest.approx([0.1, 0.2, 0.4, 0.5, 0.6])
+    assert np.isnan(found.floor[2])

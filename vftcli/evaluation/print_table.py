@@ -9,6 +9,10 @@ import polars as pl
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.remarks import Remark, Where, fact
+
+SAME_FILTER = 1e-6
+"""Errors that differ by less than this share are one filter's, computed in two ways."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,14 +23,14 @@ class Published:
         title: What it is.
         source: Where it stands.
         rmse: Observer's name here → printed RMSE of each joint. [N·m]
-        reasons: Why a computation need not give these numbers: each says so, or "" if it does not
-            apply to what was run.
+        reasons: Why a computation need not give these numbers: each gives a remark, or None if it
+            does not apply to what was run.
     """
 
     title: str
     source: str
     rmse: Mapping[str, tuple[float, ...]]
-    reasons: tuple[Callable[["Comparison"], str], ...]
+    reasons: tuple[Callable[["Comparison"], Remark | None], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,82 +63,75 @@ class Comparison:
         return np.array(self.published.rmse[name])
 
     @property
-    def remarks(self) -> tuple[str, ...]:
-        """Where the two differ and why, one sentence each."""
-        found = [winners(self), sizes(self), *(reason(self) for reason in self.published.reasons)]
-        return tuple(text for text in found if text)
+    def remarks(self) -> tuple[Remark, ...]:
+        """Where the two differ and why."""
+        found = [best_of_each(self), sizes(self), *(why(self) for why in self.published.reasons)]
+        return tuple(remark for remark in found if remark is not None)
 
 
-def winners(found: Comparison) -> str:
-    """Who wins each joint in print and here."""
+def best_of_each(found: Comparison) -> Remark | None:
+    """On which joints another observer is best than in print."""
     if not found.names:
-        return ""
+        return None
     printed = np.array([found.printed(n) for n in found.names])
     ours = np.array([found.ours[n] for n in found.names])
-    same: list[str] = []
     other: list[str] = []
     for j in range(printed.shape[1]):
         best = found.names[int(np.argmin(printed[:, j]))]
-        here = found.names[int(np.nanargmin(np.where(np.isfinite(ours[:, j]), ours[:, j], np.inf)))]
-        (same if best == here else other).append(f"J{j + 1} ({best} in print, {here} here)")
-    agree = f"the best of a joint is the same on {len(same)} of {printed.shape[1]} joints"
-    return f"{agree}; it differs on {', '.join(other)}" if other else agree
+        # A joint on which no observer is known has no best of its own: the first stands for it.
+        here = found.names[int(np.argmin(np.where(np.isfinite(ours[:, j]), ours[:, j], np.inf)))]
+        if best != here:
+            other.append(f"J{j + 1} ({best} in print, {here} here)")
+    joints = printed.shape[1]
+    if not other:
+        return fact("print-same-best", joints=joints)
+    return fact("print-other-best", same=joints - len(other), joints=joints, differing=other)
 
 
-def sizes(found: Comparison) -> str:
+def sizes(found: Comparison) -> Remark | None:
     """How large the computed errors are against the printed ones."""
     if not found.names:
-        return ""
+        return None
     ratio = np.array([found.ours[n] / found.printed(n) for n in found.names])
-    return (
-        f"computed over printed RMSE: median {np.nanmedian(ratio):.2f}, from "
-        f"{np.nanmin(ratio):.2f} to {np.nanmax(ratio):.2f}; an RMSE grows with the force of the "
-        "contacts, which the paper does not print, so sizes compare between observers, not between "
-        "experiments"
+    return fact(
+        "print-sizes",
+        median=float(np.nanmedian(ratio)),
+        least=float(np.nanmin(ratio)),
+        most=float(np.nanmax(ratio)),
     )
 
 
-def one_filter(found: Comparison) -> str:
-    """FDO and GMO of equal gain are one filter."""
+def one_filter(found: Comparison) -> Remark | None:
+    """FDO and GMO of equal gain are one filter, so they agree where their gains do."""
     if not {"fdo", "gmo"} <= set(found.names):
-        return ""
+        return None
     gap = np.abs(found.ours["fdo"] - found.ours["gmo"])
-    alike = [j + 1 for j in np.flatnonzero(gap <= 1e-6 * np.maximum(found.ours["fdo"], 1e-9))]
-    if not alike:
-        return ""
-    print_gap = np.abs(found.printed("fdo") - found.printed("gmo"))[[j - 1 for j in alike]]
-    listed = ", ".join(f"J{j}" for j in alike)
-    return (
-        f"fdo and gmo agree here on {listed}: with equal gains the bilinear filters are identical, "
-        f"so the printed differences there (up to {print_gap.max():.2f} N·m) are not the method's; "
-        "the printed k₃, with 1 + 2a in its denominator, leaks momentum into the FDO"
-    )
+    alike = np.flatnonzero(gap <= SAME_FILTER * found.ours["fdo"])
+    if not len(alike):
+        return None
+    printed = np.abs(found.printed("fdo") - found.printed("gmo"))[alike]
+    joints = tuple(int(j) + 1 for j in alike)
+    return fact("print-one-filter", Where(joints=joints), printed_Nm=float(printed.max()))
 
 
-def kalman_delay(found: Comparison) -> str:
+def kalman_delay(found: Comparison) -> Remark | None:
     """The noise convention sets the Kalman filters' bandwidth, and with it the ranking."""
     tuning = found.tunings.get("kfo-fe")
     if tuning is None or "kfo-fe" not in found.names:
-        return ""
+        return None
     convention = getattr(found.observers.get("kfo-fe"), "noise_convention", "density")
-    delay = 1e3 * tuning.delay[0]
-    text = f"kfo runs with noise_convention={convention}: a delay of {delay:.0f} ms on J1"
-    if convention == "discrete":
-        return text + "; under this reading the Kalman filters win J1–J3 as in print"
-    return (
-        f"{text}; print wins J1–J3 with it only if R is a discrete covariance "
-        "(--set kfo.noise_convention=discrete: 39 ms)"
-    )
+    code = "print-kalman-discrete" if convention == "discrete" else "print-kalman-density"
+    return fact(code, convention=convention, delay_ms=1e3 * float(tuning.delay[0]))
 
 
-def alike_at_floor(found: Comparison) -> str:
+def alike_at_floor(found: Comparison) -> Remark:
     """J6 is at the reference's noise in print."""
     printed = np.array([found.printed(n)[5] for n in found.published.rmse])
-    return (
-        f"J6 in print is {printed.min():.2f} to {printed.max():.2f} for all observers: the noise "
-        "of an unfiltered two-cycle difference, √2·K·σ_i at σ_i = 0.071 A, is 0.93 N·m, which "
-        f"hides what the observers do; the floor here is {found.floor[5]:.2f} N·m (--low-pass none "
-        "for the unfiltered difference)"
+    return fact(
+        "print-noise-floor",
+        least_Nm=float(printed.min()),
+        most_Nm=float(printed.max()),
+        floor_Nm=float(found.floor[5]),
     )
 
 
