@@ -1,0 +1,68 @@
+"""The page of an identification: whole, self-contained, with its tables and its plots."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+
+from vftcli.outputs.identification.files import identification_record
+from vftcli.outputs.identification.page import payload, render_identification, shown_trace
+
+
+class Balance(HTMLParser):
+    """Checks that every element is closed in its turn."""
+
+    VOID = frozenset({"meta", "br", "hr", "img", "input", "link", "path"})
+
+    def __init__(self):
+        super().__init__()
+        self.open = []
+
+    def handle_starttag(self, tag, attrs):
+        del attrs
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if tag not in self.VOID:
+            assert self.open.pop() == tag
+
+
+def test_the_page_is_whole_and_loads_nothing(found):
+    result, log = found
+    page = render_identification(result, identification_record(result, [log], "vftcli identify"))
+    checker = Balance()
+    checker.feed(page)
+    assert checker.open == []
+    assert "<b>log" not in page
+    assert "&lt;b&gt;log &amp; co" in page
+    assert not re.search(r"(src|href)\s*=\s*[\"']?https?:", page)
+    assert page.count("<svg viewBox=") == 6  # one residual-over-velocity plot a joint
+    data = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    assert data is not None
+    assert json.loads(data.group(1))["joints"] == 6
+    for heading in ("Residuals", "Residual over velocity", "Identified numbers"):
+        assert f"<h2>{heading}</h2>" in page
+
+
+def test_the_held_out_log_is_drawn_over_time(found):
+    result, _ = found
+    assert [trace.role for trace in result.traces] == ["train", "held-out"]
+    trace = shown_trace(result)
+    assert trace.role == "held-out"
+    data = payload(result)
+    assert data["span"] == [float(trace.t[0]), float(trace.t[-1])]
+    assert [chart["key"] for chart in data["charts"]] == ["torque", "left", "dq"]
+    assert [line["name"] for line in data["charts"][0]["series"]] == ["measured", "predicted"]
+
+
+def test_dots_stay_inside_their_plot(found):
+    result, log = found
+    page = render_identification(result, identification_record(result, [log], ""))
+    dots = np.array(re.findall(r"M(-?[\d.]+) (-?[\d.]+)h\.01", page), dtype=float)
+    assert len(dots) > 1000
+    assert dots[:, 0].min() >= 40.0  # right of the room for the numbers
+    assert dots[:, 0].max() <= 360.0
+    assert dots[:, 1].min() >= 0.0
+    assert dots[:, 1].max() <= 220.0
