@@ -47,6 +47,7 @@ def run(force: Force, *assignments: str, alphas: tuple[float, ...] = ()) -> Repl
 
 def codes(found: Replay) -> set[str]:
     """The codes of what a replay has to say."""
+    assert all(str(remark) for remark in found.remarks)  # the catalogue has words for each
     return {remark.code for remark in found.remarks}
 
 

@@ -57,6 +57,7 @@ def test_each_limit_is_told_with_its_number_and_its_controller() -> None:
     clipped[3:6, 0, 2] = clipped[5, 0, 3] = True
     reached[30:40, 1] = False
     found = limits_met(TWO, motion(x, clipped), path(reached, 1.5), np.array([0, 7]))
+    assert "the first at 3.000 s" in " ".join(str(remark) for remark in found)
     told = {(r.code, r.where.about): dict(r.values) for r in found}
     first, second = (controller.name for controller in TWO)
     assert told == {

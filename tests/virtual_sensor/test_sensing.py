@@ -33,6 +33,7 @@ def analysed(log: str, names: tuple[str, ...], wrench: WrenchChoice, **read: obj
 def reading(log: str, *names: str, **choice: object) -> SensorReading:
     sensed = analysed(log, names, WrenchChoice(**choice)).virtual_sensor  # type: ignore[arg-type]
     assert sensed is not None
+    assert all(str(remark) for remark in sensed.remarks)  # the catalogue has words for each
     return sensed
 
 

@@ -196,7 +196,7 @@ def test_a_stretched_arm_cannot_tell_a_push_along_itself() -> None:
     """A UR5 with q₃ = 0; any torque is still answered, for the plots of a blow-up."""
     q = np.array([[0.0, -1.0, 0.0, 0.3, 1.2, 0.0], [0.0, -1.0, 1.0, 0.3, 1.2, 0.0]])
     found = wrench_of(np.ones((2, 6)), flange_jacobian(load_robot("ur5").chain, q))
-    np.testing.assert_array_equal(found.told, [False, True])
+    np.testing.assert_array_equal(found.known, [False, True])
     assert np.all(np.isfinite(found.values))
 
 

@@ -232,22 +232,22 @@ def run_closed_loop(
     sensors = Sensors(arm, torque)
     loop = Loop(arm, controller, observer, sensors)
     log = Log(t=[], estimate=[], dragged=[], commanded=[], q=[], reached=[])
-    every_sample = whole(sensors.interval, arm.scenario.step, "sampling interval")
-    every_control = whole(controller.parameters.period, arm.scenario.step, "control period")
+    every_sample = steps_in(sensors.interval, arm.scenario.step, "sampling interval")
+    every_control = steps_in(controller.parameters.period, arm.scenario.step, "control period")
     forward = arm.servo.feed_forward(loop.reference)[0]
     for k in range(arm.steps):
         if k % every_sample == 0:
             loop.sample()
         if k % every_control == 0:
-            note(log, loop, zero)
+            write_down(log, loop, zero)
             forward = arm.servo.feed_forward(loop.reference)[0]
-            if runaway(loop):
+            if has_run_away(loop):
                 break
             if progress is not None:
                 progress(k, arm.steps)
         reference = loop.reference
         arm.step(reference.q[0], reference.dq[0], reference.ddq[0], forward)
-    return finished(loop, log, zero)
+    return closed_loop_of(loop, log, zero)
 
 
 def still_arm(scenario: Scenario, period: float, seed: int | None) -> Arm:
@@ -265,7 +265,7 @@ def still_arm(scenario: Scenario, period: float, seed: int | None) -> Arm:
     return Arm(scenario, scenario.seed if seed is None else seed, still, duration)
 
 
-def whole(interval: float, step: float, what: str) -> int:
+def steps_in(interval: float, step: float, what: str) -> int:
     """How many inner steps an interval is.
 
     Raises:
@@ -280,7 +280,7 @@ def whole(interval: float, step: float, what: str) -> int:
     return count
 
 
-def note(log: Log, loop: Loop, zero: tuple[float, float] | None) -> None:
+def write_down(log: Log, loop: Loop, zero: tuple[float, float] | None) -> None:
     """Act once and write down what happened."""
     t = loop.arm.t
     waits = zero is not None and t <= zero[1]
@@ -293,14 +293,14 @@ def note(log: Log, loop: Loop, zero: tuple[float, float] | None) -> None:
     log.reached.append(loop.reached)
 
 
-def runaway(loop: Loop) -> bool:
+def has_run_away(loop: Loop) -> bool:
     """Whether the arm has left everything behind."""
     x = loop.law.x[0]
     fast = np.max(np.abs(loop.arm.v)) > 50.0
     return bool(not np.all(np.isfinite(x)) or np.linalg.norm(x[:3]) > FARTHEST or fast)
 
 
-def finished(loop: Loop, log: Log, zero: tuple[float, float] | None) -> ClosedLoop:
+def closed_loop_of(loop: Loop, log: Log, zero: tuple[float, float] | None) -> ClosedLoop:
     """Put the run together; the truth is the simulator's."""
     arm, t = loop.arm, np.array(log.t)
     complete = arm.history.rows == arm.steps

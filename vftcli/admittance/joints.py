@@ -135,11 +135,11 @@ def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> Joint
         points = translation + x[:, i, :3]
         same = np.zeros(samples, dtype=bool)
         same[1:] = np.all(x[1:, i] == x[:-1, i], axis=1)
-        one_path(solver, start, (goals, points, same), q[:, i], reached[:, i])
+        fill_path(solver, start, (goals, points, same), q[:, i], reached[:, i])
     return JointPath(q=q, reached=reached, speed=largest_speed(solver.robot, q, reached, period))
 
 
-def one_path(
+def fill_path(
     solver: FlangeSolver,
     start: Array,
     goals: tuple[Array, Array, Mask],

@@ -51,12 +51,12 @@ def latencies(run: ClosedLoop) -> tuple[Latency, ...]:
     found, last = [], -quiet
     for k in np.flatnonzero(above).tolist():
         if k - last >= quiet:
-            found.append(one(run, k, threshold))
+            found.append(latency_of(run, k, threshold))
         last = k
     return tuple(found)
 
 
-def one(run: ClosedLoop, k: int, threshold: Array) -> Latency:
+def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
     """The latencies of the contact whose force first passes a threshold in row `k`."""
     axis = int(np.argmax(np.abs(run.truth[k]) / threshold))
     limit, t = threshold[axis], run.t
@@ -66,10 +66,10 @@ def one(run: ClosedLoop, k: int, threshold: Array) -> Latency:
     far = way > (STARTED if axis < 3 else TURNED)
     before = run.moved[max(k - 3, 0) : k + 1, part]
     speed = np.linalg.norm(before[-1] - before[0]) / max(t[k] - t[max(k - 3, 0)], 1e-9)
-    begin = first(felt, k)
-    ends = first(~there, k)
-    gone = None if ends is None else first(~felt, ends)
-    moving = first(far, k)
+    begin = first_true(felt, k)
+    ends = first_true(~there, k)
+    gone = None if ends is None else first_true(~felt, ends)
+    moving = first_true(far, k)
     return Latency(
         axis=axis,
         force=float(t[k]),
@@ -80,7 +80,7 @@ def one(run: ClosedLoop, k: int, threshold: Array) -> Latency:
     )
 
 
-def first(flags: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], start: int) -> int | None:
+def first_true(flags: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], start: int) -> int | None:
     """First row from `start` on that is set, or None."""
     found = np.flatnonzero(flags[start:])
     return start + int(found[0]) if found.size else None

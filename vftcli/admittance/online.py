@@ -81,4 +81,4 @@ class OnlineKalman:
         frame = model.getFrameId("flange")
         J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
         found = wrench_of(self.tau[None], J[None])
-        return found.values[0] if found.told[0] else np.zeros(6)
+        return found.values[0] if found.known[0] else np.zeros(6)

@@ -118,7 +118,7 @@ def replay(
     clock, (force, q) = on_control_clock(wrench.t, (wrench.known, q), parameters.period)
     start = solver.check_start(q[0])
     split = phases(force, parameters)
-    motion = shifted(run(controllers, split.force, split.dragged), float(clock[0]))
+    motion = started_at(run(controllers, split.force, split.dragged), float(clock[0]))
     path = follow(solver, start, motion.x, parameters.period)
     drags = drags_of(split, parameters.period)
     logged = deviation_of(solver, start, q)
@@ -243,7 +243,7 @@ def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[
     return clock, [column[newest] for column in values]
 
 
-def shifted(motion: AxisMotion, begin: float) -> AxisMotion:
+def started_at(motion: AxisMotion, begin: float) -> AxisMotion:
     """The same motion on a clock that starts at `begin`. [s]"""
     return AxisMotion(t=motion.t + begin, x=motion.x, v=motion.v, clipped=motion.clipped)
 

@@ -34,14 +34,14 @@ def phases(wrench: Array, parameters: Admittance) -> Phases:
     wrench = np.nan_to_num(wrench, nan=0.0)
     size = np.abs(wrench)
     release = parameters.threshold * (1.0 - np.asarray(parameters.hysteresis))
-    dragged = latched(size > parameters.threshold, size <= release)
+    dragged = held(size > parameters.threshold, size <= release)
     force = wrench
     if parameters.threshold_mode == "soft":
         force = np.sign(wrench) * np.maximum(size - parameters.threshold, 0.0)
     return Phases(dragged, np.where(dragged, force, 0.0))
 
 
-def latched(on: Mask, off: Mask) -> Mask:
+def held(on: Mask, off: Mask) -> Mask:
     """True from where `on` is until `off` is, False before the first of them. (T, 6)"""
     rows = np.arange(len(on))[:, None]
     last = np.maximum.accumulate(np.where(on | off, rows, -1), axis=0)

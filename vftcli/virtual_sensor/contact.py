@@ -185,7 +185,7 @@ def begins(found: ContactInterval, true: ContactInterval, late: float) -> bool:
     return true.start - EARLY <= found.start <= true.stop + late
 
 
-class Operating(NamedTuple):
+class OperatingPoint(NamedTuple):
     """One point of a receiver operating characteristic.
 
     Attributes:
@@ -203,12 +203,14 @@ class Operating(NamedTuple):
 
 def operating_curve(
     t: Array, score: Array, true: Sequence[ContactInterval], thresholds: Sequence[float]
-) -> tuple[Operating, ...]:
+) -> tuple[OperatingPoint, ...]:
     """Hits against false alarms as the threshold goes through `thresholds` (ROC)."""
     duration = float(t[-1] - t[0])
     points = []
     for threshold in thresholds:
         counts = detection(contacts(t, score, threshold), true, duration)
         found = 1.0 - counts.missed / counts.contacts if counts.contacts else float("nan")
-        points.append(Operating(threshold, found, counts.false_alarms_per_h, counts.mean_delay))
+        points.append(
+            OperatingPoint(threshold, found, counts.false_alarms_per_h, counts.mean_delay)
+        )
     return tuple(points)

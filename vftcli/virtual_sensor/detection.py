@@ -14,7 +14,7 @@ from vftcli.virtual_sensor.contact import (
     TRUE_MOMENT,
     ContactInterval,
     Detection,
-    Operating,
+    OperatingPoint,
     contacts,
     detection,
     free_band,
@@ -64,7 +64,7 @@ class ContactScore(NamedTuple):
     name: str
     signal: str
     detection: Detection
-    curve: tuple[Operating, ...]
+    curve: tuple[OperatingPoint, ...]
     found: tuple[ContactInterval, ...]
 
 

@@ -62,7 +62,7 @@ def check_frame(name: str) -> str:
     return name
 
 
-def mounted(frame: str, mounting: Mounting) -> Pose:
+def frame_pose(frame: str, mounting: Mounting) -> Pose:
     """Pose in the flange frame of what a frame is fixed to.
 
     Raises:
@@ -104,7 +104,7 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
     X[:, :3, :3] = X[:, 3:, 3:] = turned
     if frame == "flange":
         return X
-    moved: Array = adjoint(inverse(mounted(frame, mounting))) @ X
+    moved: Array = adjoint(inverse(frame_pose(frame, mounting))) @ X
     return moved
 
 

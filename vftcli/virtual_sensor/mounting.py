@@ -17,13 +17,7 @@ from vftcli.signals.remarks import Remark
 from vftcli.virtual_sensor.choice import FIT, WrenchChoice
 from vftcli.virtual_sensor.frames import Mounting
 from vftcli.virtual_sensor.log_wrench import UNSTATED, sensor_reading_of
-from vftcli.virtual_sensor.sensor import (
-    fit_pose,
-    pose_remark,
-    tool_remark,
-    weigh_tool,
-    without_tool,
-)
+from vftcli.virtual_sensor.sensor import fit_pose, weigh_tool
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 
@@ -60,7 +54,7 @@ def find_mounting(
     reading = sensor_reading_of(recording, "--sensor-pose fit")
     ours = VirtualSensor(frame="flange").wrench(disturbance, recording.q, robot.chain)
     fit = fit_pose(ours.known, reading)
-    return MountingFound(mounting._replace(sensor=fit.pose), (pose_remark(fit),))
+    return MountingFound(mounting._replace(sensor=fit.pose), (fit.remark,))
 
 
 def without_tool_weight(
@@ -89,5 +83,5 @@ def without_tool_weight(
     tool = weigh_tool(reading[free], rotation[free], gravity)
     # The log keeps the sign that it states.
     sign = (recording.wrench_frame or UNSTATED).factor
-    clean = sign * without_tool(reading, tool, rotation, gravity)
-    return replace(recording, wrench=clean), (tool_remark(tool),)
+    clean = sign * (reading - tool.reading(rotation, gravity))
+    return replace(recording, wrench=clean), (tool.remark,)

@@ -11,11 +11,11 @@ from vftcli.signals.wrench import Wrench
 MARGIN = 1.25
 """The threshold stands so far above the largest value of the free part."""
 
-TOLD = 0.001
+LEAST_SHARE = 0.001
 """Share of samples above the threshold up to which nothing is said: chance reaches it."""
 
 
-class Elsewhere(NamedTuple):
+class NullSpaceVerdict(NamedTuple):
     """Where the torque of an arm of more than six joints is no tip wrench's.
 
     Attributes:
@@ -33,13 +33,13 @@ class Elsewhere(NamedTuple):
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """What it says, nothing where next to no sample lies above the threshold."""
-        if not self.share > TOLD:
+        if not self.share > LEAST_SHARE:
             return ()
         values = {"share": self.share, "threshold_Nm": self.threshold}
         return (caution("contact-elsewhere", Where(self.name), **values),)
 
 
-def contact_elsewhere(wrench: Wrench, free: Mask) -> Elsewhere | None:
+def contact_elsewhere(wrench: Wrench, free: Mask) -> NullSpaceVerdict | None:
     """Judge a wrench's null-space channel by its free part, None for an arm of six joints.
 
     Args:
@@ -50,4 +50,4 @@ def contact_elsewhere(wrench: Wrench, free: Mask) -> Elsewhere | None:
         return None
     threshold = MARGIN * float(np.nanmax(wrench.null_space[free]))
     above: Mask = np.nan_to_num(wrench.null_space) > threshold
-    return Elsewhere(wrench.name, threshold, above, float(np.mean(above)))
+    return NullSpaceVerdict(wrench.name, threshold, above, float(np.mean(above)))

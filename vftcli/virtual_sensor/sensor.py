@@ -35,6 +35,18 @@ class PoseFit:
     def __post_init__(self) -> None:
         seal(self, "position_sd")
 
+    @property
+    def remark(self) -> Remark:
+        """The fitted pose."""
+        return fact(
+            "sensor-pose-fitted",
+            position_mm=(self.pose.translation * 1e3).tolist(),
+            position_sd_mm=(self.position_sd * 1e3).tolist(),
+            angles_deg=np.degrees(rpy_angles(self.pose.rotation)).tolist(),
+            force_rms_N=self.force_rms,
+            moment_rms_Nm=self.moment_rms,
+        )
+
 
 def fit_pose(flange: Array, sensor: Array) -> PoseFit:
     """Find R and p of (56) from readings of the same contact. Constant offsets do not matter.
@@ -96,6 +108,17 @@ class ToolWeight:
     def __post_init__(self) -> None:
         seal(self, "com", "zero")
 
+    @property
+    def remark(self) -> Remark:
+        """What was weighed."""
+        return fact(
+            "sensor-tool-weighed",
+            mass_kg=self.mass,
+            mass_sd_kg=self.mass_sd,
+            com_mm=(self.com * 1e3).tolist(),
+            force_rms_N=self.force_rms,
+        )
+
     def reading(self, rotation: Array, gravity: Array) -> Array:
         """What the sensor reads of weight and zero. (T, 6) [N, N·m]
 
@@ -145,31 +168,3 @@ def weigh_tool(sensor: Array, rotation: Array, gravity: Array) -> ToolWeight:
         mass_sd=float(np.sqrt(np.mean(left**2) / np.sum(centred**2))),
         force_rms=float(np.sqrt(np.mean(left**2))),
     )
-
-
-def pose_remark(fit: PoseFit) -> Remark:
-    """A fitted pose as a remark."""
-    return fact(
-        "sensor-pose-fitted",
-        position_mm=(fit.pose.translation * 1e3).tolist(),
-        position_sd_mm=(fit.position_sd * 1e3).tolist(),
-        angles_deg=np.degrees(rpy_angles(fit.pose.rotation)).tolist(),
-        force_rms_N=fit.force_rms,
-        moment_rms_Nm=fit.moment_rms,
-    )
-
-
-def tool_remark(weight: ToolWeight) -> Remark:
-    """An identified tool as a remark."""
-    return fact(
-        "sensor-tool-weighed",
-        mass_kg=weight.mass,
-        mass_sd_kg=weight.mass_sd,
-        com_mm=(weight.com * 1e3).tolist(),
-        force_rms_N=weight.force_rms,
-    )
-
-
-def without_tool(sensor: Array, weight: ToolWeight, rotation: Array, gravity: Array) -> Array:
-    """A sensor's reading less the weight of its tool and its zero. (T, 6) [N, N·m]"""
-    return sensor - weight.reading(rotation, gravity)

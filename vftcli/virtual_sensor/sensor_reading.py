@@ -8,7 +8,7 @@ from vftcli.signals.arrays import Mask
 from vftcli.signals.lag import time_offset
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.null_space import Elsewhere
+from vftcli.virtual_sensor.null_space import NullSpaceVerdict
 from vftcli.virtual_sensor.solvers import SCALE
 from vftcli.virtual_sensor.vendor import VendorCheck
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
@@ -40,7 +40,7 @@ class SensorReading:
     free: Mask
     logged: Wrench | None = None
     vendor: VendorCheck | None = None
-    elsewhere: tuple[Elsewhere, ...] = ()
+    elsewhere: tuple[NullSpaceVerdict, ...] = ()
     reference: Wrench | None = None
     remarks: tuple[Remark, ...] = ()
 

@@ -31,7 +31,7 @@ TORQUE_SD = 0.3
 """Joint torque error where neither the observer nor an unloaded span says it. [N·m]"""
 
 
-class Decomposed(NamedTuple):
+class Decomposition(NamedTuple):
     """J_s J_sᵀ = U diag(λ) Uᵀ of every sample.
 
     Attributes:
@@ -51,7 +51,7 @@ class Decomposed(NamedTuple):
         return smallest
 
 
-def decompose(jacobian: Array) -> Decomposed:
+def decompose(jacobian: Array) -> Decomposition:
     """Decompose the flange Jacobian in base axes. (T, 6, n)
 
     Raises:
@@ -65,7 +65,7 @@ def decompose(jacobian: Array) -> Decomposed:
         )
     scaled = SCALE[:, None] * jacobian
     squares, U = np.linalg.eigh(scaled @ np.swapaxes(scaled, 1, 2))
-    return Decomposed(scaled, U, squares)
+    return Decomposition(scaled, U, squares)
 
 
 class Solution(NamedTuple):
@@ -80,7 +80,7 @@ class Solution(NamedTuple):
     root: Array
 
 
-def spectral_gain(parts: Decomposed, inverse: Array) -> Array:
+def spectral_gain(parts: Decomposition, inverse: Array) -> Array:
     """S U diag(inverse) Uᵀ J_s, for functions of the squared singular values. (T, 6, n)"""
     U = parts.U
     gain: Array = SCALE[:, None] * (
@@ -89,7 +89,7 @@ def spectral_gain(parts: Decomposed, inverse: Array) -> Array:
     return gain
 
 
-def inverses(parts: Decomposed, left_out: float = 0.0) -> Array:
+def inverses(parts: Decomposition, left_out: float = 0.0) -> Array:
     """1/λ, and 0 in directions whose singular value is at most `left_out` [m]. (T, 6) [1/m²]"""
     # λ is a difference of larger numbers: below its rounding it may even be negative.
     rounding = np.finfo(np.float64).eps * parts.squares[:, -1:]
@@ -97,7 +97,7 @@ def inverses(parts: Decomposed, left_out: float = 0.0) -> Array:
     return np.where(parts.squares > left_out**2, 1.0 / safe, 0.0) if left_out else 1.0 / safe
 
 
-def pinv(parts: Decomposed, sd: Array) -> Solution:
+def pinv(parts: Decomposition, sd: Array) -> Solution:
     """Least squares (46), the pseudo-inverse of Jᵀ: unbiased, and unbounded as σ_min → 0.
 
     Its covariance is that of the torque, seen through it.
@@ -106,7 +106,7 @@ def pinv(parts: Decomposed, sd: Array) -> Solution:
     return Solution(gain, gain * sd[:, None, :])
 
 
-def damped(parts: Decomposed, sd: Array) -> Solution:
+def damped(parts: Decomposition, sd: Array) -> Solution:
     """Damped least squares, 1/λ replaced by 1/(λ + δ²).
 
     Bounded everywhere and biased everywhere, towards zero by the share δ²/(σ² + δ²) in each
@@ -116,7 +116,7 @@ def damped(parts: Decomposed, sd: Array) -> Solution:
     return Solution(gain, gain * sd[:, None, :])
 
 
-def maximum_a_posteriori(parts: Decomposed, sd: Array) -> Solution:
+def maximum_a_posteriori(parts: Decomposition, sd: Array) -> Solution:
     """The most probable wrench under a normal prior of 50 N and 10 N·m about zero.
 
     w = C J Σ⁻¹τ with C = (J Σ⁻¹ Jᵀ + P⁻¹)⁻¹, its covariance: next to the least squares where the
@@ -131,7 +131,7 @@ def maximum_a_posteriori(parts: Decomposed, sd: Array) -> Solution:
     return Solution(gain, SCALE[:, None] * np.swapaxes(root, 1, 2))
 
 
-SOLVERS: dict[str, Callable[[Decomposed, Array], Solution]] = {
+SOLVERS: dict[str, Callable[[Decomposition, Array], Solution]] = {
     "pinv": pinv,
     "damped": damped,
     "map": maximum_a_posteriori,
@@ -150,7 +150,7 @@ def check_solver(name: str) -> str:
     return name
 
 
-def null_space(parts: Decomposed, tau: Array) -> Array:
+def null_space(parts: Decomposition, tau: Array) -> Array:
     """(I − Jᵀpinv(Jᵀ))τ: the torque that no wrench at the flange explains. (T, n) [N·m]
 
     A wrench at the flange leaves it unchanged; a contact further down the arm, or an error of the
@@ -174,11 +174,11 @@ class FlangeWrench(NamedTuple):
 
     Attributes:
         values: Force, then moment, about the flange point in the Jacobian's axes. (T, 6) [N, N·m]
-        told: Whether the pose can tell it: σ_min is at least `LEAST_SIGMA`. (T,)
+        known: Whether the pose can tell it: σ_min is at least `LEAST_SIGMA`. (T,)
     """
 
     values: Array
-    told: Mask
+    known: Mask
 
 
 def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> FlangeWrench:

@@ -11,7 +11,7 @@ from vftcli.signals.lag import Offset, time_offset
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import bridged, resampled
-from vftcli.signals.wrench import Wrench
+from vftcli.signals.wrench import Wrench, WrenchFrame
 
 DERIVED = 0.9995
 """A correlation that no independent measurement reaches: the field is made from the torques."""
@@ -103,7 +103,7 @@ class VendorCheck:
     """What a vendor's wrench field turns out to be.
 
     Attributes:
-        said: What its reader says of it.
+        stated_frame: What the log states of it, or None.
         frame: "base" or "flange": the axes that fit best.
         axes: Order, sign and gain of its axes in that frame.
         offset: Its lag behind ours, negative where it is earlier.
@@ -111,7 +111,7 @@ class VendorCheck:
         at_zeros: What our force reads there, rms of its norm. [N]
     """
 
-    said: str
+    stated_frame: WrenchFrame | None
     frame: str
     axes: AxesFit | None
     offset: Offset
@@ -133,7 +133,7 @@ class VendorCheck:
         found.append(
             fact(
                 turn.get(round(float(np.trace(self.axes.matrix))), "log-wrench-fits-other-axes"),
-                stated=self.said,
+                stated=str(self.stated_frame or "frame not stated"),
                 frame=self.frame,
                 axes=self.axes.words,
                 gain=self.axes.gain,
@@ -157,7 +157,7 @@ def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorChec
     theirs = recording.wrench
     if theirs is None:
         return None
-    said = str(recording.wrench_frame or "frame not stated")
+    stated = recording.wrench_frame
     empty = ~np.any(theirs, axis=1)
     zeros = float(np.mean(empty))
     norm = np.linalg.norm(ours.force[empty & ~ours.hidden], axis=1)
@@ -166,7 +166,7 @@ def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorChec
     usable = ~empty & ~ours.hidden
     if np.count_nonzero(usable) < 10:
         nothing = Offset(float("nan"), float("nan"))
-        return VendorCheck(said=said, frame="base", axes=None, offset=nothing, **shares)
+        return VendorCheck(stated_frame=stated, frame="base", axes=None, offset=nothing, **shares)
     flange = link_poses(chain, recording.q).rotation[:, -1]
     forces = {"base": ours.force, "flange": np.einsum("tji,tj->ti", flange, ours.force)}
     given = np.where(usable[:, None], theirs[:, :3], np.nan)
@@ -176,4 +176,4 @@ def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorChec
     offset = time_offset(recording.t, given, turned)
     moved = resampled(recording.t - offset.lag, recording.t, bridged(recording.t, turned))
     axes = fit_axes(np.where(usable[:, None], moved, np.nan) @ fits[frame].matrix, given)
-    return VendorCheck(said=said, frame=frame, axes=axes, offset=offset, **shares)
+    return VendorCheck(stated_frame=stated, frame=frame, axes=axes, offset=offset, **shares)

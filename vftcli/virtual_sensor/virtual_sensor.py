@@ -13,12 +13,12 @@ from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.frames import Mounting, check_frame, from_base, mounted
+from vftcli.virtual_sensor.frames import Mounting, check_frame, frame_pose, from_base
 from vftcli.virtual_sensor.solvers import (
     LEAST_SIGMA,
     SOLVERS,
     TORQUE_SD,
-    Decomposed,
+    Decomposition,
     check_solver,
     decompose,
     null_space,
@@ -49,7 +49,7 @@ class VirtualSensor:
 
     def __post_init__(self) -> None:
         check_solver(self.solver)
-        mounted(check_frame(self.frame), self.mounting)
+        frame_pose(check_frame(self.frame), self.mounting)
 
     def wrench(
         self, torque: ExternalTorque, q: Array, chain: Chain, sd: Array | None = None
@@ -110,12 +110,12 @@ class VirtualSensor:
             for k, torque in enumerate(torques)
         )
 
-    def geometry(self, chain: Chain, q: Array) -> tuple[Decomposed, Array]:
+    def geometry(self, chain: Chain, q: Array) -> tuple[Decomposition, Array]:
         """The decomposed Jacobian, and what takes a wrench from base axes to the frame."""
         flange = link_poses(chain, q).rotation[:, -1]
         return decompose(flange_jacobian(chain, q)), from_base(self.frame, flange, self.mounting)
 
-    def solve(self, parts: Decomposed, X: Array, tau: Array, sd: Array) -> tuple[Array, Array]:
+    def solve(self, parts: Decomposition, X: Array, tau: Array, sd: Array) -> tuple[Array, Array]:
         """Wrench and standard deviation of one chunk. (T, 6) each"""
         gain, root = SOLVERS[self.solver](parts, sd)
         values = np.squeeze(X @ (gain @ tau[:, :, None]), axis=2)
@@ -130,7 +130,7 @@ class VirtualSensor:
             chain: The arm.
         """
         poses = link_poses(chain, q)
-        flange, pose = poses.rotation[:, -1], mounted(self.frame, self.mounting)
+        flange, pose = poses.rotation[:, -1], frame_pose(self.frame, self.mounting)
         origin = poses.translation[:, -1] + flange @ pose.translation
         if self.frame == "base":
             return ForceArrow(origin, force)

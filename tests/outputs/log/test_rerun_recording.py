@@ -18,7 +18,7 @@ from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
-from vftcli.virtual_sensor.frames import mounted
+from vftcli.virtual_sensor.frames import frame_pose
 from vftcli.virtual_sensor.solvers import wrench_of
 
 CIRCLE = Path(__file__).parents[3] / "fixtures" / "ur5_circle.csv"
@@ -101,7 +101,7 @@ def test_the_arrow_is_the_force_to_scale(
     drawn = column(rows, "/robot/flange_force", "Arrows3D:vectors")
     q, tau = analysis.recording.q[::2], analysis.estimates[2].tau[::2]
     found = wrench_of(tau, flange_jacobian(analysis.robot.chain, q))
-    expected = np.where(found.told[:, None], found.values[:, :3], np.nan)
+    expected = np.where(found.known[:, None], found.values[:, :3], np.nan)
     assert len(drawn) == len(expected)
     for arrow, force in zip(drawn, expected, strict=True):
         if np.all(np.isfinite(force)):
@@ -156,7 +156,7 @@ def test_the_arrow_is_the_tabled_force_at_its_own_point(frame: str) -> None:
     reading = analysis.virtual_sensor
     assert arrow is not None
     assert reading is not None
-    pose = mounted(frame, reading.sensor.mounting)
+    pose = frame_pose(frame, reading.sensor.mounting)
     flange = link_poses(analysis.robot.chain, poses.q)
     turn = np.eye(3) if frame == "base" else flange.rotation[:, -1] @ pose.rotation
     tabled = reading.wrenches[0].force[rows]
