@@ -73,7 +73,7 @@ def group_parameters(chain: Chain, rotor: bool) -> Grouping:
     diagonal = np.abs(np.diag(R))
     rank = int(np.count_nonzero(diagonal > RANK_TOLERANCE * diagonal[0]))
     beta = np.asarray(np.linalg.solve(R[:rank, :rank], R[:rank, rank:]), dtype=np.float64)
-    beta[np.abs(beta) < 1e-9] = 0.0
+    beta[np.abs(beta) < 1e-9] = 0.0  # rounding, which would otherwise enter the names
     first = np.argsort(order[:rank])
     return Grouping(tuple(order[:rank][first].tolist()), tuple(order[rank:].tolist()), beta[first])
 
@@ -125,6 +125,7 @@ def base_parameters(triangles: Triangles, start: Array) -> BaseParameters:
     step = Vt[keep].T @ ((U[:, keep].T @ (z - R @ before)) / S[keep]) / scale
     values = before + step
     spread = np.sqrt(np.sum((Vt[keep].T / S[keep]) ** 2, axis=1) * triangles.correlation) / scale
+    # A parameter that lies mostly in directions without data has no spread to speak of.
     lost = np.sum(Vt[~keep] ** 2, axis=0) > DOUBTFUL
     sd = np.where(silent | lost, np.inf, spread)
     size = np.maximum(np.abs(values), np.abs(before))

@@ -38,7 +38,7 @@ SMALLEST_RADIUS = 1e-3
 
 
 def basis() -> Array:
-    """∂P/∂φ_k of the ten parameters. (10, 4, 4)"""
+    """How the pseudo-inertia P grows with each of a link's ten parameters, ∂P/∂φ_k. (10, 4, 4)"""
     out = np.zeros((LINK, 4, 4))
     out[0, 3, 3] = 1.0
     for k in range(3):
@@ -56,7 +56,7 @@ BASIS = basis()
 
 
 def pseudo_inertias(phi: Array) -> Array:
-    """Pseudo-inertia of each link. (n, 4, 4)"""
+    """Pseudo-inertia P of each link from all inertial parameters (10n,). (n, 4, 4)"""
     P: Array = np.einsum("jk,krc->jrc", phi.reshape(-1, LINK), BASIS)
     return P
 
@@ -153,6 +153,7 @@ def solve(problem: Problem, x: Array) -> Array:
         step, decrement = problem.step(x)
         if decrement < SETTLED:
             return x
+        # Backtracking keeps every iterate physical: outside, the cost is infinite.
         length, low = 1.0, 1e-12
         while (new := problem.value(x + length * step)) > cost - 1e-4 * length * decrement:
             length *= 0.5
@@ -195,6 +196,8 @@ def fit_at(
 ) -> Array:
     """The physical model at one weight; the equations count as correlated as they are. (size,)"""
     R, z = triangles.joined(leave_out)
+    # Correlated rows say the same thing again; dividing them makes the misfit a log-likelihood
+    # that can be weighed against the distance.
     shrink = 1.0 / np.sqrt(triangles.correlation)
     return solve(Problem(R * shrink, z * shrink, start, triangles.layout, weight), x)
 
@@ -207,6 +210,7 @@ def fit_consistent(triangles: Triangles, profile: Array) -> ConsistentFit:
         profile: The profile's parameters with fitted friction. (size,)
     """
     start = starting_point(triangles.layout, profile)
+    # Strongest first: each fit starts where the last one, pulled harder, ended.
     totals = dict.fromkeys(WEIGHTS[::-1], 0.0)
     for part in range(len(triangles.parts)):
         x = start
@@ -223,6 +227,7 @@ def fit_consistent(triangles: Triangles, profile: Array) -> ConsistentFit:
 def nearest_physical(triangles: Triangles, profile: Array, weight: float = WEIGHTS[0]) -> Array:
     """The physical model that predicts nearly what least squares predicts. (size,)"""
     start = starting_point(triangles.layout, profile)
+    # From the strongest pull on, each optimum is a good start for the next, weaker one.
     x = start
     for pull in (w for w in WEIGHTS[::-1] if w >= weight):
         x = fit_at(triangles, start, pull, x)

@@ -53,7 +53,7 @@ def find_excitation(motions: Sequence[PreparedLog]) -> Excitation:
     Raises:
         IdentificationError: If no joint moves: a log at rest identifies nothing.
     """
-    times = np.zeros((2, motions[0].joints))
+    times = np.zeros((2, motions[0].dq.shape[1]))
     for motion in motions:
         if motion.samples < 2:
             continue
@@ -68,6 +68,7 @@ def find_excitation(motions: Sequence[PreparedLog]) -> Excitation:
             "identifies no friction and no inertia. Record free motion, or use --find-payload "
             "on static poses"
         )
+    # A tenth of a second back is enough to tell the sign of friction from an offset.
     return Excitation(moves, np.min(times, axis=0) >= 0.1 * ENOUGH)
 
 

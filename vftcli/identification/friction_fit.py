@@ -91,6 +91,7 @@ def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
     rich = tellable_terms(RICHEST, data)
     start = fit_column(data.columns(j, Shape(rich)), data.y, data.weights)
 
+    # Weights of outliers are held: candidates must answer for the same samples.
     def error(smoothing: float) -> float:
         return cross_validated(data.columns(j, Shape(rich, smoothing)), data.y, start.weights)
 
@@ -110,7 +111,7 @@ def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
 
 
 def candidate_shapes(smoothing: float, data: JointData) -> Iterator[Shape]:
-    """The shapes that compete, each once."""
+    """The friction shapes that compete for a joint at one smoothing [rad/s], each once."""
     shapes: dict[Shape, None] = {}
     for terms in CANDIDATES:
         kept = tellable_terms(terms, data)

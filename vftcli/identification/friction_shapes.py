@@ -35,7 +35,7 @@ class Shape(NamedTuple):
 
     @property
     def model(self) -> str:
-        """The robot file's name for it."""
+        """Name of the friction model that the robot file gets: the simplest that has all terms."""
         if "stribeck" in self.terms:
             return "coulomb-viscous-stribeck"
         if "load_coulomb" in self.terms:
@@ -99,7 +99,8 @@ class FrictionColumns:
         self.cache: dict[tuple[str, int, float, float], Array] = {}
 
     def column(self, term: str, j: int, shape: Shape) -> Array:
-        """One term of joint j. (M,)"""
+        """One term of joint j (from 0), filtered like the torque and kept for later calls. (M,)"""
+        # The key holds only what the term depends on, so that shapes share their columns.
         steep = shape.smoothing if term in {"coulomb", "load_coulomb", "stribeck"} else 0.0
         fades = shape.stribeck_velocity if term == "stribeck" else 0.0
         key = (term, j, steep, fades)
@@ -110,6 +111,6 @@ class FrictionColumns:
         return self.cache[key]
 
     def joint(self, j: int, shape: Shape) -> Array:
-        """All terms of joint j. (M, k)"""
+        """All terms of a shape for joint j (from 0), one column a term. (M, k)"""
         columns = [self.column(term, j, shape) for term in shape.terms]
         return np.stack(columns, axis=1) if columns else np.zeros((self.motion.samples, 0))

@@ -54,6 +54,7 @@ def fit_column(A: Array, y: Array, weights: Array) -> ColumnFit:
             f"{np.count_nonzero(weights)} samples in motion for {A.shape[1]} unknowns; "
             "record a longer log in which every joint moves"
         )
+    # Iteratively reweighted least squares: what the last fit leaves decides who is an outlier.
     outliers = np.ones_like(y)
     for _ in range(PASSES):
         x = normal(A, y, weights * outliers).solution()
@@ -77,7 +78,7 @@ class Normal(NamedTuple):
     square: float
 
     def minus(self, other: "Normal") -> "Normal":
-        """What is left when some rows are taken away."""
+        """The normal equations without some of the rows: least squares of all stretches but one."""
         return Normal(self.gram - other.gram, self.right - other.right, self.square - other.square)
 
     def solution(self) -> Array:
@@ -91,12 +92,12 @@ class Normal(NamedTuple):
         return x
 
     def misfit(self, x: Array) -> float:
-        """Sum of squares that x leaves."""
+        """Sum of squares ‖A x − y‖² that a solution x (k,) leaves."""
         return max(self.square - 2.0 * float(x @ self.right) + float(x @ self.gram @ x), 0.0)
 
 
 def normal(A: Array, y: Array, weights: Array) -> Normal:
-    """Accumulate weighted rows."""
+    """Normal equations of rows A (M, k), y (M,) with weights (M,)."""
     weighted = A * weights[:, None]
     return Normal(weighted.T @ A, weighted.T @ y, float(weights @ (y * y)))
 

@@ -47,7 +47,7 @@ REACH = 1.0
 
 
 def names_of(recordings: Sequence[Recording]) -> str:
-    """Names of logs as one text."""
+    """Names of several logs as one text, for messages and tables."""
     return ", ".join(recording.name for recording in recordings)
 
 
@@ -214,12 +214,14 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
     def distance(shift: float) -> float:
         at = motion.t + shift
         inside = (at >= other.t[0]) & (at <= other.t[-1])
+        # Two short ends may agree by chance: at least half of the motion must overlap.
         if np.count_nonzero(inside) < 0.5 * len(at):
             return float("inf")
         there = resampled(at[inside], other.t, other.q)
         return float(np.sqrt(np.mean((there - motion.q[inside]) ** 2)))
 
     low, high = other.t[0] - motion.t[-1], other.t[-1] - motion.t[0]
+    # The distance has many local minima, so the whole range is tried before it is refined.
     best = min(np.arange(low, high, COARSE), key=distance)
     for step in (COARSE / 5, COARSE / 25, FINE):
         best = min(best + step * np.arange(-6, 7), key=distance)
@@ -264,7 +266,7 @@ def resting_poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array,
         effort = drive_torque(recording, robot)
         for start, stop in runs_of(standing(recording)):
             if recording.t[stop - 1] - recording.t[start] >= DWELL:
-                edge = (stop - start) // 5
+                edge = (stop - start) // 5  # where the arm still settles or already leaves
                 span = slice(start + edge, stop - edge)
                 q.append(recording.q[span].mean(axis=0))
                 torque.append(effort[span].mean(axis=0))

@@ -92,13 +92,8 @@ class PreparedLog:
     usable: Mask
 
     @property
-    def joints(self) -> int:
-        """Number of joints n."""
-        return int(self.q.shape[1])
-
-    @property
     def samples(self) -> int:
-        """Number of samples M."""
+        """Number of samples M that were kept; 0 where nothing moves."""
         return len(self.t)
 
     def filtered(self, signals: Array) -> Array:
@@ -111,7 +106,7 @@ class PreparedLog:
         return np.concatenate(columns, axis=1)
 
     def chunks(self, size: int = 1024) -> Iterator[slice]:
-        """Spans of samples to work on at a time."""
+        """Spans of at most `size` samples: a regressor of a whole log would not fit into memory."""
         for start in range(0, self.samples, size):
             yield slice(start, min(start + size, self.samples))
 
@@ -154,6 +149,7 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
     """
     torque, dq = drive_torque(recording, robot), recording.require("dq")
     t, stride = recording.t, processing.stride(recording.median_step)
+    # Before the first and after the last movement stiction holds what no model of velocity knows.
     moving = np.flatnonzero(np.any(np.abs(dq) > processing.still, axis=1))
     kept = np.arange(moving[0], moving[-1] + 1, stride) if moving.size else np.arange(0)
     columns: dict[str, list[Array]] = {"q": [], "dq": [], "ddq": [], "tau": []}
@@ -181,6 +177,7 @@ def usable_samples(t: Array, dq: Array, processing: Processing) -> Mask:
         for start, stop in runs_of(column <= processing.still):
             if t[stop - 1] - t[start] >= processing.rest:
                 usable[start:stop, j] = False
+    # What the filter makes of a gap reaches half a period of its cutoff to either side.
     margin = 0.5 / processing.cutoff
     for k in gaps_of(t, processing.gap):
         usable[(t > t[k] - margin) & (t < t[k + 1] + margin)] = False

@@ -75,7 +75,7 @@ def with_provenance(
 
 
 def source_table(index: int, recording: Recording) -> dict[str, Any]:
-    """One log as a source."""
+    """One log as an entry of the robot file's ``[[sources]]``, numbered from 1."""
     return {
         "id": f"log-{index}",
         "what": "what `identification` and the joints' confidence name",

@@ -68,7 +68,7 @@ UNITS = {
 
 
 def root_mean_square(x: Array) -> Array:
-    """Root mean square of each column. (n,)"""
+    """Root mean square of each column of x (M, n), in its unit. (n,)"""
     value: Array = np.sqrt(np.mean(x**2, axis=0))
     return value
 
@@ -122,7 +122,7 @@ class Trace(NamedTuple):
 
     @property
     def recording(self) -> Recording:
-        """The log."""
+        """The log that was scored."""
         return self.motion.recording
 
     @property

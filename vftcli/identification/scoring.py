@@ -70,7 +70,7 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, processing: P
     """
     motion = prepare(log, profile, processing)
     if motion.samples < 2:
-        return Trace(motion, role, motion.tau, motion.tau, np.zeros(motion.joints))
+        return Trace(motion, role, motion.tau, motion.tau, np.zeros(motion.tau.shape[1]))
     before = root_mean_square(motion.tau - predicted_torque(profile, motion))
     measured = motion.tau * constant_ratio(profile, robot, motion)
     return Trace(motion, role, measured, predicted_torque(robot, motion), before)

@@ -40,23 +40,23 @@ class ParameterColumns(NamedTuple):
 
     @property
     def inertial(self) -> int:
-        """Number of inertial unknowns."""
+        """Number of inertial unknowns: ten a link, the first of the vector."""
         return LINK * self.chain.joints
 
     @property
     def rotors(self) -> int:
-        """Number of rotor inertias."""
+        """Number of rotor inertias, which follow; 0 where torque is measured behind the gear."""
         return self.chain.joints if self.rotor else 0
 
     @property
     def frictions(self) -> tuple[slice, ...]:
-        """Place of each joint's friction coefficients."""
+        """Where in the vector each joint's friction coefficients stand, behind the rotors."""
         edges = np.cumsum([self.inertial + self.rotors, *(len(s.terms) for s in self.shapes)])
         return tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(edges))
 
     @property
     def size(self) -> int:
-        """Number of unknowns."""
+        """Number of unknowns in all, the length of the vector."""
         return int(self.frictions[-1].stop)
 
     @property
@@ -69,7 +69,11 @@ class ParameterColumns(NamedTuple):
         return (*inertial, *rotors, *terms)
 
     def rows(self, motion: PreparedLog, columns: FrictionColumns, span: slice) -> Array:
-        """The regressor of some samples. (N, n, size)"""
+        """The regressor A of the samples of a span: A x is the drive torque of every joint.
+
+        Returns:
+            Its rows. (N, n, size)
+        """
         n = self.chain.joints
         q, dq, ddq = motion.q[span], motion.dq[span], motion.ddq[span]
         A = np.zeros((len(q), n, self.size))
@@ -135,7 +139,7 @@ REWEIGHTINGS = 3
 
 
 def residuals(layout: ParameterColumns, data: WeightedLog, x: Array) -> Array:
-    """Torque that x does not explain. (M, n) [N·m]"""
+    """Drive torque of a log that the unknowns x (size,) do not explain. (M, n) [N·m]"""
     motion = data.motion
     out = np.empty(motion.q.shape)
     for span in motion.chunks():
@@ -182,6 +186,7 @@ def triangulate(
         for r, w in zip(residual.T, data.weights.T, strict=True):
             if np.count_nonzero(w) > 10:
                 correlation.append(correlation_time(r[w > 0]))
+        # Stretches are contiguous: neighbouring samples would tell each other's noise.
         for k, fold in enumerate(folds(data.motion.samples)):
             for rows in weighted_rows(layout, data, np.sqrt(weights) / sigma, fold):
                 parts[k] = triangle(np.vstack([parts[k], rows]))

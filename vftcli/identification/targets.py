@@ -152,6 +152,7 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[Co
 
 def joint_model(j: int, logs: Sequence[Targets], before: float) -> ControllerModel:
     """Read one joint's model; K first, since friction needs it."""
+    # K is needed for friction; of two ways to it, the surer one in this log is taken.
     still, moving = constant_at_rest(j, logs), constant_in_motion(j, logs)
     constant = min((still, moving), key=relative_sd)
     K = constant.value if constant.known else before
@@ -247,6 +248,7 @@ def rotor_inertia(j: int, logs: Sequence[Targets]) -> tuple[Estimate, Estimate]:
         return nothing, nothing
     used = np.ones(len(rows))
     fit = fit_column(rows[:, :-1], rows[:, -1], used)
+    # Half of what robustness changes is added to the spread: an account of the model's error.
     plain = solve(rows[:, :-1], rows[:, -1])
     value, sd = float(plain[0]), float(np.hypot(fit.sd[0], 0.5 * (fit.values[0] - plain[0])))
     rotor = Estimate(value, sd, value > 0 and sd <= ROTOR_KNOWN * value)

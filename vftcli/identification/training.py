@@ -128,6 +128,7 @@ def fit_frictions(data: Training, weights: Sequence[Array]) -> list[JointFit | N
             fits.append(None)
             continue
         found = fit_joint(data, j, weights, data.fit_constants)
+        # A joint that carries little cannot tell its constant from its friction.
         if data.fit_constants and not constant_known(found.fit):
             found = fit_joint(data, j, weights, False)
         fits.append(found)

@@ -89,7 +89,11 @@ def base_remark(base: BaseParameters, layout: ParameterColumns) -> Remark:
 def stack_training(
     data: Training, layout: ParameterColumns, start: Array, weights: Sequence[Array]
 ) -> Triangles:
-    """The stacked equations of all logs."""
+    """The stacked, weighted equations of all training logs.
+
+    Raises:
+        IdentificationError: If there are hardly more equations than unknowns.
+    """
     logs = [
         WeightedLog(m, c, w) for m, c, w in zip(data.motions, data.columns, weights, strict=True)
     ]

@@ -112,7 +112,7 @@ class Arm:
 
     @property
     def t(self) -> float:
-        """Time now. [s]"""
+        """True time since the start of the run. [s]"""
         return self.history.rows * self.scenario.step
 
     @property
@@ -153,6 +153,7 @@ class Arm:
         t = (k + 0.5) * plant.step
         if self.scenario.friction.temperature_coefficient and k % WARMING_STEPS == 0:
             self.warm_up(t)
+        # Contacts cost Jacobians; most steps have none.
         if self.touching.anything(t):
             plant.advance(tau, lambda m, data, v: self.touching.torque(t, m, data, v))
             history.wrenches[k] = self.touching.wrenches

@@ -19,6 +19,7 @@ def read_force_sensor(arm: Arm, samples: Samples, truth: Truth) -> Array | None:
     spec = arm.scenario.force_sensor
     if spec is None:
         return None
+    # Its own generator: mounting a sensor leaves the noise of all other signals as it was.
     rng = np.random.default_rng(arm.seeds["sensing"].spawn(1)[0])
     clean = np.zeros((len(samples.time), 6))
     turn = rpy_matrix(spec.rpy)

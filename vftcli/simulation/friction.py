@@ -62,11 +62,12 @@ class TrueFriction:
             rest = 1.0 / (1.0 + np.exp(-self.slope * self.shift))
             torque = torque + self.amplitude * (bell - rest)
             slope = slope + self.amplitude * self.slope * bell * (1.0 - bell)
+        # The step treats the slope implicitly; a negative one would pump energy into the joint.
         return torque, np.maximum(slope, 0.0)
 
     @property
     def has_sigmoid(self) -> bool:
-        """Whether any joint has sigmoid friction."""
+        """Whether any joint has sigmoid friction; exponentials are left out where none has."""
         return bool(self.amplitude.any())
 
     def with_viscous_factor(self, factor: float) -> "TrueFriction":

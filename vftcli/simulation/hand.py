@@ -71,7 +71,7 @@ class Hand:
         return None
 
     def active(self, t: float) -> bool:
-        """Whether the hand holds on."""
+        """Whether the hand holds the arm at time `t` [s]."""
         return self.span(t) is not None
 
     def wrench(self, t: float, place: Place) -> Array:
@@ -80,6 +80,7 @@ class Hand:
         if k is None:
             return np.zeros(6)
         if k != self.grip:
+            # A hand takes hold where the handle is at that moment, wherever that may be.
             self.grip, self.held_at, self.held_as = k, place.position, place.rotation
         spec = self.spec
         u = min((t - spec.spans[k][0]) / spec.reach, 1.0) if spec.reach > 0 else 1.0

@@ -34,13 +34,13 @@ class StopSpec:
     point: Vector = ORIGIN
 
     def start(self, rng: np.random.Generator, duration: float) -> "Stop":
-        """Make the stop ready; nothing is drawn."""
+        """The stop during a run; nothing of it is drawn at random."""
         del rng, duration
         return Stop(self)
 
 
 class Stop:
-    """A hard stop during a run."""
+    """A hard stop during a run: a one-sided spring and damper along its normal."""
 
     def __init__(self, spec: StopSpec) -> None:
         self.spec = spec
@@ -50,7 +50,7 @@ class Stop:
         self.normal = np.array(spec.normal) / length
 
     def active(self, t: float) -> bool:
-        """A stop is always there."""
+        """A stop is always there; whether it is met shows in its wrench."""
         del t
         return True
 

@@ -54,6 +54,7 @@ def reach(model: Any, pose: FlangePose, guess: Array) -> Array | None:  # noqa: 
         if size < REACHED:
             return q
         J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL)
+        # Far away damping keeps steps short at singularities; near the goal it must not slow down.
         damping = 1e-3 * min(size, 1.0) ** 2
         q = q + J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), error)
     return None
@@ -68,6 +69,7 @@ def follow(robot: Robot, poses: list[FlangePose], start: Array, what: str) -> Ar
     q, path = np.array(start, dtype=float), []
     for k, pose in enumerate(poses):
         found = reach(robot.model, pose, q)
+        # A jump of a radian is another branch of the inverse kinematics, not the path's next pose.
         if found is None or np.max(np.abs(found - q)) > 1.0:
             x, y, z = pose.translation
             raise ParameterError(

@@ -16,12 +16,12 @@ FOLDER = Path(__file__).parent / "scenarios"
 
 
 def scenario_names() -> tuple[str, ...]:
-    """Names of the built-in scenarios."""
+    """Names of the built-in scenarios, in alphabetical order."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
 def listing() -> list[tuple[str, str]]:
-    """Name and title of each built-in scenario."""
+    """Name and one-line title of each built-in scenario."""
     return [(name, load_scenario(name).title) for name in scenario_names()]
 
 
@@ -87,7 +87,11 @@ def section_of(node: Any, part: str, where: str) -> Any:  # noqa: ANN401 - TOML 
 
 
 def contact_named(contacts: list[Any], name: str, where: str) -> Any:  # noqa: ANN401
-    """Return the contact of a name."""
+    """The contact table of a name among the scenario's contacts.
+
+    Raises:
+        ParameterError: If no contact bears it.
+    """
     there = [str(c.get("name")) for c in contacts if isinstance(c, dict)]
     if name not in there:
         raise ParameterError(unknown_name(f"contact {where!r}", name, there or ["none"]))

@@ -60,6 +60,7 @@ def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> Tru
     friction = perturbed_friction(true_friction(robot, scenario.friction), sizes, rng)
     gain = 1.0 + deviate(rng, sizes.torque_constant, (n,))
     offset = deviate(rng, sizes.torque_offset, (n,))
+    # Drawn whether or not there is a payload, so that other draws do not move.
     scale = 1.0 + float(deviate(rng, sizes.payload, (1,))[0])
     nominal = robot.loaded_chain
     if scenario.payload is not None:

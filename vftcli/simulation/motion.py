@@ -19,11 +19,11 @@ class Reference(NamedTuple):
 
 
 class Command(Protocol):
-    """A commanded motion of known length."""
+    """A commanded motion of known length: what every ``[trajectory]`` becomes."""
 
     @property
     def duration(self) -> float:
-        """Its own length. [s]"""
+        """Time from its start to its end. [s]"""
         ...
 
     def at(self, t: Array) -> Reference:
@@ -51,11 +51,11 @@ class Periodic:
 
     @property
     def duration(self) -> float:
-        """Its own length. [s]"""
+        """Time of all rounds. [s]"""
         return self.period * self.cycles
 
     def at(self, t: Array) -> Reference:
-        """The reference at times `t` (T,) [s]."""
+        """The series and its two derivatives at times `t` (T,) [s]."""
         order = 2.0 * np.pi / self.period * np.arange(1, len(self.sine) + 1)
         c, s = np.cos(np.outer(t, order)), np.sin(np.outer(t, order))
         a, b, w = self.cosine, self.sine, order[:, None]
@@ -81,7 +81,7 @@ class Stretches:
     duration: float
 
     def at(self, t: Array) -> Reference:
-        """The reference at times `t` (T,) [s]."""
+        """Where the stretches lead at times `t` (T,) [s]; between them the motion rests."""
         from numpy.polynomial import chebyshev
 
         t = np.asarray(t, dtype=float)

@@ -64,6 +64,7 @@ class Plant:
 
     def advance(self, tau: Array, external: External | None = None) -> None:
         """Move one step on under drive torques `tau` (n,) [N·m] and the contacts' torque."""
+        # The midpoint velocity extrapolates the last acceleration; the first step has none yet.
         if not self.moved:
             signs = self.signs
             self.a = (self.impulses(tau, external) - self.v) / self.step

@@ -75,7 +75,7 @@ class Push(NamedTuple):
 
 
 class Segments:
-    """A sequence of pushes that do not overlap."""
+    """Pushes that follow one another, asked at times that never go back."""
 
     def __init__(self, pushes: list[Push], in_link: bool = False) -> None:
         self.pushes = sorted(pushes, key=lambda p: p.start)
@@ -83,7 +83,7 @@ class Segments:
         self.next = 0
 
     def current(self, t: float) -> Push | None:
-        """The push going on at `t`, or None. [s]"""
+        """The push going on at time `t` [s], or None between two."""
         while self.next < len(self.pushes) and self.pushes[self.next].stop <= t:
             self.next += 1
         if self.next < len(self.pushes) and self.pushes[self.next].start < t:
@@ -91,7 +91,7 @@ class Segments:
         return None
 
     def active(self, t: float) -> bool:
-        """Whether a push is going on."""
+        """Whether a push is going on at time `t` [s]."""
         return self.current(t) is not None
 
     def wrench(self, t: float, place: Place) -> Array:
@@ -230,7 +230,11 @@ class PushesSpec:
     point: Vector = ORIGIN
 
     def start(self, rng: np.random.Generator, duration: float) -> Segments:
-        """Draw the pushes."""
+        """Draw the pushes of a run of `duration` [s], one after another until none fits.
+
+        Raises:
+            ParameterError: If there is no such style, or lengths and pauses are not positive.
+        """
         check_choice("style", self.style, STYLES)
         given = {k: v for k in PushStyle._fields if (v := getattr(self, k)) is not None}
         style = STYLES[self.style]._replace(**given)

@@ -72,6 +72,7 @@ def save(simulation: Simulation, path: Path, format: str = "", force: bool = Fal
             WRITERS[chosen](parts[path], simulation)
             write_truth(parts[truth], simulation.truth, simulation.scenario.sensing.start)
             parts[scenario].write_text(to_toml(ran, simulation.seed), encoding="utf-8")
+            # All parts are complete before the first takes its place.
             for file, part in parts.items():
                 if file.is_dir():
                     shutil.rmtree(file)

@@ -94,7 +94,7 @@ def log_rate(spec: SensingSpec, robot: Robot) -> float:
 
 
 def sample_run(arm: Arm) -> Samples:
-    """Sample a finished run on the log's clock."""
+    """The true signals of a finished run at the instants of the log's own, drifting clock."""
     spec, history = arm.scenario.sensing, arm.close()
     rate = log_rate(spec, arm.robot)
     end = history.rows * history.step
@@ -182,6 +182,7 @@ def with_jitter(stamp: Array, size: float, rng: np.random.Generator) -> Array:
     draw = rng.standard_normal(len(stamp))
     if size == 0 or len(stamp) < 2:
         return stamp
+    # Less than half a period to either side: stamps must go on increasing.
     bound = 0.45 * (stamp[1] - stamp[0])
     moved: Array = stamp + np.clip(size * draw, -bound, bound)
     return moved

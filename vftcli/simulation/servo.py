@@ -66,7 +66,7 @@ class Servo:
         return rigid + friction_torque(self.robot.friction, dq)
 
     def torque(self, forward: Array, q_d: Array, dq_d: Array, q: Array, dq: Array) -> Array:
-        """The commanded torque. (n,) [N·m]"""
+        """The commanded torque at a state (q, dq) for a target, within the limits. (n,) [N·m]"""
         pull = self.omega**2 * (q_d - q) + self.rate * (dq_d - dq)
         tau: Array = forward + self.inertia(self.model, self.data, q) @ pull
         return np.minimum(np.maximum(tau, -self.limit), self.limit)

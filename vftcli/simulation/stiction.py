@@ -33,6 +33,7 @@ def slide_or_stick(
     from scipy.linalg.lapack import dposv
 
     for _ in range(GUESSES):
+        # While every joint slides, one Cholesky solve settles the step; it is by far most of them.
         if signs.all():
             _, step, _ = dposv(M, impulse - limit * signs)
             after = v + step

@@ -36,7 +36,11 @@ class CircleSpec:
     towards: float = 0.0
 
     def motion(self, robot: Robot) -> Command:
-        """Solve the circle for the joints of `robot`."""
+        """The circle as a Fourier series of the joints.
+
+        Raises:
+            ParameterError: If it is out of reach, or winds a joint up.
+        """
         if self.radius <= 0 or self.period <= 0 or self.cycles <= 0:
             raise ParameterError("trajectory radius, period and cycles must be positive")
         start = check_start(robot, self.start)
@@ -75,7 +79,7 @@ class HoldSpec:
     length: float = 10.0
 
     def motion(self, robot: Robot) -> Command:
-        """The pose as a motion of no amplitude."""
+        """A motion that stays at the pose, the usual one if none is given."""
         start = check_start(robot, self.start)
         return Stretches(
             times=np.array([[0.0, 1.0]]),
@@ -101,7 +105,11 @@ class OffsetsSpec:
     start: tuple[float, ...] = ()
 
     def motion(self, robot: Robot) -> Command:
-        """Solve every line for the joints of `robot`."""
+        """Each line as a polynomial path of the joints, run through with minimum jerk.
+
+        Raises:
+            ParameterError: If a point is out of reach or the times do not increase.
+        """
         from numpy.polynomial import chebyshev
 
         q = check_start(robot, self.start)
@@ -138,7 +146,11 @@ class JointMovesSpec:
     start: tuple[float, ...] = ()
 
     def motion(self, robot: Robot) -> Command:
-        """Minimum-jerk moves."""
+        """The moves, straight in joint space and with minimum jerk.
+
+        Raises:
+            ParameterError: If a row has another length or the times do not increase.
+        """
         start = check_start(robot, self.start)
         if any(len(row) != 2 + robot.joints for row in self.moves):
             raise ParameterError(

@@ -52,6 +52,7 @@ def vendor_view(arm: Arm, samples: Samples, measured: Measured) -> Vendor:
 
 def first_order_low_pass(signal: Array, cutoff: float, step: float) -> Array:
     """First-order low-pass at `cutoff` [Hz] of a signal (M, n) sampled every `step` [s]."""
+    # Exact discretisation of the first-order filter for an input held over the step.
     share = 1.0 - np.exp(-2.0 * np.pi * cutoff * step)
     out = np.empty_like(signal)
     state = signal[0].copy()

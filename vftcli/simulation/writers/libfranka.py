@@ -78,5 +78,5 @@ def franka_table(simulation: Simulation) -> Array:
 
 
 def next_rows(values: Array) -> Array:
-    """Each row's successor, the last repeated."""
+    """Each row's successor, the last repeated: a command is executed one cycle later. (M, m)"""
     return np.vstack([values[1:], values[-1:]])

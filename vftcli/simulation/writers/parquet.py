@@ -47,7 +47,7 @@ def write_truth(path: Path, truth: Truth, start: float) -> None:
 
 
 def write_columns(path: Path, columns: dict[str, Array]) -> None:
-    """Write a flat table of doubles."""
+    """Write named columns (M,) of doubles as one Parquet table."""
     import polars as pl
 
     pl.DataFrame(columns).write_parquet(path, compression="zstd")

@@ -80,7 +80,7 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
 
 
 def typestore() -> Any:  # noqa: ANN401 - rosbags builds its types at run time
-    """ROS 2's messages and Franka's."""
+    """The message types a bag declares: those of ROS 2 Humble, and Franka's."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)

@@ -119,7 +119,7 @@ def ur_columns(simulation: Simulation, names: Sequence[str]) -> dict[str, list[A
 
 
 def joint_fields(simulation: Simulation, current: Array, target_current: Array) -> dict[str, Array]:
-    """Fields known joint by joint. (M, n) each"""
+    """Fields of the client that hold one number a joint, by name. (M, n) each"""
     samples, measured = simulation.samples, simulation.measured
     fields = {
         "timestamp": measured.stamp + simulation.scenario.sensing.start,

@@ -20,5 +20,5 @@ def write_ur_rtde(path: Path, simulation: Simulation) -> None:
 
 
 def as_text(values: Iterable[Any]) -> list[str]:
-    """Doubles with six decimals, integers bare."""
+    """A column as the recorder prints it: doubles with six decimals, integers bare."""
     return [f"{v:.6f}" if isinstance(v, float) else str(v) for v in values]
