@@ -1,0 +1,74 @@
+"""Flange poses and the way back, limits and starts."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from vftcli.robots import load_robot
+from vftcli.signals.errors import ParameterError
+from vftcli.simulation.kinematics import (
+    HOMES,
+    FlangePose,
+    check_limits,
+    check_start,
+    flange_pose,
+    follow,
+    reach,
+)
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_a_pose_nearby_is_reached(name):
+    robot = load_robot(name)
+    home = np.array(HOMES[robot.joints])
+    goal = flange_pose(robot.model, home + 0.1)
+    found = reach(robot.model, goal, home)
+    pose = flange_pose(robot.model, found)
+    # the iteration stops at an error twist of 1e-10
+    np.testing.assert_allclose(pose.translation, goal.translation, atol=1e-9)
+    np.testing.assert_allclose(pose.rotation, goal.rotation, atol=1e-9)
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, found)
+    frame = data.oMf[robot.model.getFrameId("flange")]
+    np.testing.assert_allclose(frame.translation, goal.translation, atol=1e-9)
+
+
+def test_a_pose_out_of_reach_is_none():
+    robot = load_robot("ur5")
+    home = np.array(HOMES[6])
+    far = FlangePose(np.eye(3), np.array([2.0, 0.0, 0.0]))  # a UR5 reaches 0.85 m
+    assert reach(robot.model, far, home) is None
+    with pytest.raises(ParameterError, match=r"a line: the flange .* \(point 2 of 2\)"):
+        follow(robot, [flange_pose(robot.model, home), far], home, "a line")
+
+
+def test_a_path_is_followed_without_changing_branch():
+    robot = load_robot("ur5")
+    home = np.array(HOMES[6])
+    start = flange_pose(robot.model, home)
+    points = [start.translation + np.array([0.0, 0.01 * k, 0.0]) for k in range(10)]
+    path = follow(robot, [FlangePose(start.rotation, p) for p in points], home, "a line")
+    np.testing.assert_allclose(path[0], home, atol=1e-9)
+    assert np.max(np.abs(np.diff(path, axis=0))) < 0.05  # 1 cm at half a metre, and a wrist
+    np.testing.assert_allclose(flange_pose(robot.model, path[-1]).translation, points[-1])
+
+
+def test_limits_are_held_joint_by_joint():
+    robot = load_robot("panda")
+    q = np.tile(check_start(robot, ()), (2, 1))
+    still = np.zeros_like(q)
+    check_limits(robot, q, still, "a rest")
+    over, fast = q.copy(), still.copy()
+    over[1, 3] = robot.limits.q_max[3] + 0.01
+    fast[0, 5] = -robot.limits.qd_max[5] - 0.01
+    with pytest.raises(ParameterError, match=r"joint 4 of 'panda' would move over"):
+        check_limits(robot, over, still, "a move")
+    with pytest.raises(ParameterError, match=r"joint 6 of 'panda' would move at"):
+        check_limits(robot, q, fast, "a move")
+
+
+def test_starts_have_as_many_angles_as_joints():
+    robot = load_robot("ur5")
+    np.testing.assert_array_equal(check_start(robot, ()), HOMES[6])
+    with pytest.raises(ParameterError, match="has 2 angles; robot 'ur5' has 6"):
+        check_start(robot, (0.0, 1.0))

@@ -1,0 +1,116 @@
+"""Contacts on the arm: their joint torque by virtual work, and the truth they leave."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from vftcli.robots import load_robot
+from vftcli.signals.errors import ParameterError
+from vftcli.simulation import load_scenario, simulate
+from vftcli.simulation.pushes import ProfileSpec
+from vftcli.simulation.touch import RandomWalkSpec, Touching, cross
+from vftcli.simulation.truth import at_other_point
+from vftcli.simulation.vendor import first_order_low_pass
+
+ROBOT = load_robot("ur5")
+FORCE, MOMENT, POINT = (3.0, -4.0, 12.0), (0.5, 0.2, -0.3), (0.02, 0.05, 0.1)
+Q = np.linspace(-1.0, 0.8, 6)
+
+
+def torque_of(link: int, axes: str = "base") -> tuple[np.ndarray, Touching]:
+    """Joint torque of one steady push in the middle of its span."""
+    spec = ProfileSpec(
+        name="p",
+        spans=((0.0, 10.0),),
+        force=FORCE,
+        torque=MOMENT,
+        link=link,
+        point=POINT,
+        axes=axes,
+    )
+    touching = Touching((spec,), ROBOT.chain, 1000, 0.01, np.random.SeedSequence(1))
+    data = ROBOT.model.createData()
+    pin.computeJointJacobians(ROBOT.model, data, Q)
+    return touching.torque(5.0, ROBOT.model, data, np.zeros(6)), touching
+
+
+def point_of(q: np.ndarray, link: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where the point is and how its body is turned, by Pinocchio."""
+    data = ROBOT.model.createData()
+    pin.framesForwardKinematics(ROBOT.model, data, q)
+    frame = data.oMf[ROBOT.model.getFrameId("flange")] if link == 0 else data.oMi[link]
+    return frame.act(np.array(POINT)), frame.rotation
+
+
+@pytest.mark.parametrize("link", [0, 3, 5])
+def test_joint_torque_is_virtual_work(link):
+    tau, touching = torque_of(link)
+    h = 1e-6
+    for j in range(6):
+        ends = [point_of(Q + sign * h * np.eye(6)[j], link) for sign in (1, -1)]
+        speed = (ends[0][0] - ends[1][0]) / (2 * h)
+        spin = pin.log3(ends[0][1] @ ends[1][1].T) / (2 * h)
+        # differences of order h²: 1e-9 of forces of 13 N
+        assert tau[j] == pytest.approx(np.dot(FORCE, speed) + np.dot(MOMENT, spin), abs=1e-7)
+    np.testing.assert_allclose(touching.wrenches, [[*FORCE, *MOMENT]])
+
+
+def test_link_axes_turn_with_the_link():
+    _, touching = torque_of(0, "link")
+    rotation = point_of(Q, 0)[1]
+    np.testing.assert_allclose(touching.wrenches[0, :3], rotation @ FORCE, atol=1e-12)
+    np.testing.assert_allclose(touching.wrenches[0, 3:], rotation @ MOMENT, atol=1e-12)
+
+
+def test_nothing_pushes_outside_its_span():
+    spec = ProfileSpec(name="p", spans=((1.0, 2.0),), force=FORCE)
+    touching = Touching((spec,), ROBOT.chain, 1000, 0.01, np.random.SeedSequence(1))
+    assert not touching.anything(0.5)
+    assert touching.anything(1.5)
+    assert not touching.anything(2.5)
+
+
+@pytest.mark.parametrize("link", [-1, 7])
+def test_links_that_are_not_there_are_refused(link):
+    spec = ProfileSpec(name="p", spans=((0.0, 1.0),), link=link)
+    with pytest.raises(ParameterError, match=f"link is {link}; it is 0 .flange. to 6"):
+        Touching((spec,), ROBOT.chain, 10, 0.01, np.random.SeedSequence(1))
+
+
+def test_walks_begin_at_zero_when_they_begin():
+    spec = RandomWalkSpec(name="w", intensity=(4.0,), begin=0.05)
+    touching = Touching((spec,), ROBOT.chain, 20, 0.01, np.random.SeedSequence(1))
+    walk = touching.walks[0].torque
+    assert not walk[:6].any()
+    assert walk[6:].all()
+    assert touching.anything(0.0)  # a walk acts all the time, if only with zero
+
+
+def test_small_algebra():
+    a, b = np.random.default_rng(2).standard_normal((2, 3))
+    np.testing.assert_allclose(cross(a, b), np.cross(a, b), atol=1e-15)
+    wrench = at_other_point(np.array([0.0, 0.0, 10.0, 1.0, 2.0, 3.0]), np.array([0.2, 0.1, 0.0]))
+    # moment r × f = (0.1·10, −0.2·10, 0) is added, the force stays
+    np.testing.assert_allclose(wrench, [0.0, 0.0, 10.0, 2.0, 0.0, 3.0], atol=1e-15)
+
+
+def test_the_truth_of_a_flange_push_is_its_wrench_at_the_origin():
+    scenario = load_scenario("ur5-circle", ["duration=1.0", "contacts=[]"])
+    push = ProfileSpec(name="p", spans=((0.2, 0.8),), force=(0, 0, -20.0), point=(0.1, 0, 0))
+    run = simulate(replace(scenario, contacts=(push,)), 1)
+    middle = np.argmin(np.abs(run.truth.t - 0.5))
+    np.testing.assert_allclose(run.truth.wrench[middle, :3], [0, 0, -20.0], atol=1e-9)
+    # lever of 0.1 m in flange axes, turned into the base, times 20 N: at most 2 N·m
+    assert np.linalg.norm(run.truth.wrench[middle, 3:]) <= 2.0 + 1e-9
+    assert not run.truth.wrench[run.truth.t < 0.19].any()
+    assert set(run.truth.columns()) >= {"t", "tau_ext/1", "tau_ext/6", "wrench/fx", "wrench/mz"}
+
+
+def test_the_vendors_filter_is_first_order():
+    step = np.vstack([np.zeros((1, 1)), np.ones((500, 1))])
+    out = first_order_low_pass(step, cutoff=5.0, step=0.002)[:, 0]
+    t = 0.002 * np.arange(501)
+    # input held over the step: exactly 1 − exp(−2π f t)
+    np.testing.assert_allclose(out, 1.0 - np.exp(-2 * np.pi * 5.0 * t), atol=1e-12)
