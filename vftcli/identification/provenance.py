@@ -40,7 +40,7 @@ def with_provenance(
         path=None,
     )
     document = robot_document(named)
-    new = f"identified ({found.method}) from {', '.join(r.name for r in trained)}"
+    new = f"identified ({found.method}) from {names_of(trained)}"
     old = f"profile {profile.name}"
     sure = found.parameters.filter("determined")
     determined = set(zip(sure["joint"], sure["parameter"], strict=True))
