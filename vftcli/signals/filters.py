@@ -8,9 +8,6 @@ from vftcli.signals.arrays import Array, is_uniform
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.series import median_step, resampled
 
-Kind = Literal["lowpass", "bandpass"]
-"""What a filter lets through."""
-
 ORDER = 2
 """Order of the Butterworth filter; run forwards and backwards it attenuates twice as much."""
 
