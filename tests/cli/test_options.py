@@ -18,7 +18,7 @@ READING = {
     "report": ("-o", "out"),
     "tune": ("-o", "gains.toml"),
     "admit": (),
-    "identify": ("-o", "robot.toml"),
+    "identify": ("-o", "robot.toml", "--find-payload"),
     "inspect": (),
     "convert": ("-o", "log.parquet"),
 }
