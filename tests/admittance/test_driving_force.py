@@ -1,12 +1,15 @@
 """What drives a replay: an observer's torque of a file, the log's sensor, or the truth."""
 
+from pathlib import Path
+
 import numpy as np
+import polars as pl
 import pytest
 
-from vftcli.admittance.driving_force import sensor_force, stored_force
+from vftcli.admittance.driving_force import sensor_force, stored_force, truth_force
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import flange_jacobian
-from vftcli.signals.errors import MissingSignalError, ParameterError
+from vftcli.signals.errors import MissingSignalError, ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
@@ -51,3 +54,24 @@ def test_no_free_run_zeroes_a_sensor(tmp_path) -> None:
     log = Recording(t=T, q=Q, wrench=WRENCH, wrench_frame=BASE)
     with pytest.raises(ParameterError, match="in a free run"):
         sensor_force(log, UR5, choice(log=tmp_path))
+
+
+def truth(path: Path, **columns: np.ndarray) -> Path:
+    pl.DataFrame({"t": T, **columns}).write_parquet(path)
+    return path
+
+
+def test_a_truth_file_s_wrench_is_the_force(tmp_path: Path) -> None:
+    axes = ("fx", "fy", "fz", "mx", "my", "mz")
+    columns = {f"wrench/{axis}": WRENCH[:, k] for k, axis in enumerate(axes)}
+    file = truth(tmp_path / "truth.parquet", **columns)
+    force = truth_force(Recording(t=T, q=Q), UR5, choice(), file)
+    np.testing.assert_allclose(force.wrench.known, WRENCH, atol=1e-12)
+    assert force.source.values == {"file": "truth.parquet"}
+
+
+def test_a_truth_file_of_torques_alone_is_no_force(tmp_path: Path) -> None:
+    columns = {f"tau_ext/{j}": np.zeros(len(T)) for j in range(1, 7)}
+    file = truth(tmp_path / "truth.parquet", **columns)
+    with pytest.raises(ReferenceTorqueError, match="it has no wrench"):
+        truth_force(Recording(t=T, q=Q), UR5, choice(), file)

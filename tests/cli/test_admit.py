@@ -126,6 +126,14 @@ RELEASE = ("--release", "x=0.3", "--robot", "ur5")
         (("--robot", "ur5"), 2, "give one of LOG, --release"),
         ((FIXTURE, "--robot", "panda", "--sensor"), 1, "wrench"),
         ((FIXTURE, "--robot", "panda", "--observer", "nope"), 1, "no observer 'nope'"),
+        (
+            (FIXTURE, "--robot", "panda", "--observer", "gmo", "--observer", "fdo"),
+            1,
+            "give --observer once",
+        ),
+        ((FIXTURE, "--robot", "panda", "--frame", "tool"), 1, "the replay is in base axes"),
+        ((FIXTURE, "--robot", "panda", "--sensor", "--truth", "x"), 2, "one of --sensor and"),
+        (("--closed-loop", "ur5-drag", "--zero", "start"), 1, "give it as --zero A:B"),
         (("--closed-loop", "ur5-dragg"), 1, "ur5-drag"),
     ],
 )
