@@ -294,8 +294,8 @@ def test_the_source_tells_the_digest(tmp_path: Path) -> None:
 def test_every_reader_is_described() -> None:
     for name, reader in READERS.items():
         assert reader.name == name
-        for text in (reader.title, reader.recording, reader.takes, reader.pitfalls):
-            assert len(text) > 5
+        assert set(reader.words) == {"title", "recording", "takes", "pitfalls"}
+        assert all(len(text) > 5 for text in reader.words.values())
 
 
 def test_recognition_asks_the_content_not_the_name(tmp_path: Path) -> None:

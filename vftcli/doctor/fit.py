@@ -171,9 +171,11 @@ class Windows:
         extra = -self.friction if friction else none
         bare, _ = fitted(rest, none, extra)
         values = np.linalg.svd(self.load.reshape(-1, 4), compute_uv=False)
+        # Poses that are too alike let any residual pass for a load.
         if values[0] > TELLING * values[-1]:
             return bare / size, 0.0
         loaded, load = fitted(rest, self.load, extra)
+        # A load must explain a good part of the misfit, or it only adds freedom.
         if not plausible(load) or loaded > 0.8 * bare:
             return bare / size, 0.0
         return loaded / size, float(load[0])
@@ -208,6 +210,7 @@ def fitted(rest: Array, load: Array, friction: Array) -> tuple[float, Array]:
             break
         matrix = columns[keep][:, :, used].reshape(-1, int(used.sum()))
         solution[used] = np.linalg.lstsq(matrix, rest[keep].ravel(), rcond=1e-8)[0]
+        # Friction that would drive the arm is another error in disguise: it is left out.
         used[load.shape[2] :] &= solution[load.shape[2] :] > 0
         solution[~used] = 0.0
         left = np.linalg.norm(rest - columns @ solution, axis=1)

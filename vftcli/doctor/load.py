@@ -35,6 +35,7 @@ def drive_constants(recording: Recording) -> Array | None:
         use = rest & (np.abs(current[:, j]) > 0.02)
         if use.sum() >= 10:
             i, tau = current[use, j], torque[use, j]
+            # Through the origin: no current, no torque.
             slope = float(i @ tau / (i @ i))
             misfit = float(np.std(tau - slope * i)) / max(
                 float(np.std(tau)), float(np.abs(tau).mean())

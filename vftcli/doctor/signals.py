@@ -70,6 +70,7 @@ def velocity_slopes(recording: Recording) -> Array:
     ways = np.vstack([np.zeros(recording.joints), ways])
     by_velocity = ways[first + length] - ways[first]
     by_position = recording.q[first + length] - recording.q[first]
+    # A stretch across a gap mixes motion that was not recorded.
     even = (t[first + length] - t[first] < 2 * length * recording.median_step)[:, None]
     weight = np.sum(even * by_position**2, axis=0)
     slopes = np.sum(even * by_position * by_velocity, axis=0) / np.where(weight > 0, weight, 1.0)
@@ -104,6 +105,7 @@ def work_shares(recording: Recording, effort: Array) -> Array:
     gross = np.sum(np.abs(power), axis=0)
     share = np.sum(power, axis=0) / np.where(gross > 0, gross, 1.0)
     travel = np.sum(np.abs(np.diff(recording.q, axis=0)), axis=0)
+    # One way only, gravity alone can take or give work.
     reversing = (recording.dq.max(axis=0) > MOVING) & (recording.dq.min(axis=0) < -MOVING)
     share[(travel < 0.3) | ~reversing | (gross == 0)] = np.nan
     return np.asarray(share)
@@ -181,6 +183,7 @@ def is_clipped(value: Array, least: int = 10) -> bool:
         return False
     for extreme in (value.max(), value.min()):
         at = value == extreme
+        # A drive saturates far from zero; one that often reads the same small value rests.
         if abs(extreme) < 0.5 * np.ptp(value) or at.sum() < least or at.mean() > 0.5:
             continue
         if max(stop - start for start, stop in runs_of(at)) >= least:

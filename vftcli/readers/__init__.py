@@ -105,6 +105,7 @@ def recognise(path: str | Path) -> Reader:
 
 
 def _reader(file: LogFile, name: str | None, columns: str | None) -> Reader:
+    """The reader that is named, or that the content calls for."""
     if name is not None and name not in READERS:
         raise UnknownFormatError(f"no format {name!r}; known formats: {', '.join(READERS)}.")
     reader = READERS[name] if name else _recognise(file)
@@ -120,6 +121,8 @@ def _reader(file: LogFile, name: str | None, columns: str | None) -> Reader:
 
 
 def _recognise(file: LogFile) -> Reader:
+    """The one reader that knows the content; a general one only where no other does."""
+    # A general reader would take nearly any text, also that of a vendor: it is asked last.
     found = [r for r in READERS.values() if not r.general and r.recognises(file)]
     found = found or [r for r in READERS.values() if r.general and r.recognises(file)]
     if len(found) == 1:

@@ -85,6 +85,7 @@ def picks_by_alias(table: Table) -> tuple[Picks, tuple[str, ...]]:
     if (wrench := _wrench(table)) is not None:
         signals.append(wrench)
     joints = next((len(p.cells) for p in signals if p.signal == "q"), 0)
+    # A group of another width is about something else: a gripper, a base.
     signals = [p for p in signals if len(p.cells) == joints or p.signal in {"q", "wrench"}]
     names_there = table.names or ()
     origin = names_there.index(OWN_STAMPS) if names_there.count(OWN_STAMPS) == 1 else None
@@ -112,6 +113,7 @@ def grouped(table: Table) -> dict[str, Group]:
                     f"{table.path}: two columns could be {match['stem']} of index {index}: "
                     f"{name!r} and another. Name the columns with --columns."
                 )
+    # By index, not by place: a table may hold q_10 before q_2.
     groups = {
         stem: Group(tuple(cells[i] for i in sorted(cells)), tuple(sorted(cells)))
         for stem, cells in found.items()
@@ -125,6 +127,7 @@ def grouped(table: Table) -> dict[str, Group]:
 
 
 def _pick_of(table: Table, signal: str, groups: dict[str, Group]) -> Pick | None:
+    """The columns of a signal, None where none bears a name of it."""
     found = [name for name in ALIASES[signal] if name in groups]
     if not found:
         return None
@@ -156,6 +159,7 @@ def vendor_pick(signal: str, name: str, cells: tuple[Cell, ...]) -> Pick:
 
 
 def _wrench(table: Table) -> Pick | None:
+    """The six columns of a wrench, None where one of them is missing."""
     names = [name.lower() for name in table.names or ()]
     for text in WRENCHES:
         wanted = text.split()
@@ -165,6 +169,7 @@ def _wrench(table: Table) -> Pick | None:
 
 
 def _clock(table: Table) -> Pick | None:
+    """The column of time, None where none bears a name of it."""
     names = [name.lower() for name in table.names or ()]
     bare = [re.sub(r"[_ ]?[\[(]?(?<=[_\[( ])(s|ms|us|ns)[\])]?$", "", name) for name in names]
     found = [

@@ -199,6 +199,7 @@ def refuse_backward_steps(raw: RawLog, path: Path) -> None:
     restarts = np.flatnonzero(backward) + 1
     k, t = int(restarts[0]), seconds(raw)
     where = f"at sample {raw.first_row + k} (from {t[k - 1]:.6f} to {t[k]:.6f} s)"
+    # A clock that restarts begins near zero; any other step back is disorder.
     usual = median_step(t)
     lengths = np.diff([0, *restarts, len(t)])
     if np.all(np.abs(t[restarts]) <= 3 * usual) and lengths.min() >= SEGMENT_ROWS:

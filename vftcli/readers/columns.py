@@ -134,6 +134,7 @@ def _without_segment(parts: list[str]) -> tuple[list[str], int | None]:
 
 
 def _parse_item(part: str) -> Item:
+    """One item of the text."""
     match = ITEM.fullmatch(part)
     if match is None:
         raise LogError(
@@ -163,6 +164,7 @@ def _parse_item(part: str) -> Item:
 
 
 def _rate(part: str, name: str, text: str | None) -> float | None:
+    """The rate behind @, None where there is none. [Hz]"""
     if text is None:
         return None
     try:

@@ -137,6 +137,7 @@ class TextTable:
         kinds = dict.fromkeys(columns, pl.Float64)
         if clock is not None:
             kinds[clock] = self._clock_kind(clock)
+        # Most files parse as they are; mending copies them, so it waits for a failure.
         for text in (self._text, self._mended):
             try:
                 frame = self._parse(text(), kinds)
@@ -147,6 +148,7 @@ class TextTable:
         raise self._diagnosed(kinds)
 
     def _parse(self, source: Any, kinds: Mapping[int, Any]) -> Any:  # noqa: ANN401 - polars lazily
+        """The rows by polars, every wanted column with its type."""
         import polars as pl
 
         return pl.read_csv(
@@ -167,12 +169,14 @@ class TextTable:
         lines = self.file.head.split(b"\n", 2000)[:2000]
         for number, line in enumerate(lines):
             text = decoded(line).removeprefix("\ufeff").strip()
+            # The header is a row of its own, unless it stood in a comment.
             if text and not text.startswith("#"):
                 return number + (self.names is not None and not self._header_is_comment)
         return 0
 
     @property
     def _header_is_comment(self) -> bool:
+        """Whether the names stand in a comment above the rows, as np.savetxt writes them."""
         lines = [decoded(line).removeprefix("\ufeff").strip() for line in self.file.lines[:200]]
         first = next((line for line in lines if not line.startswith("#")), "")
         return self.names is not None and self.cells(first) != list(self.names)
@@ -191,6 +195,7 @@ class TextTable:
         return text
 
     def _needs_mending(self, head: bytes) -> bool:
+        """Whether the head holds what polars refuses: blank lines, odd ends, comments."""
         blank = re.search(rb"(\n|^)[ \t\r]*\n", head) is not None
         lone = b"\r" in head and (b"\r\r" in head or head.count(b"\r") != head.count(b"\r\n"))
         blanks = self.separator == " " and re.search(rb"  |\n | \r?\n", head) is not None
@@ -244,16 +249,19 @@ class TextTable:
         above = [self.cells(decoded(row)) for row in rows[-COMPARED_ROWS - 1 : -1]]
         ends = {cells[-1] for cells in above[self.names is not None and len(rows) <= 2 :] if cells}
         decimals = {len(end.partition(".")[2]) for end in ends}
+        # Loggers print one number of decimals: fewer than above means digits are lost.
         if "." in last[-1] or "," in last[-1]:
             return decimals != {len(last[-1].partition(".")[2])}
         return ends != {last[-1]}
 
     def _clock_kind(self, clock: int) -> Any:  # noqa: ANN401 - a polars type
+        """Type of the clock's column: long whole numbers must not pass through float64."""
         import polars as pl
 
         row = self.sample[1] if self.names is not None and len(self.sample) > 1 else self.sample[0]
         cells = self.cells(row)
         text = cells[clock] if clock < len(cells) else ""
+        # float64 holds nanoseconds since 1970 only to 256 ns.
         if re.fullmatch(r"\d{16,19}", text):
             return pl.Int64
         if re.match(r"\d{4}-\d\d-\d\d", text):

@@ -36,6 +36,7 @@ def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def _franka_order(names: Sequence[str]) -> tuple[int, ...]:
+    """Franka's seven joints by their numbers, () if there are not exactly seven of them."""
     found = {int(m[2]): k for k, name in enumerate(names) if (m := FRANKA.fullmatch(name))}
     if len(found) != 7 or sum(bool(FRANKA.fullmatch(name)) for name in names) != 7:
         return ()
@@ -43,6 +44,7 @@ def _franka_order(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def _ur_order(names: Sequence[str]) -> tuple[int, ...]:
+    """UR's joints by the drivers' names, () if one is missing or stands twice."""
     order = []
     for wanted in UR_NAMES:
         found = [k for k, name in enumerate(names) if name.endswith(wanted)]
@@ -53,6 +55,7 @@ def _ur_order(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def _word_order(names: Sequence[str]) -> tuple[int, ...]:
+    """UR's joints by the names on the teach pendant, () for other names."""
     words = [re.sub(r"[_ ]+", " ", name.lower()).strip() for name in names]
     if sorted(words) != sorted(UR_WORDS):
         return ()

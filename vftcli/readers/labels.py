@@ -15,6 +15,7 @@ def labelled(paths: Iterable[str | Path]) -> dict[Path, str]:
         Path as it was given → label.
     """
     given = [Path(path) for path in paths]
+    # Spellings of one path count once, or no tail of it would be unique.
     parts = {path: absolute(path).parts for path in given}
     return {path: _shortest_tail(parts[path], set(parts.values())) for path in given}
 

@@ -62,6 +62,7 @@ def default_columns(table: ParquetTable, info: dict[str, Any]) -> str:
     labels = feature.get("names") if isinstance(feature, dict) else None
     if isinstance(labels, dict):
         labels = next(iter(labels.values()), None)
+    # A gripper ends the state, and is no joint of the arm.
     joints = length
     if isinstance(labels, list) and len(labels) == length:
         fingers = [k for k, label in enumerate(labels) if "grip" in str(label).lower()]
@@ -70,6 +71,7 @@ def default_columns(table: ParquetTable, info: dict[str, Any]) -> str:
 
 
 def _info(folder: Path) -> dict[str, Any]:
+    """meta/info.json."""
     path = folder / "meta" / "info.json"
     try:
         if path.stat().st_size > INFO_LIMIT:

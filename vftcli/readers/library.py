@@ -30,6 +30,7 @@ class Library:
         from vftcli.readers import read
 
         choice, at = choice or ReadChoice(), absolute(path)
+        # A log that nobody announced is told from those that were, which keep their labels.
         label = self._labels.setdefault(at, labelled([at, *self._labels])[at])
         if (at, choice.whole) not in self._recordings:
             self._recordings[at, choice.whole] = read(

@@ -54,6 +54,7 @@ def head_of(path: Path) -> tuple[bytes, Wrapping | None]:
 
 
 def _unwrapped_head(path: Path, wrapping: Wrapping) -> bytes:
+    """As much of a wrapped file as recognition looks at."""
     found = b""
     for piece in Unpacker(path, wrapping).pieces():
         found += piece
@@ -76,6 +77,7 @@ def unwrapped(path: Path, wrapping: Wrapping | None) -> tuple[memoryview, bool]:
     if wrapping is not None:
         unpacker = Unpacker(path, wrapping)
         return memoryview(b"".join(unpacker.pieces())), not unpacker.ended
+    # Mapping costs more than copying where there is little to copy.
     if path.stat().st_size < CHUNK:
         return memoryview(path.read_bytes()), False
     with path.open("rb") as file:
@@ -113,6 +115,7 @@ class Unpacker:
             yield piece
 
     def _gunzipped(self) -> Iterator[bytes]:
+        """The content of a gzip file, member by member."""
         with self.path.open("rb") as file:
             unpacker = zlib.decompressobj(wbits=31)
             while packed := file.read(CHUNK // 16):
@@ -127,6 +130,7 @@ class Unpacker:
             self.ended = unpacker.eof
 
     def _unzstd(self) -> Iterator[bytes]:
+        """The content of a zstd file, frame by frame."""
         import zstandard
 
         context = zstandard.ZstdDecompressor(max_window_size=1 << 27)
@@ -154,6 +158,7 @@ class Digest:
     def __init__(self, path: Path) -> None:
         self._paths = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
         self._sum = hashlib.sha256()
+        # hashlib releases the interpreter for large pieces, so a thread is enough.
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._started = False
 
@@ -164,6 +169,7 @@ class Digest:
             self._thread.start()
 
     def _run(self) -> None:
+        """Sum up the files' bytes; what cannot be opened is told by whoever reads it."""
         buffer = bytearray(CHUNK)
         view = memoryview(buffer)
         for path in self._paths:

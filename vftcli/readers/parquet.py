@@ -68,6 +68,7 @@ class ParquetTable:
         return {k: self._first_length(k) for k, kind in kinds if is_list(kind)}
 
     def _first_length(self, column: int) -> int:
+        """Length of the list in the first row of a column, 0 for an empty one."""
         with guarded(self.path):
             batches = self._file.iter_batches(
                 batch_size=1, columns=[self._schema.names[column]], use_threads=False
@@ -85,6 +86,7 @@ class ParquetTable:
             LogError: If a column holds no numbers or its lists differ in length.
         """
         names = self._schema.names
+        # pyarrow would hand over both under one name.
         if any(names.count(names[c]) > 1 for c in columns):
             raise LogError(f"{self.path}: two columns have one name; rename one of them.")
         with guarded(self.path):
@@ -94,6 +96,7 @@ class ParquetTable:
             return {c: self._numbers(table.column(names[c]), c, clock) for c in columns}
 
     def _numbers(self, values: Any, column: int, clock: int | None) -> Column:  # noqa: ANN401
+        """A column as numbers; whole stamps stay whole, times become nanoseconds."""
         import pyarrow as pa
 
         if column in self.lists:
@@ -111,6 +114,7 @@ class ParquetTable:
         return np.asarray(values.to_numpy()).astype(target)
 
     def _matrix(self, values: Any, column: int) -> Column:  # noqa: ANN401 - pyarrow
+        """A column of lists of one length. (T, k)"""
         length, name = self.lists[column], self._schema.names[column]
         values = values.combine_chunks()
         if hasattr(values, "chunks"):  # pyarrow keeps an empty or split column as chunks

@@ -50,18 +50,21 @@ def _empty(_kind: Any, _shape: Any, _code: Any) -> Any:  # noqa: ANN401
 
 
 def _scalar(dtype: Any, content: Any = None) -> Any:  # noqa: ANN401
+    """One number of its bytes."""
     if not isinstance(dtype, np.dtype) or dtype.hasobject or not isinstance(content, bytes):
         raise Refused("a scalar that is no number")
     return np.frombuffer(content, dtype=dtype, count=1)[0]
 
 
 def _encode(text: Any, encoding: Any = "latin1") -> Any:  # noqa: ANN401
+    """Text that old pickles hold the bytes of an array as."""
     if not isinstance(text, str) or encoding not in {"latin1", "latin-1"}:
         raise Refused("an odd encoding")
     return codecs.encode(text, "latin1")
 
 
 def _from_buffer(buffer: Any, dtype: Any, shape: Any, order: Any = "C") -> Any:  # noqa: ANN401
+    """An array of plain numbers over a buffer of the pickle."""
     if not isinstance(dtype, np.dtype) or dtype.hasobject:
         raise Refused("an array of objects")
     return np.frombuffer(buffer, dtype=dtype).reshape(shape, order=order).copy()
@@ -113,6 +116,7 @@ def load_arrays_only(file: LogFile) -> Any:  # noqa: ANN401 - whatever the pickl
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # old opcodes' escapes: refused or read, never told
+            # Looked over as a whole first: loading builds objects on the way to what it refuses.
             _check_opcodes(content)
             return ArrayUnpickler(io.BytesIO(content)).load()
     except Refused as refusal:
@@ -136,6 +140,7 @@ def _check_opcodes(content: bytes) -> None:
     for opcode, argument, _ in pickletools.genops(content):
         if opcode.name in {"EXT1", "EXT2", "EXT4", "PERSID", "BINPERSID", "INST", "OBJ"}:
             raise Refused(f"the opcode {opcode.name}")
+        # A memo index allocates a list of its size.
         if isinstance(argument, int) and "PUT" in opcode.name and argument > len(content):
             raise Refused("a memo larger than the file")
 

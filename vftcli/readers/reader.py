@@ -58,6 +58,7 @@ class LogFile:
 
     @cached_property
     def _unwrapped(self) -> tuple[memoryview, bool]:
+        """The content, and whether it was cut; read once."""
         return unwrapped(self.path, self.wrapping)
 
     @cached_property

@@ -52,6 +52,7 @@ def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
     picks = picks_of(table, parse_columns(columns), as_given) if columns else found(table)
     raw = picked(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
     t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
+    # No cleaning here: a reference is made by a program, and must be whole.
     check_clock(t, str(path))
     for name, values in raw.signals.items():
         if not np.all(np.isfinite(values)):

@@ -92,6 +92,7 @@ class BinaryTable:
         self._body = file.content[start:]
         remarks = []
         size = self._record.itemsize
+        # Some clients write the id of the recipe before every record.
         if len(self._body) % size and len(self._body) % (size + 1) == 0:
             self._record = np.dtype([("id", "u1"), *fields])
             remarks.append(fact("recipe-byte-skipped"))

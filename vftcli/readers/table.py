@@ -191,6 +191,7 @@ def tick_of(stamps: Column, name: str) -> tuple[float, str]:
     if len(stamps) == 0:
         return 1.0, "s"
     usual = abs(float(stamps[len(stamps) // 2]))  # the first may be garbage
+    # Counts since 1970 are near 1.7e18 ns, 1.7e15 µs and 1.7e12 ms.
     for size, unit in ((1e17, "ns"), (1e14, "us"), (1e11, "ms")):
         if size < usual < 1e20:
             return units[unit], unit
@@ -223,6 +224,7 @@ def picks_of(
 
 
 def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
+    """Picks of a text that counts the columns in file order."""
     cells = [
         cell
         for column in range(table.width)
@@ -249,6 +251,7 @@ def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
 
 
 def _pick(item: Item, cells: tuple[Cell, ...]) -> Pick:
+    """The cells of an item, with its factor to SI units."""
     wrench = item.signal == "wrench"
     return Pick(
         signal=SIGNALS.get(item.signal, item.signal),
@@ -278,6 +281,7 @@ def _named(table: Table, item: Item) -> tuple[Cell, ...]:
     }
     if not found:
         raise missing_column(table, item.signal, pattern)
+    # Indices may count from 0 or from 1, but without holes.
     first = min(found)
     for index in range(first, first + len(found)):
         if index not in found:
@@ -289,6 +293,7 @@ def _named(table: Table, item: Item) -> tuple[Cell, ...]:
 
 
 def _exact(table: Table, item: Item, name: str) -> tuple[Cell, ...]:
+    """The cells of one column by its name, or of some elements of its lists: name[0:7]."""
     names = table.names or ()
     bare, elements = name, slice(None)
     if name not in names and (match := re.fullmatch(r"(.+)\[(\d*):(\d*)\]", name)):

@@ -164,6 +164,7 @@ def unpack_chunk(ingest: Ingest, name: str, packed: memoryview, size: int) -> me
 
 
 def _unlz4(packed: memoryview, size: int) -> bytes | None:
+    """Unpack lz4 up to a size; None if damaged."""
     import lz4.frame
 
     try:
@@ -177,6 +178,7 @@ def _unlz4(packed: memoryview, size: int) -> bytes | None:
 
 
 def _unbz2(packed: memoryview, size: int) -> bytes | None:
+    """Unpack bz2 up to a size; None if damaged."""
     import bz2
 
     try:
@@ -186,6 +188,7 @@ def _unbz2(packed: memoryview, size: int) -> bytes | None:
 
 
 def _unzstd(packed: memoryview, size: int) -> bytes | None:
+    """Unpack zstd up to a size; None if damaged."""
     import zstandard
 
     try:
@@ -216,6 +219,7 @@ def equal_rows(buffer: Bytes, start: int, stride: int, ranges: Sequence[tuple[in
     """
     total = (len(buffer) - start) // stride
     count, step = 1, 16
+    # Ever longer steps: a short run costs little, a long one few comparisons.
     while count < total:
         rows = min(step, total - count)
         view = np.ndarray((rows, stride), np.uint8, buffer, start + count * stride, (stride, 1))

@@ -36,6 +36,7 @@ def batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
 def _opened(file: LogFile) -> sqlite3.Connection:
     """The database, read-only; an unpacked one is held in memory."""
     if file.wrapping is None:
+        # Immutable: SQLite must not look for a journal, nor write one beside a user's bag.
         uri = f"{file.path.absolute().as_uri()}?mode=ro&immutable=1"
         return sqlite3.connect(uri, uri=True)
     db = sqlite3.connect(":memory:")
@@ -44,6 +45,7 @@ def _opened(file: LogFile) -> sqlite3.Connection:
 
 
 def _channels(db: sqlite3.Connection, ingest: Ingest) -> dict[int, Channel]:
+    """The topics by their number, with the definitions that the bag has."""
     tables = {row[0] for row in db.execute("SELECT name FROM sqlite_master WHERE type='table'")}
     if not {"topics", "messages"} <= tables:
         raise LogError(
@@ -85,6 +87,7 @@ def _check_topics(db: sqlite3.Connection, channels: dict[int, Channel], ingest: 
 def _messages(
     db: sqlite3.Connection, number: int, channel: Channel, ingest: Ingest
 ) -> Iterator[Batch]:
+    """The messages of one topic, some thousands at a time."""
     query = "SELECT timestamp, data FROM messages WHERE topic_id = ? ORDER BY id"
     cursor = db.execute(query, (number,))
     while rows := cursor.fetchmany(ROWS):
@@ -105,6 +108,7 @@ def _messages(
 
 
 def _unzstd(message: bytes, ingest: Ingest) -> bytes:
+    """One message that was compressed on its own, within bounds."""
     import zstandard
 
     try:

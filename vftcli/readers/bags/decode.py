@@ -110,9 +110,10 @@ class Decoder:
             ) from None
 
     def _of_length(self, batch: Batch, topic: _Topic, length: int) -> None:
+        """Decode the messages of one length, layout by layout."""
         rows = np.flatnonzero(batch.lengths == length)
         known = topic.layouts.setdefault(length, [])
-        for layout in list(known):
+        for layout in known:
             rows = self._matching(batch, topic, layout, rows)
         while rows.size:
             layout = self._walked(batch, topic, int(rows[0]))
@@ -131,12 +132,14 @@ class Decoder:
         return rows[~fits]
 
     def _walked(self, batch: Batch, topic: _Topic, row: int) -> MessageLayout:
+        """The layout of one message."""
         start = int(batch.offsets[row])
         message = batch.buffer[start : start + int(batch.lengths[row])]
         cdr = batch.channel.encoding == "cdr"
         return Walker(topic.types, message, cdr=cdr).walk(batch.channel.type)
 
     def _decode(self, batch: Batch, topic: _Topic, layout: MessageLayout, rows: Integers) -> None:
+        """Decode messages of one layout into a part of their stream."""
         layout.uses += 1
         if layout.uses & (layout.uses - 1) == 0:  # the first, second, fourth, eighth … batch
             for row in self._chance.choice(rows, min(CHECKED_ROWS, len(rows)), replace=False):
@@ -156,6 +159,7 @@ class Decoder:
                 topic.constants[name] = tuple(float(value) for value in last)
         names = next((layout.texts[p] for p in kind.names if p in layout.texts), ())
         order = kinematic_order(names)
+        # Some drivers publish joints alphabetically; every message of a layout has one order.
         mixed = order != tuple(range(len(names)))
         if mixed:
             signals = {n: _picked(n, v, order, len(names)) for n, v in signals.items()}
@@ -214,6 +218,7 @@ def _joined(
     straight = bool(np.all(order == np.arange(len(order))))
 
     def whole(arrays: list[Array]) -> Array:
+        """The parts one behind the other, in the order of recording."""
         if len(arrays) == 1 and straight:
             return arrays[0]
         joined: Array = np.concatenate(arrays)

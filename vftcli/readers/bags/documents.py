@@ -57,6 +57,7 @@ class Documents:
 
 
 def _json(message: bytes) -> Any:  # noqa: ANN401
+    """A message in JSON."""
     try:
         return json.loads(message)
     except (ValueError, RecursionError) as error:
@@ -76,6 +77,7 @@ def joint_states(message: bytes) -> dict[str, Any]:
 
 
 def _joint(message: bytes) -> dict[str, Any]:
+    """One joint of a JointStates message: name = 1, position = 2 …"""
     names = {2: "position", 3: "velocity", 4: "acceleration", 5: "effort"}
     joint: dict[str, Any] = {}
     for number, value in fields(message):
@@ -111,6 +113,7 @@ def fields(message: bytes) -> Iterator[tuple[int, int | float | bytes]]:
 
 
 def _varint(message: bytes, position: int) -> tuple[int, int]:
+    """A whole number in protobuf's base-128, and where it ends."""
     value = shift = 0
     while True:
         if position >= len(message) or shift > 63:
@@ -136,6 +139,7 @@ def flattened(document: Any) -> dict[str, Any]:  # noqa: ANN401
 
 
 def _flatten(value: Any, path: str, flat: dict[str, Any], depth: int) -> None:  # noqa: ANN401
+    """Put the values below a path into the flat document."""
     if depth > MAX_DEPTH or len(flat) > MAX_VALUES:
         raise DocumentError("nested or long beyond any message of joints")
     if isinstance(value, dict):
@@ -175,6 +179,7 @@ def _read(
     times: list[int],
     request: ReadChoice,
 ) -> RawLog:
+    """The documents of one channel as a table, read by aliases or by --columns."""
     columns: dict[str, Column] = {}
     for key, first in rows[0].items():
         values = [row.get(key) for row in rows]
@@ -206,12 +211,14 @@ def _read(
 
 
 def _names(row: dict[str, Any]) -> tuple[str, ...]:
+    """The joints' names that a document holds, or none."""
     names = row.get("name", [])
     good = isinstance(names, list) and all(isinstance(name, str) for name in names)
     return tuple(names) if good else ()
 
 
 def _ordered(column: Column, names: Sequence[str]) -> Column:
+    """A joint signal's columns in kinematic order; others as they are."""
     if column.ndim != 2 or column.shape[1] != len(names):
         return column
     return column[:, list(kinematic_order(names))]

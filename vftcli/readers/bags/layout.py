@@ -129,6 +129,7 @@ class Walker:
             LayoutError: If the message is shorter or longer than its definition says.
         """
         self._message("", root, 0)
+        # Some writers pad a message at its end.
         if len(self.message) - self.position > (8 if self.cdr else 0):
             raise LayoutError(f"{len(self.message) - self.position} bytes too many")
         self.layout.settle(self.message)
@@ -143,6 +144,7 @@ class Walker:
         self.position = 4
 
     def _message(self, path: str, name: str, depth: int) -> None:
+        """Walk the fields of one message."""
         if depth > MAX_DEPTH:
             raise LayoutError("nested too deeply")
         if name not in self.types:
@@ -151,6 +153,7 @@ class Walker:
             self._field(f"{path}.{part.name}" if path else part.name, part, depth)
 
     def _field(self, path: str, part: Field, depth: int) -> None:
+        """Walk one field: numbers, text, or messages."""
         many = part.many
         if many == -1:
             many = self._count()
@@ -167,6 +170,7 @@ class Walker:
                 self._message(f"{path}[{k}]", part.type, depth + 1)
 
     def _numbers(self, path: str, code: str, count: int) -> None:
+        """Note where the numbers of a field lie."""
         dtype = np.dtype(code)
         if self.cdr and count:
             self.position = 4 + (self.position - 4 + dtype.itemsize - 1) // dtype.itemsize * (
@@ -187,11 +191,13 @@ class Walker:
             raise LayoutError("a length lies outside the message")
         self.layout.fixed.append((start, self.position))
         count = int(self.message[start : self.position].view(f"{self.order}u4")[0])
+        # An element takes a byte or more: a larger count is damage, not data.
         if count > len(self.message):
             raise LayoutError("a count larger than the message")
         return count
 
     def _texts(self, path: str, count: int) -> None:
+        """Note the strings of a field, which every message of this layout must repeat."""
         texts = []
         for _ in range(count):
             length = self._count()
@@ -228,6 +234,7 @@ def fields_of(fields: Any) -> tuple[Field, ...]:  # noqa: ANN401 - rosbags' nest
 
 
 def _described(kind: Any) -> tuple[str, int | None]:  # noqa: ANN401
+    """Type and number of a field as rosbags describes it."""
     node, inner = int(kind[0]), kind[1]
     if node == 1:  # a primitive with a bound
         return str(inner[0]), None

@@ -67,6 +67,7 @@ class Catalogue:
         self.schemas[int(struct.unpack_from("<H", content)[0])] = (name, encoding, data)
 
     def _channel(self, content: memoryview) -> None:
+        """Take up a channel record."""
         number, schema = struct.unpack_from("<HH", content)
         topic, position = self._text(content, 4)
         encoding, _ = self._text(content, position)
@@ -82,6 +83,7 @@ class Catalogue:
 
     @staticmethod
     def _text(content: memoryview, position: int) -> tuple[str, int]:
+        """A string with its length before it, and where it ends."""
         end = position + 4 + u32(content, position)
         if end > len(content):
             raise struct.error
@@ -101,6 +103,7 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
             opcode, end = content[position], position + HEADER + u64(content, position + 1)
             if end > len(content):
                 break
+            # Messages outside chunks are gathered and yielded at the end, all at once.
             if opcode == CHUNK:
                 yield from _chunk(content[position + HEADER : end], catalogue)
             else:
@@ -151,6 +154,7 @@ def _check_end(catalogue: Catalogue, left: int) -> None:
 def _message(
     content: memoryview, position: int, end: int, found: dict[int, list[MessageRun]]
 ) -> None:
+    """Note a message outside chunks."""
     length = end - position - HEADER - MESSAGE_HEAD
     if length < 0:
         raise struct.error
@@ -160,6 +164,7 @@ def _message(
 
 
 def _chunk(content: memoryview, catalogue: Catalogue) -> Iterator[Batch]:
+    """The messages of a chunk, unpacked and checked."""
     ingest = catalogue.ingest
     size, checksum = u64(content, 16), u32(content, 24)
     compression, position = Catalogue._text(content, 28)
@@ -168,6 +173,7 @@ def _chunk(content: memoryview, catalogue: Catalogue) -> Iterator[Batch]:
     if len(packed) != stored:
         raise struct.error
     chunk = unpack_chunk(ingest, compression, packed, size)
+    # A checksum of zero means that the writer made none.
     if checksum and zlib.crc32(chunk) != checksum:
         raise LogError(f"{ingest.path}: a chunk does not match its checksum; the file is damaged.")
     buffer = np.frombuffer(chunk, dtype=np.uint8)
@@ -206,6 +212,7 @@ def _walk(chunk: memoryview, buffer: Bytes, catalogue: Catalogue) -> dict[int, l
 def _yielded(
     found: dict[int, list[MessageRun]], buffer: Bytes, catalogue: Catalogue
 ) -> Iterator[Batch]:
+    """One batch a channel, of all the runs that were found."""
     for number, runs in found.items():
         if (channel := catalogue.channels.get(number)) is None:
             raise LogError(f"{catalogue.ingest.path}: messages of an unknown channel; damaged.")

@@ -35,6 +35,7 @@ def read_bag(file: LogFile, request: ReadChoice) -> RawLog:
         said = "; ".join(["no messages in any whole chunk", *map(str, ingest.remarks)])
         raise LogError(f"{file.path}: {said}.")
     streams = decoder.streams()
+    # ROS messages go before documents: their types say what they hold.
     if documents.rows and not any("q" in stream.signals for stream in streams):
         raw = read_documents(file, documents, request)
     else:
@@ -44,12 +45,14 @@ def read_bag(file: LogFile, request: ReadChoice) -> RawLog:
 
 
 def _size(file: LogFile) -> int:
+    """Bytes of a file or of all storage files of a folder."""
     if not file.is_folder:
         return len(file.content)
     return sum((file.path / name).stat().st_size for name in storage_files(file))
 
 
 def _batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
+    """The messages of a file, or of a folder's files one behind the other."""
     if not file.is_folder:
         yield from _file_batches(file, ingest)
         return
@@ -61,6 +64,7 @@ def _batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
 
 
 def _file_batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
+    """The messages of one file, by the container that its first bytes tell."""
     if file.head.startswith(ROSBAG1):
         yield from rosbag1.batches(file.content, ingest)
     elif file.head.startswith(MCAP):

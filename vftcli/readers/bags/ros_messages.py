@@ -254,6 +254,7 @@ class Serialiser:
             self._field(f"{path}.{field.name}" if path else field.name, field)
 
     def _field(self, path: str, field: Field) -> None:
+        """Lay one field: numbers, text, or another message."""
         self.met.add(path)
         value = self.values.get(path)
         if field.type in SIZES:
@@ -272,6 +273,7 @@ class Serialiser:
             self._count(0)  # sequences of messages stay empty
 
     def _numbers(self, value: Value | None, dtype: np.dtype[Any], many: int | None) -> None:
+        """Leave room for the numbers of a field and note what goes there."""
         given = np.zeros(0) if value is None else np.asarray(value, dtype=dtype)
         width = 1 if many is None else many
         if width < 0:
@@ -286,8 +288,10 @@ class Serialiser:
         self.template += bytes(width * dtype.itemsize)
 
     def _count(self, count: int) -> None:
+        """Lay a length."""
         self._align(4)
         self.template += struct.pack("<I", count)
 
     def _align(self, size: int) -> None:
+        """Lay zeros up to a multiple of a size, counted behind the encapsulation."""
         self.template += bytes(-(len(self.template) - 4) % size)

@@ -145,6 +145,7 @@ def _compare(record: Record, counts: dict[int, int], ingest: Ingest) -> None:
 
 
 def _connect(connections: dict[int, Channel], content: memoryview, record: Record) -> None:
+    """Take up a connection record; a malformed one leaves its messages unknown."""
     number = record.header.get(b"conn", b"")
     if len(number) != 4:
         return
@@ -168,6 +169,7 @@ def _chunk(
     counts: dict[int, int],
     ingest: Ingest,
 ) -> Iterator[Batch]:
+    """The messages of a chunk, one batch a connection, and how many there were of each."""
     size = record.header.get(b"size", b"")
     if len(size) != 4:
         raise LogError(f"{ingest.path}: a chunk without its size; the bag is damaged.")
@@ -211,6 +213,7 @@ def _walk(
             template = _template(chunk, position, record) if record.op == OP_MESSAGE else None
             if template is None:
                 raise LogError(f"{ingest.path}: an unknown record in a chunk; damaged.")
+            # The newest first: messages of one topic come in a row.
             templates.insert(0, template)
         data = position + 8 + template.length
         length = u32(chunk, data - 4)
@@ -232,6 +235,7 @@ def _walk(
 
 
 def _known(chunk: memoryview, position: int, templates: list[Template]) -> Template | None:
+    """The template that a message's header fits, None where none does."""
     for template in templates:
         time = position + template.time
         if (

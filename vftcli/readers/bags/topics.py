@@ -294,6 +294,7 @@ def leading(streams: Sequence[Stream], path: Path, others: dict[str, str]) -> St
             "Record a JointState, FrankaState or FrankaRobotState topic."
         )
     most = max(s.messages for s in found)
+    # Topics of one rate may differ by the messages lost at either end.
     near = [s for s in found if s.messages >= 0.9 * most]
     best = max(near, key=lambda s: (s.kind.rank, "effort" in s.signals, s.messages))
     # A stream of as many joints with other names, of the same type and rate, is another arm.
@@ -320,6 +321,7 @@ def clock_of(stream: Stream) -> StreamClock:
     if robot is None or not runs(robot):
         return StreamClock(host, 1e-9, words, host)
     words = f"robot clock (time of {stream.channel.topic})"
+    # Franka counts whole milliseconds, which seconds in float64 would blur.
     milliseconds = np.rint(robot * 1e3)
     if np.all(np.abs(robot * 1e3 - milliseconds) < 1e-3) and abs(robot[-1]) < 1e12:
         return StreamClock(milliseconds.astype(np.int64), 1e-3, words, host)
