@@ -73,6 +73,11 @@ def test_the_free_run_and_not_the_log_is_subtracted_before_tuning(circle: Record
     """A free run as long as the log: what is left of the log is the push, not nothing."""
     found = baseline(part(circle, 8.0, 12.0), part(circle, 0.0, 4.0))
     left = without_free_motion(found).spectra
+    # The noise of the log and of the one free run that is subtracted: twice that of either.
+    noise = np.column_stack(
+        [np.interp(left.frequency, found.spectra.frequency, x) for x in found.spectra.floor.T]
+    )
+    np.testing.assert_allclose(left.free, 2.0 * noise)
     slow = left.frequency < 5.0
     assert np.all(left.loaded[slow, :3].sum(axis=0) > 3.0 * left.free[slow, :3].sum(axis=0))
 
@@ -99,10 +104,10 @@ def test_a_log_without_a_free_part_says_why(circle: Recording) -> None:
 
 
 def spectra(contact: float) -> Spectra:
-    """White noise, and in the loaded part a contact a hundred times louder about one frequency."""
+    """White noise, and in the loaded part a contact a thousand times louder about one frequency."""
     f = np.linspace(0.0, 62.5, 251)
     quiet = np.ones((251, 3))
-    louder = 100.0 * np.exp(-(((f - contact) / 0.5) ** 2))[:, None] * np.ones(3)
+    louder = 1000.0 * np.exp(-(((f - contact) / 0.5) ** 2))[:, None] * np.ones(3)
     return Spectra(frequency=f, free=quiet, loaded=quiet + louder, step=0.008, segments=(4, 4))
 
 

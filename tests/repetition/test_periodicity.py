@@ -107,3 +107,12 @@ def test_a_stated_period_near_the_end_of_the_log(repeated: Make, stated: float) 
     """The longest that is allowed, .85 of what moves: one lag is left to look at, and it is."""
     log = repeated(period=12.5, cycles=14.78 / 12.5)
     assert find_period(log, stated).seconds == pytest.approx(12.5, rel=1e-3)  # 2.3 s overlap
+
+
+def test_a_clock_of_bursts_leaves_no_lag_to_look_at() -> None:
+    """Eleven samples, half of them at once: six steps of the median, too few for a period."""
+    t = np.concatenate([1e-4 * np.arange(5), 0.1 + 0.1 * np.arange(6)])
+    q = np.outer(np.sin(20.0 * t), np.ones(6))
+    log = Recording(t=t, q=q, dq=np.ones_like(q))
+    with pytest.raises(ReferenceTorqueError, match="no repetition found"):
+        find_period(log)

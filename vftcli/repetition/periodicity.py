@@ -139,10 +139,11 @@ def valleys(distance: Array, samples: int, step: float, stated: float | None) ->
     if stated is not None:
         low = max(2, int(np.floor((1.0 - AROUND) * stated / step)))
         high = min(high, int(np.ceil((1.0 + AROUND) * stated / step)) + 1)
-    lags = np.arange(low, max(high, low + 1))
+    # None where a clock of bursts spans hardly more than a few of its median steps.
+    lags = np.arange(low, high)
     before, here, after = distance[lags - 1], distance[lags], distance[lags + 1]
     found = lags[(here <= before) & (here <= after)]
-    if stated is not None and not len(found):
+    if stated is not None and len(lags) and not len(found):
         found = lags[[int(np.argmin(here))]]
     deep = np.sort(found[np.argsort(distance[found])[:CANDIDATES]])
     bend = distance[deep - 1] - 2.0 * distance[deep] + distance[deep + 1]
