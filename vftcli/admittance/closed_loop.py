@@ -283,6 +283,7 @@ def steps_in(interval: float, step: float, what: str) -> int:
 def write_down(log: Log, loop: Loop, zero: tuple[float, float] | None) -> None:
     """Act once and write down what happened."""
     t = loop.arm.t
+    # A controller that followed its own drift would never find the zero of a still arm.
     waits = zero is not None and t <= zero[1]
     wrench = loop.rest(counts=zero is not None and t >= zero[0]) if waits else loop.control()
     log.t.append(t)

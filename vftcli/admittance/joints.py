@@ -150,6 +150,7 @@ def fill_path(
     shown, last, before, good = start, start, start, True
     for k, (rotation, point, same) in enumerate(zip(*goals, strict=True)):
         if not same:
+            # Straight on from the two poses before: the arm moves evenly from period to period.
             guess = 2.0 * last - before if good else last
             found, good = try_pose(solver, rotation, point, guess, last)
             last, before = found, last if good else found

@@ -132,6 +132,7 @@ def energy(controller: Controller, x: Array, v: Array) -> Array:
     """
     p = controller.parameters
     potential = 0.5 * p.stiffness * x**2
+    # The traditional controller has no speed scale; its branch below does not use the quotient.
     moving = np.where(controller.rate > 0.0, controller.rate, 1.0)
     varied = kinetic_shape(np.abs(v) * moving) / moving**2
     kinetic = p.mass * np.where(controller.rate > 0.0, varied, 0.5 * v**2) / controller.alpha**2

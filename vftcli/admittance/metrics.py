@@ -106,6 +106,7 @@ def row_of(
     back = returns["return_2_s"]
     period = float(t[1] - t[0]) if len(t) > 1 else 0.0
     span = slice(drag.begin, drag.release)
+    # Row k + 1 is what the force of row k made of row k.
     work = np.nansum(wrench[span, axis] * v[1:][span]) * period if len(wrench) else 0.0
     return {
         "controller": controller.kind,

@@ -234,6 +234,7 @@ def filled_xi(values: Mapping[str, Array]) -> Array | None:
     xi = values.get("xi")
     if xi is None:
         return None
+    # A wrong sign is refused by the type, with the axis's name; here it must only not be rooted.
     product = np.where(values["mass"] * values["stiffness"] > 0, values["mass"], np.nan)
     own = values["damping"] / (2.0 * np.sqrt(product * values["stiffness"]))
     return np.where(np.isnan(xi), own, xi)

@@ -153,6 +153,7 @@ def check_stable(
         UnstableError: If one is unstable and `force_unstable` is not set.
     """
     verdicts = tuple(judge(controller) for controller in controllers)
+    # Under a hand any deviation can come about; only a release has a size.
     size = np.full(6, np.inf) if release is None else np.abs(release)
     grave = [r for verdict in verdicts for r in verdict.complaints(size <= verdict.escape)]
     if grave and not force_unstable:

@@ -43,6 +43,7 @@ def phases(wrench: Array, parameters: Admittance) -> Phases:
 
 def held(on: Mask, off: Mask) -> Mask:
     """True from where `on` is until `off` is, False before the first of them. (T, 6)"""
+    # The last row at which anything was switched tells the state: no loop over samples.
     rows = np.arange(len(on))[:, None]
     last = np.maximum.accumulate(np.where(on | off, rows, -1), axis=0)
     state = np.take_along_axis(on, np.maximum(last, 0), axis=0)

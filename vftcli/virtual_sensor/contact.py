@@ -97,6 +97,7 @@ def contacts(t: Array, score: Array, enter: float = 1.0) -> tuple[ContactInterva
     found: list[ContactInterval] = []
     for first, last in hysteresis(score, enter):
         start, stop, peak = float(t[first]), float(t[last]), float(score[first : last + 1].max())
+        # A hand that slips for a moment has not let go.
         if found and start - found[-1].stop < GAP:
             found[-1] = ContactInterval(found[-1].start, stop, max(found[-1].peak, peak))
         else:

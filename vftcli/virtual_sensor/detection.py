@@ -143,6 +143,7 @@ def contact_scores(
     found = []
     for signal in signals:
         score = free_band(signal.values, free, signal.least).score(signal.values)
+        # Observers rise from zero: what they read before they have settled touches nothing.
         score = np.where(t < t[0] + SETTLING, 0.0, score)
         here = contacts(t, score)
         found.append(

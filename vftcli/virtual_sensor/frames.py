@@ -98,6 +98,7 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
         ParameterError: If there is no such frame, or its pose is not known.
     """
     if check_frame(frame) == "base":
+        # A wrench in base axes needs no pose at all, not even the tool's.
         return np.broadcast_to(np.eye(6), (len(flange), 6, 6))
     turned = np.swapaxes(flange, 1, 2)
     X = np.zeros((len(flange), 6, 6))

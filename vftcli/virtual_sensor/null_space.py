@@ -48,6 +48,7 @@ def contact_elsewhere(wrench: Wrench, free: Mask) -> NullSpaceVerdict | None:
     """
     if wrench.null_space is None or not np.any(free):
         return None
+    # The largest, not a quantile: the free part holds no contact, so all of it is error.
     threshold = MARGIN * float(np.nanmax(wrench.null_space[free]))
     above: Mask = np.nan_to_num(wrench.null_space) > threshold
     return NullSpaceVerdict(wrench.name, threshold, above, float(np.mean(above)))

@@ -73,6 +73,7 @@ def sense(
     (disturbance,) = less_free_run((mean_disturbance(terms),), free_run)
     raw = VirtualSensor(frame="base").wrench(disturbance, recording.q, chain)
     mounting, found = find_mounting(recording, robot, disturbance, choice)
+    # The disturbance was solved in base axes, so that --frame moves no zero.
     sensor = VirtualSensor(solver=choice.solver, frame=choice.frame, mounting=mounting)
     torques = less_free_run(estimates, free_run)
     zero = zero_spans(choice.zero, raw)
@@ -94,6 +95,7 @@ def sense(
         for row in drifts[1:]
         for first, last in zip(drifts[0], row, strict=True)
     )
+    # Only now: the band and the warnings are about the wrench as it was read.
     if drifts:
         drifts[0] = [replace(drift, removed=True) for drift in drifts[0]]
         wrenches = tuple(without_drift(w, d) for w, d in zip(wrenches, drifts[0], strict=True))

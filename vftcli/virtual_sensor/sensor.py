@@ -72,6 +72,7 @@ def fit_pose(flange: Array, sensor: Array) -> PoseFit:
             "the sensor's pose cannot be found: the forces lie on one line; push in two "
             "directions, or give the pose with --sensor-pose x,y,z,roll,pitch,yaw"
         )
+    # A reflection may fit better than any rotation; the smallest direction gives way.
     turn = np.diag([1.0, 1.0, np.sign(np.linalg.det(Vt.T @ U.T))])
     R = Vt.T @ turn @ U.T
     lever = skew(-ours[:, :3]).reshape(-1, 3)
@@ -157,6 +158,7 @@ def weigh_tool(sensor: Array, rotation: Array, gravity: Array) -> ToolWeight:
     mass = float(np.sum(centred * force) / np.sum(centred**2))
     zero = force.mean(axis=0) - mass * down.mean(axis=0)
     left = force - mass * down - zero
+    # (m c) × Rᵀg is linear in m c, the first moment of the mass.
     lever = skew(-centred).reshape(-1, 3)
     moved = (moment - moment.mean(axis=0)).ravel()
     first = np.linalg.lstsq(lever, moved, rcond=None)[0]

@@ -64,6 +64,7 @@ def decompose(jacobian: Array) -> Decomposition:
             "leave --wrench out and use the joint torques"
         )
     scaled = SCALE[:, None] * jacobian
+    # The 6×6 product is cheaper to decompose than the 6×n factor, and only the squares are needed.
     squares, U = np.linalg.eigh(scaled @ np.swapaxes(scaled, 1, 2))
     return Decomposition(scaled, U, squares)
 

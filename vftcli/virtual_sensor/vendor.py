@@ -163,6 +163,7 @@ def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorChec
     norm = np.linalg.norm(ours.force[empty & ~ours.hidden], axis=1)
     at_zeros = float(np.sqrt(np.mean(norm**2))) if len(norm) else float("nan")
     shares = {"zeros": zeros, "at_zeros": at_zeros}
+    # Zeros may stand for "not known", and would pull every fit towards nothing.
     usable = ~empty & ~ours.hidden
     if np.count_nonzero(usable) < 10:
         nothing = Offset(float("nan"), float("nan"))

@@ -85,6 +85,7 @@ class VirtualSensor:
         spread = np.empty((len(torques), samples, 6))
         residual = np.empty((len(torques), samples))
         sigma = np.empty(samples)
+        # Chunk by chunk, so that memory does not grow with the log.
         for start in range(0, samples, CHUNK):
             span = slice(start, min(start + CHUNK, samples))
             parts, X = self.geometry(chain, q[span])
@@ -175,4 +176,5 @@ def deviation_of(torque: ExternalTorque, given: Array | None) -> TorqueDeviation
     else:
         sd, remark = TORQUE_SD, caution("band-assumed", where, torque_sd_Nm=TORQUE_SD)
     least = np.maximum(np.asarray(sd, dtype=np.float64), 1e-6)
+    # A view: one row stands for every sample without being copied.
     return TorqueDeviation(np.broadcast_to(least, torque.tau.shape), (remark,))

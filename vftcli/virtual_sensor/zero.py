@@ -199,7 +199,9 @@ def unloaded_start(wrench: Wrench) -> Span | None:
     first = known & (t >= SETTLING) & (t <= SETTLING + LEAST_SPAN)
     if np.count_nonzero(first) < 3:
         return None
+    # Medians, since a knock in the first half second must move neither level nor spread.
     level = np.median(wrench.values[first], axis=0)
+    # 1.4826 turns a median absolute deviation into a normal standard deviation.
     spread = 1.4826 * np.median(np.abs(wrench.values[first] - level), axis=0)
     least = np.repeat([FORCE_STEP, MOMENT_STEP], 3)
     away = np.any(np.abs(wrench.values - level) > np.maximum(least, SPREADS * spread), axis=1)
