@@ -10,7 +10,7 @@ from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Note
+from vftcli.signals.remarks import Remark
 
 if TYPE_CHECKING:
     import polars as pl
@@ -53,7 +53,7 @@ class Analysis:
     errors: "pl.DataFrame | None" = None
     contacts: "tuple[ContactScore, ...]" = ()
     published: "Comparison | None" = None
-    remarks: tuple[Note, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
 
     @property

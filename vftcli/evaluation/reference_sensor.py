@@ -8,7 +8,7 @@ from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.robot import Robot
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Note, caution
+from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import NOTHING, Mounting
 from vftcli.virtual_sensor.log_wrench import logged_wrench
@@ -38,7 +38,7 @@ def sensor_reference(
 
 
 def torque_of(
-    wrench: Wrench, recording: Recording, robot: Robot, name: str, remarks: tuple[Note, ...]
+    wrench: Wrench, recording: Recording, robot: Robot, name: str, remarks: tuple[Remark, ...]
 ) -> ExternalTorque:
     """Joint torque of a wrench in base axes about the flange point."""
     J = flange_jacobian(robot.chain, recording.q)

@@ -6,7 +6,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask, check_clock, check_shape, frozen_mask, seal
 from vftcli.signals.errors import ShapeError
-from vftcli.signals.remarks import Note
+from vftcli.signals.remarks import Remark
 
 COVERS = 1.96
 """Half width of a 95 % band, in standard deviations."""
@@ -36,7 +36,7 @@ class ExternalTorque:
     floor: Array | None = None
     error_sd: Array | None = None
     moving: Mask | None = None
-    remarks: tuple[Note, ...] = ()
+    remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         seal(self, "t", "tau", "sd", "floor", "error_sd")

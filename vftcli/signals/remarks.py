@@ -158,7 +158,3 @@ def as_record(remark: Remark) -> dict[str, Any]:
         "joints": list(where.joints),
         "span_s": None if where.span is None else list(where.span),
     }
-
-
-Note = Remark | str
-"""For the time of the move only: a remark, or a sentence that has not become one yet."""

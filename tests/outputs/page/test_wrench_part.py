@@ -9,7 +9,7 @@ from vftcli.outputs.page.wrench_part import (
     trade_off_grid,
     wrench_section,
 )
-from vftcli.virtual_sensor.contact import Detection, Operating
+from vftcli.virtual_sensor.contact import Detection, OperatingPoint
 from vftcli.virtual_sensor.detection import ContactScore
 
 
@@ -42,7 +42,7 @@ def score() -> ContactScore:
     )
     marks = [2 ** (0.5 * k) for k in range(-4, 6)]
     curve = tuple(
-        Operating(
+        OperatingPoint(
             threshold=mark, found=1.0 / mark if mark > 1 else 1.0, false_alarms_per_h=k, delay=0.0
         )
         for k, mark in enumerate(marks)

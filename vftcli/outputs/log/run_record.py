@@ -19,7 +19,7 @@ from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.robot import Robot
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Note, Remark, as_record
+from vftcli.signals.remarks import Remark, as_record
 
 CONVENTIONS = {
     "sign": "tau_ext is the torque the environment exerts ON the robot: "
@@ -249,9 +249,9 @@ def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
     }
 
 
-def all_remarks(analysis: Analysis) -> list[Note]:
+def all_remarks(analysis: Analysis) -> list[Remark]:
     """Remarks of the run, of every estimate and of the reference, each once."""
-    found: list[Note] = [*analysis.remarks]
+    found: list[Remark] = [*analysis.remarks]
     # Compared by their words: values may be arrays, which do not compare as one truth.
     of_run = set(map(str, found))
     for torque in analysis.torques:
@@ -261,8 +261,7 @@ def all_remarks(analysis: Analysis) -> list[Note]:
     return list({str(note): note for note in found}.values())
 
 
-def about(name: str, note: Note) -> Note:
+def about(name: str, remark: Remark) -> Remark:
     """A remark that says what it is about, where it does not yet."""
-    if isinstance(note, str):
-        return f"{name}: {note}"
-    return note if note.where.about else replace(note, where=note.where._replace(about=name))
+    where = remark.where
+    return remark if where.about else replace(remark, where=where._replace(about=name))

@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from vftcli.signals.remarks import Note, Remark, explanation
+from vftcli.signals.remarks import Remark, explanation
 
 HERE = Path(__file__).parent
 
@@ -76,13 +76,15 @@ def pairs(table: Mapping[str, Any]) -> str:
     return f'<dl class="pairs">{rows}</dl>'
 
 
-def bullets(lines: Iterable[Note]) -> str:
+def bullets(lines: Iterable[Remark | str]) -> str:
     """A bullet list; of a remark it shows the long words."""
-    items = "".join(f"<li>{escape(in_full(line))}</li>" for line in lines)
+    items = "".join(
+        f"<li>{escape(explanation(x) if isinstance(x, Remark) else x)}</li>" for x in lines
+    )
     return f'<ul class="plain">{items}</ul>'
 
 
-def remarks(lines: Sequence[Note]) -> str:
+def remarks(lines: Sequence[Remark]) -> str:
     """What the reader should know before believing a number, "" where there is nothing."""
     if not lines:
         return ""
@@ -155,8 +157,3 @@ def robot_facts(robot: Mapping[str, Any]) -> dict[str, Any]:
         "Robot": f"{robot.get('name')} ({robot.get('file') or 'built in'})",
         "Robot sha256": robot.get("sha256") or "–",
     }
-
-
-def in_full(note: Note) -> str:
-    """A note in full: a remark's long words, or the sentence as it is."""
-    return explanation(note) if isinstance(note, Remark) else note
