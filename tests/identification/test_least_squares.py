@@ -94,3 +94,14 @@ def test_the_robust_spread_of_normal_noise():
     assert robust_sd(np.random.default_rng(1).normal(0, 2.0, 100_000)) == pytest.approx(
         2.0, rel=0.02
     )
+
+
+def test_cross_validation_does_not_see_the_order_of_logs() -> None:
+    """Two logs of 103 and 57 rows: a fifth of each is left out, whichever stands first."""
+    rng = np.random.default_rng(5)
+    A, y, weights = rng.standard_normal((160, 3)), rng.standard_normal(160), np.ones(160)
+    turned = np.r_[103:160, 0:103]
+    one = cross_validated(A, y, weights, (103, 57))
+    other = cross_validated(A[turned], y[turned], weights, (57, 103))
+    assert one == pytest.approx(other, rel=1e-12)
+    assert cross_validated(A, y, weights, (160,)) == cross_validated(A, y, weights)

@@ -61,7 +61,9 @@ class Verdict(NamedTuple):
             warning("law-unstable-at-limit", where, axis=AXES[k], number=float(self.recovery[k]))
             for k in np.flatnonzero((self.recovery >= DISCRETE_BOUND) & self.limited)
         ]
-        escapes = ~self.limited & np.isfinite(self.escape) & ~(False if safe is None else safe)
+        escapes = (
+            ~self.limited & np.isfinite(self.escape) & ~np.asarray(False if safe is None else safe)
+        )
         found += [
             warning("law-escapes", where, axis=AXES[k], bound=float(self.escape[k]), unit=UNITS[k])
             for k in np.flatnonzero(escapes)

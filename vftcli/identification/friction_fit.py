@@ -73,6 +73,11 @@ class JointData(NamedTuple):
     load_spread: float
     reverses: bool
 
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Rows of each log."""
+        return tuple(source.motion.samples for source in self.sources)
+
     def columns(self, j: int, shape: Shape) -> Array:
         """Friction columns, then the fixed ones. (M, k + f)"""
         friction = np.concatenate([source.joint(j, shape) for source in self.sources])
@@ -93,7 +98,8 @@ def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
 
     # Weights of outliers are held: candidates must answer for the same samples.
     def error(smoothing: float) -> float:
-        return cross_validated(data.columns(j, Shape(rich, smoothing)), data.y, start.weights)
+        A = data.columns(j, Shape(rich, smoothing))
+        return cross_validated(A, data.y, start.weights, data.lengths)
 
     smoothing = min(SMOOTHINGS, key=error)
     choices = []
@@ -101,7 +107,8 @@ def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
         A = data.columns(j, shape)
         fit = fit_column(A, data.y, data.weights)
         if is_dissipative(shape, fit):
-            choices.append(ShapeChoice(j + 1, shape, cross_validated(A, data.y, start.weights)))
+            missed = cross_validated(A, data.y, start.weights, data.lengths)
+            choices.append(ShapeChoice(j + 1, shape, missed))
     if not choices:
         return Shape(tellable_terms(PLAIN, data), smoothing), []
     limit = MARGIN * min(c.error for c in choices)
