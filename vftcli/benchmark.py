@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.observers import DEFAULT, KalmanObserver
-from vftcli.observers.auto_tuning import KINDS, tuned
+from vftcli.observers.auto_tuning import KINDS, tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Part, Spectra, spectra_of
 from vftcli.robots import Robot, load_robot
@@ -260,7 +260,7 @@ def run_rounds(timings: Timings, robot: Robot, recording: Recording, rounds: int
         return spectra_of(Part(terms, ~free), [Part(terms, free)])
 
     def auto(name: str, terms: DynamicsTerms, found: Spectra) -> None:
-        tuned(name, found).estimate(terms)
+        tune_to_spectra(name, found).estimate(terms)
 
     def complete() -> None:
         terms = core()

@@ -8,12 +8,12 @@ import pytest
 from vftcli.observers import OBSERVERS, Setup, build_observers
 from vftcli.observers.auto_tuning import (
     KINDS,
-    curve,
+    error_curve,
     expected_error,
     kalman_filter,
     kalman_smoother,
     noise_level,
-    tuned,
+    tune_to_spectra,
 )
 from vftcli.observers.spectra import Part, spectra_of
 from vftcli.robots.terms import DynamicsTerms
@@ -54,7 +54,7 @@ def half_pushed(
 def test_the_expected_error_is_the_measured_one(name: str, pushed: Pushed) -> None:
     """The spectra predict the rmse that the tuned observer then has against the truth."""
     loaded, free = pushed()
-    observer = tuned(name, spectra_of(loaded, [free]))
+    observer = tune_to_spectra(name, spectra_of(loaded, [free]))
     assert observer.curve is not None
     tau = observer.estimate(loaded.terms).tau
     truth = 5.0 * low_passed_noise(8000, 6.0, 1) * loaded.inside[:, None]
@@ -69,7 +69,7 @@ def test_the_expected_error_is_the_measured_one(name: str, pushed: Pushed) -> No
 def test_tuning_finds_the_best_of_all_natural_frequencies(pushed: Pushed) -> None:
     loaded, free = pushed()
     spectra = spectra_of(loaded, [free])
-    found = curve(kalman_filter, spectra)
+    found = error_curve(kalman_filter, spectra)
     near = [expected_error(kalman_filter, found.best * f, spectra) for f in (0.7, 1.4)]
     for error in near:
         assert np.all(np.diag(error) >= found.least)
@@ -79,7 +79,7 @@ def test_more_noise_calls_for_slower_filters(pushed: Pushed) -> None:
     best = []
     for noise in (0.5, 4.0):
         loaded, free = pushed(noise=noise)
-        best.append(curve(kalman_smoother, spectra_of(loaded, [free])).best)
+        best.append(error_curve(kalman_smoother, spectra_of(loaded, [free])).best)
     assert np.all(best[1] < best[0])
 
 

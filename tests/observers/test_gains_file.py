@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.observers.gains_file import layered, load_gains
+from vftcli.observers.gains_file import load_gains, overlay_gains
 from vftcli.observers.table import sections
 from vftcli.signals.errors import ParameterError
 
@@ -38,7 +38,7 @@ def test_what_is_no_gains_file_is_refused(tmp_path: Path, text: str, words: str)
 def test_the_upper_layer_wins_parameter_by_parameter() -> None:
     under = {"kfo": {"r_diag": 1.0, "q_p_diag": 2.0}, "fdo": {"omega": 3.0}}
     over = {"kfo": {"r_diag": 9.0}, "gmo": {"gain": 4.0}}
-    assert layered(under, over) == {
+    assert overlay_gains(under, over) == {
         "kfo": {"r_diag": 9.0, "q_p_diag": 2.0},
         "fdo": {"omega": 3.0},
         "gmo": {"gain": 4.0},

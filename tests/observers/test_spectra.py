@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.observers.spectra import Part, Spectra, smoothed, spectra_of
+from vftcli.observers.spectra import Part, Spectra, neighbour_mean, spectra_of
 from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
@@ -133,10 +133,12 @@ def test_the_floor_is_the_quietest_octave_s_level_below_it() -> None:
 
 def test_neighbours_are_averaged_over_a_fifth_of_the_frequency() -> None:
     spectrum = np.arange(50.0)[:, None]
-    np.testing.assert_allclose(smoothed(spectrum)[:40], spectrum[:40])  # a straight line stays
+    np.testing.assert_allclose(
+        neighbour_mean(spectrum)[:40], spectrum[:40]
+    )  # a straight line stays
     spike = np.zeros((50, 1))
     spike[20] = 9.0
-    found = smoothed(spike)[:, 0]
+    found = neighbour_mean(spike)[:, 0]
     assert found[20] == pytest.approx(1.0)  # 4 neighbours either side
     assert found[4] == 0.0
     assert np.flatnonzero(found).tolist() == list(range(17, 26))

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.filters import band_pass, even_clock, low_pass, passed
+from vftcli.signals.filters import band_pass, even_clock, low_pass, noise_passed
 
 RNG = np.random.default_rng(4)
 
@@ -58,7 +58,9 @@ def test_white_noise_behind_the_filter(slope: int) -> None:
     if slope:
         smooth = (smooth[2:] - smooth[:-2]) / (2.0 * step)
     # 4 × 40 000 samples at a fifth of the band: some 10⁴ independent ones, 1 % of their square
-    assert np.mean(smooth**2) == pytest.approx(passed(step, cutoff, "lowpass", slope), rel=0.05)
+    assert np.mean(smooth**2) == pytest.approx(
+        noise_passed(step, cutoff, "lowpass", slope), rel=0.05
+    )
 
 
 def test_a_log_too_short_for_the_start_up_is_left_alone() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vftcli.signals.errors import ClockError
-from vftcli.signals.series import bridged, gaps_of, median_step, resampled, runs_of
+from vftcli.signals.series import bridge_unknown, gaps_of, median_step, resample_columns, runs_of
 
 
 @given(st.lists(st.booleans(), max_size=60))
@@ -54,9 +54,9 @@ def test_columns_on_another_clock_are_interpolated_one_by_one(seed: int) -> None
     x = rng.standard_normal((20, 3))
     at = rng.uniform(t[0] - 1.0, t[-1] + 1.0, 15)
     expected = np.array([[np.interp(time, t, x[:, k]) for k in range(3)] for time in at])
-    assert np.array_equal(resampled(at, t, x), expected)
+    assert np.array_equal(resample_columns(at, t, x), expected)
     away = (at < t[0]) | (at > t[-1])
-    open_ended = resampled(at, t, x, outside=np.nan)
+    open_ended = resample_columns(at, t, x, outside=np.nan)
     assert np.array_equal(np.isnan(open_ended[:, 0]), away)
     assert np.array_equal(open_ended[~away], expected[~away])
 
@@ -65,8 +65,8 @@ def test_unknown_samples_are_bridged_by_a_straight_line() -> None:
     t = np.array([0.0, 1.0, 3.0, 4.0, 5.0])
     nan = np.nan
     x = np.array([[0.0, nan, 6.0, 8.0, nan], [nan] * 5]).T
-    assert bridged(t, x)[:, 0].tolist() == [0.0, 2.0, 6.0, 8.0, 8.0]
-    assert not bridged(t, x)[:, 1].any()
+    assert bridge_unknown(t, x)[:, 0].tolist() == [0.0, 2.0, 6.0, 8.0, 8.0]
+    assert not bridge_unknown(t, x)[:, 1].any()
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -80,4 +80,6 @@ def test_bridging_then_resampling_reads_the_line_between_known_samples(seed: int
         known = np.isfinite(x[:, k])
         direct = np.interp(at, t[known], x[known, k])
         # Both are the same line; their arithmetic differs by rounding.
-        np.testing.assert_allclose(resampled(at, t, bridged(t, x))[:, k], direct, atol=1e-12)
+        np.testing.assert_allclose(
+            resample_columns(at, t, bridge_unknown(t, x))[:, k], direct, atol=1e-12
+        )

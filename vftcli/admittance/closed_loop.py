@@ -19,7 +19,7 @@ from vftcli.observers.kalman import KalmanObserver
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix
-from vftcli.signals.series import resampled
+from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.experiment import Progress, Simulation, observe
@@ -309,7 +309,7 @@ def closed_loop_of(loop: Loop, log: Log, zero: tuple[float, float] | None) -> Cl
     truth = np.full((len(t), 6), np.nan)
     if simulation is not None:
         seen = simulation.truth
-        truth = resampled(t, seen.t, seen.wrench)
+        truth = resample_columns(t, seen.t, seen.wrench)
     estimate = np.array(log.estimate)
     if zero is not None:
         estimate[t < zero[0]] = np.nan

@@ -14,7 +14,7 @@ from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution
-from vftcli.signals.series import resampled
+from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import WrenchFrame
 from vftcli.virtual_sensor.frames import Mounting
 from vftcli.virtual_sensor.log_wrench import logged_wrench
@@ -95,5 +95,5 @@ def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path
             f"log's ({recording.t[0] + start:g} to {recording.t[-1] + start:g} s); both must be "
             "the log's own clock"
         )
-    there = resampled(recording.t, t, columns)
+    there = resample_columns(recording.t, t, columns)
     return np.where(inside[:, None], there, np.nan)

@@ -22,7 +22,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
-from vftcli.signals.series import resampled, runs_of
+from vftcli.signals.series import resample_columns, runs_of
 
 STATIC = 4
 """Parameters that gravity tells: mass and three first moments."""
@@ -146,7 +146,7 @@ def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> LoadSolution
     torque = zero_phase(free.t, drive_torque(free, robot), processing.cutoff)
     at = motion.t + shift
     inside = (at >= free.t[0]) & (at <= free.t[-1])
-    extra = (motion.tau - resampled(at, free.t, torque))[inside]
+    extra = (motion.tau - resample_columns(at, free.t, torque))[inside]
     sign = motion.filtered(np.tanh(loaded.require("dq") / SMOOTHING))[inside]
     q, dq, ddq = motion.q[inside], motion.dq[inside], motion.ddq[inside]
     Y = torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK:][:, :, :STATIC]
@@ -217,7 +217,7 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
         # Two short ends may agree by chance: at least half of the motion must overlap.
         if np.count_nonzero(inside) < 0.5 * len(at):
             return float("inf")
-        there = resampled(at[inside], other.t, other.q)
+        there = resample_columns(at[inside], other.t, other.q)
         return float(np.sqrt(np.mean((there - motion.q[inside]) ** 2)))
 
     low, high = other.t[0] - motion.t[-1], other.t[-1] - motion.t[0]

@@ -15,7 +15,7 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.signals.series import resampled
+from vftcli.signals.series import resample_columns
 
 EXPLAINS = 0.4
 """Share of a residual that a cause must explain to be named."""
@@ -190,6 +190,6 @@ def repeated_share(train: PreparedLog, test: PreparedLog) -> float:
     path, points = (np.hstack([log.q, SLOWNESS * log.dq]) for log in (train, test))
     # Between samples the path is interpolated, so that its points lie nearer than `NEAR`.
     index = np.arange(0, len(path) - 1 + 1e-9, 0.25)
-    tree = cKDTree(resampled(index, np.arange(float(len(path))), path))
+    tree = cKDTree(resample_columns(index, np.arange(float(len(path))), path))
     distance, _ = tree.query(points, p=np.inf, distance_upper_bound=NEAR)
     return float(np.mean(np.isfinite(distance)))

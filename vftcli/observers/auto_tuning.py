@@ -61,7 +61,7 @@ def kalman_filter(omega_n: Array, r: Array | float = 1.0) -> KalmanObserver:
 
 
 def kalman_smoother(omega_n: Array, r: Array | float = 1.0) -> KalmanSmoother:
-    """The smoother on that filter."""
+    """A smoother on the Kalman filter with these natural frequencies and ζ = 1/√2. (n,) [rad/s]"""
     return KalmanSmoother(filter=kalman_filter(omega_n, r))
 
 
@@ -72,7 +72,7 @@ KINDS: dict[str, Kind] = {"kfo-auto": kalman_filter, "rts-auto": kalman_smoother
 """Name at the command line → what is tuned."""
 
 
-def tried(step: float) -> Array:
+def natural_frequencies(step: float) -> Array:
     """Natural frequencies worth trying at a sample time. (G,) [rad/s]"""
     return np.geomspace(SLOWEST, FASTEST / step, TRIED)
 
@@ -86,9 +86,9 @@ def expected_error(kind: Kind, omega_n: Array, spectra: Spectra) -> Array:
     return np.asarray(np.sqrt((missed + passed) * spectra.width))
 
 
-def curve(kind: Kind, spectra: Spectra) -> Curve:
+def error_curve(kind: Kind, spectra: Spectra) -> Curve:
     """The expected error over all natural frequencies, and where it is smallest."""
-    omega_n = tried(spectra.step)
+    omega_n = natural_frequencies(spectra.step)
     rmse = expected_error(kind, omega_n, spectra)
     return Curve(omega_n, rmse, omega_n[np.argmin(rmse, axis=0)])
 
@@ -107,6 +107,7 @@ def noise_level(omega_n: Array, spectra: Spectra) -> Array:
     share = (np.abs(response) * jump / settled.gains.l2) ** 2
     variance = np.sum(share * spectra.loaded, axis=0) * spectra.width
     scale = variance / (settled.prior.p11 + model.r)
+    # A log without any noise would make R zero, and the filter singular.
     return np.asarray(np.maximum(scale, np.finfo(float).tiny))
 
 
@@ -138,9 +139,9 @@ class AutoTuned:
         return self.observer.frequency_response(frequency, step, joints)
 
 
-def tuned(name: str, spectra: Spectra) -> AutoTuned:
+def tune_to_spectra(name: str, spectra: Spectra) -> AutoTuned:
     """The observer `name` with the natural frequencies its spectra call for."""
-    found = curve(KINDS[name], spectra)
+    found = error_curve(KINDS[name], spectra)
     best = frozen(found.best)
     r = noise_level(best, spectra)
     observer: Observer = (

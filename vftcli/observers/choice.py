@@ -113,15 +113,15 @@ class ObserverChoice:
         observers, remarks = build_observers(self.names, setup)
         if self.match is None:
             return observers, remarks
-        from vftcli.observers.matching import matched
+        from vftcli.observers.matching import match_observers
 
-        observers, on_match = matched(observers, self.match, setup)
+        observers, on_match = match_observers(observers, self.match, setup)
         return observers, (*remarks, *on_match)
 
     def gains_over(self, gains: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[str, Any]]:
         """A robot's gains with those of the gains file put over them."""
         if self.gains_file is None:
             return gains
-        from vftcli.observers.gains_file import layered, load_gains
+        from vftcli.observers.gains_file import load_gains, overlay_gains
 
-        return layered(gains, load_gains(self.gains_file, sections()))
+        return overlay_gains(gains, load_gains(self.gains_file, sections()))

@@ -109,6 +109,7 @@ def first_order_response(rate: Array, frequency: Array, step: float) -> Complex:
     The momentum is the continuous integral e^{jωt}/(jω), sampled.
     """
     omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[:, None]
+    # At 0 Hz the quotient is 0/0; its limit is reached to the last digit long before.
     omega = np.where(omega == 0.0, 1e-9, omega)
     back = np.exp(-1j * omega * step)
     a = 0.5 * step * rate[None, :]

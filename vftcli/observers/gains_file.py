@@ -38,7 +38,7 @@ def load_gains(path: Path, sections: Mapping[str, Sequence[str]]) -> Gains:
     return gains
 
 
-def layered(under: Gains, over: Gains) -> Gains:
+def overlay_gains(under: Gains, over: Gains) -> Gains:
     """Gains of one source with those of another put over them, parameter by parameter."""
     names = dict.fromkeys((*under, *over))
     return {name: {**under.get(name, {}), **over.get(name, {})} for name in names}

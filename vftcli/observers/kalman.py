@@ -68,6 +68,7 @@ class KalmanObserver:
             )
         for name in ("r_diag", "q_p_diag", "q_tau_diag", "decay"):
             value = frozen(np.atleast_1d(np.asarray(getattr(self, name), dtype=np.float64)))
+            # The paper gives A_τ = −a, its tables a: either sign means the same decay.
             value = frozen(np.abs(value)) if name == "decay" else value
             object.__setattr__(self, name, value)
             least_allowed = value > 0 if name in {"r_diag", "q_tau_diag"} else value >= 0

@@ -75,7 +75,7 @@ def solved_prior(model: Discrete) -> Covariance:
 
 
 def predict(posterior: Covariance, model: Discrete) -> Covariance:
-    """P⁻ = A P Aᵀ + Q."""
+    """Covariance before the next measurement, P⁻ = A P Aᵀ + Q."""
     p11, p12, p22 = posterior
     moved = p12 + model.a12 * p22
     return Covariance(
@@ -89,8 +89,10 @@ def update(prior: Covariance, r: Array) -> Gains:
     """Gains for a measured momentum, and the covariance after it in Joseph's form."""
     p11, p12, p22 = prior
     innovation = p11 + r
+    # 1 − L₁ as a quotient: the difference would lose every digit of a small r.
     l1, l2 = p11 / innovation, p12 / innovation
     rest = r / innovation
+    # Joseph's form stays positive whatever the rounding of the gains.
     posterior = Covariance(
         rest**2 * p11 + l1**2 * r,
         rest * (p12 - l2 * p11) + l1 * l2 * r,
@@ -149,7 +151,7 @@ def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gain
 
 
 def empty_gains(shape: tuple[int, ...]) -> Gains:
-    """Gains and covariances to be written to."""
+    """Uninitialised gains and covariances, as `write` fills them."""
     return Gains(np.empty(shape), np.empty(shape), Covariance(*(np.empty(shape) for _ in range(3))))
 
 
@@ -165,10 +167,11 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
     samples, n = model.a12.shape
     length = max(1, int(np.ceil(np.sqrt(samples))))
     blocks = -(-samples // length)
-    padded = Discrete(*(blocked(entry, blocks, length) for entry in model))
+    padded = Discrete(*(in_blocks(entry, blocks, length) for entry in model))
     starts = Covariance(*(np.tile(g, (blocks, 1)) for g in guess))
     for start, value in zip(starts, entering, strict=True):
         start[0] = value
+    # After k passes the first k blocks are exact, so this ends, mostly long before.
     for _ in range(blocks):
         gains = run_blocks(padded, starts, length)
         change = 0.0
@@ -186,7 +189,7 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
     return Gains(flat[0], flat[1], Covariance(*flat[2:]))
 
 
-def blocked(entry: Array, blocks: int, length: int) -> Array:
+def in_blocks(entry: Array, blocks: int, length: int) -> Array:
     """Arrange samples as position in block × block × joint, repeating the last to fill up."""
     short = blocks * length - len(entry)
     padded = np.concatenate([entry, np.repeat(entry[-1:], short, axis=0)]) if short else entry

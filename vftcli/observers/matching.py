@@ -49,7 +49,7 @@ def parse_target(text: str) -> MatchTarget:
     return MatchTarget(quantity.strip(), value)
 
 
-def matched(
+def match_observers(
     observers: Sequence[Observer], goal: MatchTarget, setup: Setup
 ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
     """Re-tune observers to one delay or −3 dB bandwidth per joint, with remarks on it.
@@ -89,6 +89,7 @@ def tune(observer: Observer, goal: MatchTarget, setup: Setup) -> Observer:
     ends = [measure(turn(observer, np.exp(x)), goal.value, setup) for x in (a, b)]
     if not np.all((np.minimum(*ends) <= 0.0) & (np.maximum(*ends) >= 0.0)):
         raise ParameterError(out_of_reach(observer, goal, setup))
+    # Both measures are monotonic in the gain, so that halving its logarithm finds the one crossing.
     for _ in range(HALVINGS):
         middle = 0.5 * (a + b)
         above = measure(turn(observer, np.exp(middle)), goal.value, setup) > 0.0
@@ -97,7 +98,7 @@ def tune(observer: Observer, goal: MatchTarget, setup: Setup) -> Observer:
 
 
 def out_of_reach(observer: Observer, goal: MatchTarget, setup: Setup) -> str:
-    """One line on a goal that no gain reaches."""
+    """The message that no gain gives an observer the delay or bandwidth that is wanted."""
     limit = (
         f"a delay of more than half a sample ({0.5 * setup.step:g} s)"
         if goal.quantity == "delay"
@@ -111,7 +112,7 @@ def out_of_reach(observer: Observer, goal: MatchTarget, setup: Setup) -> str:
 
 
 def excess_delay(observer: Observer, goal: float, setup: Setup) -> Array:
-    """Delay less the wanted one. (n,) [s]"""
+    """How much longer an observer's delay is than the wanted one. (n,) [s]"""
     return observer.tuning(setup.step, setup.joints).delay - goal
 
 
@@ -146,7 +147,7 @@ class Knob(NamedTuple):
 
 
 def turn_kalman(observer: Observer, value: Array) -> Observer:
-    """The Kalman observer with another Q_τ."""
+    """A Kalman observer with another Q_τ, the one number that moves its ω_n alone. (n,)"""
     return replace(cast("KalmanObserver", observer), q_tau_diag=value)
 
 

@@ -79,6 +79,7 @@ class MomentumObserver:
         x[1:, 0] = gain * (p[1:] - p[:-1]) - a[-terms.samples + 1 :] * (mu[1:] + mu[:-1])
         F = np.zeros((len(a), 2, 2, n))
         F[:, 0, 0], F[:, 0, 1], F[:, 1, 0] = 1.0 - a, -a, 1.0
+        # As printed it may well diverge: that is the result, and is shown as unknown.
         with np.errstate(over="ignore", invalid="ignore"):
             tau = recursion(F[0] if len(a) == 1 else F, x, np.zeros((2, n)))[:, 0]
         unstable = np.flatnonzero(np.median(a, axis=0) >= 1.0)

@@ -62,7 +62,7 @@ def blockwise(F: Array, x: Array, start: Array) -> Array:
     for i in range(1, BLOCK):
         step = steps[0 if constant else i]
         add_product(step, y[i - 1], y[i], room)
-        reach[i] = product(step, reach[i - 1])
+        reach[i] = transition_product(step, reach[i - 1])
     ends_reach = reach[-1, ..., 0] if constant else np.moveaxis(reach[-1], -1, 0)
     ends = blockwise(ends_reach, np.moveaxis(y[-1], -1, 0), start)
     entering = np.ascontiguousarray(np.concatenate([start[None], ends[:-1]]).transpose(1, 2, 0))
@@ -97,7 +97,7 @@ def add_product(F: Array, state: Array, out: Array, room: Array) -> None:
             out[row] += room
 
 
-def product(F: Array, G: Array) -> Array:
+def transition_product(F: Array, G: Array) -> Array:
     """F·G for every joint and block. (m, m, n, …)"""
     out = np.zeros_like(G)
     room = np.empty_like(G[0, 0])
@@ -128,5 +128,6 @@ def steps_of(t: Array) -> Steps:
     dt = np.diff(t)
     usual = median(dt)
     if uniform := is_uniform(t):
+        # The mean step of an even clock has more digits than any single difference of stamps.
         usual = float((t[-1] - t[0]) / (len(t) - 1))
     return Steps(np.concatenate([[usual], dt]), uniform, usual)

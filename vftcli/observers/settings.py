@@ -66,7 +66,11 @@ def check_name(section: str, parameter: str, sections: Mapping[str, Sequence[str
 
 
 def parse_value(parameter: str, text: str, whole: str) -> Value:
-    """A word, a number, or a list of numbers."""
+    """The value of an assignment: a word for the parameters in `WORDS`, else one number or several.
+
+    Raises:
+        ParameterError: If it is no number, or not a finite one.
+    """
     if parameter in WORDS:
         return text
     values = numbers(text)
@@ -77,11 +81,14 @@ def parse_value(parameter: str, text: str, whole: str) -> Value:
     return values[0] if len(values) == 1 else list(values)
 
 
-def merged(section: str, name: str, *sources: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def parameters_given(
+    section: str, name: str, *sources: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
     """Parameters of one observer: later sources win, its own section over the shared one."""
     found: dict[str, Any] = {}
     for source in sources:
         found |= source.get(section, {})
+        # kfo-zoh.r_diag is meant for that one filter, kfo.r_diag for all of them.
         if name != section:
             found |= source.get(name, {})
     return found

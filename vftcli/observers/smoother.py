@@ -68,7 +68,7 @@ class KalmanSmoother:
         tau = steady_filter(F, g, change, start, wanted=both)
         innovation = innovations(tau, gains.l2, model.a22)
         S = settled.prior.p11 + model.r
-        backward, b = adjoint(gains, model.a12, model.a22)
+        backward, b = backward_filter(gains, model.a12, model.a22)
         # λ̃ᵗ is driven by νᵗ⁺¹: turned round, by the sample before.
         driven = np.zeros_like(innovation)
         driven[1:] = innovation[:0:-1] / S
@@ -79,7 +79,7 @@ class KalmanSmoother:
     def _steady_deviation(self, gains: Gains, model: Discrete, S: Array, samples: int) -> Array:
         """√P₂₂ of the smoother: it settles within a few time constants of the log's end. (T, n)"""
         step = information_step(gains, model.a12, model.a22)
-        missing = still_missing(step, information_gain(model.a12, S), samples)
+        missing = missing_information(step, information_gain(model.a12, S), samples)
         information = (missing[0] - missing).transpose(1, 0, 2)
         variances = smoothed_variance(gains.posterior, information)
         sd = empty_series(samples, len(S))
@@ -96,14 +96,14 @@ class KalmanSmoother:
         states = recursion(F, g * change[:, None, :], np.zeros((2, n)))
         tau = states[:, 1].copy()
         innovation = innovations(tau, gains.l2, model.a22)
-        backward, b = adjoint(gains, model.a12, model.a22)
+        backward, b = backward_filter(gains, model.a12, model.a22)
         forced = -b * (innovation / S)[:, None, :]
-        lam = shifted_back(recursion(backward[::-1], -forced[::-1], np.zeros((2, n)))[::-1])
+        lam = one_sample_later(recursion(backward[::-1], -forced[::-1], np.zeros((2, n)))[::-1])
         P = gains.posterior
         tau -= P.p12 * lam[:, 0] + P.p22 * lam[:, 1]
         step = information_step(gains, model.a12, model.a22)
         gain = information_gain(model.a12, S)
-        information = shifted_back(recursion(step[::-1], gain[::-1], np.zeros((3, n)))[::-1])
+        information = one_sample_later(recursion(step[::-1], gain[::-1], np.zeros((3, n)))[::-1])
         variance = smoothed_variance(P, information.transpose(1, 0, 2))
         return tau, np.sqrt(variance)
 
@@ -155,7 +155,7 @@ def innovations(tau: Array, l2: Array, a22: Array) -> Array:
     return nu
 
 
-def adjoint(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
+def backward_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
     """Transition ((I − LC)A)ᵀ and input −AᵀCᵀ of the backward recursion. (…, 2, 2, n), (…, 2, n)"""
     rest, l2 = 1.0 - gains.l1, gains.l2
     F = np.stack([rest, -l2, rest * a12, a22 - l2 * a12], axis=-2)
@@ -181,14 +181,14 @@ def information_gain(a12: Array, S: Array) -> Array:
 
 
 def smoothed_variance(P: Covariance, information: Array) -> Array:
-    """P₂₂ − [P₁₂ P₂₂] Λ̃ [P₁₂ P₂₂]ᵀ. Like P₂₂"""
+    """Variance of the smoothed torque, P₂₂ − [P₁₂ P₂₂] Λ̃ [P₁₂ P₂₂]ᵀ. Like P₂₂ [(N·m)²]"""
     l11, l12, l22 = information
     gained = P.p12**2 * l11 + 2.0 * P.p12 * P.p22 * l12 + P.p22**2 * l22
     variance: Array = P.p22 - gained
     return variance
 
 
-def still_missing(step: Array, gain: Array, samples: int) -> Array:
+def missing_information(step: Array, gain: Array, samples: int) -> Array:
     """What Λ̃ lacks of its settled value, 0, 1, 2 … samples from the end of a log. (N, 3, n)
 
     Λ̃ ← SΛ̃ + g settles at Λ̃∞ = (I − S)⁻¹g, from which it is Sᵏ Λ̃∞ away after k samples. The
@@ -206,7 +206,7 @@ def still_missing(step: Array, gain: Array, samples: int) -> Array:
     return kept
 
 
-def shifted_back(series: Array) -> Array:
+def one_sample_later(series: Array) -> Array:
     """The series one sample later, zero at the end: what a sample learns from those after it."""
     out = np.zeros_like(series)
     out[:-1] = series[1:]

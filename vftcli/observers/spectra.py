@@ -73,7 +73,7 @@ class Spectra:
         The difference is averaged over neighbouring frequencies before it is cut at zero: bin by
         bin, chance would count where it is positive and not where it is negative.
         """
-        excess = smoothed(self.loaded - self.free)
+        excess = neighbour_mean(self.loaded - self.free)
         return np.maximum(excess, 0.0)
 
     @property
@@ -90,7 +90,7 @@ class Spectra:
             low *= np.sqrt(2.0)
         quietest = np.argmin(levels, axis=0)
         above = self.frequency[:, None] > np.array(tops)[quietest]
-        return np.where(above, smoothed(self.free), np.min(levels, axis=0))
+        return np.where(above, neighbour_mean(self.free), np.min(levels, axis=0))
 
     def missed(self, response: NDArray[np.complex128]) -> Array:
         """∫|1 − H|² S_τ df, what an estimator's lag and bandwidth leave out. (n,) [(N·m)²]
@@ -107,7 +107,7 @@ class Spectra:
         return np.asarray(np.sum(share * self.free, axis=0) * self.width)
 
 
-def smoothed(spectrum: Array) -> Array:
+def neighbour_mean(spectrum: Array) -> Array:
     """Mean of each bin and its neighbours within ±`NEIGHBOURS` of its frequency. (F, n)"""
     bins = np.arange(len(spectrum))
     reach = (NEIGHBOURS * bins).astype(int)

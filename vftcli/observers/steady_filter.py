@@ -9,14 +9,11 @@ once a block. It is the plain loop's sum in another order, to rounding.
 
 import numpy as np
 
-from vftcli.observers.recursion import recursion
+from vftcli.observers.recursion import PIECE, recursion
 from vftcli.signals.arrays import Array, empty_series
 
 BLOCK = 32
 """Samples in a block: the work grows with it, the number of blocks shrinks."""
-
-PIECE = 1 << 16
-"""Samples handled at a time, so that memory does not grow with the log."""
 
 
 def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> Array:

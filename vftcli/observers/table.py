@@ -9,7 +9,13 @@ from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
 from vftcli.observers.kalman import KalmanObserver
 from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer, per_joint
-from vftcli.observers.settings import PARAMETERS, Settings, joint_values, merged, parse_settings
+from vftcli.observers.settings import (
+    PARAMETERS,
+    Settings,
+    joint_values,
+    parameters_given,
+    parse_settings,
+)
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, caution, fact
@@ -67,7 +73,7 @@ class Entry(NamedTuple):
 
 def build_fdo(setup: Setup) -> Built:
     """The filtered dynamics observer, its cutoff given or left over from the Kalman filter."""
-    given = merged("fdo", "fdo", setup.gains, setup.settings)
+    given = parameters_given("fdo", "fdo", setup.gains, setup.settings)
     remarks: tuple[Remark, ...] = ()
     omega = given.get("omega")
     if omega is None:
@@ -83,7 +89,7 @@ def build_fdo(setup: Setup) -> Built:
 
 def build_gmo(setup: Setup) -> Built:
     """The momentum observer, its gains given or left over from the Kalman filter."""
-    given = merged("gmo", "gmo", setup.gains, setup.settings)
+    given = parameters_given("gmo", "gmo", setup.gains, setup.settings)
     remarks: tuple[Remark, ...] = ()
     gain = given.get("gain")
     if gain is None:
@@ -102,7 +108,7 @@ def build_kfo(scheme: str, section: str | None = None) -> Callable[[Setup], Buil
     """
 
     def build(setup: Setup) -> Built:
-        given = merged("kfo", section or f"kfo-{scheme}", setup.gains, setup.settings)
+        given = parameters_given("kfo", section or f"kfo-{scheme}", setup.gains, setup.settings)
         convention = str(given.pop("noise_convention", "density"))
         values = {
             key: joint_values(value, setup.joints, f"kfo.{key}")
@@ -138,10 +144,10 @@ def build_auto(name: str, by_hand: Callable[[Setup], Built]) -> Callable[[Setup]
     """The builder of an observer whose gains come from the log, else from `by_hand`."""
 
     def build(setup: Setup) -> Built:
-        from vftcli.observers.auto_tuning import AutoTuned, tuned
+        from vftcli.observers.auto_tuning import AutoTuned, tune_to_spectra
 
         if setup.spectra is not None:
-            return tuned(name, setup.spectra), ()
+            return tune_to_spectra(name, setup.spectra), ()
         observer, remarks = by_hand(setup)
         fallback = caution("tuning-without-free-part", Where(name), observer=observer.name)
         return AutoTuned(name=name, observer=observer), (*remarks, fallback)

@@ -17,7 +17,7 @@ from vftcli.signals.arrays import Array, Mask, frozen_mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution
-from vftcli.signals.series import resampled
+from vftcli.signals.series import resample_columns
 
 QUIETER = 0.85
 """A free part that was found is believed if on most joints the loaded part has this share of its
@@ -121,7 +121,7 @@ def without_free_motion(found: Baseline) -> Baseline:
     except ParameterError:
         return found
     floor = (1.0 + 1.0 / len(part.pairings)) * spectra.floor
-    noise = resampled(loaded.frequency, spectra.frequency, floor)
+    noise = resample_columns(loaded.frequency, spectra.frequency, floor)
     return replace(found, spectra=replace(loaded, free=noise))
 
 

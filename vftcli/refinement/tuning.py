@@ -11,8 +11,8 @@ from vftcli.observers.auto_tuning import (
     expected_error,
     kalman_filter,
     kalman_smoother,
+    natural_frequencies,
     noise_level,
-    tried,
 )
 from vftcli.observers.matching import MatchTarget, tune
 from vftcli.observers.spectra import Spectra
@@ -161,7 +161,7 @@ def densities(omega_n: Array, spectra: Spectra) -> dict[str, Any]:
 
 def rates(kind: Kind, spectra: Spectra, goal: TuningGoal) -> Array:
     """The rate of each joint that reaches the goal. (n,) [rad/s]"""
-    grid = tried(spectra.step)
+    grid = natural_frequencies(spectra.step)
     if goal.name == "false-alarms" and goal.threshold is not None:
         few = alarms(kind, grid, spectra, goal.threshold) <= goal.value
         check_reachable(few, spectra, goal)
@@ -189,7 +189,7 @@ def shared_rate(kind: Kind, spectra: Spectra, goal: TuningGoal) -> float:
     """One rate for all joints: the smallest mean error, or what the slowest joint allows."""
     if goal.name != "rmse":
         return float(np.min(rates(kind, spectra, goal)))
-    grid = tried(spectra.step)
+    grid = natural_frequencies(spectra.step)
     return float(grid[np.argmin(expected_error(kind, grid, spectra).mean(axis=1))])
 
 

@@ -8,7 +8,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.lag import lag_fit
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import resampled, runs_of
+from vftcli.signals.series import resample_columns, runs_of
 
 LEAST_OVERLAP = 0.3
 """Share of the shorter log that must overlap at an admissible shift."""
@@ -101,7 +101,7 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     more.
     """
     t = np.linspace(recording.t[0], recording.t[-1], COARSE)
-    q = resampled(t, recording.t, recording.q)
+    q = resample_columns(t, recording.t, recording.q)
     path = np.append(np.max(np.abs(np.diff(q, axis=0)), axis=1), 0.0)
     span = recording.duration + free.duration
     step = max(0.02, span / 5000.0)
@@ -121,7 +121,7 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
 
 def near(q: Array, t: Array, free: Recording) -> Mask:
     """Whether positions lie within `SAME_TRAJECTORY` of the free run at instants of its clock."""
-    apart = np.max(np.abs(resampled(t, free.t, free.q, np.inf) - q), axis=1)
+    apart = np.max(np.abs(resample_columns(t, free.t, free.q, np.inf) - q), axis=1)
     return np.asarray(apart <= SAME_TRAJECTORY)
 
 
@@ -166,7 +166,7 @@ def explaining_rate(recording: Recording, free: Recording) -> float | None:
 def uniform(recording: Recording, step: float) -> Array:
     """Joint positions on a uniform clock. (N, n) [rad]"""
     t = np.arange(0.0, recording.duration + 0.5 * step, step)
-    return resampled(t + recording.t[0], recording.t, recording.q)
+    return resample_columns(t + recording.t[0], recording.t, recording.q)
 
 
 def best_fit(recording: Recording, free: Recording) -> tuple[float, float]:
@@ -196,7 +196,7 @@ def distance_moving(recording: Recording, free: Recording, shift: float, rate: f
     used = (t >= free.t[0]) & (t <= free.t[-1]) & (speed >= 0.5 * np.sqrt(np.mean(speed**2)))
     if np.count_nonzero(used) < 8:
         return float("inf")
-    distance = resampled(t[used], free.t, free.q) - recording.q[used]
+    distance = resample_columns(t[used], free.t, free.q) - recording.q[used]
     return float(np.quantile(np.linalg.norm(distance, axis=1), 0.25))
 
 
@@ -227,8 +227,8 @@ def gauss_newton_step(
     """How far shift [s] and rate are off, to first order; zeros where nothing moves."""
     own = recording.t[inside]
     middle = float(own.mean())
-    distance = resampled(t[inside], free.t, free.q) - recording.q[inside]
-    speed = resampled(t[inside], free.t, slope)
+    distance = resample_columns(t[inside], free.t, free.q) - recording.q[inside]
+    speed = resample_columns(t[inside], free.t, slope)
     scale = 1.4826 * np.median(np.abs(distance), axis=0) + 1e-7
     share = speed / (scale**2 + distance**2)
     arm = (own - middle)[:, None]
@@ -254,6 +254,6 @@ def lying_at(
         overlap &= within
     deviation = float("inf")
     if np.count_nonzero(overlap) >= 2:
-        there = resampled(t[overlap], free.t, free.q)
+        there = resample_columns(t[overlap], free.t, free.q)
         deviation = float(np.sqrt(np.mean((there - recording.q[overlap]) ** 2)))
     return Alignment(shift, rate, deviation, overlap)

@@ -10,7 +10,7 @@ from vftcli.repetition.periodicity import Period, moving_part
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import resampled
+from vftcli.signals.series import resample_columns
 
 ON_PATH = 0.1
 """A sample is on the repeated path if it is there again one period away, within this. [rad]"""
@@ -77,7 +77,7 @@ def segment(recording: Recording, period: Period) -> Cycles:
 def comes_back(t: Array, q: Array, shift: float) -> Mask:
     """Whether the arm is at the same place `shift` seconds away. (T,)"""
     there = t + shift
-    distance = np.abs(resampled(there, t, q) - q).max(axis=1)
+    distance = np.abs(resample_columns(there, t, q) - q).max(axis=1)
     return np.asarray((there >= t[0]) & (there <= t[-1]) & (distance <= ON_PATH))
 
 

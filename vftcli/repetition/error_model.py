@@ -8,7 +8,7 @@ import numpy as np
 from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.pairing import Pairing, mean_of
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.filters import band_pass, low_pass, passed
+from vftcli.signals.filters import band_pass, low_pass, noise_passed
 
 STUCK = 0.3
 """A stop of this length leaves the whole of the dry friction open, a shorter one its share. [s]"""
@@ -150,15 +150,17 @@ def noise_of(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None
         return white(x, moving)
     middle = max(cutoff, min(LEAST_BAND, 0.2 / step))
     limits = (0.7 * middle, min(1.3 * middle, 0.45 / step))
-    dense = rms(band_pass(t, x, *limits), moving) / np.sqrt(passed(step, limits, "bandpass"))
-    return np.asarray(dense * np.sqrt(passed(step, cutoff, "lowpass")))
+    dense = rms(band_pass(t, x, *limits), moving) / np.sqrt(noise_passed(step, limits, "bandpass"))
+    return np.asarray(dense * np.sqrt(noise_passed(step, cutoff, "lowpass")))
 
 
 def slope_noise(t: Array, momentum: Array, moving: Mask, step: float, cutoff: float) -> Array:
     """Noise that differentiated momenta put into the model's low-passed torque. (n,) [N·m]"""
     limits = band(step, cutoff)
-    dense = rms(band_pass(t, momentum, *limits), moving) / np.sqrt(passed(step, limits, "bandpass"))
-    return np.asarray(dense * np.sqrt(passed(step, cutoff, "lowpass", slope=1)))
+    dense = rms(band_pass(t, momentum, *limits), moving) / np.sqrt(
+        noise_passed(step, limits, "bandpass")
+    )
+    return np.asarray(dense * np.sqrt(noise_passed(step, cutoff, "lowpass", slope=1)))
 
 
 def white(x: Array, moving: Mask) -> Array:

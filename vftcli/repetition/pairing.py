@@ -9,7 +9,7 @@ from vftcli.repetition.cycles import Cycles
 from vftcli.repetition.drive_run import DriveRun
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.filters import low_pass
-from vftcli.signals.series import resampled
+from vftcli.signals.series import resample_columns
 
 GAP = 5.5
 """A gap of more than this many median steps is not interpolated across."""
@@ -41,7 +41,7 @@ class Pairing(NamedTuple):
         """Columns of a signal of the free run at the paired instants, NaN where there is none."""
         known = self.known
         result = np.full((len(self.times), x.shape[1]), np.nan)
-        result[known] = resampled(self.times[known], self.free.t, x)
+        result[known] = resample_columns(self.times[known], self.free.t, x)
         return result
 
 
@@ -95,8 +95,8 @@ def by_phase(motion: DriveRun, pairing: Pairing) -> Pairing:
     damping = 0.01 * float(np.mean(np.sum(speed**2, axis=1))) + 1e-6
     for _ in range(4):
         at = np.clip(times + shift, times.min(), times.max())
-        path = resampled(at, free.t, speed)
-        distance = resampled(at, free.t, free.q) - q
+        path = resample_columns(at, free.t, speed)
+        distance = resample_columns(at, free.t, free.q) - q
         shift -= np.sum(distance * path, axis=1) / (np.sum(path**2, axis=1) + damping)
         shift = np.clip(shift, -FARTHEST, FARTHEST)
     cutoff = min(PHASE_CUTOFF, 0.2 / motion.step)

@@ -9,7 +9,7 @@ from vftcli.repetition.standstill import duration, standing
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import resampled
+from vftcli.signals.series import resample_columns
 
 LEAST_REPEATED = 0.15
 """Share of the moving part of the log that must be there twice."""
@@ -63,7 +63,7 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     t, q = moving_part(recording)
     check_stated(recording, stated, float(t[-1] - t[0]))
     step = recording.median_step
-    x = resampled(np.arange(t[0], t[-1], step), t, q)
+    x = resample_columns(np.arange(t[0], t[-1], step), t, q)
     spread = float(np.sqrt(np.mean((x - x.mean(axis=0)) ** 2) * x.shape[1]))
     closest = (float("nan"), float("inf"))
     for lag in valleys(distances(x), len(x), step, stated):
@@ -154,7 +154,7 @@ def valleys(distance: Array, samples: int, step: float, stated: float | None) ->
 def returned(t: Array, q: Array, seconds: float) -> float:
     """Lower quartile over time of the distance between q and itself `seconds` later. [rad]"""
     inside = t + seconds <= t[-1]
-    distance = resampled(t[inside] + seconds, t, q) - q[inside]
+    distance = resample_columns(t[inside] + seconds, t, q) - q[inside]
     return float(np.quantile(np.sqrt(np.sum(distance**2, axis=1)), 0.25))
 
 
@@ -183,8 +183,8 @@ def period_step(t: Array, q: Array, period: float, multiples: NDArray[np.int64])
     for m in multiples:
         there = t + m * period
         inside = there <= t[-1]
-        distance = resampled(there[inside], t, q) - q[inside]
-        slope = m * resampled(there[inside], t, dq)
+        distance = resample_columns(there[inside], t, q) - q[inside]
+        slope = m * resample_columns(there[inside], t, dq)
         scale = 1.4826 * np.median(np.abs(distance), axis=0) + 1e-7
         share = 1.0 / (scale**2 + distance**2)
         move += float(np.sum(share * slope * distance))

@@ -4,7 +4,7 @@ import numpy as np
 
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, is_uniform
-from vftcli.signals.series import gaps_of, resampled, runs_of
+from vftcli.signals.series import gaps_of, resample_columns, runs_of
 
 GAP = 5.5
 """A step of more than this many median steps is a gap; no stretch reaches across."""
@@ -36,6 +36,7 @@ def disturbance_stretches(terms: DynamicsTerms, inside: Mask, step: float) -> li
     whole = inside[1:] & inside[:-1]
     if len(t) > 1 and is_uniform(t):
         return [d[start:stop] for start, stop in runs_of(whole)]
+    # Across a gap the mean of two μ says nothing of what was between them.
     whole[gaps_of(t, GAP)] = False
     stretches = []
     for start, stop in runs_of(whole):
@@ -43,5 +44,5 @@ def disturbance_stretches(terms: DynamicsTerms, inside: Mask, step: float) -> li
         total = np.concatenate([np.zeros((1, d.shape[1])), d[start:stop] * np.diff(clock)[:, None]])
         np.cumsum(total, axis=0, out=total)
         even = np.arange(clock[0], clock[-1], step)
-        stretches.append(np.diff(resampled(even, clock, total), axis=0) / step)
+        stretches.append(np.diff(resample_columns(even, clock, total), axis=0) / step)
     return stretches

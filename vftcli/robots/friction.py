@@ -73,6 +73,7 @@ def sigmoid(
         C. Gaz et al., "Dynamic identification of the Franka Emika Panda robot with retrieval of
         feasible parameters using penalty-based optimization", IEEE RA-L 2019, Sec. II.
     """
+    # Far below −v₀ the term is zero long before the exponential overflows.
     exponent = np.minimum(-slope * (dq + shift), 700.0)  # e^709 is the largest float64
     moving = amplitude / (1.0 + np.exp(exponent))
     at_rest = amplitude / (1.0 + np.exp(-slope * np.asarray(shift)))
@@ -118,7 +119,7 @@ def friction_torque(
     for (model, _keys), joints in groups.items():
         if model not in MODELS:
             raise ParameterError(f"no friction model {model!r}; there is {', '.join(MODELS)}")
-        values = stacked([friction[j].parameters for j in joints])
+        values = stack_parameters([friction[j].parameters for j in joints])
         every = len(joints) == dq.shape[1]
         if load is not None and model in LOADED:
             values["load"] = load if every else load[:, joints]
@@ -128,7 +129,7 @@ def friction_torque(
     return torque
 
 
-def stacked(parameters: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+def stack_parameters(parameters: Sequence[Mapping[str, float]]) -> dict[str, Array]:
     """Turn one mapping a joint into one array a parameter. (n,) each"""
     return {key: np.array([p[key] for p in parameters]) for key in parameters[0]}
 

@@ -92,7 +92,7 @@ def kept_or_new(old: Table, payload: Payload) -> Table:
 
 
 def payload_table(payload: Payload) -> Table:
-    """One load, in flange axes."""
+    """The ``[payload]`` table of a load, its centre and tensor in flange axes."""
     tensor = payload.inertia[np.triu_indices(3)].tolist()
     return {"mass": payload.mass, "com": payload.com.tolist(), "inertia": tensor}
 
@@ -156,12 +156,12 @@ def is_tables(value: object) -> bool:
 
 
 def bare(key: str) -> str:
-    """A key, quoted if TOML needs it."""
+    """A key as TOML writes it: bare where it may be, else quoted."""
     return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else quoted(key)
 
 
 def quoted(text: str) -> str:
-    """A basic string with its escapes."""
+    """A string in TOML's double quotes, with the escapes that these need."""
     escapes = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
     out = "".join(escapes.get(c, c) for c in text)
     return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in out) + '"'

@@ -6,7 +6,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, is_uniform
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.series import median_step, resampled
+from vftcli.signals.series import median_step, resample_columns
 
 ORDER = 2
 """Order of the Butterworth filter; run forwards and backwards it attenuates twice as much."""
@@ -15,8 +15,8 @@ Kind = Literal["lowpass", "bandpass"]
 """What a filter lets pass."""
 
 UNEVEN = 0.05
-"""Steps that differ from their median by a larger share are resampled: by less, the error of a
-filter that takes them as equal is below what the interpolation would make."""
+"""Steps that differ from their median by a larger share are resampled; a clock that jitters by less
+is filtered as an even one."""
 
 
 def low_pass(
@@ -39,15 +39,15 @@ def low_pass(
     Raises:
         ParameterError: If the cutoff is not below half the sample rate.
     """
-    return filtered(t, x, design(median_step(t), cutoff, "lowpass", order), settling)
+    return filter_columns(t, x, butterworth(median_step(t), cutoff, "lowpass", order), settling)
 
 
 def band_pass(t: Array, x: Array, low: float, high: float) -> Array:
     """Keep the band from `low` to `high` [Hz] of each column, without phase shift. (T, n)"""
-    return filtered(t, x, design(median_step(t), (low, high), "bandpass"))
+    return filter_columns(t, x, butterworth(median_step(t), (low, high), "bandpass"))
 
 
-def filtered(t: Array, x: Array, sections: Array, settling: float | None = None) -> Array:
+def filter_columns(t: Array, x: Array, sections: Array, settling: float | None = None) -> Array:
     """Columns behind second-order sections that run forwards and backwards along time. (T, n)"""
     from scipy.signal import sosfiltfilt
 
@@ -58,13 +58,14 @@ def filtered(t: Array, x: Array, sections: Array, settling: float | None = None)
         return x.copy()
     else:
         padding = None
+    # A log keeps its own samples where it can: resampling is a filter too.
     even = is_uniform(t, tolerance=UNEVEN)
     clock = t if even else even_clock(t, step)
     if padding is not None:
         padding = min(len(clock) - 1, padding)
-    columns = x if even else resampled(clock, t, x)
+    columns = x if even else resample_columns(clock, t, x)
     smooth: Array = sosfiltfilt(sections, columns, axis=0, padlen=padding)
-    return smooth if even else resampled(t, clock, smooth)
+    return smooth if even else resample_columns(t, clock, smooth)
 
 
 def even_clock(t: Array, step: float) -> Array:
@@ -72,7 +73,7 @@ def even_clock(t: Array, step: float) -> Array:
     return np.linspace(t[0], t[-1], max(2, round(float(t[-1] - t[0]) / step) + 1))
 
 
-def design(
+def butterworth(
     step: float, cutoff: float | tuple[float, float], kind: Kind, order: int = ORDER
 ) -> Array:
     """Second-order sections of a Butterworth filter for a sample time. [s]
@@ -91,7 +92,9 @@ def design(
     return sections
 
 
-def passed(step: float, cutoff: float | tuple[float, float], kind: Kind, slope: int = 0) -> float:
+def noise_passed(
+    step: float, cutoff: float | tuple[float, float], kind: Kind, slope: int = 0
+) -> float:
     """Mean square of white noise of unit variance behind the filter, differentiated `slope` times.
 
     Args:
@@ -102,7 +105,8 @@ def passed(step: float, cutoff: float | tuple[float, float], kind: Kind, slope: 
     """
     from scipy.signal import sosfreqz
 
-    omega, response = sosfreqz(design(step, cutoff, kind), 1024)
+    omega, response = sosfreqz(butterworth(step, cutoff, kind), 1024)
+    # |H|² of one pass is the amplitude of both, so |H|⁴ is their power.
     gain = np.abs(response) ** 4
     if slope:
         gain = gain * (np.sin(omega) / step) ** 2

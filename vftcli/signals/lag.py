@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.signals.arrays import Array, Mask, is_uniform
-from vftcli.signals.series import bridged, median_step, resampled
+from vftcli.signals.series import bridge_unknown, median_step, resample_columns
 
 LONGEST = 1.0
 """Longest delay looked for. [s]"""
@@ -40,6 +40,7 @@ def lags(late: Array, early: Array, step: float) -> Array:
     size = 1 << int(np.ceil(np.log2(2 * len(x))))
     at = np.arange(first - 1, last + 2) % size
     there = known.astype(np.float64)
+    # Each column is normalised by the samples that overlap at that lag, unknown ones left out.
     power = sliding(x**2, there, size, at) * sliding(there, y**2, size, at)
     fit = sliding(x, y, size, at) / np.sqrt(np.where(power > 0, power, np.inf))
     return np.array([step * (first - 1 + peak(column)) for column in fit.T])
@@ -100,7 +101,7 @@ def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offs
     """
     step = median_step(t)
     even = t if is_uniform(t) else np.arange(t[0], t[-1], step)
-    x, y = (resampled(even, t, bridged(t, series)) for series in (late, early))
+    x, y = (resample_columns(even, t, bridge_unknown(t, series)) for series in (late, early))
     x, y = x - x.mean(axis=0), y - y.mean(axis=0)
     count = len(even)
     reach = min(int(limit / step), count - 2)
@@ -154,6 +155,7 @@ def lag_fit(late: Array, early: Array, least: float) -> LagFit:
         early: Another, on a clock of the same step. (N, k)
         least: Share of the shorter series that must overlap.
     """
+    # A common offset changes no difference, and without it the sums of squares keep their digits.
     middle = late.mean(axis=0)
     x, y = late - middle, early - middle
     size = 1 << int(np.ceil(np.log2(len(x) + len(y))))

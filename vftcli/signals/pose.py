@@ -71,19 +71,19 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def rotation_x(angle: float) -> Array:
-    """Rotation about x. (3, 3)"""
+    """The matrix that turns a vector about x by an angle [rad]. (3, 3)"""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
 def rotation_y(angle: float) -> Array:
-    """Rotation about y. (3, 3)"""
+    """The matrix that turns a vector about y by an angle [rad]. (3, 3)"""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
 def rotation_z(angle: float) -> Array:
-    """Rotation about z. (3, 3)"""
+    """The matrix that turns a vector about z by an angle [rad]. (3, 3)"""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -113,6 +113,7 @@ def rotation_onto(direction: Array) -> Array:
     z = direction / np.linalg.norm(direction)
     if np.allclose(z, (0.0, 0.0, 1.0), atol=1e-15):
         return np.eye(3)
+    # The axis farthest from z gives the best conditioned cross product.
     start = np.eye(3)[int(np.argmin(np.abs(z)))]
     x = np.cross(start, z)
     x /= np.linalg.norm(x)
@@ -123,6 +124,7 @@ def exp_quaternion(vector: Array) -> Array:
     """The unit quaternion of a rotation vector. (…, 3) [rad] → (…, 4)"""
     angle = np.sqrt(np.sum(vector**2, axis=-1, keepdims=True))
     half = 0.5 * angle
+    # sin(θ/2)/θ is 0/0 at rest, where every replay starts.
     share = np.where(angle < SMALL, 0.5 - angle**2 / 48.0, np.sin(half) / np.maximum(angle, SMALL))
     return np.concatenate([np.cos(half), share * vector], axis=-1)
 

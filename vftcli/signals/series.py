@@ -43,7 +43,7 @@ def runs_of(mask: Mask) -> list[tuple[int, int]]:
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def resampled(at: Array, t: Array, x: Array, outside: float | None = None) -> Array:
+def resample_columns(at: Array, t: Array, x: Array, outside: float | None = None) -> Array:
     """Columns of `x`, known at `t`, interpolated linearly to the times `at`. (S, n)
 
     Args:
@@ -56,7 +56,7 @@ def resampled(at: Array, t: Array, x: Array, outside: float | None = None) -> Ar
     return np.column_stack(columns) if columns else np.zeros((len(at), 0))
 
 
-def bridged(t: Array, x: Array) -> Array:
+def bridge_unknown(t: Array, x: Array) -> Array:
     """Columns with their unknown (non-finite) samples replaced by a straight line across. (T, n)
 
     Before the first known sample and after the last the column keeps that sample's value; one

@@ -11,7 +11,7 @@ from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import handed_over
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.series import resampled
+from vftcli.signals.series import resample_columns
 
 DISTURBANCE = "disturbance"
 """Its name."""
@@ -32,6 +32,6 @@ def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
     gained = raw_disturbance(terms) * np.diff(t)[:, None]
     total = np.concatenate([np.zeros((1, joints)), np.cumsum(gained, axis=0)])
     before, after = np.maximum(t - HALF, t[0]), np.minimum(t + HALF, t[-1])
-    mean = resampled(after, t, total) - resampled(before, t, total)
+    mean = resample_columns(after, t, total) - resample_columns(before, t, total)
     mean /= (after - before)[:, None]
     return ExternalTorque(name=DISTURBANCE, t=t, tau=handed_over(mean))

@@ -10,7 +10,7 @@ from vftcli.signals.arrays import Array, seal
 from vftcli.signals.lag import Offset, time_offset
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact
-from vftcli.signals.series import bridged, resampled
+from vftcli.signals.series import bridge_unknown, resample_columns
 from vftcli.signals.wrench import Wrench, WrenchFrame
 
 DERIVED = 0.9995
@@ -175,6 +175,8 @@ def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorChec
     frame = max(fits, key=lambda name: fits[name].correlation)
     turned = forces[frame] @ fits[frame].matrix.T
     offset = time_offset(recording.t, given, turned)
-    moved = resampled(recording.t - offset.lag, recording.t, bridged(recording.t, turned))
+    moved = resample_columns(
+        recording.t - offset.lag, recording.t, bridge_unknown(recording.t, turned)
+    )
     axes = fit_axes(np.where(usable[:, None], moved, np.nan) @ fits[frame].matrix, given)
     return VendorCheck(stated_frame=stated, frame=frame, axes=axes, offset=offset, **shares)

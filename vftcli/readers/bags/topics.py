@@ -16,7 +16,7 @@ from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, caution, fact
-from vftcli.signals.series import median_step, resampled
+from vftcli.signals.series import median_step, resample_columns
 from vftcli.signals.wrench import WrenchFrame
 
 TARGETS = re.compile(r"desired|command|target|goal|reference", re.IGNORECASE)
@@ -230,7 +230,7 @@ class Gathering:
                 lead=lead.channel.topic,
             )
         )
-        return resampled(x, xp, values)
+        return resample_columns(x, xp, values)
 
     def tell_left(self, streams: Sequence[Stream]) -> None:
         """Remark which messages and topics were left out."""
