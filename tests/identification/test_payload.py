@@ -191,3 +191,13 @@ def test_a_load_is_found_from_poses_and_too_few_are_refused():
     for few in (POSES[:3], np.repeat(POSES[:1], 5, axis=0) + 0.01 * np.arange(5)[:, None]):
         with pytest.raises(IdentificationError, match="a load needs 4 different ones"):
             payload_from_poses([steps(few, load=load)], UR5)
+
+
+def test_what_settles_at_the_edges_of_a_rest_does_not_count():
+    recording = steps(POSES)
+    settling = recording.current.copy()
+    for k in range(5):  # 0.2 s after each arrival, of which the window takes 0.1 s
+        settling[120 * k : 120 * k + 20] += 1.0
+    spoilt = Recording(t=recording.t, q=recording.q, dq=recording.dq, current=settling)
+    torque = resting_poses([spoilt], UR5)[1]
+    np.testing.assert_allclose(torque, gravity_torque(UR5, POSES), atol=1e-9)

@@ -6,7 +6,8 @@ import pytest
 from vftcli.identification import Processing, Task, identify
 from vftcli.identification.consistent import is_physical
 from vftcli.identification.processing import gravity_torque, prepare
-from vftcli.identification.scoring import predicted_torque, rms
+from vftcli.identification.result import root_mean_square
+from vftcli.identification.scoring import predicted_torque
 from vftcli.robots import JointFriction, load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.regressor import chain_parameters
@@ -88,8 +89,8 @@ def test_another_trajectory_is_predicted_to_the_noise_floor(train, other, truth,
     found = identify([train], load_robot("ur5"), Task(method=method), [other])
     trace = next(t for t in found.traces if t.role == "held-out")
     motion = prepare(other, truth, Processing())
-    floor = rms(motion.tau - predicted_torque(truth, motion))
+    floor = root_mean_square(motion.tau - predicted_torque(truth, motion))
     # the floor is what the true arm itself leaves: current noise and stiction at reversals
-    assert rms(trace.residual).mean() <= 1.1 * floor.mean()
+    assert root_mean_square(trace.residual).mean() <= 1.1 * floor.mean()
     assert is_physical(chain_parameters(found.robot.chain))
     assert np.all(found.robot.chain.rotor_inertia > 0)

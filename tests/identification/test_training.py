@@ -13,9 +13,9 @@ from vftcli.identification.training import (
     all_residuals,
     contacts_remark,
     data_of_joint,
-    dry_friction,
     fit_frictions,
     fit_without_contacts,
+    fitted_dry_friction,
     model_doubts,
     prepare_training,
 )
@@ -85,7 +85,7 @@ def test_friction_and_rotor_of_every_joint_are_found(data, weights):
         assert pytest.approx(UR5.chain.rotor_inertia[j], abs=0.05) == J
     left = all_residuals(data, fits)
     assert [x.shape for x in left] == [m.tau.shape for m in data.motions]
-    dry = dry_friction(data, 0, fits)
+    dry = fitted_dry_friction(data, 0, fits)
     np.testing.assert_allclose(dry, 4.0, atol=0.3)
 
 
