@@ -226,6 +226,18 @@ def test_a_wrench_of_another_rate_is_interpolated(tmp_path: Path) -> None:
     assert any("interpolated wrench of /wrench (1000 Hz)" in r for r in recording.source.repairs)
 
 
+def test_a_converted_log_of_an_earlier_version_reads_without_a_frame(tmp_path: Path) -> None:
+    """Its frame_id is a sentence, which was refused as the user's mistake."""
+    more = {"topic": "/vftcli/wrench", "force": (1.0, 0.0, 0.0)}
+    more["frame"] = "base axes, moment about the flange point"
+    messages = [ur_message(k) for k in range(20)]
+    messages += [{**more, "time": message["time"]} for message in messages]
+    messages.sort(key=lambda message: message["time"])
+    recording = read(write_joint_states(tmp_path / "x", messages))
+    assert recording.wrench is not None
+    assert recording.wrench_frame is None
+
+
 def test_a_topic_that_is_taken_is_not_told_as_left_out(tmp_path: Path) -> None:
     """Whatever its name: one with a hyphen was not found again in the sentence on its taking."""
     messages = [ur_message(k) for k in range(50)]

@@ -29,6 +29,12 @@ def test_what_is_no_frame(text: str) -> None:
         WrenchFrame.parsed(text)
 
 
+@pytest.mark.parametrize("notation", ["base axes, moment about the flange point", "", None])
+def test_a_converted_log_of_an_earlier_version_states_no_frame(notation: object) -> None:
+    assert WrenchFrame.of_conversion(notation) is None
+    assert WrenchFrame.of_conversion("base@tool") == WrenchFrame("base", "tool")
+
+
 def test_a_frame_in_words() -> None:
     assert str(STIFFNESS_FRAME) == (
         "base axes at the stiffness frame K, as force BY the robot ON the environment"

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from io import BytesIO
@@ -14,7 +13,7 @@ import numpy as np
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Column
 from vftcli.readers.tables import from_table
-from vftcli.signals.errors import LogError, ParameterError
+from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark
 from vftcli.signals.wrench import WrenchFrame
 
@@ -178,17 +177,10 @@ def read_parquet(file: LogFile, request: ReadChoice) -> RawLog:
     names = tuple(str(name) for name in told.get("joint_names") or ())
     return replace(
         raw,
-        wrench_frame=raw.wrench_frame or stated_frame(told.get("wrench_frame")),
+        wrench_frame=raw.wrench_frame or WrenchFrame.of_conversion(told.get("wrench_frame")),
         joint_names=raw.joint_names or names,
         robot_hint=raw.robot_hint or told.get("robot"),
     )
-
-
-def stated_frame(notation: object) -> WrenchFrame | None:
-    """The wrench's frame that our own metadata holds; None where it cannot be understood."""
-    with suppress(ParameterError):
-        return WrenchFrame.parsed(notation) if isinstance(notation, str) else None
-    return None
 
 
 def refuse_episodes(table: ParquetTable) -> None:

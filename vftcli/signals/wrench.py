@@ -1,5 +1,6 @@
 """Wrench: force and moment ON the robot along a log; WrenchFrame: what a log states of its own."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -60,6 +61,16 @@ class WrenchFrame:
             )
         # get_args has checked the sign, which the type checker cannot see.
         return cls(axes, point or OWN_POINT.get(axes, axes), sign)  # type: ignore[arg-type]
+
+    @classmethod
+    def of_conversion(cls, notation: object) -> "WrenchFrame | None":
+        """The frame that a log converted by us holds, None where it states none that is known.
+
+        Earlier versions wrote a sentence there; such a file still reads, its frame not stated.
+        """
+        with suppress(ParameterError):
+            return cls.parsed(notation) if isinstance(notation, str) else None
+        return None
 
     @property
     def notation(self) -> str:

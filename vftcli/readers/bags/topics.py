@@ -192,7 +192,7 @@ class Gathering:
         if sensor is None:
             return frame
         if sensor.channel.topic.startswith(OWN):
-            return WrenchFrame.parsed(sensor.frame) if sensor.frame else None
+            return WrenchFrame.of_conversion(sensor.frame)
         values = self.interpolated(sensor, "wrench")
         if values is None:
             return frame
