@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.outputs.files import OutputFolder, atomic, write_text
+from vftcli.outputs.files import OutputFolder, atomic, numbered, write_text
 from vftcli.signals.errors import OutputError
 
 
@@ -172,3 +172,7 @@ def test_a_move_that_fails_half_way_is_undone(
         write()
     assert names(tmp_path) == ["a.txt", "b.txt", "stale.txt"]
     assert {path.read_text() for path in tmp_path.iterdir()} == {"old"}
+
+
+def test_equal_names_get_numbers_that_are_free():
+    assert numbered(["a", "b", "a", "a-2", "a"]) == ["a", "b", "a-2", "a-2-2", "a-3"]

@@ -181,6 +181,17 @@ def refuse_existing(path: Path, force: bool) -> None:
         raise OutputError(f"{path} exists; give another -o, or --force to overwrite it")
 
 
+def numbered(names: Iterable[str]) -> list[str]:
+    """Names that all differ: one that is taken already gets the next number behind it."""
+    found: list[str] = []
+    for name in names:
+        free, number = name, 2
+        while free in found:
+            free, number = f"{name}-{number}", number + 1
+        found.append(free)
+    return found
+
+
 def make_folders(path: Path) -> list[Path]:
     """Make a folder and its missing parents; return those made, outermost first."""
     missing = [p for p in (path, *path.parents) if not p.exists()]

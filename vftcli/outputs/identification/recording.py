@@ -1,7 +1,8 @@
 """The Rerun recording of an identification: measured and predicted torque of every log.
 
 `/torque/<log>/J1` … hold the measured and the predicted torque, `/residual/<log>/J1` … their
-difference, on the timeline `t` in seconds from each log's first sample.
+difference, on the timeline `t` in seconds from each log's first sample. Logs of one name are
+numbered.
 """
 
 import re
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from vftcli.identification.result import Identification, Trace
+from vftcli.outputs.files import numbered
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.palette import REFERENCE, SPARE
 from vftcli.outputs.rerun_file import Lines, Tab, rerun_file
@@ -19,22 +21,19 @@ from vftcli.signals.remarks import explanation
 def write_identification_rrd(path: Path, found: Identification) -> None:
     """Write the recording with its blueprint, so that it opens arranged.
 
-    Args:
-        path: Where to; an existing file is replaced.
-        found: What to show.
-
     Raises:
         OutputError: If it cannot be written whole.
     """
-    tabs = [tab for trace in found.traces for tab in tabs_of(trace)]
+    # An entity's path may hold no blank; names of files may. A log may be there in two roles.
+    names = [re.sub(r"[^A-Za-z0-9_.-]", "_", trace.recording.name) for trace in found.traces]
+    entities = zip(found.traces, numbered(names), strict=True)
+    tabs = [tab for trace, entity in entities for tab in tabs_of(trace, entity)]
     with rerun_file(path, found.robot.name, tabs, {"Summary": summary(found)}):
         pass  # there is no arm to draw
 
 
-def tabs_of(trace: Trace) -> tuple[Tab, Tab]:
-    """The plots of one log: torques, and residuals, joint by joint."""
-    # An entity's path may hold no blank; names of files may.
-    entity = re.sub(r"[^A-Za-z0-9_.-]", "_", trace.recording.name)
+def tabs_of(trace: Trace, entity: str) -> tuple[Tab, Tab]:
+    """The plots of one log, called `entity` in paths: torques, and residuals, joint by joint."""
     names, colours = ["measured", "predicted"], [REFERENCE, SPARE[1]]
     torque, residual = [], []
     for j in range(trace.measured.shape[1]):

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.files import OutputFolder, numbered
 from vftcli.outputs.log import tables
 from vftcli.outputs.log.estimates import write_estimates
 from vftcli.outputs.log.rerun_recording import write_rrd
@@ -53,7 +53,8 @@ def write_reports(
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
-    places = sub_folders(analyses)
+    # One folder a log, called as its file without the ending.
+    places = numbered(Path(a.recording.name).stem or "log" for a in analyses)
     # All names that any log may have are declared, so that --force removes stale ones.
     below = [f"{place}/{name}" for place in places for name in FILES]
     with OutputFolder(path, force, ["index.html", "run.json", *ERROR_TABLES, *below]) as folder:
@@ -96,18 +97,6 @@ def put_errors(
         return
     for name, text_of in ERROR_TABLES.items():
         put(folder / f"{place}{name}", text_of(errors, bounds))
-
-
-def sub_folders(analyses: Sequence[Analysis]) -> list[str]:
-    """One folder name a log: its file's name without the ending, numbered where two are alike."""
-    found: list[str] = []
-    for analysis in analyses:
-        stem = Path(analysis.recording.name).stem or "log"
-        name, number = stem, 2
-        while name in found:
-            name, number = f"{stem}-{number}", number + 1
-        found.append(name)
-    return found
 
 
 def combined(analyses: Sequence[Analysis]) -> "pl.DataFrame | None":
