@@ -91,9 +91,6 @@ MODELS: dict[str, Callable[..., Array]] = {
 }
 """Name in a robot file → function of velocity and the file's parameters."""
 
-LOADED = frozenset({"coulomb-viscous-load", "coulomb-viscous-stribeck"})
-"""Models that also take the load of the joint."""
-
 
 def friction_torque(
     friction: Sequence[JointFriction], dq: Array, load: Array | None = None
@@ -116,22 +113,17 @@ def friction_torque(
     for j, joint in enumerate(friction):
         if joint.model != "none":
             groups.setdefault((joint.model, tuple(sorted(joint.parameters))), []).append(j)
-    for (model, _keys), joints in groups.items():
+    for (model, keys), joints in groups.items():
         if model not in MODELS:
             raise ParameterError(f"no friction model {model!r}; there is {', '.join(MODELS)}")
-        values = stack_parameters([friction[j].parameters for j in joints])
+        values = {key: np.array([friction[j].parameters[key] for j in joints]) for key in keys}
         every = len(joints) == dq.shape[1]
-        if load is not None and model in LOADED:
+        if load is not None and "load_coulomb" in values:
             values["load"] = load if every else load[:, joints]
         if every:
             return MODELS[model](dq, **values)
         torque[:, joints] = MODELS[model](dq[:, joints], **values)
     return torque
-
-
-def stack_parameters(parameters: Sequence[Mapping[str, float]]) -> dict[str, Array]:
-    """Turn one mapping a joint into one array a parameter. (n,) each"""
-    return {key: np.array([p[key] for p in parameters]) for key in parameters[0]}
 
 
 def dry_friction(friction: Sequence[JointFriction], joints: int) -> Array:

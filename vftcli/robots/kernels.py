@@ -17,6 +17,7 @@ These are p of (8), Cᵀq̇ of (14) and G of (16), exactly rather than by differ
 them against Pinocchio's mass matrix, Coriolis matrix and gravity.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -184,24 +185,35 @@ def cosine_and_sine(q: Array) -> tuple[Array, Array]:
     return square, t
 
 
-def momentum_terms(chain: Chain, q: Array, dq: Array) -> MomentumTerms:
-    """Evaluate p = M q̇, Cᵀq̇ and g for every sample.
+def momentum_chunks(
+    chain: Chain, q: Array, dq: Array
+) -> Iterator[tuple[slice, Array, MomentumTerms]]:
+    """Evaluate one chunk of samples after another.
 
     Args:
         chain: The arm, its payload merged in.
         q: Joint positions. (T, n) [rad]
         dq: Joint velocities. (T, n) [rad/s]
+
+    Yields:
+        Which samples, their velocity (N, n) and their terms (N, n), all with their columns whole;
+        the terms are written over by the next chunk's.
     """
     samples, n = q.shape
-    maps = maps_of(chain)
-    out = [empty_series(samples, n) for _ in range(3)]
-    space = Workspace(n, min(CHUNK, samples))
-    rows = np.empty((3, n, min(CHUNK, samples)))
+    maps, size = maps_of(chain), min(CHUNK, samples)
+    space, rows = Workspace(n, size), np.empty((3, n, size))
     for start in range(0, samples, CHUNK):
-        stop = min(start + CHUNK, samples)
-        p, coriolis, gravity = rows[:, :, : stop - start]
-        columns = np.ascontiguousarray(q[start:stop].T), np.ascontiguousarray(dq[start:stop].T)
+        span = slice(start, min(start + CHUNK, samples))
+        p, coriolis, gravity = rows[:, :, : span.stop - span.start]
+        columns = np.ascontiguousarray(q[span].T), np.ascontiguousarray(dq[span].T)
         momentum_chunk(maps, space, *columns, p, coriolis, gravity)
-        for array, values in zip(out, (p, coriolis, gravity), strict=True):
-            array[start:stop] = values.T
-    return MomentumTerms(*out)
+        yield span, columns[1].T, MomentumTerms(p.T, coriolis.T, gravity.T)
+
+
+def momentum_terms(chain: Chain, q: Array, dq: Array) -> MomentumTerms:
+    """Evaluate p = M q̇, Cᵀq̇ and g for every sample of `q` [rad] and `dq` [rad/s]. (T, n)"""
+    terms = MomentumTerms(*(empty_series(*q.shape) for _ in range(3)))
+    for span, _, chunk in momentum_chunks(chain, q, dq):
+        for whole, part in zip(terms, chunk, strict=True):
+            whole[span] = part
+    return terms

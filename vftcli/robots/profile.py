@@ -5,12 +5,12 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
 from vftcli.robots.chain import Chain, Payload, symmetric, unphysical
-from vftcli.robots.conventions import CONVENTIONS, Convention, Kinematics
+from vftcli.robots.conventions import CONVENTIONS, Kinematics
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
@@ -19,6 +19,7 @@ from vftcli.signals.remarks import fact
 
 SCHEMA = 1
 UPRIGHT = (0.0, 0.0, -9.81)
+ORIGIN = (0.0, 0.0, 0.0)
 
 FRICTION_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "coulomb-viscous": (("coulomb", "viscous"), ("smoothing",)),
@@ -61,6 +62,7 @@ class RobotFile:
             key: The key to look for.
         """
         header = 1 if table == "" else None
+        assigns = re.compile(rf"[\"']?{re.escape(key)}[\"']?\s*=")
         joint, name = -1, ""
         for number, line in enumerate(self.text.splitlines(), start=1):
             stripped = line.strip()
@@ -69,29 +71,86 @@ class RobotFile:
                 joint += stripped.startswith("[[joints]]")
                 if name == table and index in {None, joint}:
                     header = number
-            elif name == table and index in {None, joint} and starts_with_key(stripped, key):
+            elif name == table and index in {None, joint} and key and assigns.match(stripped):
                 return number
         if header is None and "." in table:
             return self.line(table.rpartition(".")[0], index, "")
         return header
 
-    def refuse(
-        self, message: str, table: str = "", index: int | None = None, key: str = ""
-    ) -> NoReturn:
+    @property
+    def root(self) -> "Section":
+        """The keys before any table, and the tables under theirs."""
+        return Section(self, self.document)
+
+
+class Section(NamedTuple):
+    """A table of a robot file, whose values are checked as they are read.
+
+    Attributes:
+        file: The file.
+        values: The table.
+        table: Its dotted name, "" for the whole document.
+        joint: Which ``[[joints]]`` it is or belongs to, from 0, or None outside of them.
+    """
+
+    file: RobotFile
+    values: Mapping[str, Any]
+    table: str = ""
+    joint: int | None = None
+
+    def refuse(self, message: str, key: str = "") -> NoReturn:
         """Raise a RobotError that names the file, the line and the joint."""
-        line = self.line(table, index, key)
-        where = f"{self.path}" + (f", line {line}" if line else "")
-        joint = ""
-        if index is not None:
-            names = self.document.get("joints", [])
-            label = names[index].get("name", "") if index < len(names) else ""
-            joint = f"joint {index + 1}{f' ({label})' if label else ''}: "
-        raise RobotError(f"{where}: {joint}{message}")
+        line = self.file.line(self.table, self.joint, key)
+        where = f"{self.file.path}" + (f", line {line}" if line else "")
+        whose = ""
+        if self.joint is not None:
+            names = self.file.document.get("joints", [])
+            label = names[self.joint].get("name", "") if self.joint < len(names) else ""
+            whose = f"joint {self.joint + 1}{f' ({label})' if label else ''}: "
+        raise RobotError(f"{where}: {whose}{message}")
+
+    def number(self, key: str, default: float | None = None) -> float:
+        """Return a finite number, `default` if the key is absent, or complain about its line."""
+        if key not in self.values:
+            if default is not None:
+                return default
+            self.refuse(f"{key} is missing", key)
+        value = self.values[key]
+        if not is_finite(value):
+            self.refuse(f"{key} is {value!r}; it must be a finite number", key)
+        return float(value)
+
+    def vector(self, key: str, length: int, default: Sequence[float] | None = None) -> Array:
+        """Return `length` finite numbers, `default` if absent, or complain. (length,)"""
+        if key not in self.values and default is None:
+            self.refuse(f"{key} is missing; it has {length} numbers", key)
+        value = self.values.get(key, default)
+        if key in self.values and not (
+            isinstance(value, list) and len(value) == length and all(map(is_finite, value))
+        ):
+            self.refuse(f"{key} is {value!r}; it must be {length} finite numbers", key)
+        return np.array(value, dtype=float)
+
+    def section(self, name: str) -> "Section":
+        """Return the section of a name, empty if there is none, or complain about its line."""
+        values = self.values.get(name, {})
+        if not isinstance(values, dict):
+            self.refuse(f"{name} must be a section [{name}]", name)
+        return Section(self.file, values, name)
+
+    def named_sections(self, *keys: str) -> dict[str, "Section"]:
+        """Return each table in this one by its name, itself under "" if it has one of `keys`."""
+        found = {
+            name: Section(self.file, table, f"{self.table}.{name}")
+            for name, table in self.values.items()
+            if isinstance(table, dict)
+        }
+        return {**found, "": self} if any(key in self.values for key in keys) else found
 
 
-def starts_with_key(line: str, key: str) -> bool:
-    """Whether a line of TOML assigns `key`."""
-    return bool(key) and re.match(rf"[\"']?{re.escape(key)}[\"']?\s*=", line) is not None
+def is_finite(value: object) -> bool:
+    """Whether a value of TOML is a finite number; true and false are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def load_profile(path: Path) -> Robot:
@@ -101,290 +160,189 @@ def load_profile(path: Path) -> Robot:
         RobotError: If the file is missing, incomplete or describes no physical arm; the message
             names the line.
     """
-    file = RobotFile(path)
-    doc = file.document
-    if doc.get("schema", SCHEMA) != SCHEMA:
-        file.refuse(
-            f"schema is {doc['schema']!r}; this version reads schema {SCHEMA}", key="schema"
-        )
-    joints = checked_joints(file)
-    convention = checked_convention(file, joints)
-    chain = build_chain(file, joints, convention.kinematics(joints, doc))
-    return assemble(file, joints, chain)
+    root = RobotFile(path).root
+    schema = root.values.get("schema", SCHEMA)
+    if schema != SCHEMA:
+        root.refuse(f"schema is {schema!r}; this version reads schema {SCHEMA}", "schema")
+    joints = checked_joints(root)
+    return assemble(root, joints, build_chain(root, joints, checked_kinematics(root, joints)))
 
 
-def assemble(file: RobotFile, joints: Sequence[Mapping[str, Any]], chain: Chain) -> Robot:
+def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
     """Put a Robot together from its chain and the rest of its file (drives, friction, gains)."""
-    doc = file.document
+    doc, path = root.values, root.file.path
     source = doc.get("torque_source", "joint_torque")
     if source not in TORQUE_SOURCES:
-        file.refuse(
+        root.refuse(
             f"torque_source is {source!r}; it is one of {', '.join(TORQUE_SOURCES)}",
-            key="torque_source",
+            "torque_source",
         )
-    payloads = checked_payloads(file)
+    payloads = {
+        name: checked_payload(section)
+        for name, section in root.section("payload").named_sections("mass").items()
+    }
     gains = doc.get("observers", {})
     if not isinstance(gains, dict) or not all(isinstance(v, dict) for v in gains.values()):
-        file.refuse(
-            "[observers] must hold sections, as [observers.gmo] gain = 10.0", key="observers"
-        )
+        root.refuse("[observers] must hold sections, as [observers.gmo] gain = 10.0", "observers")
     notes = doc.get("notes", ())
     sentences = (notes,) if isinstance(notes, str) else notes
+    limits = {name: column(joints, name) for name in Limits.__dataclass_fields__}
+    noise = {name: column(joints, f"noise_{name}") for name in SensorNoise.__dataclass_fields__}
     return Robot(
-        name=str(doc.get("name", file.path.stem)),
-        title=str(doc.get("title", doc.get("name", file.path.stem))),
+        name=str(doc.get("name", path.stem)),
+        title=str(doc.get("title", doc.get("name", path.stem))),
         chain=chain,
         torque_source=source,
-        torque_constant=checked_torque_constant(file, joints, source),
-        friction=checked_friction(file, joints),
-        limits=Limits(**{k: column(file, joints, k) for k in Limits.__dataclass_fields__}),
-        noise=SensorNoise(
-            **{k: column(file, joints, f"noise_{k}") for k in SensorNoise.__dataclass_fields__}
-        ),
-        sample_rate_hz=number(file, doc, "sample_rate_hz", default=math.nan),
+        torque_constant=checked_torque_constant(joints, source),
+        friction=checked_friction(joints),
+        limits=Limits(**limits),
+        noise=SensorNoise(**noise),
+        sample_rate_hz=root.number("sample_rate_hz", math.nan),
         ros_state=str(doc.get("ros_state", "")),
         payload=payloads.pop("", None),
         payloads=payloads,
         gains=gains,
-        tools=checked_poses(file, "tool"),
-        sensors=checked_poses(file, "sensor"),
-        admittance=checked_section(file, "admittance"),
+        tools=checked_poses(root.section("tool")),
+        sensors=checked_poses(root.section("sensor")),
+        admittance=root.section("admittance").values,
         sources=tuple(s for s in doc.get("sources", ()) if isinstance(s, dict)),
-        published=checked_section(file, "published"),
+        published=root.section("published").values,
         document=doc,
         remarks=tuple(fact("robot-file-note", text=text) for text in sentences if text),
-        path=file.path,
+        path=path,
     )
 
 
-def checked_joints(file: RobotFile) -> list[dict[str, Any]]:
+def checked_joints(root: Section) -> list[Section]:
     """Return the ``[[joints]]`` tables, as many as `dof` says."""
-    joints = file.document.get("joints")
+    joints = root.values.get("joints")
     if not isinstance(joints, list) or not joints or not all(isinstance(j, dict) for j in joints):
-        file.refuse("there are no [[joints]] tables; a robot file has one for each joint")
-    dof = file.document.get("dof", len(joints))
+        root.refuse("there are no [[joints]] tables; a robot file has one for each joint")
+    dof = root.values.get("dof", len(joints))
     if dof != len(joints):
-        file.refuse(f"dof is {dof} but the file has {len(joints)} [[joints]] tables", key="dof")
-    return joints
+        root.refuse(f"dof is {dof} but the file has {len(joints)} [[joints]] tables", "dof")
+    return [Section(root.file, joint, "joints", j) for j, joint in enumerate(joints)]
 
 
-def checked_convention(file: RobotFile, joints: Sequence[Mapping[str, Any]]) -> Convention:
-    """Return the file's kinematic convention, with every key it needs present in every joint."""
-    name = file.document.get("convention")
+def checked_kinematics(root: Section, joints: Sequence[Section]) -> Kinematics:
+    """Return the chain's frames, once every joint has the keys that the file's convention needs."""
+    name = root.values.get("convention")
     if name not in CONVENTIONS:
-        file.refuse(
-            f"convention is {name!r}; it is one of {', '.join(CONVENTIONS)}", key="convention"
-        )
+        root.refuse(f"convention is {name!r}; it is one of {', '.join(CONVENTIONS)}", "convention")
     convention = CONVENTIONS[name]
-    for j, joint in enumerate(joints):
+    for joint in joints:
         for key in convention.numbers:
-            number(file, joint, key, index=j)
+            joint.number(key)
         for key in convention.vectors:
-            vector(file, joint, key, 3, index=j)
-    return convention
+            joint.vector(key, 3)
+    return convention.kinematics([joint.values for joint in joints], root.values)
 
 
-def build_chain(
-    file: RobotFile, joints: Sequence[Mapping[str, Any]], kinematics: Kinematics
-) -> Chain:
+def build_chain(root: Section, joints: Sequence[Section], kinematics: Kinematics) -> Chain:
     """Move the inertials into the chain's frames and check that a body can have them."""
-    doc = file.document
     masses, coms, inertias = [], [], []
-    for j, (joint, frame) in enumerate(zip(joints, kinematics.inertial_frames, strict=True)):
-        mass = number(file, joint, "mass", index=j)
-        com = vector(file, joint, "com", 3, index=j)
-        tensor = symmetric(vector(file, joint, "inertia", 6, index=j).tolist())
-        if why := unphysical(mass, tensor):
-            key = "mass" if why.startswith("mass") else "inertia"
-            file.refuse(why, "joints", j, key)
+    for joint, frame in zip(joints, kinematics.inertial_frames, strict=True):
+        mass, com, tensor = checked_body(joint)
         masses.append(mass)
         coms.append(frame.rotation @ com + frame.translation)
         inertias.append(frame.rotation @ tensor @ frame.rotation.T)
-    rotor = column(file, joints, "rotor_inertia", default=0.0)
-    if np.any(rotor < 0):
-        j = int(np.argmax(rotor < 0))
-        file.refuse(
-            f"rotor_inertia is {rotor[j]:g} kg·m²; it must not be negative",
-            "joints",
-            j,
-            "rotor_inertia",
-        )
-    gravity = vector(file, doc, "gravity", 3) if "gravity" in doc else np.array(UPRIGHT)
+    rotor = column(joints, "rotor_inertia", default=0.0)
+    for joint, inertia in zip(joints, rotor, strict=True):
+        if inertia < 0:
+            message = f"rotor_inertia is {inertia:g} kg·m²; it must not be negative"
+            joint.refuse(message, "rotor_inertia")
     return Chain(
-        names=tuple(str(j.get("name", f"joint{i}")) for i, j in enumerate(joints, start=1)),
+        names=tuple(str(j.values.get("name", f"joint{i}")) for i, j in enumerate(joints, start=1)),
         rotation=np.array([p.rotation for p in kinematics.placements]),
         translation=np.array([p.translation for p in kinematics.placements]),
         mass=np.array(masses),
         com=np.array(coms),
         inertia=np.array(inertias),
         rotor_inertia=rotor,
-        gravity=gravity,
+        gravity=root.vector("gravity", 3, UPRIGHT),
         flange_rotation=kinematics.tip.rotation,
         flange_translation=kinematics.tip.translation,
     )
 
 
-def checked_torque_constant(
-    file: RobotFile, joints: Sequence[Mapping[str, Any]], source: str
-) -> Array | None:
+def checked_body(
+    table: Section, default: Sequence[float] | None = None
+) -> tuple[float, Array, Array]:
+    """Return mass [kg], centre of mass (3,) [m] and tensor (3, 3) [kg·m²] that a body can have.
+
+    Args:
+        table: Where they stand.
+        default: Six numbers to take for the tensor, and three for the centre, where they are left
+            out; None if they must be given.
+    """
+    mass, com = table.number("mass"), table.vector("com", 3, default and default[:3])
+    tensor = symmetric(table.vector("inertia", 6, default).tolist())
+    if why := unphysical(mass, tensor):
+        table.refuse(why, "mass" if why.startswith("mass") else "inertia")
+    return mass, com, tensor
+
+
+def checked_torque_constant(joints: Sequence[Section], source: str) -> Array | None:
     """Return the drive constants, or None where no joint has one and none is needed."""
-    missing = [j for j, joint in enumerate(joints) if "torque_constant" not in joint]
+    missing = [joint for joint in joints if "torque_constant" not in joint.values]
     if len(missing) == len(joints) and source != "current":
         return None
     if missing:
-        file.refuse(
-            "torque_constant is missing; torque_source = current needs it in every joint",
-            "joints",
-            missing[0],
+        missing[0].refuse(
+            "torque_constant is missing; torque_source = current needs it in every joint"
         )
-    constant = column(file, joints, "torque_constant")
-    if np.any(constant <= 0):
-        j = int(np.argmax(constant <= 0))
-        file.refuse(
-            f"torque_constant is {constant[j]:g} N·m/A; it must be positive",
-            "joints",
-            j,
-            "torque_constant",
-        )
-    return constant
+    constants = column(joints, "torque_constant")
+    for joint, constant in zip(joints, constants, strict=True):
+        if constant <= 0:
+            message = f"torque_constant is {constant:g} N·m/A; it must be positive"
+            joint.refuse(message, "torque_constant")
+    return constants
 
 
-def checked_friction(
-    file: RobotFile, joints: Sequence[Mapping[str, Any]]
-) -> tuple[JointFriction, ...]:
+def checked_friction(joints: Sequence[Section]) -> tuple[JointFriction, ...]:
     """Return one friction model a joint; a joint without one has the model "none"."""
     models = []
-    for j, joint in enumerate(joints):
-        section = joint.get("friction", {"model": "none"})
-        name = section.get("model") if isinstance(section, dict) else None
+    for joint in joints:
+        values = joint.values.get("friction", {"model": "none"})
+        section = Section(joint.file, values, "joints.friction", joint.joint)
+        name = values.get("model") if isinstance(values, dict) else None
         if name == "none":
             models.append(JointFriction())
             continue
         if name not in FRICTION_KEYS:
-            file.refuse(
-                f"friction model is {name!r}; it is one of {', '.join(FRICTION_KEYS)}",
-                "joints.friction",
-                j,
-                "model",
+            section.refuse(
+                f"friction model is {name!r}; it is one of {', '.join(FRICTION_KEYS)}", "model"
             )
         required, optional = FRICTION_KEYS[name]
-        values = {k: number(file, section, k, "joints.friction", j) for k in required}
-        values |= {
-            k: number(file, section, k, "joints.friction", j) for k in optional if k in section
-        }
+        keys = (*required, *(key for key in optional if key in values))
+        parameters = {key: section.number(key) for key in keys}
         for key in ("smoothing", "stribeck_velocity"):
-            if values.get(key, 1.0) <= 0:
-                file.refuse(f"{key} must be positive [rad/s]", "joints.friction", j, key)
-        models.append(
-            JointFriction(
-                model=name, parameters=values, confidence=str(section.get("confidence", ""))
-            )
-        )
+            if parameters.get(key, 1.0) <= 0:
+                section.refuse(f"{key} must be positive [rad/s]", key)
+        confidence = str(values.get("confidence", ""))
+        models.append(JointFriction(model=name, parameters=parameters, confidence=confidence))
     return tuple(models) if any(m.model != "none" for m in models) else ()
 
 
-def checked_payloads(file: RobotFile) -> dict[str, Payload]:
-    """Return ``[payload]`` under the name "" and each ``[payload.NAME]`` under its own."""
-    section = checked_section(file, "payload")
-    found = {}
-    if "mass" in section:
-        found[""] = checked_payload(file, section, "payload")
-    for name, value in section.items():
-        if isinstance(value, dict):
-            found[name] = checked_payload(file, value, f"payload.{name}")
-    return found
-
-
-def checked_payload(file: RobotFile, section: Mapping[str, Any], table: str) -> Payload:
+def checked_payload(section: Section) -> Payload:
     """Return one payload section as a Payload; `rpy` turns its axes into the flange's."""
-    mass = number(file, section, "mass", table)
-    com = vector(file, section, "com", 3, table) if "com" in section else np.zeros(3)
-    tensor = vector(file, section, "inertia", 6, table) if "inertia" in section else np.zeros(6)
-    turn = (
-        rpy_matrix(vector(file, section, "rpy", 3, table).tolist())
-        if "rpy" in section
-        else np.eye(3)
-    )
-    com, inertia = turn @ com, turn @ symmetric(tensor.tolist()) @ turn.T
-    if why := unphysical(mass, inertia):
-        file.refuse(why, table, None, "mass" if why.startswith("mass") else "inertia")
-    return Payload(mass=mass, com=com, inertia=inertia)
+    mass, com, tensor = checked_body(section, default=np.zeros(6).tolist())
+    turn = rpy_matrix(section.vector("rpy", 3, ORIGIN).tolist())
+    return Payload(mass=mass, com=turn @ com, inertia=turn @ tensor @ turn.T)
 
 
-def checked_section(file: RobotFile, name: str) -> Mapping[str, Any]:
-    """Return the section of a name, empty if the file has none, or complain about its line."""
-    section: Mapping[str, Any] = file.document.get(name, {})
-    if not isinstance(section, dict):
-        file.refuse(f"{name} must be a section [{name}]", key=name)
-    return section
-
-
-def checked_poses(file: RobotFile, name: str) -> dict[str, Pose]:
+def checked_poses(section: Section) -> dict[str, Pose]:
     """Return the poses on the flange that ``[name]``, under "", and each ``[name.NAME]`` state.
 
     Keys are xyz [m] and rpy [rad]; what is left out is zero.
     """
-    section = checked_section(file, name)
-    tables: dict[str, Mapping[str, Any]] = {k: v for k, v in section.items() if isinstance(v, dict)}
-    if "xyz" in section or "rpy" in section:
-        tables[""] = section
     found = {}
-    for key, table in tables.items():
-        place = f"{name}.{key}" if key else name
-        xyz, rpy = (
-            vector(file, table, part, 3, place) if part in table else np.zeros(3)
-            for part in ("xyz", "rpy")
-        )
-        found[key] = Pose(rpy_matrix(rpy.tolist()), xyz)
+    for name, table in section.named_sections("xyz", "rpy").items():
+        turn = rpy_matrix(table.vector("rpy", 3, ORIGIN).tolist())
+        found[name] = Pose(turn, table.vector("xyz", 3, ORIGIN))
     return found
 
 
-def column(
-    file: RobotFile,
-    joints: Sequence[Mapping[str, Any]],
-    key: str,
-    default: float = math.nan,
-) -> Array:
+def column(joints: Sequence[Section], key: str, default: float = math.nan) -> Array:
     """Return one number a joint, `default` where a joint has none. (n,)"""
-    return np.array([number(file, j, key, index=i, default=default) for i, j in enumerate(joints)])
-
-
-def number(
-    file: RobotFile,
-    table: Mapping[str, Any],
-    key: str,
-    section: str = "joints",
-    index: int | None = None,
-    default: float | None = None,
-) -> float:
-    """Return a finite number, `default` if the key is absent, or complain about its line."""
-    place = (section, index) if index is not None or section != "joints" else ("", None)
-    if key not in table:
-        if default is not None:
-            return default
-        file.refuse(f"{key} is missing", *place, key)
-    value = table[key]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        file.refuse(f"{key} is {value!r}; it must be a finite number", *place, key)
-    return float(value)
-
-
-def vector(
-    file: RobotFile,
-    table: Mapping[str, Any],
-    key: str,
-    length: int,
-    section: str = "joints",
-    index: int | None = None,
-) -> Array:
-    """Return `length` finite numbers, or complain about their line. (length,)"""
-    place = (section, index) if index is not None or section != "joints" else ("", None)
-    if key not in table:
-        file.refuse(f"{key} is missing; it has {length} numbers", *place, key)
-    value = table[key]
-    good = isinstance(value, list) and len(value) == length
-    if not good or not all(
-        isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v) for v in value
-    ):
-        file.refuse(f"{key} is {value!r}; it must be {length} finite numbers", *place, key)
-    return np.array(value, dtype=float)
+    return np.array([joint.number(key, default) for joint in joints])

@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.robots.drive import check_joints, drive_torque, uses_current
 from vftcli.robots.friction import friction_torque
-from vftcli.robots.kernels import CHUNK, Workspace, maps_of, momentum_chunk
+from vftcli.robots.kernels import MomentumTerms, momentum_chunks
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import (
     Array,
@@ -72,41 +72,24 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
     q, dq = recording.q, recording.require("dq")
     effort, scale = effort_of(recording, robot)
     p, mu = empty_series(*q.shape), empty_series(*q.shape)
-    chunks = literal_chunks if literal else kernel_chunks
-    for span, velocity, momentum, free_torque, gravity in chunks(robot, q, dq):
-        p[span] = momentum
+    chunks = literal_chunks(robot, q, dq) if literal else momentum_chunks(robot.loaded_chain, q, dq)
+    for span, velocity, chunk in chunks:
+        p[span] = chunk.p
         mu[span] = effort[span]
         mu[span] *= scale
-        mu[span] += free_torque
+        mu[span] += np.subtract(chunk.coriolis_transpose_dq, chunk.gravity)
         if robot.friction:
-            mu[span] -= friction_torque(robot.friction, velocity, gravity)
+            mu[span] -= friction_torque(robot.friction, velocity, chunk.gravity)
     return DynamicsTerms(t=recording.t, p=handed_over(p), mu=handed_over(mu))
 
 
-Chunk = tuple[slice, Array, Array, Array, Array]
-"""Which samples; their velocity, p, Cᵀq̇ − g and g, each (N, n) with its columns whole."""
-
-
-def kernel_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
-    """Yield one chunk of samples after another, by the batched kernels."""
-    samples, n = q.shape
-    maps, size = maps_of(robot.loaded_chain), min(CHUNK, samples)
-    space, rows = Workspace(n, size), np.empty((3, n, size))
-    for start in range(0, samples, CHUNK):
-        span = slice(start, min(start + CHUNK, samples))
-        momentum, coriolis, gravity = rows[:, :, : span.stop - span.start]
-        columns = np.ascontiguousarray(q[span].T), np.ascontiguousarray(dq[span].T)
-        momentum_chunk(maps, space, *columns, momentum, coriolis, gravity)
-        coriolis -= gravity
-        yield span, columns[1].T, momentum.T, coriolis.T, gravity.T
-
-
-def literal_chunks(robot: Robot, q: Array, dq: Array) -> Iterator[Chunk]:
+def literal_chunks(
+    robot: Robot, q: Array, dq: Array
+) -> Iterator[tuple[slice, Array, MomentumTerms]]:
     """Yield the whole log at once, by the paper's numeric method."""
     from vftcli.robots.literal import literal_momentum_terms
 
-    p, coriolis, gravity = literal_momentum_terms(robot.model, q, dq)
-    yield slice(0, len(q)), dq, p, coriolis - gravity, gravity
+    yield slice(0, len(q)), dq, literal_momentum_terms(robot.model, q, dq)
 
 
 def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]:

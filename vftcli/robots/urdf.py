@@ -1,6 +1,6 @@
 """Robots from URDF files, through Pinocchio; drives, friction and gains from a TOML beside them."""
 
-from collections.abc import Mapping
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,27 +8,16 @@ from typing import Any
 import numpy as np
 
 from vftcli.robots.chain import Chain, unphysical
-from vftcli.robots.profile import UPRIGHT, RobotFile, assemble, column
+from vftcli.robots.profile import UPRIGHT, RobotFile, Section, assemble, column
 from vftcli.robots.robot import Limits, Robot, SensorNoise
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import rotation_onto
 from vftcli.signals.remarks import caution
 
-FREE_JOINTS = (
-    "JointModelRUBX",
-    "JointModelRUBY",
-    "JointModelRUBZ",
-    "JointModelRevoluteUnboundedUnaligned",
-)
-AXES = {
-    "JointModelRX": (1.0, 0.0, 0.0),
-    "JointModelRY": (0.0, 1.0, 0.0),
-    "JointModelRZ": (0.0, 0.0, 1.0),
-    "JointModelRUBX": (1.0, 0.0, 0.0),
-    "JointModelRUBY": (0.0, 1.0, 0.0),
-    "JointModelRUBZ": (0.0, 0.0, 1.0),
-}
+UNBOUNDED = ("JointModelRUB", "JointModelRevoluteUnbounded")
+"""How Pinocchio's names of revolute joints without position limits begin."""
+
 FLANGE_NAMES = ("flange", "tool0", "link8", "ee_link", "tcp")
 
 
@@ -64,12 +53,12 @@ def load_urdf(path: Path) -> Robot:
             remarks=(caution("urdf-alone", file=beside.name),),
             path=path,
         )
-    file = RobotFile(beside)
-    tables = matched_tables(file, chain)
-    rotor = column(file, tables, "rotor_inertia", default=0.0)
-    gravity = np.asarray(file.document.get("gravity", UPRIGHT), dtype=float)
+    root = RobotFile(beside).root
+    joints = matched_joints(root, chain)
+    rotor = column(joints, "rotor_inertia", default=0.0)
+    gravity = root.vector("gravity", 3, UPRIGHT)
     chain = replace(chain, rotor_inertia=rotor + chain.rotor_inertia, gravity=gravity)
-    robot = assemble(file, tables, chain)
+    robot = assemble(root, joints, chain)
     known = {
         name: np.where(np.isnan(mine := getattr(robot.limits, name)), getattr(limits, name), mine)
         for name in Limits.__dataclass_fields__
@@ -77,14 +66,18 @@ def load_urdf(path: Path) -> Robot:
     return replace(robot, limits=Limits(**known), path=path)
 
 
-def matched_tables(file: RobotFile, chain: Chain) -> list[Mapping[str, Any]]:
+def matched_joints(root: Section, chain: Chain) -> list[Section]:
     """Return the ``[[joints]]`` of the TOML beside a URDF in the chain's order, matched by name."""
-    tables = {str(t.get("name")): t for t in file.document.get("joints", [])}
+    tables = {str(table.get("name")): table for table in root.values.get("joints", [])}
     if unknown := [name for name in tables if name not in chain.names]:
         raise RobotError(
-            f"{file.path}: no joint {unknown[0]!r} in the URDF; it has {', '.join(chain.names)}"
+            f"{root.file.path}: no joint {unknown[0]!r} in the URDF; "
+            f"it has {', '.join(chain.names)}"
         )
-    return [tables.get(name, {"name": name}) for name in chain.names]
+    return [
+        Section(root.file, tables.get(name, {"name": name}), "joints", j)
+        for j, name in enumerate(chain.names)
+    ]
 
 
 def chain_from_model(model: Any, owner: str) -> Chain:  # noqa: ANN401 - Pinocchio is untyped
@@ -139,8 +132,8 @@ def joint_axis(model: Any, index: int, owner: str) -> Array:  # noqa: ANN401
 
     joint = model.joints[index]
     kind = joint.shortname()
-    if kind in AXES:
-        return np.array(AXES[kind])
+    if aligned := re.fullmatch("JointModelR(?:UB)?([XYZ])", kind):
+        return np.array(np.eye(3)["XYZ".index(aligned[1])])
     if not kind.startswith("JointModelRevolute"):
         raise RobotError(
             f"{owner}: joint {model.names[index]!r} is a {kind.removeprefix('JointModel')}, not "
@@ -172,7 +165,7 @@ def urdf_limits(model: Any) -> Limits:  # noqa: ANN401
         speed, effort = model.velocityLimit[joint.idx_v], model.effortLimit[joint.idx_v]
         limits["qd_max"][k - 1] = speed if 0 < speed < 1e300 else np.nan
         limits["tau_max"][k - 1] = effort if 0 < effort < 1e300 else np.nan
-        if joint.shortname() not in FREE_JOINTS:
+        if not joint.shortname().startswith(UNBOUNDED):
             limits["q_min"][k - 1] = model.lowerPositionLimit[joint.idx_q]
             limits["q_max"][k - 1] = model.upperPositionLimit[joint.idx_q]
     return Limits(**limits)
