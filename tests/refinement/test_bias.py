@@ -12,7 +12,6 @@ from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.refinement.bias import (
     RANGE,
     Scale,
-    check_removal,
     features,
     fitted,
     remove_free_cycle,
@@ -138,9 +137,3 @@ def test_features_are_held_within_what_the_free_part_showed(log: ModelledRun) ->
     beyond = np.vstack([10.0 * scale.most, -10.0 * scale.most])
     np.testing.assert_allclose(scale.applied(beyond), scale.applied(RANGE / 10.0 * beyond))
     np.testing.assert_allclose(scale.applied(X), (X - scale.mean) / scale.sd)
-
-
-def test_names_of_removals() -> None:
-    assert check_removal("model") == "model"
-    with pytest.raises(ParameterError, match="there is none, free-cycle, model"):
-        check_removal("all")

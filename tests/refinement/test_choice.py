@@ -2,8 +2,8 @@
 
 import pytest
 
-from vftcli.refinement.bias import REMOVALS
-from vftcli.refinement.choice import NOTHING, RefinementChoice
+from vftcli.refinement import bias
+from vftcli.refinement.choice import NOTHING, REMOVALS, RefinementChoice
 from vftcli.signals.errors import ParameterError
 
 
@@ -19,8 +19,8 @@ def test_bands_and_removal_look_back() -> None:
     )
 
 
-def test_the_word_for_nothing_is_one_of_the_table() -> None:
-    assert NOTHING in REMOVALS
+def test_the_table_makes_what_may_be_chosen() -> None:
+    assert tuple(bias.REMOVALS) == REMOVALS
 
 
 def test_another_removal_is_refused_before_a_log_is_read() -> None:

@@ -50,6 +50,13 @@ def test_the_cycle_that_is_named_is_the_one_taken(circle: ModelledRun) -> None:
     np.testing.assert_array_equal(motion.part.own, partners.free)
 
 
+@pytest.mark.parametrize("cycle", [0, 6])
+def test_cycles_that_are_not_there(circle: ModelledRun, cycle: int) -> None:
+    assert motion_of(circle, choice=FreeChoice(cycles=(1, 5))).cycles_given == (0, 4)
+    with pytest.raises(ReferenceTorqueError, match=f"no cycle {cycle}; the log holds 5 whole"):
+        _ = motion_of(circle, choice=FreeChoice(cycles=(1, cycle))).cycles_given
+
+
 def test_a_cycle_inside_a_free_span_is_free(circle: ModelledRun) -> None:
     motion = motion_of(circle, choice=FreeChoice(spans=((3.9, 8.1), (19.0, 19.5))))
     assert motion.free_cycles.numbers == (1,)
@@ -95,8 +102,8 @@ def test_each_run_is_a_piece_with_its_own_pairing(part_of: Make, circle: Modelle
     assert [len(piece.pairings) for piece in found.pieces] == [1, 0, 1]
     assert codes(found.remarks) == ["free-run", "free-run-of-another-motion", "free-run"]
     assert [pairing.free for pairing in found.pairings] == [
-        motion.runs[0].drive,
-        motion.runs[2].drive,
+        motion.runs[0].run.drive,
+        motion.runs[2].run.drive,
     ]
     assert not found.own.any()
     assert all(piece.inside.all() for piece in found.pieces)

@@ -26,7 +26,7 @@ def test_a_stop_lasts_from_its_first_sample_through_its_last() -> None:
 
 
 def test_a_long_stop_stands_with_the_moments_around_it() -> None:
-    found = standing(T, duration(T, speeds((100, 149))))[:, 0]
+    found = standing(T, speeds((100, 149)))[:, 0]
     around = round(BREAKAWAY / STEP)
     expected = np.zeros(400, dtype=bool)
     expected[100 - around : 150 + around] = True
@@ -36,13 +36,13 @@ def test_a_long_stop_stands_with_the_moments_around_it() -> None:
 
 def test_a_reversal_is_no_stop() -> None:
     short = round(LEAST / STEP) - 2
-    assert not standing(T, duration(T, speeds((100, 100 + short)))).any()
-    assert standing(T, duration(T, speeds((100, 100 + short + 2)))).any()
+    assert not standing(T, speeds((100, 100 + short))).any()
+    assert standing(T, speeds((100, 100 + short + 2))).any()
 
 
 def test_joints_are_told_apart() -> None:
     both = np.hstack([speeds((100, 149)), speeds()])
-    found = standing(T, duration(T, both))
+    found = standing(T, both)
     assert found[:, 0].any()
     assert not found[:, 1].any()
 

@@ -1,5 +1,6 @@
 """The two-cycle difference against the simulated truth, and on real pairs of logs."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
@@ -9,8 +10,9 @@ import pytest
 
 from vftcli.readers import read
 from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.ladder import RUNGS
-from vftcli.repetition.two_cycle import two_cycle_difference
+from vftcli.repetition.two_cycle import friction_change, two_cycle_difference
 from vftcli.robots import Robot, load_robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
@@ -193,3 +195,32 @@ def test_a_payload_is_seen(logs: Path) -> None:
     mass = np.sum(gravity[known, 1] * shown[known, 1]) / np.sum(gravity[known, 1] ** 2)
     # 2.805 kg with its centre of mass anywhere near the flange: a lever of 1 m, give or take 0.1 m.
     assert mass == pytest.approx(2.805, rel=0.1)
+
+
+@pytest.fixture
+def swing(drive_of: Callable[..., DriveRun]) -> DriveRun:
+    """Two joints swinging at 0.4 and 0.7 Hz for 20 s."""
+    t = 0.008 * np.arange(2500)
+    dq = np.sin(2.0 * np.pi * t[:, None] * np.array([0.4, 0.7]))
+    return drive_of(t, np.zeros_like(dq), dq)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_change_is_found(swing: DriveRun, seed: int) -> None:
+    """0.4 N·m of friction under 0.3 N·m of noise: 2500 samples tell it to 0.006 N·m."""
+    motion, rng = swing, np.random.default_rng(seed)
+    tau = 0.4 * np.sign(motion.dq) * [1.0, 0.0] + 0.3 * rng.standard_normal(motion.dq.shape)
+    found = friction_change(motion, tau, np.ones_like(tau, bool))
+    assert found[0] == pytest.approx(0.4, abs=0.03)
+    assert found[1] == 0.0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_pushes_are_not_taken_for_it(swing: DriveRun, seed: int) -> None:
+    """Pushes of 10 N·m, a second each, at random times and either way."""
+    motion, rng = swing, np.random.default_rng(seed)
+    tau = 0.3 * rng.standard_normal(motion.dq.shape)
+    for start in rng.uniform(0.0, 19.0, 8):
+        pushed = (motion.t >= start) & (motion.t < start + 1.0)
+        tau[pushed] += 10.0 * rng.choice([-1, 1], 2)
+    assert np.array_equal(friction_change(motion, tau, np.ones_like(tau, bool)), [0.0, 0.0])

@@ -9,9 +9,7 @@ from vftcli.evaluation.reference_file import file_reference
 from vftcli.evaluation.reference_sensor import sensor_reference
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.two_cycle import two_cycle_reference
-from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import NOTHING, Mounting
 
@@ -68,23 +66,13 @@ class ReferenceSource:
     mounting: Mounting = NOTHING
     logged: Wrench | None = None
 
-    @property
-    def recording(self) -> Recording:
-        """The log."""
-        return self.motion.log.recording
-
-    @property
-    def robot(self) -> Robot:
-        """The arm, its payload mounted."""
-        return self.motion.log.robot
-
 
 REFERENCES: dict[str, Callable[[ReferenceSource], ReferenceLoad]] = {
-    "zero": lambda source: zero_reference(source.recording),
-    "vendor": lambda source: vendor_reference(source.recording),
+    "zero": lambda source: zero_reference(source.motion.log.recording),
+    "vendor": lambda source: vendor_reference(source.motion.log.recording),
     "two-cycle": lambda source: ReferenceLoad(torque=two_cycle_reference(source.motion)),
     "sensor": lambda source: sensor_reference(
-        source.recording, source.robot, source.mounting, source.logged
+        source.motion.log.recording, source.motion.log.robot, source.mounting, source.logged
     ),
 }
 """Name at the command line → what makes it; ``file:PATH`` is the one name with a path in it."""
@@ -97,6 +85,6 @@ def make_reference(source: ReferenceSource, choice: ReferenceChoice) -> Referenc
         ReferenceTorqueError: If it cannot be made from the log.
     """
     if choice.path is not None:
-        mounting = source.mounting
-        return file_reference(choice.path, source.recording, source.robot, mounting, choice.columns)
+        log, mounting = source.motion.log, source.mounting
+        return file_reference(choice.path, log.recording, log.robot, mounting, choice.columns)
     return REFERENCES[choice.name](source)

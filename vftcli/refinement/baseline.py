@@ -10,7 +10,7 @@ from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Part, Spectra, spectra_of
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.repetition.pairing import mean_of
-from vftcli.repetition.standstill import duration, standing
+from vftcli.repetition.standstill import standing
 from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask
@@ -81,10 +81,8 @@ def baseline_of(motion: FreeMotion) -> Baseline:
         ParameterError: If a span that is given as free holds no samples of the log, or all.
     """
     log = motion.log
-    dq = log.recording.require("dq")
-    bare = Baseline(
-        motion=motion, standing=standing(log.recording.t, duration(log.recording.t, dq))
-    )
+    stands = standing(log.recording.t, log.recording.require("dq"))
+    bare = Baseline(motion=motion, standing=stands)
     try:
         part = motion.part
     except ReferenceTorqueError as error:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.refinement.baseline import Baseline, FreeReading, bias_at_phase
+from vftcli.repetition.free_motion import FreePart
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
@@ -70,7 +71,7 @@ def remove_free_cycle(found: Baseline, readings: Sequence[FreeReading]) -> Remov
             "of the same motion (--free LOG); --remove-bias model needs neither, only a free part"
             f"{here}"
         )
-    removed = tuple(minus_free_motion(found, reading) for reading in readings)
+    removed = tuple(minus_free_motion(part, reading) for reading in readings)
     count = len(part.pairings)
     remarks = [fact("bias-at-phase" if count == 1 else "bias-at-phase-mean", motions=count)]
     if count == 1 and part.own.any():
@@ -81,11 +82,9 @@ def remove_free_cycle(found: Baseline, readings: Sequence[FreeReading]) -> Remov
     return Removal(removed, tuple(remarks))
 
 
-def minus_free_motion(found: Baseline, reading: FreeReading) -> ExternalTorque:
+def minus_free_motion(part: FreePart, reading: FreeReading) -> ExternalTorque:
     """An estimate less what its observer reads in the free motion at the same phase."""
-    part, estimate = found.part, reading.estimate
-    if part is None:
-        return estimate
+    estimate = reading.estimate
     bias = bias_at_phase(part, [e.tau for e in reading.free])
     # A free cycle that no other is laid under reads nothing but bias.
     own = part.own & ~np.isfinite(bias[:, 0])
@@ -115,10 +114,14 @@ def remove_modelled(found: Baseline, readings: Sequence[FreeReading]) -> Removal
         weights, share = fitted(scale.applied(X), reading.samples)
         used = share <= WORTH
         bias = np.where(used, here @ weights[1:] + weights[0], 0.0)
-        removed.append(minus_model(reading, bias, np.where(used, share, 1.0)))
-        where = Where(
-            about=reading.estimate.name, joints=tuple(int(j) + 1 for j in np.flatnonzero(used))
-        )
+        estimate, error_sd = reading.estimate, reading.estimate.error_sd
+        if error_sd is not None:
+            # The band gets rid of what the model predicts of free samples that it has not seen.
+            predicted = np.mean(reading.samples**2, axis=0) * np.where(used, 1.0 - share**2, 0.0)
+            error_sd = handed_over(np.sqrt(np.maximum(error_sd**2 - predicted, 0.0)))
+        tau = handed_over(estimate.tau - bias)
+        removed.append(replace(estimate, tau=tau, error_sd=error_sd))
+        where = Where(about=estimate.name, joints=tuple(int(j) + 1 for j in np.flatnonzero(used)))
         code = "bias-modelled" if used.any() else "bias-not-modelled"
         remarks.append(fact(code, where, share=share[used].tolist()))
     return Removal(tuple(removed), tuple(remarks))
@@ -183,35 +186,9 @@ def ridge(X: Array, y: Array, penalty: float) -> Array:
     return np.concatenate([np.asarray(level - mean @ weights)[None], weights])
 
 
-def minus_model(reading: FreeReading, bias: Array, share: Array) -> ExternalTorque:
-    """The estimate less the modelled bias, its band rid of what the model predicts unseen.
-
-    Args:
-        reading: The estimate, and what its observer reads in the free part.
-        bias: The modelled bias. (T, n) [N·m]
-        share: Share of the free rms that the model leaves, 1 where it is not used. (n,)
-    """
-    estimate, error_sd = reading.estimate, reading.estimate.error_sd
-    if error_sd is not None:
-        square = np.mean(reading.samples**2, axis=0)
-        error_sd = handed_over(np.sqrt(np.maximum(error_sd**2 - square * (1.0 - share**2), 0.0)))
-    return replace(estimate, tau=handed_over(estimate.tau - bias), error_sd=error_sd)
-
-
 REMOVALS: dict[str, Callable[[Baseline, Sequence[FreeReading]], Removal]] = {
     "none": remove_nothing,
     "free-cycle": remove_free_cycle,
     "model": remove_modelled,
 }
 """What ``--remove-bias`` takes."""
-
-
-def check_removal(name: str) -> str:
-    """A key of `REMOVALS`.
-
-    Raises:
-        ParameterError: If it is none.
-    """
-    if name not in REMOVALS:
-        raise ParameterError(f"--remove-bias {name!r}; there is {', '.join(REMOVALS)}")
-    return name

@@ -56,7 +56,6 @@ def budget(found: Baseline, reading: FreeReading) -> Budget:
     modelled = read - noise
     velocity = [piece.run.recording.require("dq")[piece.inside] for piece in found.pieces]
     by_friction = modelled * friction_share(np.concatenate(velocity), reading.samples)
-    # A torque anywhere within ±F_c is F_c/√3 rms.
     robot = found.motion.log.robot
     # Stiction may hold any torque up to dry friction: evenly spread, its square is a third.
     hidden = dry_friction(robot.friction, robot.joints) ** 2 / 3.0 * found.standing.mean(axis=0)

@@ -2,8 +2,13 @@
 
 from dataclasses import dataclass
 
+from vftcli.signals.errors import ParameterError
+
 NOTHING = "none"
-"""The word for a bias that stays; any other word is a key of `vftcli.refinement.bias.REMOVALS`."""
+"""The word for a bias that stays."""
+
+REMOVALS = (NOTHING, "free-cycle", "model")
+"""What ``--remove-bias`` takes; `vftcli.refinement.bias.REMOVALS` makes them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,11 +27,10 @@ class RefinementChoice:
     remove_bias: str = NOTHING
 
     def __post_init__(self) -> None:
-        if self.remove_bias != NOTHING:
-            # A plain estimate removes nothing: it need not load what could.
-            from vftcli.refinement.bias import check_removal
-
-            check_removal(self.remove_bias)
+        if self.remove_bias not in REMOVALS:
+            raise ParameterError(
+                f"--remove-bias {self.remove_bias!r}; there is {', '.join(REMOVALS)}"
+            )
 
     @classmethod
     def parsed(cls, *, bands: bool = False, remove_bias: str | None = None) -> "RefinementChoice":

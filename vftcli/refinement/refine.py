@@ -1,17 +1,19 @@
 """From a log's baseline to finished estimates: bands drawn, bias removed, limits named."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from vftcli.observers.auto_tuning import AutoTuned, Curve
 from vftcli.observers.observer import Observer
-from vftcli.refinement.bands import band_remarks, with_band
-from vftcli.refinement.baseline import Baseline, free_reading
-from vftcli.refinement.bias import REMOVALS, check_removal
+from vftcli.refinement.baseline import Baseline, FreeReading, free_reading
+from vftcli.refinement.bias import REMOVALS
 from vftcli.refinement.budget import Budget, budget, limits_remark
 from vftcli.refinement.consistency import Consistency, consistency
+from vftcli.signals.arrays import handed_over
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.remarks import Remark, Where, fact
+from vftcli.signals.remarks import Remark, Where, caution, fact
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +56,7 @@ def refine(
     Raises:
         ParameterError: If the bias cannot be removed as asked.
     """
-    remove = REMOVALS[check_removal(removal)]
+    remove = REMOVALS[removal]
     pairs = list(zip(observers, estimates, strict=True))
     readings = [free_reading(found, observer, estimate) for observer, estimate in pairs]
     banded = [reading._replace(estimate=with_band(found, reading)) for reading in readings]
@@ -72,7 +74,15 @@ def refine(
         removed=removal,
         remarks=(
             *found.remarks,
-            *tuning_remarks(curves),
+            *(
+                fact(
+                    "tuned",
+                    Where(about=name),
+                    omega_n_rad_s=curve.best.tolist(),
+                    expected_rmse_Nm=curve.least.tolist(),
+                )
+                for name, curve in curves.items()
+            ),
             *band_remarks(found),
             *finished.remarks,
             *(limits_remark(one, found.stuck) for one in budgets[-1:]),
@@ -80,14 +90,30 @@ def refine(
     )
 
 
-def tuning_remarks(curves: Mapping[str, Curve]) -> tuple[Remark, ...]:
-    """What was chosen for each tuned observer."""
-    return tuple(
-        fact(
-            "tuned",
-            Where(about=name),
-            omega_n_rad_s=curve.best.tolist(),
-            expected_rmse_Nm=curve.least.tolist(),
-        )
-        for name, curve in curves.items()
-    )
+def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
+    """The estimate with its band, and marked where joints move; itself without spectra.
+
+    The band is how far the estimate may be off, as the log itself shows it,
+
+        sd² = rms_free² + ∫ |1 − H|² S_τ df,
+
+    what the estimator reads where nothing touches the arm, bias and model error included, and what
+    its lag and bandwidth leave out of the torque there is. The Kalman covariance knows neither: it
+    is the filter's own account, of a model without error, and stands apart (`sd`).
+    """
+    estimate, spectra = reading.estimate, found.spectra
+    if spectra is None:
+        return estimate
+    response = reading.observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
+    sd = np.sqrt(reading.rms**2 + spectra.missed(response))
+    banded = np.broadcast_to(handed_over(sd), estimate.tau.shape)
+    return replace(estimate, error_sd=banded, moving=~found.standing)
+
+
+def band_remarks(found: Baseline) -> tuple[Remark, ...]:
+    """What the bands are, and where they do not hold."""
+    if found.spectra is None:
+        return ()
+    stuck = tuple(int(j) + 1 for j in np.flatnonzero(found.stuck))
+    limit = (caution("band-of-a-standing-joint", Where(joints=stuck)),) if stuck else ()
+    return (fact("band"), *limit)

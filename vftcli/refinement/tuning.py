@@ -15,25 +15,22 @@ from vftcli.observers.auto_tuning import (
     noise_level,
 )
 from vftcli.observers.matching import MatchTarget, tune
+from vftcli.observers.observer import Complex
 from vftcli.observers.spectra import Spectra
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import numbers
 
-GOALS = {
-    "rmse": "the smallest expected error",
-    "delay": "a delay behind a slow ramp [s]",
-    "bandwidth": "a −3 dB bandwidth [Hz]",
-    "false-alarms": "at most so many false alarms an hour on each joint, beyond --threshold",
-}
-"""Goal → what it asks for."""
+GOALS = ("rmse", "delay", "bandwidth", "false-alarms")
+"""The smallest expected error, a delay behind a slow ramp [s], a −3 dB bandwidth [Hz], or at most
+so many false alarms an hour on each joint, beyond --threshold."""
 
 
 class TuningGoal(NamedTuple):
     """What the gains are for.
 
     Attributes:
-        name: A key of `GOALS`.
+        name: One of `GOALS`.
         value: Its number, NaN for the smallest error.
         threshold: Torque beyond which an estimate raises an alarm. (n,) or (1,) [N·m]
     """
@@ -68,8 +65,12 @@ class Tuned(NamedTuple):
 def parse_goal(text: str, threshold: str | None = None) -> TuningGoal:
     """Read ``rmse``, ``delay=S``, ``bandwidth=HZ`` or ``false-alarms=PER_HOUR``.
 
+    Args:
+        text: The word.
+        threshold: One number or one a joint, positive. [N·m]
+
     Raises:
-        ParameterError: If it is none of these, or a threshold is missing.
+        ParameterError: If it is none of these, or a threshold is malformed or missing.
     """
     name, equals, number = text.partition("=")
     name = name.strip()
@@ -82,27 +83,19 @@ def parse_goal(text: str, threshold: str | None = None) -> TuningGoal:
             f"--goal {text!r} is not rmse, delay=S, bandwidth=HZ or false-alarms=PER_HOUR with a "
             "positive number"
         )
-    level = parse_threshold(threshold)
+    level = None
+    if threshold is not None:
+        level = np.array(numbers(threshold) or [np.nan])
+        if not (np.all(np.isfinite(level)) and np.all(level > 0.0)):
+            raise ParameterError(
+                f"--threshold {threshold!r} is not a positive number or one a joint [N·m]"
+            )
     if name == "false-alarms" and level is None:
         raise ParameterError(
             "--goal false-alarms needs to know what raises an alarm: add --threshold N·m, one "
             "number or one a joint"
         )
     return TuningGoal(name, value, level)
-
-
-def parse_threshold(text: str | None) -> Array | None:
-    """One number or one a joint, positive. [N·m]
-
-    Raises:
-        ParameterError: If it is something else.
-    """
-    if text is None:
-        return None
-    level = np.array(numbers(text) or [np.nan])
-    if not (np.all(np.isfinite(level)) and np.all(level > 0.0)):
-        raise ParameterError(f"--threshold {text!r} is not a positive number or one a joint [N·m]")
-    return level
 
 
 def momentum(rate: Array) -> Observer:
@@ -118,34 +111,42 @@ def tune_all(spectra: Spectra, goal: TuningGoal) -> tuple[Tuned, ...]:
     Raises:
         ParameterError: If the goal cannot be reached.
     """
-    if goal.threshold is not None and len(goal.threshold) not in {1, spectra.joints}:
+    threshold = goal.threshold
+    if threshold is not None and len(threshold) not in {1, spectra.joints}:
         raise ParameterError(
-            f"--threshold has {len(goal.threshold)} values; give one, or one for each of "
+            f"--threshold has {len(threshold)} values; give one, or one for each of "
             f"{spectra.joints} joints"
         )
     first_order = rates(momentum, spectra, goal)
-    single = np.full(spectra.joints, shared_rate(momentum, spectra, goal))
+    # FDO has one rate for all joints: the smallest mean error, or what the slowest joint allows.
+    shared = float(np.min(first_order))
+    if goal.name == "rmse":
+        grid = natural_frequencies(spectra.step)
+        shared = float(grid[np.argmin(expected_error(momentum, grid, spectra).mean(axis=1))])
+    single = np.full(spectra.joints, shared)
     causal = rates(kalman_filter, spectra, goal)
     smooth = rates(kalman_smoother, spectra, goal)
-    cutoff = {"omega": float(single[0])}
     lines = [
-        ("fdo", "fdo", cutoff, FilteredDynamicsObserver(omega=float(single[0])), single),
+        ("fdo", "fdo", {"omega": shared}, FilteredDynamicsObserver(omega=shared), single),
         ("gmo", "gmo", {"gain": first_order.tolist()}, momentum(first_order), first_order),
         ("kfo-zoh", "kfo", densities(causal, spectra), kalman_filter(causal), causal),
         ("kfo-rts", "kfo-rts", densities(smooth, spectra), kalman_smoother(smooth), smooth),
     ]
-    return tuple(
-        Tuned(
-            observer=name,
-            section=section,
-            gains=gains,
-            rate=rate,
-            delay=np.asarray(observer.tuning(spectra.step, spectra.joints).delay),
-            rmse=error_of(observer, spectra),
-            alarms=None if goal.threshold is None else alarms_of(observer, spectra, goal.threshold),
+    tuned = []
+    for name, section, gains, observer, rate in lines:
+        response = observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
+        tuned.append(
+            Tuned(
+                observer=name,
+                section=section,
+                gains=gains,
+                rate=rate,
+                delay=np.asarray(observer.tuning(spectra.step, spectra.joints).delay),
+                rmse=np.sqrt(spectra.missed(response) + spectra.passed(response)),
+                alarms=None if threshold is None else alarms(response, spectra, threshold),
+            )
         )
-        for name, section, gains, observer, rate in lines
-    )
+    return tuple(tuned)
 
 
 def densities(omega_n: Array, spectra: Spectra) -> dict[str, Any]:
@@ -163,8 +164,7 @@ def rates(kind: Kind, spectra: Spectra, goal: TuningGoal) -> Array:
     """The rate of each joint that reaches the goal. (n,) [rad/s]"""
     grid = natural_frequencies(spectra.step)
     if goal.name == "false-alarms" and goal.threshold is not None:
-        few = alarms(kind, grid, spectra, goal.threshold) <= goal.value
-        check_reachable(few, spectra, goal)
+        few = few_alarms(kind, grid, spectra, goal.threshold, goal.value)
         # The fastest that still raises few alarms: of the run of rates that do, its last.
         fastest = len(grid) - 1 - np.argmax(few[::-1], axis=0)
         best = np.argmin(expected_error(kind, grid, spectra), axis=0)
@@ -174,60 +174,42 @@ def rates(kind: Kind, spectra: Spectra, goal: TuningGoal) -> Array:
         return np.full(spectra.joints, goal.value / fraction)
     if goal.name == "rmse" or kind is kalman_smoother:
         return np.asarray(grid[np.argmin(expected_error(kind, grid, spectra), axis=0)])
-    return matched_rate(kind, spectra, goal)
-
-
-def matched_rate(kind: Kind, spectra: Spectra, goal: TuningGoal) -> Array:
-    """The rate with a delay or bandwidth. (n,) [rad/s]"""
     n = spectra.joints
     setup = Setup(gains={}, settings={}, joints=n, step=spectra.step, as_printed=False)
     observer = tune(kind(np.full(n, 10.0)), MatchTarget(goal.name, goal.value), setup)
     return np.array(observer.tuning(spectra.step, n).omega_n)
 
 
-def shared_rate(kind: Kind, spectra: Spectra, goal: TuningGoal) -> float:
-    """One rate for all joints: the smallest mean error, or what the slowest joint allows."""
-    if goal.name != "rmse":
-        return float(np.min(rates(kind, spectra, goal)))
-    grid = natural_frequencies(spectra.step)
-    return float(grid[np.argmin(expected_error(kind, grid, spectra).mean(axis=1))])
+def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most: float) -> Mask:
+    """Whether a rate of the grid raises at most so many false alarms an hour on a joint. (G, n)
 
-
-def check_reachable(few: Mask, spectra: Spectra, goal: TuningGoal) -> None:
-    """Raise unless every joint has a rate with few enough false alarms."""
+    Raises:
+        ParameterError: If none does.
+    """
+    response = kind(grid).frequency_response(spectra.frequency, spectra.step, len(grid))
+    columns = range(len(grid))
+    few = np.array([alarms(response[:, [g]], spectra, threshold) <= most for g in columns])
     never = np.flatnonzero(~np.any(few, axis=0))
-    if not len(never):
-        return
-    read = np.sqrt(np.sum(spectra.free, axis=0) * spectra.width)
-    listed = ", ".join(f"J{j + 1} ({read[j]:.2g} N·m rms)" for j in never)
-    raise ParameterError(
-        f"no gain keeps the false alarms at {goal.value:g} an hour: the free part itself is too "
-        f"loud for the threshold on {listed}; raise --threshold or remove the bias"
-    )
+    if len(never):
+        read = np.sqrt(np.sum(spectra.free, axis=0) * spectra.width)
+        listed = ", ".join(f"J{j + 1} ({read[j]:.2g} N·m rms)" for j in never)
+        raise ParameterError(
+            f"no gain keeps the false alarms at {most:g} an hour: the free part itself is "
+            f"too loud for the threshold on {listed}; raise --threshold or remove the bias"
+        )
+    return few
 
 
-def error_of(observer: Observer, spectra: Spectra) -> Array:
-    """Expected error of one observer. (n,) [N·m]"""
-    response = observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
-    return np.sqrt(spectra.missed(response) + spectra.passed(response))
+def alarms(response: Complex, spectra: Spectra, threshold: Array) -> Array:
+    """Expected false alarms an hour. (n,)
 
-
-def alarms_of(observer: Observer, spectra: Spectra, threshold: Array) -> Array:
-    """Expected false alarms an hour of one observer. (n,)"""
-    response = observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
+    Args:
+        response: An observer's, one column a joint or one for all. (F, n) or (F, 1)
+        spectra: What the log shows.
+        threshold: Torque beyond which there is an alarm. (n,) or (1,) [N·m]
+    """
     power = np.abs(response) ** 2 * spectra.free * spectra.width
     return crossings(power, spectra.frequency, threshold)
-
-
-def alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array) -> Array:
-    """Expected false alarms an hour at every rate. (G, n)"""
-    response = kind(grid).frequency_response(spectra.frequency, spectra.step, len(grid))
-    share = np.abs(response) ** 2
-    levels = [
-        crossings(share[:, [g]] * spectra.free * spectra.width, spectra.frequency, threshold)
-        for g in range(len(grid))
-    ]
-    return np.array(levels)
 
 
 def crossings(power: Array, frequency: Array, threshold: Array) -> Array:

@@ -67,14 +67,23 @@ def align(recording: Recording, free: Recording) -> Alignment:
             their clocks run at rates that differ by more than `SAME_RATE`.
     """
     check_same_arm(recording, free)
-    found = lying_at(recording, free, *best_fit(recording, free))
-    if not found.deviation <= SAME_TRAJECTORY:
-        shared = shared_part(recording, free)
-        if shared is None:
-            raise ReferenceTorqueError(misfit(recording, free, found))
-        found = shared
-    if abs(found.rate - 1.0) > SAME_RATE:
-        raise ReferenceTorqueError(other_rate(recording, free, found.rate))
+    closest = lying_at(recording, free, *best_fit(recording, free))
+    fits = closest.deviation <= SAME_TRAJECTORY
+    found = closest if fits else shared_part(recording, free)
+    rate = found.rate if found is not None else explaining_rate(recording, free)
+    if rate is None:
+        raise ReferenceTorqueError(
+            f"{free.name} is not a free run of the trajectory in {recording.name}: at the best "
+            f"shift ({closest.shift:.3f} s) the joint positions still differ by "
+            f"{closest.deviation:.3g} rad rms (at most {SAME_TRAJECTORY:g}); give a log of the "
+            "same motion with --free"
+        )
+    if found is None or abs(rate - 1.0) > SAME_RATE:
+        raise ReferenceTorqueError(
+            f"the clocks of {recording.name} and {free.name} run at different rates: the same "
+            f"motion takes {rate:.4g} times as long in {free.name}; correct its time stamps, or "
+            "name their unit with --columns (t[ms], t[ns])"
+        )
     return found
 
 
@@ -106,12 +115,12 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     span = recording.duration + free.duration
     step = max(0.02, span / 5000.0)
     shifts = free.t[0] - recording.t[-1] + np.arange(0.0, span, step)
-    shared = [float(np.sum(path * near(q, t + shift, free))) for shift in shifts]
+    shared = [float(np.sum(path * near(t + shift, q, free))) for shift in shifts]
     best = float(shifts[int(np.argmax(shared))])
     if max(shared) < LEAST_OVERLAP * float(np.sum(path)):
         return None
     shift, rate = refined(recording, free, best, 1.0)
-    matched = near(recording.q, rate * recording.t + shift, free)
+    matched = near(rate * recording.t + shift, recording.q, free)
     long = np.zeros(recording.samples, dtype=bool)
     for start, stop in runs_of(matched):
         long[start:stop] = recording.t[stop - 1] - recording.t[start] >= 1.0
@@ -119,40 +128,24 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     return found if np.isfinite(found.deviation) else None
 
 
-def near(q: Array, t: Array, free: Recording) -> Mask:
-    """Whether positions lie within `SAME_TRAJECTORY` of the free run at instants of its clock."""
-    apart = np.max(np.abs(resample_columns(t, free.t, free.q, np.inf) - q), axis=1)
-    return np.asarray(apart <= SAME_TRAJECTORY)
+def apart(t: Array, q: Array, free: Recording) -> Array:
+    """How far the free run is from positions q at instants t of its clock. (T, n) [rad]
+
+    NaN before its first sample and after its last.
+    """
+    return resample_columns(t, free.t, free.q, np.nan) - q
 
 
-def misfit(recording: Recording, free: Recording, found: Alignment) -> str:
-    """One line on why two logs do not fit: other clocks if that explains it, else other motions."""
-    rate = explaining_rate(recording, free)
-    if rate is not None:
-        return other_rate(recording, free, rate)
-    return (
-        f"{free.name} is not a free run of the trajectory in {recording.name}: at the best "
-        f"shift ({found.shift:.3f} s) the joint positions still differ by {found.deviation:.3g} "
-        f"rad rms (at most {SAME_TRAJECTORY:g}); give a log of the same motion with --free"
-    )
-
-
-def other_rate(recording: Recording, free: Recording, rate: float) -> str:
-    """One line on clocks that run at different rates."""
-    return (
-        f"the clocks of {recording.name} and {free.name} run at different rates: the same motion "
-        f"takes {rate:.4g} times as long in {free.name}; correct its time stamps, or name their "
-        "unit with --columns (t[ms], t[ns])"
-    )
+def near(t: Array, q: Array, free: Recording) -> Mask:
+    """Whether the free run lies within `SAME_TRAJECTORY` of positions q at its instants t. (T,)"""
+    return np.asarray(np.max(np.abs(apart(t, q, free)), axis=1) <= SAME_TRAJECTORY)
 
 
 def explaining_rate(recording: Recording, free: Recording) -> float | None:
     """A ratio of clock rates at which the two logs are the same trajectory, None without one."""
     for rate in RATES[np.abs(RATES - 1.0) > SAME_RATE]:
-        span = min(recording.duration * rate, free.duration) / max(
-            recording.duration * rate, free.duration
-        )
-        if span < LEAST_OVERLAP:
+        lengths = (recording.duration * rate, free.duration)
+        if min(lengths) < LEAST_OVERLAP * max(lengths):
             continue
         step = max(recording.median_step * rate, free.median_step, free.duration / 4000.0)
         fit = lag_fit(uniform(free, step), uniform(recording, step / rate), LEAST_OVERLAP)
@@ -191,13 +184,12 @@ def distance_moving(recording: Recording, free: Recording, shift: float, rate: f
 
     A quarter, because contacts push an arm off its path; fast, because any two rests lie alike.
     """
-    t = rate * recording.t + shift
+    distance = np.linalg.norm(apart(rate * recording.t + shift, recording.q, free), axis=1)
     speed = np.linalg.norm(np.gradient(recording.q, recording.t, axis=0), axis=1)
-    used = (t >= free.t[0]) & (t <= free.t[-1]) & (speed >= 0.5 * np.sqrt(np.mean(speed**2)))
+    used = np.isfinite(distance) & (speed >= 0.5 * np.sqrt(np.mean(speed**2)))
     if np.count_nonzero(used) < 8:
         return float("inf")
-    distance = resample_columns(t[used], free.t, free.q) - recording.q[used]
-    return float(np.quantile(np.linalg.norm(distance, axis=1), 0.25))
+    return float(np.quantile(distance[used], 0.25))
 
 
 def refined(
@@ -210,11 +202,7 @@ def refined(
     """
     slope = np.gradient(free.q, free.t, axis=0)
     for _ in range(15):
-        t = rate * recording.t + shift
-        inside = (t >= free.t[0]) & (t <= free.t[-1])
-        if np.count_nonzero(inside) < 8:
-            break
-        move = gauss_newton_step(recording, free, t, inside, slope)
+        move = gauss_newton_step(recording, free, rate * recording.t + shift, slope)
         shift, rate = shift - move[0], rate - move[1]
         if abs(move[0]) < 1e-9 and abs(move[1]) < 1e-12:
             break
@@ -222,12 +210,22 @@ def refined(
 
 
 def gauss_newton_step(
-    recording: Recording, free: Recording, t: Array, inside: Array, slope: Array
+    recording: Recording, free: Recording, t: Array, slope: Array
 ) -> tuple[float, float]:
-    """How far shift [s] and rate are off, to first order; zeros where nothing moves."""
-    own = recording.t[inside]
+    """How far shift [s] and rate are off, to first order; zeros where nothing tells.
+
+    Args:
+        recording: The log.
+        free: The free run.
+        t: Its clock at the log's samples, by shift and rate so far. (T,) [s]
+        slope: Its velocities. (S, n) [rad/s]
+    """
+    distance = apart(t, recording.q, free)
+    inside = np.isfinite(distance[:, 0])
+    if np.count_nonzero(inside) < 8:
+        return (0.0, 0.0)
+    own, distance = recording.t[inside], distance[inside]
     middle = float(own.mean())
-    distance = resample_columns(t[inside], free.t, free.q) - recording.q[inside]
     speed = resample_columns(t[inside], free.t, slope)
     scale = 1.4826 * np.median(np.abs(distance), axis=0) + 1e-7
     share = speed / (scale**2 + distance**2)
@@ -248,12 +246,11 @@ def lying_at(
 
     The deviation is infinite where fewer than two samples are left.
     """
-    t = rate * recording.t + shift
-    overlap = (t >= free.t[0]) & (t <= free.t[-1])
+    distance = apart(rate * recording.t + shift, recording.q, free)
+    overlap = np.isfinite(distance[:, 0])
     if within is not None:
         overlap &= within
     deviation = float("inf")
     if np.count_nonzero(overlap) >= 2:
-        there = resample_columns(t[overlap], free.t, free.q)
-        deviation = float(np.sqrt(np.mean((there - recording.q[overlap]) ** 2)))
+        deviation = float(np.sqrt(np.mean(distance[overlap] ** 2)))
     return Alignment(shift, rate, deviation, overlap)

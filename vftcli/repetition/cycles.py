@@ -1,6 +1,5 @@
 """The cycles of a repeated motion in one log, without the way in and the way out."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -89,13 +88,3 @@ def settled(t: Array, on_path: Mask, seconds: float) -> float:
     share = (count[stop] - count[here]) / np.maximum(stop - here, 1)
     good = np.flatnonzero(on_path & (share >= 0.75))
     return float(t[good[0]]) if len(good) else float(t[-1])
-
-
-def check_cycles(recording: Recording, cycles: Cycles, asked: Sequence[int]) -> None:
-    """Raise unless the asked cycles are in the log, and something else to compare with them."""
-    beyond = [c for c in asked if not 1 <= c <= cycles.whole]
-    if beyond:
-        raise ReferenceTorqueError(
-            f"{recording.name}: there is no cycle {beyond[0]}; the log holds {cycles.whole} whole "
-            f"cycles of {cycles.period:.4g} s from {cycles.begin:.4g} s on"
-        )

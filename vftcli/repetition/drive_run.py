@@ -63,7 +63,6 @@ def drive_run_of(recording: Recording, robot: Robot, terms: DynamicsTerms) -> Dr
     """
     torque = drive_torque(recording, robot)
     dq = recording.require("dq")
-    standstill_s = duration(recording.t, dq)
     return DriveRun(
         name=recording.name,
         t=recording.t,
@@ -73,6 +72,6 @@ def drive_run_of(recording: Recording, robot: Robot, terms: DynamicsTerms) -> Dr
         model=np.gradient(terms.p, recording.t, axis=0) - terms.mu + torque,
         momentum=terms.p,
         coulomb=dry_friction(robot.friction, robot.joints),
-        standstill_s=standstill_s,
-        standing=standing(recording.t, standstill_s),
+        standstill_s=duration(recording.t, dq),
+        standing=standing(recording.t, dq),
     )

@@ -56,19 +56,15 @@ class ErrorModel(NamedTuple):
     @property
     def floor(self) -> Array:
         """Root mean square of `sd` while the joint moves; over all samples if it mostly stands."""
-        known = self.known
-        share = np.where(self.standing_share <= 1.0 - TRUSTED_SHARE, ~self.standing[known], True)
-        square = np.sum(np.where(share, self.sd[known] ** 2, 0.0), axis=0)
-        return np.asarray(np.sqrt(square / np.maximum(np.sum(share, axis=0), 1)))
+        moving = ~self.standing[self.known]
+        used = np.where(self.standing_share <= 1.0 - TRUSTED_SHARE, moving, True)
+        return rms(self.sd[self.known], used)
 
     @property
     def floor_standing(self) -> Array:
         """Root mean square of `sd` while the joint stands, NaN where it never does. (n,) [N·m]"""
-        known = self.known
-        standing = self.standing[known]
-        square = np.sum(np.where(standing, self.sd[known] ** 2, 0.0), axis=0)
-        count = np.sum(standing, axis=0)
-        return np.where(count > 0, np.sqrt(square / np.maximum(count, 1)), np.nan)
+        standing = self.standing[self.known]
+        return np.where(np.any(standing, axis=0), rms(self.sd[self.known], standing), np.nan)
 
 
 def error_model(

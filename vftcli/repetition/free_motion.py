@@ -111,15 +111,19 @@ class FreeMotion:
         Raises:
             ReferenceTorqueError: If the log repeats nothing, or has no such cycle.
         """
-        from vftcli.repetition.cycles import check_cycles
-
-        check_cycles(self.log.recording, self.cycles, self.choice.cycles)
-        slack = SLACK * self.cycles.period
+        cycles, whole = self.cycles, self.cycles.whole
+        for number in self.choice.cycles:
+            if not 1 <= number <= whole:
+                raise ReferenceTorqueError(
+                    f"{self.log.recording.name}: there is no cycle {number}; the log holds {whole} "
+                    f"whole cycles of {cycles.period:.4g} s from {cycles.begin:.4g} s on"
+                )
+        slack = SLACK * cycles.period
         within = {
             number
-            for number in range(self.cycles.whole)
+            for number in range(whole)
             for a, b in self.choice.spans
-            if self.cycles.span(number)[0] >= a - slack and self.cycles.span(number)[1] <= b + slack
+            if cycles.span(number)[0] >= a - slack and cycles.span(number)[1] <= b + slack
         }
         return tuple(sorted(within | {number - 1 for number in self.choice.cycles}))
 
@@ -152,11 +156,15 @@ class FreeMotion:
             ParameterError: If a given span holds no samples, or the whole log.
         """
         log, choice = self.log, self.choice
-        own, remarks = self.within_spans, list(self.span_remarks)
+        own, t = self.within_spans, log.recording.t
+        remarks = [
+            fact("free-span", begin_s=max(a, float(t[0])), end_s=min(b, float(t[-1])))
+            for a, b in choice.spans
+        ]
         pairings: tuple[Pairing, ...] = ()
         if choice.cycles or not choice.is_given:
             found = self.free_cycles
-            own = own | np.isin(self.cycles.number(log.recording.t), found.numbers)
+            own = own | np.isin(self.cycles.number(t), found.numbers)
             pairings = self.pairings_by(self.cycles.period, found.numbers)
             remarks.append(found.remark(self.cycles.whole))
         elif choice.spans and self.repeats:
@@ -164,8 +172,13 @@ class FreeMotion:
         pieces = [FreePiece(log, own, pairings)] if own.any() else []
         for run in self.runs:
             whole = np.ones(run.recording.samples, dtype=bool)
-            pieces.append(FreePiece(run.run, whole, (run.pairing,) if run.is_same_motion else ()))
-            remarks.append(run_remark(run))
+            about = Where(about=run.recording.name)
+            if run.is_same_motion:
+                pieces.append(FreePiece(run.run, whole, (run.pairing,)))
+                remarks.append(fact("free-run", about, shift_s=run.alignment.shift))
+            else:
+                pieces.append(FreePiece(run.run, whole, ()))
+                remarks.append(fact("free-run-of-another-motion", about))
         return FreePart(tuple(pieces), own, tuple(remarks))
 
     @property
@@ -195,20 +208,3 @@ class FreeMotion:
                 f"a part of the log, which runs from {t[0]:g} to {t[-1]:g} s"
             )
         return inside
-
-    @property
-    def span_remarks(self) -> tuple[Remark, ...]:
-        """The spans that are given as free, as far as they are in the log."""
-        t = self.log.recording.t
-        return tuple(
-            fact("free-span", begin_s=max(a, float(t[0])), end_s=min(b, float(t[-1])))
-            for a, b in self.choice.spans
-        )
-
-
-def run_remark(run: FreeRun) -> Remark:
-    """Whether a free run repeats the log's motion, and where."""
-    about = Where(about=run.recording.name)
-    if not run.is_same_motion:
-        return fact("free-run-of-another-motion", about)
-    return fact("free-run", about, shift_s=run.alignment.shift)

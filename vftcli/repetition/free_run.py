@@ -92,16 +92,6 @@ class FreeRun:
         """The free run as it was read."""
         return self.run.recording
 
-    @property
-    def terms(self) -> DynamicsTerms:
-        """P and μ along the free run."""
-        return self.run.terms
-
-    @property
-    def drive(self) -> "DriveRun":
-        """Drive torque along the free run, and the model's."""
-        return self.run.drive
-
     @cached_property
     def _alignment(self) -> "Alignment | ReferenceTorqueError":
         from vftcli.repetition.alignment import align
@@ -137,5 +127,5 @@ class FreeRun:
         from vftcli.repetition.pairing import pair_with_run
 
         found = self.alignment
-        pairing = pair_with_run(self.log.recording.t, self.drive, found.shift, found.rate)
+        pairing = pair_with_run(self.log.recording.t, self.run.drive, found.shift, found.rate)
         return pairing._replace(times=np.where(found.overlap, pairing.times, np.nan))

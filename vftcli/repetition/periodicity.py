@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.repetition.standstill import duration, standing
+from vftcli.repetition.standstill import standing
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
@@ -109,7 +109,7 @@ def moving_part(recording: Recording) -> tuple[Array, Array]:
             "give a free run in another log with --free"
         )
     dq = recording.dq if recording.dq is not None else np.gradient(q, t, axis=0)
-    moving = np.flatnonzero(~np.all(standing(t, duration(t, dq)), axis=1))
+    moving = np.flatnonzero(~np.all(standing(t, dq), axis=1))
     if len(moving) < 8 or np.ptp(q[moving], axis=0).max() < 0.01:
         raise ReferenceTorqueError(
             f"{recording.name}: the arm does not move, so it repeats nothing; the two-cycle "

@@ -30,15 +30,15 @@ def duration(t: Array, dq: Array) -> Array:
     return length
 
 
-def standing(t: Array, standstill_s: Array) -> Mask:
+def standing(t: Array, dq: Array) -> Mask:
     """Where a joint stops for at least `LEAST` seconds, the moments before and after too. (T, n)
 
     Args:
         t: Clock. (T,) [s]
-        standstill_s: Lengths of stops, as from `duration`. (T, n) [s]
+        dq: Joint velocities. (T, n) [rad/s]
     """
-    found = np.zeros(standstill_s.shape, dtype=bool)
-    for j, long in enumerate((standstill_s >= LEAST).T):
+    found = np.zeros(dq.shape, dtype=bool)
+    for j, long in enumerate((duration(t, dq) >= LEAST).T):
         for start, end in runs_of(long):
             # A joint is stuck before its speed is zero and settles after it has broken away.
             around = (t >= t[start] - BREAKAWAY) & (t <= t[end - 1] + BREAKAWAY)

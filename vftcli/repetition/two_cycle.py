@@ -7,18 +7,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.repetition.choice import AUTOMATIC, FreeChoice
+from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.error_model import TRUSTED_SHARE, rms
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import FreeRun, ModelledRun
-from vftcli.repetition.friction_change import friction_change
 from vftcli.repetition.ladder import LOW_PASS, RUNGS, Difference, differences, most_certain
 from vftcli.repetition.pairing import Pairing, pair_with_run
+from vftcli.repetition.standstill import STILL
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
+
+BLOCK = 1.0
+"""Length of the pieces whose scatter tells chance from change. [s]"""
+
+SURE = 3.0
+"""Standard errors from which on a change is believed: contacts alone rarely look like one."""
 
 
 class Partners(NamedTuple):
@@ -91,7 +98,11 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
         moving=moving,
         remarks=(
             *partners.remarks,
-            *ladder_remarks(ladder, chosen),
+            *(step.remark("alignment-floor", floor_Nm=step.floor.tolist()) for step in ladder),
+            chosen.remark(
+                "alignment-chosen" if len(ladder) > 1 else "alignment-asked",
+                title=RUNGS[chosen.rung].title,
+            ),
             *floor_remarks(chosen, measured),
             *change_remarks(change),
         ),
@@ -211,11 +222,33 @@ def error_ratio(found: Difference, where: Mask) -> Array:
     return np.asarray(np.clip(shown / np.maximum(expected, 1e-12), 0.3, 3.0))
 
 
-def ladder_remarks(ladder: Sequence[Difference], chosen: Difference) -> tuple[Remark, ...]:
-    """Every rung with its floor, and which one is used and why."""
-    made = [d.remark("alignment-floor", floor_Nm=d.floor.tolist()) for d in ladder]
-    code = "alignment-chosen" if len(ladder) > 1 else "alignment-asked"
-    return (*made, chosen.remark(code, title=RUNGS[chosen.rung].title))
+def friction_change(motion: DriveRun, tau: Array, moving: Mask) -> Array:
+    """Change of dry friction from the free run to the log, 0 where it may be chance. (n,) [N·m]
+
+    Joints warm up between two logs, and then friction does not cancel. The change is the mean of
+    the difference times the sign of the velocity. Contacts do not follow the sign of the velocity
+    over a whole log; its scatter over pieces of `BLOCK` says how sure the mean is.
+
+    Args:
+        motion: The log.
+        tau: The two-cycle difference, NaN where there is none. (T, n) [N·m]
+        moving: Whether the joint moves. (T, n)
+    """
+    t, n = motion.t, tau.shape[1]
+    piece = ((t - t[0]) / BLOCK).astype(np.int64)
+    change = np.zeros(n)
+    for j in range(n):
+        used = np.isfinite(tau[:, j]) & moving[:, j] & (np.abs(motion.dq[:, j]) > STILL)
+        along = tau[used, j] * np.sign(motion.dq[used, j])
+        count = np.bincount(piece[used]).astype(np.float64)
+        total = np.bincount(piece[used], weights=along)
+        means = total[count > 0] / count[count > 0]
+        if len(means) < 5:
+            continue
+        spread = float(np.std(means, ddof=1)) / np.sqrt(len(means))
+        if abs(float(np.mean(means))) > SURE * spread:
+            change[j] = float(np.mean(along))
+    return change
 
 
 def floor_remarks(chosen: Difference, measured: Array | None) -> tuple[Remark, ...]:

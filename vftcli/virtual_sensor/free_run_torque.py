@@ -41,7 +41,7 @@ def free_run_torque(run: FreeRun, observers: Sequence[Observer]) -> FreeRunTorqu
         run: The free run beside its log.
         observers: The observers that run over it.
     """
-    terms = run.terms
+    terms = run.run.terms
     read = (*(o.estimate(terms) for o in observers), mean_disturbance(terms))
     settled = terms.t - terms.t[0] >= min(SETTLING, 0.5 * float(terms.t[-1] - terms.t[0]))
     where, there = Where(run.recording.name), {}

@@ -77,7 +77,7 @@ def sense(
     sensor = VirtualSensor(solver=choice.solver, frame=choice.frame, mounting=mounting)
     torques = less_free_run(estimates, free_run)
     zero = zero_spans(choice.zero, raw)
-    quiet = motion.zero.terms if motion.zero is not None else None
+    quiet = motion.zero.run.terms if motion.zero is not None else None
     lags = Disturbance(terms=terms, observers=observers, free=quiet)
     error = torque_error(choice, torques, zero.chosen(t), free_run, lags)
     wrenches = sensor.wrenches(torques, recording.q, chain, dict(error.sd))
