@@ -1,12 +1,19 @@
-"""A load that the controller does not know: currents at rest beside those it expects."""
+"""Payload and drive constants, from what the controller expects, with known faults."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from vftcli.doctor.load import MISMATCH, payload_mismatch
+from vftcli.doctor.load import drive_constants, load_findings, payload_mismatch, resting
+from vftcli.robots import load_robot
+from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark
 
 T = 0.01 * np.arange(400)
+TEN = np.full(6, 10.0)
+"""Drive constants of 10 N·m/A, so that currents in A are a tenth of the torques in N·m."""
 
 
 def log(*extra: float) -> Recording:
@@ -16,15 +23,177 @@ def log(*extra: float) -> Recording:
 
 
 @pytest.mark.parametrize(
-    ("share", "joints"),
+    ("torques", "joints"),
     [
-        ((0.0, 2.0, 2.0, 0.0, 0.0, 0.0), (2, 3)),
-        ((0.0, 2.0, -2.0, 2.0, 0.0, 0.0), (2, 3, 4)),
-        ((9.0, 2.0, 0.0, 0.0, 9.0, 9.0), None),  # the base and the wrist do not tell a load
-        ((0.0, 2.0, 0.9, 0.9, 0.0, 0.0), None),  # one joint alone may be its own drive's
+        ((0.0, 8.0, 8.0, 0.0, 0.0, 0.0), (2, 3)),
+        ((0.0, 8.0, -8.0, 8.0, 0.0, 0.0), (2, 3, 4)),
+        ((0.0, 4.1, 0.0, -4.1, 0.0, 0.0), (2, 4)),
+        ((0.0, 4.1, 3.9, -3.9, 0.0, 0.0), None),  # one joint alone may be its own drive's
+        ((36.0, 8.0, 0.0, 0.0, 36.0, 36.0), None),  # the base and the wrist do not tell a load
     ],
 )
-def test_two_heavy_joints_tell_a_load(share: tuple, joints: tuple | None) -> None:
-    constants = np.full(6, 10.0)
-    found = list(payload_mismatch(log(*(MISMATCH * np.array(share) / 10.0)), constants))
+def test_two_heavy_joints_tell_a_load(torques: tuple, joints: tuple | None) -> None:
+    """Each of more than 4 N·m. [N·m]"""
+    found = list(payload_mismatch(log(*(np.array(torques) / TEN)), TEN))
     assert [remark.where.joints for remark in found] == ([] if joints is None else [joints])
+
+
+@pytest.mark.parametrize(("current", "told"), [(0.39, False), (0.41, True)])
+def test_an_unknown_constant_is_taken_for_a_large_drive_s(current: float, told: bool) -> None:
+    """Ten newton metres an ampere, so 0.4 A are the 4 N·m that tell."""
+    assert len(list(payload_mismatch(log(0, current, current, 0, 0, 0), None))) == told
+    nowhere = np.full(6, np.nan)
+    assert len(list(payload_mismatch(log(0, current, current, 0, 0, 0), nowhere))) == told
+    weak = np.full(6, 5.0)
+    assert not list(payload_mismatch(log(0, current, current, 0, 0, 0), weak))
+
+
+def test_the_numbers_of_a_mismatch() -> None:
+    still = log(0, 1.0, -2.0, 0.1, 0, 0)
+    assert still.target_current is not None
+    still = replace(still, current=2.0 + np.array([0, 1.0, -2.0, 0.1, 0, 0]) + 0 * still.q)
+    still = replace(still, target_current=still.target_current + 2.0)
+    (untold,) = payload_mismatch(still, TEN)
+    assert (untold.code, untold.level) == ("payload-mismatch-untold", "warning")
+    assert untold.where.joints == (2, 3)
+    assert dict(untold.values) == {
+        "carried_A": pytest.approx([3.0, 0.0]),
+        "expected_A": pytest.approx([2.0, 2.0]),
+        "extra_Nm": pytest.approx([10.0, -20.0]),
+        "payload_kg": None,
+    }
+    (told,) = payload_mismatch(replace(still, payload_mass=0.0), TEN)
+    assert (told.code, told.values["payload_kg"]) == ("payload-mismatch", 0.0)
+
+
+@pytest.mark.parametrize(("samples", "told"), [(19, False), (20, True)])
+def test_a_mismatch_needs_twenty_samples_at_rest(samples: int, told: bool) -> None:
+    still = log(0, 1, 1, 0, 0, 0)
+    dq = np.where(np.arange(400) < samples, 0.0, 1.0)[:, None] * np.ones(6)
+    assert len(list(payload_mismatch(replace(still, dq=dq), TEN))) == told
+
+
+def test_a_mismatch_needs_both_currents() -> None:
+    still = log(0, 1, 1, 0, 0, 0)
+    assert not list(payload_mismatch(replace(still, current=None), TEN))
+    assert not list(payload_mismatch(replace(still, target_current=None), TEN))
+    assert not list(payload_mismatch(replace(still, dq=None), TEN))
+
+
+def test_an_arm_rests_where_no_joint_is_meant_to_move_and_none_does() -> None:
+    """By what is commanded, which has no noise, up to 2 mrad/s; by what is measured to 10."""
+
+    def speeds(*values: float) -> Array:
+        dq = np.zeros((len(values), 6))
+        dq[:, 4] = values
+        return dq
+
+    def rest(measured: Array, commanded: Array | None) -> list[bool]:
+        q = np.zeros_like(measured)
+        clock = T[: len(q)]
+        return resting(Recording(t=clock, q=q, dq=measured, target_dq=commanded)).tolist()
+
+    around = speeds(1.9e-3, 2.1e-3, -1.9e-3, -2.1e-3)
+    assert rest(around, None) == [True, False, True, False]
+    assert rest(speeds(0, 0, 0, 0), around) == [True, False, True, False]
+    assert rest(speeds(9e-3, 11e-3, -9e-3, -11e-3), speeds(0, 0, 0, 0)) == [True, False] * 2
+
+
+def controlled(constants: Array, current: Array | None = None) -> Recording:
+    """An arm at rest whose controller expects currents and torques of these constants."""
+    still = log(0, 0, 0, 0, 0, 0)
+    if current is None:
+        # slowly changing loads of 1 to 3 A, as in a series of held poses
+        current = 2 + np.sin(np.outer(T, np.arange(1, 7)))
+    return replace(
+        still, current=current, target_current=current, target_torque=current * constants
+    )
+
+
+def test_constants_are_the_controller_s_torque_per_current() -> None:
+    planted = np.array([14.0, 13.0, 10.0, 9.5, 9.0, -8.0])
+    found = drive_constants(controlled(planted))
+    assert found == pytest.approx(planted, rel=1e-12)
+    assert drive_constants(replace(controlled(planted), target_torque=None)) is None
+    assert drive_constants(replace(controlled(planted), target_current=None)) is None
+
+
+@pytest.mark.parametrize(("current", "known"), [(0.019, False), (0.021, True), (-0.021, True)])
+def test_constants_need_a_fiftieth_of_an_ampere(current: float, known: bool) -> None:
+    found = drive_constants(controlled(TEN, np.full((400, 6), current)))
+    assert found is not None
+    assert np.isfinite(found).all() == known
+
+
+@pytest.mark.parametrize(("samples", "known"), [(9, False), (10, True)])
+def test_constants_need_ten_samples(samples: int, known: bool) -> None:
+    current = np.where(np.arange(400) < samples, 1.0, 0.0)[:, None] * np.ones(6)
+    found = drive_constants(controlled(TEN, current))
+    assert found is not None
+    assert np.isfinite(found).all() == known
+
+
+@pytest.mark.parametrize(("noise", "known"), [(0.04, True), (0.06, False)])
+def test_constants_need_torques_that_are_proportional_to_the_currents(
+    noise: float, known: bool
+) -> None:
+    """Up to a twentieth of the torque, as with an offset or friction that the drive model adds."""
+    arm = controlled(TEN, np.ones((400, 6)))
+    assert arm.target_torque is not None
+    wave = np.where(np.arange(400) % 2, 1 + noise, 1 - noise)[:, None]
+    found = drive_constants(replace(arm, target_torque=arm.target_torque * wave))
+    assert found is not None
+    assert np.isfinite(found).all() == known
+    if known:
+        assert found == pytest.approx(TEN)
+
+
+def test_constants_come_from_resting_samples_only() -> None:
+    arm = controlled(TEN)
+    assert arm.target_torque is not None
+    moves = (np.arange(400) >= 200)[:, None]
+    found = drive_constants(
+        replace(
+            arm,
+            dq=np.where(moves, 0.5, 0.0) * np.ones(6),
+            target_torque=np.where(moves, 3.0, 1.0) * arm.target_torque,
+        )
+    )
+    assert found == pytest.approx(TEN)
+
+
+def constants_told(factors: Array) -> list[Remark]:
+    """What is told of a controller whose constants are the UR10e profile's times these."""
+    robot = load_robot("ur10e")
+    assert robot.torque_constant is not None
+    found = load_findings(controlled(robot.torque_constant * factors), robot)
+    return [remark for remark in found if remark.code == "drive-constants"]
+
+
+@pytest.mark.parametrize(
+    ("change", "told"), [(0.04, False), (-0.04, False), (0.06, True), (-0.06, True)]
+)
+def test_constants_a_twentieth_off_the_profile_are_told(change: float, told: bool) -> None:
+    factors = np.ones(6)
+    factors[[1, 4]] += change
+    factors[1] += 2 * change if told else 0.0
+    found = constants_told(factors)
+    assert len(found) == told
+    if told:
+        (remark,) = found
+        profile = np.asarray(load_robot("ur10e").torque_constant)[[1, 4]]
+        assert (remark.level, remark.where.joints) == ("warning", (2, 5))
+        assert dict(remark.values) == {
+            "robot": "ur10e",
+            "found_Nm_A": pytest.approx((profile * factors[[1, 4]]).tolist()),
+            "profile_Nm_A": pytest.approx(profile.tolist()),
+            "worst_percent": pytest.approx(18.0),
+        }
+
+
+def test_no_constants_are_compared_without_a_robot_that_has_them() -> None:
+    arm = controlled(TEN)
+    assert list(load_findings(arm, None)) == []
+    assert list(load_findings(arm, replace(load_robot("ur10e"), torque_constant=None))) == []
+    unknown = replace(arm, target_torque=None)
+    assert list(load_findings(unknown, load_robot("ur10e"))) == []
