@@ -23,6 +23,6 @@ def test_motion_follows_the_log_at_its_rate() -> None:
     chain = load_robot("panda").chain
     t = 0.001 * np.arange(5000)
     q = np.sin(t[:, None] * np.arange(1, 8))
-    poses = motion(chain, t, q, 50.0)
+    poses = motion(chain, t, q)
     np.testing.assert_allclose(np.diff(poses.t), 0.02, atol=1e-9)
     np.testing.assert_array_equal(poses.translation, link_poses(chain, q[::20]).translation)

@@ -6,6 +6,7 @@ import rerun.chunk
 
 from vftcli.outputs.rerun_file import (
     Lines,
+    PlotLine,
     Tab,
     drawable,
     finish,
@@ -17,9 +18,8 @@ from vftcli.signals.errors import OutputError
 
 
 def lines(path: str, values: np.ndarray) -> Lines:
-    count = values.shape[1]
-    names = [f"line {k}" for k in range(count)]
-    return Lines(path, "what [N]", names, ["#102030"] * count, [1.0] * count, values)
+    shown = [PlotLine(f"line {k}", column, "#102030") for k, column in enumerate(values.T)]
+    return Lines(path, "what [N]", shown)
 
 
 def rows_of(path: Path, entity: str, ending: str) -> list:

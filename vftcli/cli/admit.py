@@ -294,15 +294,11 @@ def looped(
 def show(result: "Replay", run: "ClosedLoop | None", json: bool) -> None:
     """The comparison on stdout, remarks on stderr."""
     from vftcli.cli.console import say
-    from vftcli.outputs.admittance.tables import (
-        comparison_json,
-        comparison_text,
-        latency_text,
-        parameter_text,
-    )
+    from vftcli.outputs.admittance.tables import comparison_text, latency_text, parameter_text
+    from vftcli.outputs.grid import json_rows
 
     if json:
-        typer.echo(comparison_json(result.rows).rstrip("\n"))
+        typer.echo(json_rows(result.rows).rstrip("\n"))
         return
     say(f"{result.robot.title or result.robot.name}: {result.source}")
     say(parameter_text(result))

@@ -12,6 +12,9 @@ from vftcli.signals.pose import matrix_quaternion
 THICKNESS = (0.048, 0.030)
 """Radius of the first and of the last link, as a share of the arm's length."""
 
+RATE = 50.0
+"""Poses a second that are drawn. [Hz]"""
+
 SHORTEST = 0.02
 """A link shorter than this share of the arm's length is not drawn: its joints are. """
 
@@ -72,10 +75,10 @@ def capsules(chain: Chain) -> list[list[Capsule]]:
     return shapes
 
 
-def motion(chain: Chain, t: Array, q: Array, rate: float) -> ArmPoses:
-    """Poses of all links at about `rate` samples a second. [Hz]"""
+def motion(chain: Chain, t: Array, q: Array) -> ArmPoses:
+    """Poses of all links at about `RATE` samples a second."""
     # At least each sample: a slow log is drawn as it is.
-    every = max(1, int(len(t) / max(float(t[-1] - t[0]) * rate, 1.0)))
+    every = max(1, int(len(t) / max(float(t[-1] - t[0]) * RATE, 1.0)))
     t, q = t[::every], np.ascontiguousarray(q[::every])
     poses = link_poses(chain, q)
     scalar_last = np.roll(matrix_quaternion(poses.rotation), -1, axis=-1)

@@ -20,9 +20,6 @@ from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import OutputError
 
-ARM_RATE = 50.0
-"""Poses a second of the arm. [Hz]"""
-
 NEWTON_PER_METRE = 200.0
 """Length of the force arrow: 200 N are 1 m."""
 
@@ -57,29 +54,45 @@ SPELLED = {
 """How to write what the viewer's font may lack."""
 
 
+class PlotLine(NamedTuple):
+    """One line of a plot.
+
+    Attributes:
+        name: What the legend calls it.
+        values: NaN where not known. (T,)
+        colour: ``#rrggbb``.
+        width: In pixels.
+    """
+
+    name: str
+    values: Array
+    colour: str
+    width: float = 1.5
+
+
 class Lines(NamedTuple):
     """The lines of one plot.
 
     Attributes:
         path: The entity.
         title: What the plot shows, with its unit.
-        names: One a line.
-        colours: ``#rrggbb``, one a line.
-        widths: One a line. [px]
-        values: One column a line, NaN where not known. (T, k)
+        lines: At least one, all of one length.
     """
 
     path: str
     title: str
-    names: Sequence[str]
-    colours: Sequence[str]
-    widths: Sequence[float]
-    values: Array
+    lines: Sequence[PlotLine]
+
+    @property
+    def values(self) -> Array:
+        """One column a line. (T, k)"""
+        return np.column_stack([line.values for line in self.lines])
 
     @property
     def ends(self) -> tuple[float, float]:
         """Lower and upper end of a vertical axis that shows all of them, with some room."""
-        known = self.values[np.isfinite(self.values)]
+        known = self.values
+        known = known[np.isfinite(known)]
         low, high = (known.min(), known.max()) if known.size else (-1.0, 1.0)
         room = max(0.05 * (high - low), 1e-3)
         return float(low - room), float(high + room)
@@ -226,14 +239,15 @@ def send_lines(stream: Stream, t: Array, lines: Lines) -> None:
     import rerun as rr
 
     style = rr.SeriesLines(
-        names=[drawable(name) for name in lines.names],
-        colors=[rgb(c) for c in lines.colours],
-        widths=lines.widths,
+        names=[drawable(line.name) for line in lines.lines],
+        colors=[rgb(line.colour) for line in lines.lines],
+        widths=[line.width for line in lines.lines],
         aggregation_policy=rr.components.AggregationPolicy.MinMax,  # an average hides spikes
     )
     stream.log(lines.path, style, static=True)
-    samples, count = lines.values.shape
-    scalars = rr.Scalars.columns(scalars=lines.values.ravel()).partition(np.full(samples, count))
+    values = lines.values
+    counts = np.full(len(values), len(lines.lines))
+    scalars = rr.Scalars.columns(scalars=values.ravel()).partition(counts)
     stream.send_columns(lines.path, [rr.TimeColumn("t", duration=t)], scalars)
 
 
@@ -242,12 +256,7 @@ def send_arm(
 ) -> None:
     """Send an arm's shape once and its poses over time.
 
-    Args:
-        stream: The recording.
-        path: Entity of the arm.
-        chain: Its geometry.
-        poses: Where its links are.
-        ghost: Red, green, blue and opacity of a see-through arm; None for a solid one.
+    A `ghost` is a see-through arm of this red, green, blue and opacity.
     """
     import rerun as rr
 

@@ -30,13 +30,13 @@ def test_a_release_has_no_force(release: Replay) -> None:
 
 
 def test_the_traditional_controller_is_grey(push: Replay) -> None:
-    paint = dict(zip([c.kind for c in push.controllers], colours(push), strict=True))
+    paint = dict(zip([c.kind for c in push.controllers], colours(push, REFERENCE), strict=True))
     assert paint["traditional"] == REFERENCE
     assert paint["variable"] != REFERENCE
 
 
 def test_plots_bear_units_and_thresholds(push: Replay) -> None:
-    groups = line_groups(push, colours(push))
+    groups = line_groups(push, colours(push, REFERENCE))
     assert [lines.title for lines in groups["Deviation"]][2:4] == [
         "z deviation [m]",
         "rx deviation [rad]",

@@ -10,13 +10,13 @@ from vftcli.outputs.admittance.tables import (
     COLUMNS,
     comparison_csv,
     comparison_grid,
-    comparison_json,
     comparison_text,
     parameter_grid,
     parameter_text,
     position_rotation,
     stability_grid,
 )
+from vftcli.outputs.grid import json_rows
 
 
 def test_controllers_stand_under_each_other_by_axis_and_drag(release: Replay) -> None:
@@ -37,7 +37,7 @@ def test_an_overshoot_is_printed_in_per_cent_with_a_true_minus(release: Replay) 
 
 
 def test_rows_for_machines_are_not_rounded(release: Replay) -> None:
-    rows = json.loads(comparison_json(release.rows))
+    rows = json.loads(json_rows(release.rows))
     assert rows == json.loads(json.dumps(list(release.rows)))
     read = list(csv.DictReader(io.StringIO(comparison_csv(release.rows))))
     assert [float(r["peak"]) for r in read] == [row["peak"] for row in release.rows]

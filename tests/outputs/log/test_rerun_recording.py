@@ -150,7 +150,7 @@ def test_the_arrow_is_the_tabled_force_at_its_own_point(frame: str) -> None:
         wrench=WrenchChoice(frame=frame, tool=tool, sensor_pose=sensor, zero=zero),
     )
     analysis = analyse_log(CIRCLE, choice)
-    poses = motion(analysis.robot.chain, analysis.t, analysis.recording.q, 50.0)
+    poses = motion(analysis.robot.chain, analysis.t, analysis.recording.q)
     rows = np.searchsorted(analysis.t, poses.t)
     arrow = force_arrow(analysis, poses, rows)
     reading = analysis.virtual_sensor

@@ -6,11 +6,8 @@ from vftcli.evaluation import SCHEMA
 from vftcli.outputs.grid import GridCell
 from vftcli.outputs.log.rmse_tables import (
     blocks,
-    chance_text,
-    coverage_text,
     detail_grids,
-    interval_text,
-    lag_text,
+    details,
     logs_of,
     marks_in_words,
     mean_of,
@@ -88,21 +85,16 @@ def test_logs_of_one_label_stay_apart_also_with_other_joints() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text_of", "row", "text"),
+    ("values", "texts"),
     [
-        (interval_text, {"rmse_low_Nm": 0.5, "rmse_high_Nm": 12.34}, "0.500–12.3"),
-        (interval_text, {"rmse_low_Nm": None, "rmse_high_Nm": 1.0}, "–"),
-        (lag_text, {"lag_s": 0.0604}, "60"),
-        (lag_text, {"lag_s": None}, "–"),
-        (coverage_text, {"coverage_95": 0.946}, "95 %"),
-        (coverage_text, {}, "–"),
-        (chance_text, {"p_vs_best": 1.0}, "best"),
-        (chance_text, {"p_vs_best": 0.0312}, "0.031"),
-        (chance_text, {"p_vs_best": None}, "–"),
+        ((0.5, 12.34, 0.0604, 0.946, 1.0), ["0.500–12.3", "60", "95 %", "best"]),
+        ((None, 1.0, 0.0, 1.0, 0.0312), ["–", "0", "100 %", "0.031"]),
+        ((0.5, None, None, None, None), ["–"] * 4),
     ],
 )
-def test_details_as_text(text_of, row: dict, text: str) -> None:
-    assert text_of(row) == text
+def test_details_as_text(values: tuple[float | None, ...], texts: list[str]) -> None:
+    keys = ("rmse_low_Nm", "rmse_high_Nm", "lag_s", "coverage_95", "p_vs_best")
+    assert list(details(dict(zip(keys, values, strict=True))).values()) == texts
 
 
 def test_a_detail_that_nobody_knows_has_no_table() -> None:

@@ -10,11 +10,11 @@ from vftcli.admittance.parameters import AXES, PER_AXIS
 from vftcli.admittance.replay import Replay
 from vftcli.admittance.stability import Verdict
 from vftcli.outputs.admittance.page import render_admittance
-from vftcli.outputs.admittance.recording import write_ghosts
-from vftcli.outputs.admittance.tables import comparison_csv, comparison_json, latency_rows
+from vftcli.outputs.admittance.recording import padded, write_ghosts
+from vftcli.outputs.admittance.tables import comparison_csv, latency_rows
 from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.grid import json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, to_json, versions
-from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import AXES as FORCES
 
@@ -63,11 +63,6 @@ def motion_table(replay: Replay) -> "pl.DataFrame":
         for k, axis in enumerate(AXES):
             columns[f"logged/{axis}"] = padded(replay.logged[:, k])
     return pl.DataFrame({k: np.ascontiguousarray(v) for k, v in columns.items()}).fill_nan(None)
-
-
-def padded(column: Array) -> Array:
-    """A column with one unknown row more: the last deviation follows from the force before it."""
-    return np.append(column, np.nan)
 
 
 def title_of(recording: Recording | None, run: ClosedLoop | None) -> str:
@@ -142,14 +137,6 @@ def write_admittance(
 ) -> None:
     """Write the folder of a replay, all or nothing.
 
-    Args:
-        path: The folder.
-        replay: What to show.
-        recording: The log it was made from, None without one.
-        run: The closed loop it was made from, None without one.
-        command: The command line, as the user typed it.
-        force: Whether existing files may be replaced.
-
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
@@ -158,7 +145,7 @@ def write_admittance(
     texts = {
         "index.html": render_admittance(replay, record, title, run),
         "comparison.csv": comparison_csv(replay.rows),
-        "comparison.json": comparison_json(replay.rows),
+        "comparison.json": json_rows(replay.rows),
         "run.json": to_json(record),
     }
     with OutputFolder(path, force, FILES) as folder:

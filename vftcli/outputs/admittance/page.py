@@ -10,6 +10,7 @@ from vftcli.admittance.deviations_from_paper import DIFFERENCES
 from vftcli.admittance.law import Controller
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
+from vftcli.outputs.admittance.recording import colours, padded
 from vftcli.outputs.admittance.tables import (
     comparison_grid,
     latency_grid,
@@ -139,16 +140,9 @@ def payload(replay: Replay, run: ClosedLoop | None) -> dict[str, Any]:
     }
 
 
-def colours(replay: Replay) -> list[str]:
-    """The page's ink for the traditional controller, a colour for each variable one."""
-    # Every variable controller its own colour, again from the start when there are no more.
-    spare = iter(SPARE * len(replay.controllers))
-    return [next(spare) if c.kind == "variable" else "ink" for c in replay.controllers]
-
-
 def charts(replay: Replay, run: ClosedLoop | None = None) -> Iterator[Chart]:
     """The charts, top to bottom; one column an axis."""
-    p, paint = replay.parameters, colours(replay)
+    p, paint = replay.parameters, colours(replay, "ink")
     pairs_of = list(zip(replay.controllers, paint, strict=True))
     moved = () if run is None else (ChartLine("closed loop", padded(run.moved), "#8a929a", True),)
     shown = (*lines(pairs_of, replay.motion.x), *moved)
@@ -178,11 +172,6 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> Iterator[Chart]:
     yield Chart(
         "energy-v", "The printed V (52): it rises", "J", lines(pairs_of, replay.lyapunov.printed)
     )
-
-
-def padded(values: Array) -> Array:
-    """Rows with an unknown one more: the last deviation follows from the force before it."""
-    return np.vstack([values, np.full((1, values.shape[1]), np.nan)])
 
 
 def lines(controllers: list[tuple[Controller, str]], values: Array) -> tuple[ChartLine, ...]:

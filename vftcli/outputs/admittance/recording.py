@@ -10,12 +10,11 @@ from vftcli.outputs.admittance.tables import comparison_text, parameter_text
 from vftcli.outputs.arm import motion
 from vftcli.outputs.palette import REFERENCE, SPARE, rgb
 from vftcli.outputs.rerun_file import (
-    ARM_RATE,
     FORCE,
     NEWTON_PER_METRE,
     ArmView,
     Lines,
-    Stream,
+    PlotLine,
     Tab,
     rerun_file,
     send_arm,
@@ -34,18 +33,13 @@ SHAFT = 0.008
 def write_ghosts(path: Path, replay: Replay, title: str) -> None:
     """Write the recording with its blueprint, so that it opens arranged.
 
-    Args:
-        path: Where to; an existing file is replaced.
-        replay: What to show.
-        title: Name of the log.
-
     Raises:
         OutputError: If it cannot be written whole.
     """
-    paint, chain, t = colours(replay), replay.robot.chain, replay.motion.t
-    poses = [
-        motion(chain, t, replay.path.q[:, n], ARM_RATE) for n in range(len(replay.controllers))
-    ]
+    import rerun as rr
+
+    paint, chain, t = colours(replay, REFERENCE), replay.robot.chain, replay.motion.t
+    poses = [motion(chain, t, replay.path.q[:, n]) for n in range(len(replay.controllers))]
     tabs = [Tab(name, t, group) for name, group in line_groups(replay, paint).items()]
     view = ArmView("One arm a controller", poses[0])
     documents = {"Summary": words(replay)}
@@ -53,17 +47,10 @@ def write_ghosts(path: Path, replay: Replay, title: str) -> None:
         for n, (pose, colour) in enumerate(zip(poses, paint, strict=True)):
             base = f"/robot/{n}_{replay.controllers[n].name}".replace(" ", "")
             send_arm(stream, base, chain, pose, (*rgb(colour), GHOST))
-            send_path(stream, f"{base}/path", pose.translation[:, -1], colour)
-            force = entering_force(replay, pose.t)
-            send_force(stream, f"{base}/force", pose.t, pose.translation[:, -1], force, SHAFT)
-
-
-def send_path(stream: Stream, path: str, points: Array, colour: str) -> None:
-    """Draw where a flange has been as one line in base axes. (S, 3) [m]"""
-    import rerun as rr
-
-    strip = rr.LineStrips3D([points], colors=[rgb(colour)], radii=[0.002])
-    stream.log(path, strip, static=True)
+            flange, force = pose.translation[:, -1], entering_force(replay, pose.t)
+            trail = rr.LineStrips3D([flange], colors=[rgb(colour)], radii=[0.002])
+            stream.log(f"{base}/path", trail, static=True)
+            send_force(stream, f"{base}/force", pose.t, flange, force, SHAFT)
 
 
 def entering_force(replay: Replay, t: Array) -> Array:
@@ -76,43 +63,37 @@ def entering_force(replay: Replay, t: Array) -> Array:
     return force
 
 
-def colours(replay: Replay) -> list[str]:
-    """Grey for the traditional controller, a colour for each variable one."""
+def colours(replay: Replay, traditional: str) -> list[str]:
+    """One colour for the traditional controller, another for each variable one."""
+    # Every variable controller its own colour, again from the start when there are no more.
     spare = iter(SPARE * len(replay.controllers))
-    return [next(spare) if c.kind == "variable" else REFERENCE for c in replay.controllers]
+    return [next(spare) if c.kind == "variable" else traditional for c in replay.controllers]
 
 
 def line_groups(replay: Replay, paint: list[str]) -> dict[str, list[Lines]]:
     """The plots, tab by tab: deviation and force of every axis."""
-    names = [controller.name for controller in replay.controllers]
-    widths = [1.5] * len(names)
-    deviation = [
-        Lines(
-            f"/deviation/{axis}",
-            f"{axis} deviation [{'m' if k < 3 else 'rad'}]",
-            names,
-            paint,
-            widths,
-            finite(replay.motion.x[:, :, k]),
-        )
-        for k, axis in enumerate(AXES)
-    ]
+    painted = [(c.name, n, paint[n]) for n, c in enumerate(replay.controllers)]
     threshold = replay.parameters.threshold
-    force = []
+    deviation, force = [], []
     for k, axis in enumerate(AXES):
-        felt = np.append(replay.wrench[:, k], np.nan)
-        bounds = [np.full(len(felt), sign * threshold[k]) for sign in (1.0, -1.0)]
-        force.append(
-            Lines(
-                f"/force/{axis}",
-                f"{axis} force on the robot [{unit_of(k)}]",
-                ["force", "threshold", "− threshold"],
-                [FORCE, REFERENCE, REFERENCE],
-                [1.5, 1.0, 1.0],
-                np.column_stack([felt, *bounds]),
-            )
+        moved = finite(replay.motion.x[:, :, k])
+        shown = [PlotLine(name, moved[:, n], colour) for name, n, colour in painted]
+        title = f"{axis} deviation [{'m' if k < 3 else 'rad'}]"
+        deviation.append(Lines(f"/deviation/{axis}", title, shown))
+        felt = padded(replay.wrench[:, k])
+        bound = np.full(len(felt), threshold[k])
+        both = (
+            PlotLine("force", felt, FORCE),
+            PlotLine("threshold", bound, REFERENCE, 1.0),
+            PlotLine("− threshold", -bound, REFERENCE, 1.0),
         )
+        force.append(Lines(f"/force/{axis}", f"{axis} force on the robot [{unit_of(k)}]", both))
     return {"Deviation": deviation, "Force": force}
+
+
+def padded(values: Array) -> Array:
+    """Rows with an unknown one more: the last deviation follows from the force before it."""
+    return np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])
 
 
 def finite(values: Array) -> Array:

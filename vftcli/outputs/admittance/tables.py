@@ -9,7 +9,7 @@ from vftcli.admittance.closed_loop import ClosedLoop
 from vftcli.admittance.latency import latencies
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.grid import Column, Grid, csv_rows, json_rows, terminal
+from vftcli.outputs.grid import Column, Grid, csv_rows, terminal
 from vftcli.signals.arrays import Array
 
 
@@ -36,11 +36,6 @@ COLUMNS = {
     "work_J": Column("work [J]", form=number_form(".3f")),
 }
 """Key of a row → its column."""
-
-
-def comparison_json(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The comparison as a JSON array of rows."""
-    return json_rows(rows)
 
 
 def comparison_csv(rows: Sequence[Mapping[str, Any]]) -> str:

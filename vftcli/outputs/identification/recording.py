@@ -14,7 +14,7 @@ from vftcli.identification.result import Identification, Trace
 from vftcli.outputs.files import numbered
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.palette import REFERENCE, SPARE
-from vftcli.outputs.rerun_file import Lines, Tab, rerun_file
+from vftcli.outputs.rerun_file import Lines, PlotLine, Tab, rerun_file
 from vftcli.signals.remarks import explanation
 
 
@@ -34,15 +34,17 @@ def write_identification_rrd(path: Path, found: Identification) -> None:
 
 def tabs_of(trace: Trace, entity: str) -> tuple[Tab, Tab]:
     """The plots of one log, called `entity` in paths: torques, and residuals, joint by joint."""
-    names, colours = ["measured", "predicted"], [REFERENCE, SPARE[1]]
     torque, residual = [], []
     for j in range(trace.measured.shape[1]):
-        both = np.column_stack([trace.measured[:, j], trace.predicted[:, j]])
-        path, title = f"/torque/{entity}/J{j + 1}", f"J{j + 1} drive torque [N·m]"
-        torque.append(Lines(path, title, names, colours, [2.5, 1.5], both))
-        left = trace.residual[:, j : j + 1]
-        path, title = f"/residual/{entity}/J{j + 1}", f"J{j + 1} measured − predicted [N·m]"
-        residual.append(Lines(path, title, ["residual"], [SPARE[0]], [1.5], left))
+        both = (
+            PlotLine("measured", trace.measured[:, j], REFERENCE, 2.5),
+            PlotLine("predicted", trace.predicted[:, j], SPARE[1]),
+        )
+        left = PlotLine("residual", trace.residual[:, j], SPARE[0])
+        joint = f"J{j + 1}"
+        torque.append(Lines(f"/torque/{entity}/{joint}", f"{joint} drive torque [N·m]", both))
+        title = f"{joint} measured − predicted [N·m]"
+        residual.append(Lines(f"/residual/{entity}/{joint}", title, [left]))
     title = f"{trace.recording.name} ({trace.role})"
     return Tab(title, trace.t, torque), Tab(f"{title}: residual", trace.t, residual)
 

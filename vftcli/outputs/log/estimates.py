@@ -8,10 +8,12 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.files import OutputFolder, one_line
+from vftcli.outputs.log.mcap_output import write_mcap
+from vftcli.outputs.log.rerun_recording import write_rrd
 from vftcli.outputs.log.run_record import run_record, to_json
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import OutputError
-from vftcli.signals.wrench import AXES, Wrench
+from vftcli.signals.wrench import AXES
 
 if TYPE_CHECKING:
     import polars as pl
@@ -72,17 +74,13 @@ def wrench_columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
             yield from per_axis(f"wrench_sd/{wrench.name}", wrench.known_sd)
         # By plain least squares nothing can be said there; a bounded solver says something finite.
         if bounded and wrench.hidden.any():
-            yield from per_axis(f"wrench_masked/{wrench.name}", masked_only(wrench))
+            said = np.where(wrench.hidden[:, None], wrench.values, np.nan)
+            yield from per_axis(f"wrench_masked/{wrench.name}", said)
         if wrench.null_space is not None:
             yield f"null_space/{wrench.name}", wrench.null_space
     sigma = next((w.sigma_min for w in analysis.wrenches if w.sigma_min is not None), None)
     if sigma is not None:
         yield "sigma_min", sigma
-
-
-def masked_only(wrench: Wrench) -> Array:
-    """What a bounded solver says where the pose cannot tell, NaN elsewhere. (T, 6)"""
-    return np.where(wrench.hidden[:, None], wrench.values, np.nan)
 
 
 def per_axis(name: str, values: Array) -> Iterator[tuple[str, Array]]:
@@ -111,24 +109,10 @@ def write_csv(path: Path, analysis: Analysis) -> None:
     estimates_table(analysis).write_csv(path, float_precision=9)
 
 
-def write_mcap_file(path: Path, analysis: Analysis) -> None:
-    """Write a ros2-profile MCAP (imported only when it is wanted)."""
-    from vftcli.outputs.log.mcap_output import write_mcap
-
-    write_mcap(path, analysis)
-
-
-def write_rrd_file(path: Path, analysis: Analysis) -> None:
-    """Write a Rerun recording (imported only when it is wanted)."""
-    from vftcli.outputs.log.rerun_recording import write_rrd
-
-    write_rrd(path, analysis)
-
-
 EXTRAS: dict[str, tuple[str, Callable[[Path, Analysis], None]]] = {
     "csv": ("estimates.csv", write_csv),
-    "mcap": ("estimates.mcap", write_mcap_file),
-    "rrd": ("recording.rrd", write_rrd_file),
+    "mcap": ("estimates.mcap", write_mcap),
+    "rrd": ("recording.rrd", write_rrd),
 }
 """Flag → file name and its writer."""
 

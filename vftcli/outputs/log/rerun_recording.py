@@ -19,10 +19,10 @@ from vftcli.outputs.log.tables import to_markdown
 from vftcli.outputs.log.wrench_tables import paper_bounds
 from vftcli.outputs.palette import REFERENCE, SPARE, colours_of
 from vftcli.outputs.rerun_file import (
-    ARM_RATE,
     NEWTON_PER_METRE,
     ArmView,
     Lines,
+    PlotLine,
     Tab,
     rerun_file,
     send_arm,
@@ -41,10 +41,6 @@ SHAFT = 0.012
 def write_rrd(path: Path, analysis: Analysis) -> None:
     """Write the recording with its blueprint, so that it opens arranged.
 
-    Args:
-        path: Where to; an existing file is replaced.
-        analysis: What to show.
-
     Raises:
         OutputError: If it cannot be written whole.
     """
@@ -55,7 +51,7 @@ def write_rrd(path: Path, analysis: Analysis) -> None:
         "Summary": summary(analysis),
         "Errors": table or "No reference was given, so no errors can be told.",
     }
-    poses = motion(chain, analysis.t, analysis.recording.q, ARM_RATE)
+    poses = motion(chain, analysis.t, analysis.recording.q)
     arrow = force_arrow(analysis, poses, np.searchsorted(analysis.t, poses.t))
     name = analysis.recording.name
     with rerun_file(path, name, tabs, words, ArmView("Arm", poses)) as stream:
@@ -91,23 +87,18 @@ def joint_lines(
 ) -> Lines:
     """All estimates of one joint less something, and the reference first if it is wanted."""
     colours = colours_of(analysis.estimates)
-    names = [e.name for e in analysis.estimates]
-    columns = [e.tau[:, j] - minus for e in analysis.estimates]
-    shades, widths = [colours[name] for name in names], [1.5] * len(names)
+    lines = [PlotLine(e.name, e.tau[:, j] - minus, colours[e.name]) for e in analysis.estimates]
     if group == "tau_ext":
-        for name, column, shade in band_lines(analysis, j):
-            names, columns = [*names, name], [*columns, column]
-            shades, widths = [*shades, shade], [*widths, 0.6]
+        lines += band_lines(analysis, j)
     if reference is not None:
-        names, columns = [f"reference ({reference.name})", *names], [reference.tau[:, j], *columns]
-        shades, widths = [REFERENCE, *shades], [2.5, *widths]
+        name = f"reference ({reference.name})"
+        lines.insert(0, PlotLine(name, reference.tau[:, j], REFERENCE, 2.5))
     rests = analysis.reference is not None and analysis.reference.mostly_rests[j]
     doubt = " (the joint rests: do not trust the reference)" if rests else ""
-    path, title = f"/{group}/J{j + 1}", f"J{j + 1} {TITLES[group]}{doubt}"
-    return Lines(path, title, names, shades, widths, np.column_stack(columns))
+    return Lines(f"/{group}/J{j + 1}", f"J{j + 1} {TITLES[group]}{doubt}", lines)
 
 
-def band_lines(analysis: Analysis, j: int) -> Iterator[tuple[str, Array, str]]:
+def band_lines(analysis: Analysis, j: int) -> Iterator[PlotLine]:
     """Both edges of the last observer's 95 % band of one joint, thin in its colour.
 
     Every observer's would hide them all; the tables and the page hold the others.
@@ -117,7 +108,8 @@ def band_lines(analysis: Analysis, j: int) -> Iterator[tuple[str, Array, str]]:
         if estimate.error_sd is not None:
             for sign, edge in ((1.0, "upper"), (-1.0, "lower")):
                 column = estimate.tau[:, j] + sign * COVERS * estimate.error_sd[:, j]
-                yield f"{estimate.name} 95 % {edge}", column, colours[estimate.name]
+                name = f"{estimate.name} 95 % {edge}"
+                yield PlotLine(name, column, colours[estimate.name], 0.6)
             return
 
 
@@ -127,14 +119,13 @@ def wrench_lines(analysis: Analysis, k: int) -> Lines:
     # The reference first: it is drawn below the others, and thicker.
     found = sorted(analysis.wrenches, key=lambda wrench: wrench.name != "reference")
     title = f"{AXES[k]} in {found[0].frame} axes [{unit_of(k)}]"
-    return Lines(
-        f"/wrench/{AXES[k]}",
-        title,
-        [wrench.name for wrench in found],
-        [colours.get(wrench.name, REFERENCE) for wrench in found],
-        [1.5 if wrench.name in colours else 2.5 for wrench in found],
-        np.column_stack([wrench.known[:, k] for wrench in found]),
-    )
+    lines = [
+        PlotLine(w.name, w.known[:, k], colours[w.name])
+        if w.name in colours
+        else PlotLine(w.name, w.known[:, k], REFERENCE, 2.5)
+        for w in found
+    ]
+    return Lines(f"/wrench/{AXES[k]}", title, lines)
 
 
 def condition_lines(analysis: Analysis) -> list[Lines]:
@@ -145,30 +136,39 @@ def condition_lines(analysis: Analysis) -> list[Lines]:
     sigma = next((w.sigma_min for w in wrenches if w.sigma_min is not None), None)
     if sigma is not None and analysis.virtual_sensor is not None:
         least = np.full_like(sigma, analysis.virtual_sensor.sensor.least_sigma)
-        names, shades = ["σ_min", "masked below"], [REFERENCE, SPARE[0]]
-        values = np.column_stack([sigma, least])
-        title = "σ_min of J, angular rows × 0.3 m [m]"
-        found.append(Lines("/wrench/sigma_min", title, names, shades, [1.5, 1.0], values))
-    left = {w.name: w.null_space for w in wrenches if w.null_space is not None}
-    if left:
-        shades, widths = [colours[name] for name in left], [1.5] * len(left)
+        lines = [
+            PlotLine("σ_min", sigma, REFERENCE),
+            PlotLine("masked below", least, SPARE[0], 1.0),
+        ]
+        found.append(Lines("/wrench/sigma_min", "σ_min of J, angular rows × 0.3 m [m]", lines))
+    lines = [
+        PlotLine(w.name, w.null_space, colours[w.name])
+        for w in wrenches
+        if w.null_space is not None
+    ]
+    if lines:
         title = "torque that no wrench at the flange explains [N·m]"
-        values = np.column_stack(list(left.values()))
-        found.append(Lines("/wrench/null_space", title, list(left), shades, widths, values))
+        found.append(Lines("/wrench/null_space", title, lines))
     return found
 
 
 def motion_lines(analysis: Analysis) -> list[Lines]:
     """Positions, velocities and drive torques, one line a joint."""
-    recording, n = analysis.recording, analysis.recording.joints
-    signals = [("/q", "position [rad]", recording.q)]
-    if recording.dq is not None:
-        signals.append(("/dq", "velocity [rad/s]", recording.dq))
-    torque = drive_torque(recording, analysis.robot)
-    signals.append(("/drive_torque", "drive torque [N·m]", torque))
-    names, widths = [f"J{j}" for j in range(1, n + 1)], [1.5] * n
-    colours = [SPARE[j % len(SPARE)] for j in range(n)]
-    return [Lines(path, title, names, colours, widths, x) for path, title, x in signals]
+    recording = analysis.recording
+    signals = [
+        ("/q", "position [rad]", recording.q),
+        ("/dq", "velocity [rad/s]", recording.dq),
+        ("/drive_torque", "drive torque [N·m]", drive_torque(recording, analysis.robot)),
+    ]
+    return [
+        Lines(
+            path,
+            title,
+            [PlotLine(f"J{j + 1}", x, SPARE[j % len(SPARE)]) for j, x in enumerate(values.T)],
+        )
+        for path, title, values in signals
+        if values is not None
+    ]
 
 
 def summary(analysis: Analysis) -> str:

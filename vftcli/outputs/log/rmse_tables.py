@@ -1,6 +1,6 @@
 """RMSE of joint torques as grids: observers down, joints across, and how sure each number is."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -134,7 +134,11 @@ def rmse_grid(table: Block) -> Grid:
     for name, values, bests, floors in zip(
         table.observers, table.rmse, table.best, table.at_floor, strict=True
     ):
-        cells = (rmse_cell(*entry) for entry in zip(values, bests, floors, strict=True))
+        cells = []
+        for text, best, at_floor in zip(map(significant, values), bests, floors, strict=True):
+            # A star where the reference can tell no more.
+            mark, page = ("*", text + ON_PAGE) if at_floor else ("", "")
+            cells.append(GridCell(text, bool(best), mark, page))
         rows.append((name, *cells, mean_of(values)))
     if table.has_floor:
         rows.append(("floor", *map(float, table.floor), mean_of(table.floor)))
@@ -155,54 +159,33 @@ def rmse_grid(table: Block) -> Grid:
     )
 
 
-def rmse_cell(value: float, best: bool, at_floor: bool) -> GridCell:
-    """One RMSE, with a star where the reference can tell no more."""
-    text = significant(value)
-    return GridCell(text, bool(best), "*" if at_floor else "", text + ON_PAGE if at_floor else "")
-
-
-def interval_text(row: dict[str, Any]) -> str:
-    """The ends of the RMSE's 95 % interval, a dash where it is not known."""
-    low, high = row["rmse_low_Nm"], row["rmse_high_Nm"]
-    return DASH if low is None or high is None else f"{significant(low)}–{significant(high)}"
-
-
-def lag_text(row: dict[str, Any]) -> str:
-    """The best-fitting delay in milliseconds."""
-    return DASH if row["lag_s"] is None else f"{1e3 * row['lag_s']:.0f}"
-
-
-def coverage_text(row: dict[str, Any]) -> str:
-    """The share of samples within the estimate's own 95 % band."""
+def details(row: dict[str, Any]) -> dict[str, str]:
+    """What the tables below the RMSE table say of one row: title of the table → text."""
+    low, high, lag, p = (row[k] for k in ("rmse_low_Nm", "rmse_high_Nm", "lag_s", "p_vs_best"))
     share = row.get("coverage_95")
-    return DASH if share is None else f"{100 * share:.0f} %"
-
-
-def chance_text(row: dict[str, Any]) -> str:
-    """The chance that it is no worse than the best, or that it is the best."""
-    p = row["p_vs_best"]
-    if p is None:
-        return DASH
-    return "best" if p >= 1.0 else f"{p:.3f}"
-
-
-DETAILS: dict[str, Callable[[dict[str, Any]], str]] = {
-    "95 % interval of the RMSE, moving-block bootstrap [N·m]": interval_text,
-    "lag of the estimate behind the reference, best fit [ms]": lag_text,
-    "samples within the estimate's 95 % band, while the joint moves": coverage_text,
-    "p of being no worse than the best, paired bootstrap": chance_text,
-}
-"""The tables below the RMSE table in order: title → what a row of the tidy table says as text."""
+    interval = DASH if low is None or high is None else f"{significant(low)}–{significant(high)}"
+    chance = DASH if p is None else "best" if p >= 1.0 else f"{p:.3f}"
+    return {
+        "95 % interval of the RMSE, moving-block bootstrap [N·m]": interval,
+        "lag of the estimate behind the reference, best fit [ms]": DASH
+        if lag is None
+        else f"{1e3 * lag:.0f}",
+        "samples within the estimate's 95 % band, while the joint moves": DASH
+        if share is None
+        else f"{100 * share:.0f} %",
+        "p of being no worse than the best, paired bootstrap": chance,
+    }
 
 
 def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
     """Every further table of the RMSE table's shape that has something to say."""
     for group in logs_of(errors.filter(pl.col("p_vs_best").is_not_null()), "joint"):
         joints = joint_columns([int(j) for j in group["joint"].unique().sort()])
-        for title, text_of in DETAILS.items():
-            rows: dict[str, list[str]] = {}
-            for row in group.iter_rows(named=True):
-                rows.setdefault(row["observer"], []).append(text_of(row))
+        found: dict[str, dict[str, list[str]]] = {}
+        for row in group.iter_rows(named=True):
+            for title, text in details(row).items():
+                found.setdefault(title, {}).setdefault(row["observer"], []).append(text)
+        for title, rows in found.items():
             if any(text != DASH for texts in rows.values() for text in texts):
                 yield Grid(
                     title=f"{group['recording'][0]}: {title}",
