@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.robots.conventions import CONVENTIONS, Kinematics
-from vftcli.signals.pose import IDENTITY, Pose, rotation_x, rotation_z, rpy_angles
+from vftcli.signals.pose import IDENTITY, Pose, rotation_about, rpy_angles
 
 TABLE = [
     {"a": 0.1, "d": 0.3, "alpha": 0.7, "theta": 0.2},
@@ -19,7 +19,7 @@ def flange(found: Kinematics, angles: tuple[float, ...]) -> Pose:
     """The tip's pose in the base at joint angles [rad], frame by frame."""
     pose = IDENTITY
     for placement, angle in zip(found.placements, angles, strict=True):
-        pose = pose @ placement @ Pose(rotation_z(angle), np.zeros(3))
+        pose = pose @ placement @ Pose(rotation_about("z", angle), np.zeros(3))
     return pose @ found.tip
 
 
@@ -28,7 +28,7 @@ def along(d: float) -> Pose:
 
 
 def across(a: float, alpha: float) -> Pose:
-    return Pose(rotation_x(alpha), np.array([a, 0.0, 0.0]))
+    return Pose(rotation_about("x", alpha), np.array([a, 0.0, 0.0]))
 
 
 def tip() -> Pose:
@@ -48,7 +48,7 @@ def test_standard_dh_turns_first_and_moves_the_inertials_out() -> None:
     found = CONVENTIONS["standard-dh"].kinematics(TABLE, DOCUMENT)
     pose = IDENTITY
     for j, angle in zip(TABLE, ANGLES, strict=True):
-        pose = pose @ Pose(rotation_z(angle + j["theta"]), np.zeros(3)) @ along(j["d"])
+        pose = pose @ Pose(rotation_about("z", angle + j["theta"]), np.zeros(3)) @ along(j["d"])
         pose = pose @ across(j["a"], j["alpha"])
     same(flange(found, ANGLES), pose @ tip())
     # the table's frame j lies at the far end of link j
@@ -61,7 +61,7 @@ def test_modified_dh_moves_first() -> None:
     pose = IDENTITY
     for j, angle in zip(TABLE, ANGLES, strict=True):
         pose = pose @ across(j["a"], j["alpha"])
-        pose = pose @ Pose(rotation_z(angle + j["theta"]), np.zeros(3)) @ along(j["d"])
+        pose = pose @ Pose(rotation_about("z", angle + j["theta"]), np.zeros(3)) @ along(j["d"])
     same(flange(found, ANGLES), pose @ tip())
     same(found.inertial_frames[1], IDENTITY)
 

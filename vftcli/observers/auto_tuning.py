@@ -65,8 +65,8 @@ def kalman_smoother(omega_n: Array, r: Array | float = 1.0) -> KalmanSmoother:
     return KalmanSmoother(filter=kalman_filter(omega_n, r))
 
 
-Kind = Callable[[Array], Observer]
-"""Natural frequencies, one a joint → the observer."""
+Kind = Callable[..., Observer]
+"""Natural frequencies (n,) [rad/s], and R if it is not 1 → the observer."""
 
 KINDS: dict[str, Kind] = {"kfo-auto": kalman_filter, "rts-auto": kalman_smoother}
 """Name at the command line → what is tuned."""
@@ -143,8 +143,5 @@ def tune_to_spectra(name: str, spectra: Spectra) -> AutoTuned:
     """The observer `name` with the natural frequencies its spectra call for."""
     found = error_curve(KINDS[name], spectra)
     best = frozen(found.best)
-    r = noise_level(best, spectra)
-    observer: Observer = (
-        kalman_smoother(best, r) if KINDS[name] is kalman_smoother else kalman_filter(best, r)
-    )
+    observer = KINDS[name](best, noise_level(best, spectra))
     return AutoTuned(name=name, observer=observer, curve=found)

@@ -149,7 +149,8 @@ class KalmanObserver:
         d, model = self.densities(joints), self.model(step, joints)
         gains = self.steady(step, joints).gains
         # The convention scales all of Q alike, so Q₂₂/Ts (with A_τ = 0) is the effective density.
-        scale = model.step if self._counts_step_twice() else np.ones(joints)
+        literal = self.as_printed or self.noise_convention == "literal"
+        scale = model.step if literal and self.discretisation == "fe" else np.ones(joints)
         r, q_p, q_tau = model.r * step, d.q_p * scale, d.q_tau * scale
         omega = (q_tau / r) ** 0.25
         zeta = 0.5 * np.sqrt(2.0 + q_p / np.sqrt(q_tau * r))
@@ -163,10 +164,6 @@ class KalmanObserver:
             dc_gain=step / (model.a12 + (1.0 - model.a22) * ratio),
             parameter_count=3 * joints,
         )
-
-    def _counts_step_twice(self) -> bool:
-        literal = self.as_printed or self.noise_convention == "literal"
-        return literal and self.discretisation == "fe"
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Exact response to τ_ext = e^{jωt} whose integral, the momentum, is sampled. (F, n)"""
@@ -231,6 +228,6 @@ def error_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
     from e⁰ = 0, τ̂⁰ = 0, which is x̂⁰ = [p⁰; 0]. It is the same filter without the cancellation of
     two large momenta.
     """
-    rest, l2 = 1.0 - gains.l1, gains.l2
-    F = np.stack([rest, -rest * a12, l2, a22 - l2 * a12], axis=-2)
-    return F.reshape(*F.shape[:-2], 2, 2, F.shape[-1]), np.stack([rest, l2], axis=-2)
+    f11, f12, f21, f22 = transition(gains, a12, a22)
+    F = np.stack([f11, -f12, -f21, f22], axis=-2)
+    return F.reshape(*F.shape[:-2], 2, 2, F.shape[-1]), np.stack([f11, gains.l2], axis=-2)

@@ -111,11 +111,6 @@ def out_of_reach(observer: Observer, goal: MatchTarget, setup: Setup) -> str:
     )
 
 
-def excess_delay(observer: Observer, goal: float, setup: Setup) -> Array:
-    """How much longer an observer's delay is than the wanted one. (n,) [s]"""
-    return observer.tuning(setup.step, setup.joints).delay - goal
-
-
 def excess_response(observer: Observer, goal: float, setup: Setup) -> Array:
     """Gain at the wanted bandwidth, relative to that of a constant, less 1/√2. (n,)"""
     frequency = np.array([goal])
@@ -126,7 +121,7 @@ def excess_response(observer: Observer, goal: float, setup: Setup) -> Array:
 
 
 MEASURES: dict[str, Callable[[Observer, float, Setup], Array]] = {
-    "delay": excess_delay,
+    "delay": lambda observer, goal, on: observer.tuning(on.step, on.joints).delay - goal,
     "bandwidth": excess_response,
 }
 """Quantity of ``--match`` → how far an observer is above the goal."""
@@ -146,17 +141,15 @@ class Knob(NamedTuple):
     high: float
 
 
-def turn_kalman(observer: Observer, value: Array) -> Observer:
-    """A Kalman observer with another Q_τ, the one number that moves its ω_n alone. (n,)"""
-    return replace(cast("KalmanObserver", observer), q_tau_diag=value)
-
-
 KNOBS: dict[type, Knob] = {
     FilteredDynamicsObserver: Knob(
         lambda _, value: FilteredDynamicsObserver(omega=float(value[0])), 1e-3, 1e6
     ),
     MomentumObserver: Knob(lambda _, value: MomentumObserver(gain=value), 1e-3, 1e6),
-    KalmanObserver: Knob(turn_kalman, 1e-9, 1e18),
+    # Q_τ is the one number that moves a Kalman filter's ω_n alone.
+    KalmanObserver: Knob(
+        lambda kalman, value: replace(cast("KalmanObserver", kalman), q_tau_diag=value), 1e-9, 1e18
+    ),
 }
 """Observer → its knob: cutoff ω [rad/s], gain K [1/s], or Q_τ. A cutoff is one for all joints."""
 

@@ -1,14 +1,13 @@
 """Observer parameters: what the command line sets, what the robot file gives, what is left over."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, numbers
+from vftcli.signals.parsing import assignment, did_you_mean, numbers
 
 Value = float | str | list[float]
 Settings = dict[str, dict[str, Value]]
@@ -52,16 +51,14 @@ def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[s
 def check_name(section: str, parameter: str, sections: Mapping[str, Sequence[str]]) -> None:
     """Raise a ParameterError that lists what there is unless the name exists."""
     if section not in sections:
-        close = get_close_matches(section, sections, n=1)
-        hint = f" Did you mean {close[0]}?" if close else ""
         raise ParameterError(
-            f"no observer {section!r} to set.{hint} There is {', '.join(sections)}"
+            f"no observer {section!r} to set.{did_you_mean(section, sections)} "
+            f"There is {', '.join(sections)}"
         )
-    if parameter not in sections[section]:
-        close = get_close_matches(parameter, sections[section], n=1)
-        hint = f" Did you mean {close[0]}?" if close else ""
+    if parameter not in (known := sections[section]):
         raise ParameterError(
-            f"{section} has no parameter {parameter!r}.{hint} It has {', '.join(sections[section])}"
+            f"{section} has no parameter {parameter!r}.{did_you_mean(parameter, known)} "
+            f"It has {', '.join(known)}"
         )
 
 

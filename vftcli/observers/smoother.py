@@ -20,7 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.observers.kalman import KalmanObserver, error_filter, momentum_change
+from vftcli.observers.kalman import (
+    KalmanObserver,
+    error_filter,
+    momentum_change,
+    second_entry,
+    transition,
+)
 from vftcli.observers.kalman_gains import Covariance, Gains, gain_sequence
 from vftcli.observers.kalman_model import Discrete
 from vftcli.observers.observer import Complex, Tuning
@@ -64,8 +70,8 @@ class KalmanSmoother:
         gains = settled.gains
         change = momentum_change(terms, steps, trapezoid=not self.filter.as_printed)
         F, g = error_filter(gains, model.a12, model.a22)
-        start, both = np.zeros((2, n)), np.stack([np.zeros(n), np.ones(n)])
-        tau = steady_filter(F, g, change, start, wanted=both)
+        start = np.zeros((2, n))
+        tau = steady_filter(F, g, change, start, wanted=second_entry(n))
         innovation = innovations(tau, gains.l2, model.a22)
         S = settled.prior.p11 + model.r
         backward, b = backward_filter(gains, model.a12, model.a22)
@@ -89,8 +95,13 @@ class KalmanSmoother:
 
     def _step_by_step(self, terms: DynamicsTerms, steps: Steps) -> tuple[Array, Array]:
         """Smooth with gains that follow each step's own sample time. (T, n) each"""
-        gains, model, S = self._forward(terms, steps)
-        n = terms.joints
+        samples, n = terms.p.shape
+        dt = np.full(samples, steps.median) if steps.uniform else steps.dt
+        settled = self.filter.steady(steps.median, n)
+        model = self.filter.model(dt[:, None], n)
+        gains = gain_sequence(model, self.filter.first_prior(settled), settled.gains.posterior)
+        # L₁ = P⁻₁₁/S and R = S − P⁻₁₁, so S = R/(1 − L₁).
+        S = model.r / (1.0 - gains.l1)
         F, g = error_filter(gains, model.a12, model.a22)
         change = momentum_change(terms, steps, trapezoid=not self.filter.as_printed)
         states = recursion(F, g * change[:, None, :], np.zeros((2, n)))
@@ -106,16 +117,6 @@ class KalmanSmoother:
         information = one_sample_later(recursion(step[::-1], gain[::-1], np.zeros((3, n)))[::-1])
         variance = smoothed_variance(P, information.transpose(1, 0, 2))
         return tau, np.sqrt(variance)
-
-    def _forward(self, terms: DynamicsTerms, steps: Steps) -> tuple[Gains, Discrete, Array]:
-        """The filter's gains, models and innovation variances along the log. (T, n) each"""
-        samples, n = terms.p.shape
-        dt = np.full(samples, steps.median) if steps.uniform else steps.dt
-        settled = self.filter.steady(steps.median, n)
-        model = self.filter.model(dt[:, None], n)
-        gains = gain_sequence(model, self.filter.first_prior(settled), settled.gains.posterior)
-        # L₁ = P⁻₁₁/S and R = S − P⁻₁₁, so S = R/(1 − L₁).
-        return gains, model, model.r / (1.0 - gains.l1)
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """What the parameters mean: no delay, −3 dB where |H_KFO|² has fallen to 1/√2.
@@ -157,16 +158,15 @@ def innovations(tau: Array, l2: Array, a22: Array) -> Array:
 
 def backward_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
     """Transition ((I − LC)A)ᵀ and input −AᵀCᵀ of the backward recursion. (…, 2, 2, n), (…, 2, n)"""
-    rest, l2 = 1.0 - gains.l1, gains.l2
-    F = np.stack([rest, -l2, rest * a12, a22 - l2 * a12], axis=-2)
-    b = np.stack([-np.ones_like(rest), -a12 * np.ones_like(rest)], axis=-2)
+    f11, f12, f21, f22 = transition(gains, a12, a22)
+    F = np.stack([f11, f21, f12, f22], axis=-2)
+    b = np.stack([-np.ones_like(f11), -a12 * np.ones_like(f11)], axis=-2)
     return F.reshape(*F.shape[:-2], 2, 2, F.shape[-1]), b
 
 
 def information_step(gains: Gains, a12: Array, a22: Array) -> Array:
     """Λ̃ ← FᵀΛ̃F with F = (I − LC)A, as a matrix on (Λ₁₁, Λ₁₂, Λ₂₂). (…, 3, 3, n)"""
-    rest, l2 = 1.0 - gains.l1, gains.l2
-    f11, f12, f21, f22 = rest, rest * a12, -l2, a22 - l2 * a12
+    f11, f12, f21, f22 = transition(gains, a12, a22)
     rows = [
         [f11 * f11, 2.0 * f11 * f21, f21 * f21],
         [f11 * f12, f11 * f22 + f12 * f21, f21 * f22],

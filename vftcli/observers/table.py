@@ -73,30 +73,42 @@ class Entry(NamedTuple):
 
 def build_fdo(setup: Setup) -> Built:
     """The filtered dynamics observer, its cutoff given or left over from the Kalman filter."""
-    given = parameters_given("fdo", "fdo", setup.gains, setup.settings)
-    remarks: tuple[Remark, ...] = ()
-    omega = given.get("omega")
-    if omega is None:
-        rate, code = leftover_rate(setup)
+    omega, origin = first_order_gain(setup, "fdo", "omega")
+    if origin:
         # One cutoff for all joints: the one with the joints' mean delay.
-        omega = float(1.0 / np.mean(1.0 / rate))
-        remarks = (fact(code, parameter="fdo.omega", gain=omega, unit="rad/s"),)
-    value = joint_values(omega, setup.joints, "fdo.omega")
-    if np.any(value != value[0]):
+        omega = np.full_like(omega, 1.0 / np.mean(1.0 / omega))
+    if np.any(omega != omega[0]):
         raise ParameterError("fdo.omega takes one cutoff for all joints; gmo.gain takes one each")
-    return FilteredDynamicsObserver(omega=float(value[0]), as_printed=setup.as_printed), remarks
+    cutoff = float(omega[0])
+    observer = FilteredDynamicsObserver(omega=cutoff, as_printed=setup.as_printed)
+    return observer, tuple(
+        fact(code, parameter="fdo.omega", gain=cutoff, unit="rad/s") for code in origin
+    )
 
 
 def build_gmo(setup: Setup) -> Built:
     """The momentum observer, its gains given or left over from the Kalman filter."""
-    given = parameters_given("gmo", "gmo", setup.gains, setup.settings)
-    remarks: tuple[Remark, ...] = ()
-    gain = given.get("gain")
-    if gain is None:
-        gain, code = leftover_rate(setup)
-        remarks = (fact(code, parameter="gmo.gain", gain=gain.tolist(), unit="1/s"),)
-    values = joint_values(gain, setup.joints, "gmo.gain")
-    return MomentumObserver(gain=values, as_printed=setup.as_printed), remarks
+    gain, origin = first_order_gain(setup, "gmo", "gain")
+    observer = MomentumObserver(gain=gain, as_printed=setup.as_printed)
+    return observer, tuple(
+        fact(code, parameter="gmo.gain", gain=gain.tolist(), unit="1/s") for code in origin
+    )
+
+
+def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tuple[str, ...]]:
+    """A first-order observer's gain (n,) [1/s], and where it was not given its remark's code.
+
+    It is then the inverse of the Kalman filter's delay, so that the observers lag alike;
+    `FALLBACK_RATE` where no gains are given at all.
+    """
+    given = parameters_given(name, name, setup.gains, setup.settings)
+    if parameter in given:
+        return joint_values(given[parameter], setup.joints, f"{name}.{parameter}"), ()
+    if "kfo" in setup.gains or "kfo" in setup.settings:
+        kalman, _ = build_kfo("fe")(setup)
+        delay = kalman.tuning(setup.step, setup.joints).delay
+        return 1.0 / delay, ("gain-from-kalman-delay",)
+    return per_joint(FALLBACK_RATE, setup.joints), ("gain-from-default",)
 
 
 def build_kfo(scheme: str, section: str | None = None) -> Callable[[Setup], Built]:
@@ -226,19 +238,6 @@ def observer_settings(assignments: Sequence[str]) -> Settings:
         ParameterError: If one is malformed or names nothing there is.
     """
     return parse_settings(assignments, sections())
-
-
-def leftover_rate(setup: Setup) -> tuple[Array, str]:
-    """First-order gain where none was given, and the code of the remark on where it is from.
-
-    It is the inverse of the Kalman filter's delay, so that the observers lag alike; `FALLBACK_RATE`
-    where no gains are given at all. (n,) [1/s]
-    """
-    if "kfo" in setup.gains or "kfo" in setup.settings:
-        kalman, _ = build_kfo("fe")(setup)
-        delay = kalman.tuning(setup.step, setup.joints).delay
-        return 1.0 / delay, "gain-from-kalman-delay"
-    return per_joint(FALLBACK_RATE, setup.joints), "gain-from-default"
 
 
 def check_observer(name: str) -> str:

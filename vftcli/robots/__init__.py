@@ -1,11 +1,11 @@
 """Robots: the built-in profiles, and the loaders of users' own TOML and URDF files."""
 
-import difflib
 from pathlib import Path
 
 from vftcli.robots.chain import Chain, Payload
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
 from vftcli.signals.errors import RobotError
+from vftcli.signals.parsing import did_you_mean
 
 PROFILES: dict[str, Path] = {
     name: Path(__file__).parent / f"{name}.toml"
@@ -33,11 +33,9 @@ def load_robot(robot: str | Path) -> Robot:
         from vftcli.robots.profile import load_profile
 
         return load_profile(path)
-    close = difflib.get_close_matches(str(robot).lower(), PROFILES, n=1)
-    hint = f" Did you mean {close[0]}?" if close else ""
     raise RobotError(
-        f"no robot {str(robot)!r}.{hint} Built in: {', '.join(PROFILES)}; "
-        "or give a FILE.toml or FILE.urdf."
+        f"no robot {str(robot)!r}.{did_you_mean(str(robot).lower(), PROFILES)} "
+        f"Built in: {', '.join(PROFILES)}; or give a FILE.toml or FILE.urdf."
     )
 
 

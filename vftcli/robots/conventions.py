@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.signals.pose import IDENTITY, Pose, rotation_x, rotation_z, rpy_matrix
+from vftcli.signals.pose import IDENTITY, Pose, rotation_about, rpy_matrix
 
 
 class Kinematics(NamedTuple):
@@ -39,8 +39,8 @@ def standard_dh(joints: Sequence[Joint], document: Mapping[str, Any]) -> Kinemat
     placements, distal = [], []
     before = IDENTITY
     for joint in joints:
-        placements.append(before @ Pose(rotation_z(joint["theta"]), np.zeros(3)))
-        link = Pose(rotation_x(joint["alpha"]), np.array([joint["a"], 0.0, joint["d"]]))
+        placements.append(before @ Pose(rotation_about("z", joint["theta"]), np.zeros(3)))
+        link = Pose(rotation_about("x", joint["alpha"]), np.array([joint["a"], 0.0, joint["d"]]))
         distal.append(link)
         before = link
     return Kinematics(placements, distal, distal[-1] @ tip_offset(document))
@@ -50,9 +50,9 @@ def modified_dh(joints: Sequence[Joint], document: Mapping[str, Any]) -> Kinemat
     """Chain frames of a modified (proximal) Denavit-Hartenberg table; the tip is `flange_d` out."""
     placements = []
     for joint in joints:
-        R = rotation_x(joint["alpha"])
+        R = rotation_about("x", joint["alpha"])
         along = Pose(R, np.array([joint["a"], 0.0, 0.0]))
-        screw = Pose(rotation_z(joint["theta"]), np.array([0.0, 0.0, joint["d"]]))
+        screw = Pose(rotation_about("z", joint["theta"]), np.array([0.0, 0.0, joint["d"]]))
         placements.append(along @ screw)
     return Kinematics(placements, [IDENTITY] * len(joints), tip_offset(document))
 

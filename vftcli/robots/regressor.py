@@ -6,6 +6,7 @@ inertia is not part of it (Pinocchio's regressor leaves it out too): it is a col
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -134,8 +135,6 @@ def tensor_of(entries: Sequence[float] | Array) -> Array:
 
 def with_parameters(chain: Chain, phi: Array, rotor_inertia: Array | None = None) -> Chain:
     """The chain with other inertial parameters φ (10n,) and, if given, rotor inertias. (n,)"""
-    from dataclasses import replace
-
     masses, coms, inertias = [], [], []
     for row in phi.reshape(chain.joints, LINK):
         mass = float(row[0])

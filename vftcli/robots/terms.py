@@ -1,13 +1,10 @@
 """DynamicsTerms: all an observer ever sees of a robot and its log."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-
-import numpy as np
 
 from vftcli.robots.drive import check_joints, drive_torque, uses_current
 from vftcli.robots.friction import friction_torque
-from vftcli.robots.kernels import MomentumTerms, momentum_chunks
+from vftcli.robots.kernels import momentum_chunks
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import (
     Array,
@@ -72,24 +69,20 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
     q, dq = recording.q, recording.require("dq")
     effort, scale = effort_of(recording, robot)
     p, mu = empty_series(*q.shape), empty_series(*q.shape)
-    chunks = literal_chunks(robot, q, dq) if literal else momentum_chunks(robot.loaded_chain, q, dq)
+    chunks = momentum_chunks(robot.loaded_chain, q, dq)
+    if literal:
+        from vftcli.robots.literal import literal_momentum_terms
+
+        # The paper's method takes the whole log at once.
+        chunks = iter([(slice(0, len(q)), dq, literal_momentum_terms(robot.model, q, dq))])
     for span, velocity, chunk in chunks:
         p[span] = chunk.p
         mu[span] = effort[span]
         mu[span] *= scale
-        mu[span] += np.subtract(chunk.coriolis_transpose_dq, chunk.gravity)
+        mu[span] += chunk.coriolis_transpose_dq - chunk.gravity
         if robot.friction:
             mu[span] -= friction_torque(robot.friction, velocity, chunk.gravity)
     return DynamicsTerms(t=recording.t, p=handed_over(p), mu=handed_over(mu))
-
-
-def literal_chunks(
-    robot: Robot, q: Array, dq: Array
-) -> Iterator[tuple[slice, Array, MomentumTerms]]:
-    """Yield the whole log at once, by the paper's numeric method."""
-    from vftcli.robots.literal import literal_momentum_terms
-
-    yield slice(0, len(q)), dq, literal_momentum_terms(robot.model, q, dq)
 
 
 def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]:

@@ -10,9 +10,9 @@ import numpy as np
 from vftcli.robots.chain import Chain, Payload
 from vftcli.robots.conventions import CONVENTIONS
 from vftcli.robots.profile import SCHEMA
-from vftcli.robots.robot import Limits, Robot, SensorNoise
+from vftcli.robots.robot import Robot
 from vftcli.signals.errors import RobotError
-from vftcli.signals.pose import Pose, rpy_angles
+from vftcli.signals.pose import rpy_angles
 
 Table = dict[str, Any]
 
@@ -88,11 +88,6 @@ def kept_or_new(old: Table, payload: Payload) -> Table:
     """The file's own section if it says the same mass, else a new one in flange axes."""
     if old.get("mass") == payload.mass:
         return {key: value for key, value in old.items() if not is_table(value)}
-    return payload_table(payload)
-
-
-def payload_table(payload: Payload) -> Table:
-    """The ``[payload]`` table of a load, its centre and tensor in flange axes."""
     tensor = payload.inertia[np.triu_indices(3)].tolist()
     return {"mass": payload.mass, "com": payload.com.tolist(), "inertia": tensor}
 
@@ -101,16 +96,11 @@ def xyz_rpy_document(robot: Robot) -> Table:
     """A document for a robot that came from a URDF: its chain, stated as xyz and rpy."""
     chain = robot.chain
     joints: list[Table] = []
+    figures = {**vars(robot.limits), **{f"noise_{k}": v for k, v in vars(robot.noise).items()}}
     for j, name in enumerate(chain.names):
-        place = Pose(chain.rotation[j], chain.translation[j])
-        table = {
-            "name": name,
-            "xyz": place.translation.tolist(),
-            "rpy": list(rpy_angles(place.rotation)),
-        }
-        for group in (robot.limits, robot.noise):
-            table |= known_numbers(group, j)
-        joints.append(table)
+        rpy = list(rpy_angles(chain.rotation[j]))
+        known = {key: float(of[j]) for key, of in figures.items() if math.isfinite(of[j])}
+        joints.append({"name": name, "xyz": chain.translation[j].tolist(), "rpy": rpy, **known})
     return {
         **{key: value for key, value in robot.document.items() if key != "joints"},
         "convention": "xyz-rpy",
@@ -118,13 +108,6 @@ def xyz_rpy_document(robot: Robot) -> Table:
         "ee_rpy": list(rpy_angles(chain.flange_rotation)),
         "joints": joints,
     }
-
-
-def known_numbers(group: Limits | SensorNoise, j: int) -> Table:
-    """The limits or noise figures of one joint that are known, under their keys in the file."""
-    prefix = "noise_" if isinstance(group, SensorNoise) else ""
-    values = {f"{prefix}{key}": float(getattr(group, key)[j]) for key in vars(group)}
-    return {key: value for key, value in values.items() if math.isfinite(value)}
 
 
 def lines_of(document: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[str]:

@@ -1,6 +1,15 @@
 """Words of the command line that rooms share: a span of time, a list of numbers, an assignment."""
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 from vftcli.signals.errors import ParameterError
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """The known name nearest to a word, as a question behind a blank; "" where none is near."""
+    close = get_close_matches(word, list(known), n=1)
+    return f" Did you mean {close[0]}?" if close else ""
 
 
 def interval(text: str) -> tuple[float, float]:

@@ -7,7 +7,7 @@ jump, up to a full turn. Quaternions are (w, x, y, z).
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -70,28 +70,21 @@ def cross(a: Array, b: Array) -> Array:
     )
 
 
-def rotation_x(angle: float) -> Array:
-    """The matrix that turns a vector about x by an angle [rad]. (3, 3)"""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-
-
-def rotation_y(angle: float) -> Array:
-    """The matrix that turns a vector about y by an angle [rad]. (3, 3)"""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-
-
-def rotation_z(angle: float) -> Array:
-    """The matrix that turns a vector about z by an angle [rad]. (3, 3)"""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+def rotation_about(axis: Literal["x", "y", "z"], angle: float) -> Array:
+    """The matrix that turns a vector about one axis by an angle [rad]. (3, 3)"""
+    # The two other axes in the order in which the turn takes the first to the second.
+    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    R = np.eye(3)
+    R[i, i] = R[j, j] = np.cos(angle)
+    R[j, i] = np.sin(angle)
+    R[i, j] = -R[j, i]
+    return R
 
 
 def rpy_matrix(angles: Sequence[float]) -> Array:
     """Rz(yaw) Ry(pitch) Rx(roll), the URDF's fixed-axis angles [rad]. (3, 3)"""
     roll, pitch, yaw = angles
-    return rotation_z(yaw) @ rotation_y(pitch) @ rotation_x(roll)
+    return rotation_about("z", yaw) @ rotation_about("y", pitch) @ rotation_about("x", roll)
 
 
 def rpy_angles(rotation: Array) -> tuple[float, float, float]:

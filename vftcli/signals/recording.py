@@ -12,20 +12,6 @@ from vftcli.signals.remarks import Remark
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import WrenchFrame
 
-JOINT_SIGNALS = (
-    "q",
-    "dq",
-    "current",
-    "torque",
-    "target_q",
-    "target_dq",
-    "target_current",
-    "target_torque",
-    "tau_ext",
-    "temperature",
-)
-"""Names of the fields of a Recording that hold one column a joint."""
-
 MEANINGS = {
     "q": "joint positions",
     "dq": "joint velocities",
@@ -39,6 +25,10 @@ MEANINGS = {
     "temperature": "joint temperatures",
     "wrench": "wrenches",
 }
+"""Fields of a Recording that hold a signal → what that is."""
+
+JOINT_SIGNALS = tuple(name for name in MEANINGS if name != "wrench")
+"""Those of them that hold one column a joint."""
 
 
 class Awaited:
@@ -199,8 +189,7 @@ class Recording:
     @property
     def signals(self) -> tuple[str, ...]:
         """Names of the signals this log has, in a fixed order."""
-        names = (*JOINT_SIGNALS, "wrench")
-        return tuple(name for name in names if getattr(self, name) is not None)
+        return tuple(name for name in MEANINGS if getattr(self, name) is not None)
 
     def require(self, name: str) -> Array:
         """Return a signal, or say that the log lacks it and what would supply it.
@@ -228,6 +217,5 @@ class Recording:
                 f"{self.name}: fewer than two samples between {start:g} and {stop:g} s; "
                 f"the log runs from {self.t[0]:g} to {self.t[-1]:g} s"
             )
-        names = ("t", *JOINT_SIGNALS, "wrench")
-        kept = {n: v[keep] for n in names if (v := getattr(self, n)) is not None}
+        kept = {name: getattr(self, name)[keep] for name in ("t", *self.signals)}
         return replace(self, **kept)
