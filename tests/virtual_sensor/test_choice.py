@@ -41,8 +41,7 @@ def test_a_zero_is_spans_the_start_or_a_log(tmp_path: Path) -> None:
     assert ZeroChoice.parsed(["1:2", "8:9"]).spans == ((1.0, 2.0), (8.0, 9.0))
     assert ZeroChoice.parsed(["start"]) == ZeroChoice(start=True)
     both = ZeroChoice.parsed([str(log), "start"])
-    assert (both.log, both.start, both.of_log) == (log, True, True)
-    assert not ZeroChoice.parsed([str(log)]).of_log
+    assert (both.log, both.start) == (log, True)
     assert ZeroChoice.parsed([]) == ZeroChoice()
 
 

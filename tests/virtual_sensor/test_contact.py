@@ -6,10 +6,9 @@ import pytest
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.virtual_sensor.contact import (
-    contacts,
-    detection,
+    find_contacts,
     free_band,
-    hysteresis,
+    match_contacts,
     operating_curve,
 )
 from vftcli.virtual_sensor.detection import judge_contacts, learned_free
@@ -26,20 +25,21 @@ def pulses(*spans: tuple[float, float], height: float = 3.0) -> np.ndarray:
 
 def test_a_score_that_dips_stays_one_contact_until_it_leaves_the_lower_threshold() -> None:
     score = np.array([0, 0.5, 1.2, 0.8, 0.7, 1.1, 0.5, 0.0, 0.9, 0.0])
-    assert hysteresis(score, 1.0) == [(2, 5)]
+    (found,) = find_contacts(np.arange(10.0), score)
+    assert (found.start, found.stop) == (2.0, 5.0)
 
 
 def test_short_spikes_are_dropped_and_close_contacts_joined() -> None:
     score = pulses((2.0, 3.0), (3.1, 4.0), (8.0, 8.01), (12.0, 12.5))
-    found = contacts(T, score)
+    found = find_contacts(T, score)
     assert [(round(c.start, 2), round(c.stop, 2)) for c in found] == [(2.0, 3.99), (12.0, 12.49)]
     assert found[0].peak == 3.0
 
 
 def test_hits_misses_false_alarms_and_delays_are_counted() -> None:
-    true = contacts(T, pulses((2, 4), (8, 9), (14, 15)))
-    found = contacts(T, pulses((2.2, 4.3), (11, 11.5), (14.1, 15)))
-    told = detection(found, true, 20.0)
+    true = find_contacts(T, pulses((2, 4), (8, 9), (14, 15)))
+    found = find_contacts(T, pulses((2.2, 4.3), (11, 11.5), (14.1, 15)))
+    told = match_contacts(found, true, 20.0)
     assert (told.contacts, told.missed, told.false_alarms) == (3, 1, 1)
     # one alarm in the 16 s without contact (each contact's last sample is 10 ms early)
     assert told.false_alarms_per_h == pytest.approx(3600 / 16.03, rel=1e-3)
@@ -51,7 +51,7 @@ def test_hits_misses_false_alarms_and_delays_are_counted() -> None:
 def test_a_higher_threshold_finds_less_and_alarms_less() -> None:
     rng = np.random.default_rng(0)
     score = np.abs(pulses((5, 6), (12, 13)) + 0.5 * rng.standard_normal(len(T)))
-    curve = operating_curve(T, score, contacts(T, pulses((5, 6), (12, 13))), [0.3, 2.2, 20.0])
+    curve = operating_curve(T, score, find_contacts(T, pulses((5, 6), (12, 13))), [0.3, 2.2, 20.0])
     assert curve[0].found == 1.0
     assert curve[1].found == 1.0
     assert curve[2].found == 0.0
@@ -84,4 +84,4 @@ def test_contacts_are_told_from_torques_before_the_first_true_one() -> None:
 
 def test_a_log_that_starts_in_contact_has_no_free_part() -> None:
     with pytest.raises(ParameterError, match=r"no free part.*--zero A:B"):
-        learned_free(T, contacts(T, pulses((0.5, 2.0))))
+        learned_free(T, find_contacts(T, pulses((0.5, 2.0))))

@@ -6,13 +6,13 @@ import pytest
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.contact import contacts
+from vftcli.virtual_sensor.contact import find_contacts
 from vftcli.virtual_sensor.detection import (
     LEAST_TORQUE,
+    WRENCH_LIMITS,
     judge_contacts,
     learned_free,
     true_intervals,
-    wrench_limits,
 )
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
@@ -27,15 +27,15 @@ def push(height: float, start: float = 5.0, stop: float = 7.0) -> np.ndarray:
 
 def test_a_score_beyond_one_is_a_contact_and_one_below_is_none() -> None:
     """The default threshold is 1: 1.3 half widths of the free band are one contact."""
-    assert len(contacts(T, push(1.3))) == 1
-    assert contacts(T, push(0.99)) == ()
+    assert len(find_contacts(T, push(1.3))) == 1
+    assert find_contacts(T, push(0.99)) == ()
 
 
 def test_true_contacts_exceed_their_limits_on_any_axis() -> None:
     truth = np.zeros((len(T), 6))
     truth[:, 1], truth[:, 4] = push(1.1), push(0.3, 10.0, 11.0)
     truth[:, 2], truth[0, 0] = push(0.9, 14.0, 15.0), np.nan
-    found = true_intervals(T, truth, wrench_limits())
+    found = true_intervals(T, truth, WRENCH_LIMITS)
     assert [(round(c.start, 1), round(c.stop, 1)) for c in found] == [(5.0, 7.0), (10.0, 11.0)]
 
 
@@ -90,8 +90,8 @@ def test_contacts_are_told_from_wrenches_where_there_are_some() -> None:
 
 
 def test_the_free_part_lasts_from_settling_to_the_first_contact() -> None:
-    true = contacts(T, push(3.0))
+    true = find_contacts(T, push(3.0))
     np.testing.assert_array_equal(learned_free(T, true), (T >= 1.0) & (true[0].start > T))
     assert learned_free(T, ())[-2]
     with pytest.raises(ParameterError, match=r"begins at 1.05 s.*--zero A:B"):
-        learned_free(T, contacts(T, push(3.0, 1.05)))
+        learned_free(T, find_contacts(T, push(3.0, 1.05)))

@@ -10,8 +10,7 @@ from vftcli.signals.errors import ParameterError, RobotError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.virtual_sensor.solvers import (
     LEAST_SIGMA,
-    PRIOR_FORCE,
-    PRIOR_MOMENT,
+    PRIOR,
     SCALE,
     SOLVERS,
     decompose,
@@ -85,7 +84,7 @@ def test_the_answer_and_its_covariance_are_those_of_the_textbook(solver: str) ->
     found = told("ur5", q, tau, solver=solver, sd=sd)
     J = flange_jacobian(load_robot("ur5").chain, q)[0]
     S, G = np.diag(SCALE), np.diag(SCALE) @ J
-    prior = np.diag(np.repeat([PRIOR_FORCE, PRIOR_MOMENT], 3) ** -2.0)
+    prior = np.diag((PRIOR * SCALE) ** -2.0)
     information = J @ np.diag(sd**-2) @ J.T + prior
     gain = {
         "pinv": np.linalg.pinv(J.T),
@@ -127,8 +126,8 @@ def test_near_a_singularity_pinv_blows_up_and_map_does_not(pose: np.ndarray) -> 
     assert blown.sigma_min is not None
     assert blown.sigma_min.max() < LEAST_SIGMA
     assert held.sd is not None
-    assert np.max(np.abs(held.values[:, :3])) < 4.0 * PRIOR_FORCE
-    assert np.all(held.sd[:, :3] <= PRIOR_FORCE * (1 + 1e-9))
+    assert np.max(np.abs(held.values[:, :3])) < 4.0 * PRIOR[0]
+    assert np.all(held.sd[:, :3] <= PRIOR[0] * (1 + 1e-9))
     assert np.sqrt(np.mean(blown.values[:, :3] ** 2)) > 3 * np.sqrt(
         np.mean(held.values[:, :3] ** 2)
     )

@@ -7,7 +7,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.kinematics import link_poses
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import Wrench, WrenchFrame
-from vftcli.virtual_sensor.vendor import axes_words, check_vendor, fit_axes
+from vftcli.virtual_sensor.vendor import AxesFit, check_vendor, fit_axes
 
 
 def pushes(samples: int = 400, seed: int = 1) -> np.ndarray:
@@ -27,9 +27,14 @@ def test_any_order_and_sign_of_axes_is_recognised(seed: int) -> None:
     fit = fit_axes(ours, theirs)
     np.testing.assert_array_equal(fit.matrix, P)
     assert fit.gain == pytest.approx(1.7, rel=0.01)  # 0.2 N of noise over 400 samples of 20 N
-    assert fit.words == axes_words(P)
     assert not fit_axes(ours, ours + rng.standard_normal(ours.shape)).derived
     assert fit_axes(ours, 2.0 * ours @ P.T).derived
+
+
+def test_axes_in_words() -> None:
+    matrix = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    fit = AxesFit(matrix=matrix, gain=1.0, correlation=1.0)
+    assert fit.words == "+x +z −y"
 
 
 def log(wrench: np.ndarray, frame: WrenchFrame | None, samples: int = 400) -> Recording:

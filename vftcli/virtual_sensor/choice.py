@@ -38,11 +38,6 @@ class ZeroChoice:
         if self.spans and self.start:
             raise ParameterError("--zero takes either start or spans A:B")
 
-    @property
-    def of_log(self) -> bool:
-        """Whether the zero is taken from a part of the log itself."""
-        return self.start or bool(self.spans)
-
     @classmethod
     def parsed(cls, words: Sequence[str]) -> "ZeroChoice":
         """The choice that ``--zero A:B|start|LOG``, which may be repeated, states.

@@ -22,11 +22,9 @@ GAP = 0.25
 BAND = 1.3
 """The free band reaches this far beyond the largest departure seen in the free part."""
 
-EARLY = 0.1
-"""An alarm that begins earlier than this before a true contact is false, whatever it meets. [s]"""
-
-TRUE_FORCE, TRUE_MOMENT = 1.0, 0.2
-"""A true wrench beyond this is a contact. [N], [N·m]"""
+EARLY, LATE = 0.1, 1.0
+"""An alarm that begins earlier than this before a true contact, or later than this after its end,
+is false, whatever it meets: a slow observer shows a contact for a while after it. [s]"""
 
 
 class ContactInterval(NamedTuple):
@@ -84,7 +82,7 @@ def free_band(values: Array, free: Mask, least: Array | float) -> FreeBand:
     return FreeBand(centre=centre, half=np.maximum(half, least))
 
 
-def contacts(t: Array, score: Array, enter: float = 1.0) -> tuple[ContactInterval, ...]:
+def find_contacts(t: Array, score: Array, enter: float = 1.0) -> tuple[ContactInterval, ...]:
     """Intervals in which a score rises above `enter` until it falls below `LEAVE` of it.
 
     Those shorter than `HOLD` are dropped, those closer than `GAP` joined.
@@ -95,27 +93,19 @@ def contacts(t: Array, score: Array, enter: float = 1.0) -> tuple[ContactInterva
         enter: Threshold, in half widths.
     """
     found: list[ContactInterval] = []
-    for first, last in hysteresis(score, enter):
-        start, stop, peak = float(t[first]), float(t[last]), float(score[first : last + 1].max())
+    for begin, end in runs_of(score > LEAVE * enter):
+        above = score[begin:end] > enter
+        if not above.any():
+            continue
+        # It starts where `enter` is first exceeded, not where the lower threshold is.
+        first = begin + int(np.argmax(above))
+        start, stop, peak = float(t[first]), float(t[end - 1]), float(score[first:end].max())
         # A hand that slips for a moment has not let go.
         if found and start - found[-1].stop < GAP:
             found[-1] = ContactInterval(found[-1].start, stop, max(found[-1].peak, peak))
         else:
             found.append(ContactInterval(start, stop, peak))
     return tuple(c for c in found if c.stop - c.start >= HOLD)
-
-
-def hysteresis(score: Array, enter: float) -> list[tuple[int, int]]:
-    """First and last sample of the runs above `LEAVE`·enter that rise above `enter`.
-
-    A run begins where `enter` is first exceeded.
-    """
-    above = score > enter
-    return [
-        (start + int(np.argmax(above[start:stop])), stop - 1)
-        for start, stop in runs_of(score > LEAVE * enter)
-        if above[start:stop].any()
-    ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,28 +139,19 @@ class Detection:
         return max(found) if found else float("nan")
 
 
-def detection(
-    found: Sequence[ContactInterval],
-    true: Sequence[ContactInterval],
-    duration: float,
-    late: float = 1.0,
+def match_contacts(
+    found: Sequence[ContactInterval], true: Sequence[ContactInterval], duration: float
 ) -> Detection:
-    """Match detections with true contacts.
+    """Match detected contacts with the true ones of a log that lasts `duration` [s].
 
     A detection belongs to a true contact that it overlaps, or whose end it follows by less than
-    `late`, as a slow observer's does.
-
-    Args:
-        found: Detected contacts.
-        true: True contacts.
-        duration: Length of the log. [s]
-        late: How long after its end a contact may still show. [s]
+    `LATE`.
     """
     delays = []
     for contact in true:
-        hits = [f for f in found if f.stop >= contact.start and f.start <= contact.stop + late]
+        hits = [f for f in found if f.stop >= contact.start and f.start <= contact.stop + LATE]
         delays.append(max(hits[0].start - contact.start, 0.0) if hits else float("nan"))
-    false = [f for f in found if not any(begins(f, c, late) for c in true)]
+    false = [f for f in found if not any(c.start - EARLY <= f.start <= c.stop + LATE for c in true)]
     free = duration - sum(c.stop - c.start for c in true)
     return Detection(
         contacts=len(true),
@@ -179,11 +160,6 @@ def detection(
         false_alarms_per_h=len(false) * 3600.0 / free if free > 0 else float("nan"),
         delay=tuple(delays),
     )
-
-
-def begins(found: ContactInterval, true: ContactInterval, late: float) -> bool:
-    """Whether a detection begins at a true contact: little before it, or until `late` after it."""
-    return true.start - EARLY <= found.start <= true.stop + late
 
 
 class OperatingPoint(NamedTuple):
@@ -209,7 +185,7 @@ def operating_curve(
     duration = float(t[-1] - t[0])
     points = []
     for threshold in thresholds:
-        counts = detection(contacts(t, score, threshold), true, duration)
+        counts = match_contacts(find_contacts(t, score, threshold), true, duration)
         found = 1.0 - counts.missed / counts.contacts if counts.contacts else float("nan")
         points.append(
             OperatingPoint(threshold, found, counts.false_alarms_per_h, counts.mean_delay)

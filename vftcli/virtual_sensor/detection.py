@@ -1,7 +1,6 @@
 """Contacts of every observer against the true ones."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,14 +9,12 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.virtual_sensor.contact import (
-    TRUE_FORCE,
-    TRUE_MOMENT,
     ContactInterval,
     Detection,
     OperatingPoint,
-    contacts,
-    detection,
+    find_contacts,
     free_band,
+    match_contacts,
     operating_curve,
 )
 from vftcli.virtual_sensor.sensor_reading import SensorReading
@@ -26,28 +23,14 @@ from vftcli.virtual_sensor.zero import SETTLING
 TRUE_TORQUE = 0.5
 """A true joint torque beyond this is a contact. [N·m]"""
 
+WRENCH_LIMITS = np.repeat([1.0, 0.2], 3)
+"""A true wrench beyond this is a contact, and half a free band at least so wide. (6,) [N, N·m]"""
+
 LEAST_TORQUE = 0.5
 """Smallest half width of a free band of joint torques. [N·m]"""
 
 THRESHOLDS = tuple(float(x) for x in np.geomspace(0.1, 10.0, 41))
 """Multiples of the free band of an operating curve."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Signal:
-    """What contacts are told from: an observer's wrench or its joint torques.
-
-    Attributes:
-        name: The observer.
-        kind: "torque" or "wrench".
-        values: NaN where not known. (T, k)
-        least: Smallest half width of its free band, one a column. (k,)
-    """
-
-    name: str
-    kind: str
-    values: Array
-    least: Array
 
 
 class ContactScore(NamedTuple):
@@ -68,14 +51,9 @@ class ContactScore(NamedTuple):
     found: tuple[ContactInterval, ...]
 
 
-def wrench_limits() -> Array:
-    """What a true wrench must exceed to be a contact, and a free band at least be. (6,)"""
-    return np.repeat([TRUE_FORCE, TRUE_MOMENT], 3)
-
-
 def true_intervals(t: Array, truth: Array, limits: Array | float) -> tuple[ContactInterval, ...]:
     """Contacts of a true wrench or torque (T, k)."""
-    return contacts(t, np.nan_to_num(np.abs(truth) / limits).max(axis=1))
+    return find_contacts(t, np.nan_to_num(np.abs(truth) / limits).max(axis=1))
 
 
 def learned_free(t: Array, true: Sequence[ContactInterval]) -> Mask:
@@ -113,44 +91,25 @@ def judge_contacts(
     floor = np.zeros(reference.joints) if reference.floor is None else reference.floor
     limits = np.maximum(TRUE_TORQUE, 5.0 * np.nan_to_num(floor))
     true = true_intervals(reference.t, reference.tau, limits)
+    kind, least = "torque", np.asarray(LEAST_TORQUE)
+    signals = {estimate.name: estimate.tau for estimate in estimates}
     if measured is not None:
-        least = wrench_limits()
-        signals = [
-            Signal(name=w.name, kind="wrench", values=w.known, least=least)
-            for w in measured.wrenches
-        ]
-    else:
-        signals = [
-            Signal(name=e.name, kind="torque", values=e.tau, least=np.full(e.joints, LEAST_TORQUE))
-            for e in estimates
-        ]
+        kind, least = "wrench", WRENCH_LIMITS
+        signals = {wrench.name: wrench.known for wrench in measured.wrenches}
     given = measured is not None and measured.drifts
-    free = measured.free if measured is not None and given else learned_free(reference.t, true)
-    return contact_scores(reference.t, signals, free, true)
-
-
-def contact_scores(
-    t: Array, signals: Iterable[Signal], free: Mask, true: Sequence[ContactInterval]
-) -> tuple[ContactScore, ...]:
-    """Judge every observer's contacts by the true ones.
-
-    Args:
-        t: Time. (T,) [s]
-        signals: The observers.
-        free: The free part the band is learned from. (T,)
-        true: True contacts.
-    """
+    t = reference.t
+    free = measured.free if measured is not None and given else learned_free(t, true)
     found = []
-    for signal in signals:
-        score = free_band(signal.values, free, signal.least).score(signal.values)
+    for name, values in signals.items():
+        score = free_band(values, free, least).score(values)
         # Observers rise from zero: what they read before they have settled touches nothing.
         score = np.where(t < t[0] + SETTLING, 0.0, score)
-        here = contacts(t, score)
+        here = find_contacts(t, score)
         found.append(
             ContactScore(
-                name=signal.name,
-                signal=signal.kind,
-                detection=detection(here, true, float(t[-1] - t[0])),
+                name=name,
+                signal=kind,
+                detection=match_contacts(here, true, float(t[-1] - t[0])),
                 curve=operating_curve(t, score, true, THRESHOLDS),
                 found=here,
             )

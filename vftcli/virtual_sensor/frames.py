@@ -156,25 +156,15 @@ def read_pose(text: str, robot: Robot, section: str, option: str) -> Pose:
         option: How the option is called, for messages.
 
     Raises:
-        ParameterError: If it is neither.
+        ParameterError: If it is neither; the message lists the names there are.
     """
-    values = numbers(text)
-    if values is None:
-        return named_pose(text, robot, section, option)
-    return pose_of_numbers(values, option)
-
-
-def named_pose(name: str, robot: Robot, section: str, option: str) -> Pose:
-    """Pose ``[section.NAME]`` of a robot's file.
-
-    Raises:
-        ParameterError: If the file has no such section; the message lists those it has.
-    """
+    if (values := numbers(text)) is not None:
+        return pose_of_numbers(values, option)
     poses = {"tool": robot.tools, "sensor": robot.sensors}[section]
-    if not name or name not in poses:
+    if not text or text not in poses:
         there = ", ".join(filter(None, poses)) or "none"
         raise ParameterError(
-            f"{option} {name!r}: {robot.name} has no [{section}.{name}]; it has {there}. Give "
+            f"{option} {text!r}: {robot.name} has no [{section}.{text}]; it has {there}. Give "
             f"numbers x,y,z,roll,pitch,yaw [m, rad], or add the section with xyz and rpy"
         )
-    return poses[name]
+    return poses[text]

@@ -1,7 +1,6 @@
 """Where a log's sensor sits and what it weighs, found before it is compared with."""
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,22 +20,10 @@ from vftcli.virtual_sensor.sensor import fit_pose, weigh_tool
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 
-class MountingFound(NamedTuple):
-    """Where tool and sensor sit.
-
-    Attributes:
-        mounting: Their poses on the flange.
-        remarks: What was found in the log.
-    """
-
-    mounting: Mounting
-    remarks: tuple[Remark, ...] = ()
-
-
 def find_mounting(
     recording: Recording, robot: Robot, disturbance: ExternalTorque, choice: WrenchChoice
-) -> MountingFound:
-    """Tool and sensor poses as asked; the sensor's estimated from the log for ``fit``.
+) -> tuple[Mounting, tuple[Remark, ...]]:
+    """Tool and sensor poses as asked, and what was found: ``fit`` estimates the sensor's pose.
 
     Args:
         recording: The log.
@@ -50,11 +37,11 @@ def find_mounting(
     """
     mounting = choice.mounting(robot)
     if choice.sensor_pose != FIT:
-        return MountingFound(mounting)
+        return mounting, ()
     reading = sensor_reading_of(recording, "--sensor-pose fit")
     ours = VirtualSensor(frame="flange").wrench(disturbance, recording.q, robot.chain)
     fit = fit_pose(ours.known, reading)
-    return MountingFound(mounting._replace(sensor=fit.pose), (fit.remark,))
+    return mounting._replace(sensor=fit.pose), (fit.remark,)
 
 
 def without_tool_weight(

@@ -148,10 +148,9 @@ def torque_error(
     """
     if choice.torque_sd is not None:
         return given_error(choice.torque_sd, torques)
-    if free_run is not None:
-        return from_free_part(torques, free, free_run.rms, disturbance)
-    if np.count_nonzero(free) > 1:
-        return from_free_part(torques, free, None, disturbance)
+    if free_run is not None or np.count_nonzero(free) > 1:
+        rms = None if free_run is None else free_run.rms
+        return from_free_part(torques, free, rms, disturbance)
     if torques and all(torque.error_sd is not None for torque in torques):
         return from_band(torques)
     return from_default(torques, choice.solver)

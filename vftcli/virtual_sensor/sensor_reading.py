@@ -73,12 +73,8 @@ def with_reference(
         drift = replace(zero_drift(reference, reading.zero_span), removed=True)
         reference = without_drift(reference, drift)
         told.append(drift.remark)
-    told += [lag_remark(wrench, reference) for wrench in reading.wrenches]
+    for wrench in reading.wrenches:
+        offset = time_offset(reference.t, wrench.known / SCALE, reference.known / SCALE)
+        where, values = Where(wrench.name), {"correlation": offset.correlation}
+        told.append(fact("lag-behind-sensor", where, lag_ms=offset.lag * 1e3, **values))
     return replace(reading, reference=reference, remarks=(*reading.remarks, *told))
-
-
-def lag_remark(wrench: Wrench, reference: Wrench) -> Remark:
-    """How far a virtual sensor runs behind the real one."""
-    offset = time_offset(reference.t, wrench.known / SCALE, reference.known / SCALE)
-    where, lag = Where(wrench.name), offset.lag * 1e3
-    return fact("lag-behind-sensor", where, lag_ms=lag, correlation=offset.correlation)

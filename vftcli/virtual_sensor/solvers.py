@@ -24,8 +24,8 @@ LEAST_SIGMA = 0.05
 DAMPING = 0.05
 """Damping δ of the damped solver, the singular value below which it starts to hold back. [m]"""
 
-PRIOR_FORCE, PRIOR_MOMENT = 50.0, 10.0
-"""Standard deviations of the MAP solver's prior about zero. [N], [N·m]"""
+PRIOR = np.repeat([50.0, 10.0 / LENGTH], 3)
+"""Standard deviations of the MAP solver's prior about zero: 50 N and 10 N·m, of w_s. (6,) [N]"""
 
 TORQUE_SD = 0.3
 """Joint torque error where neither the observer nor an unloaded span says it. [N·m]"""
@@ -123,9 +123,8 @@ def maximum_a_posteriori(parts: Decomposition, sd: Array) -> Solution:
     w = C J Σ⁻¹τ with C = (J Σ⁻¹ Jᵀ + P⁻¹)⁻¹, its covariance: next to the least squares where the
     pose is good, and next to the prior where the pose cannot tell.
     """
-    prior = np.repeat([PRIOR_FORCE, PRIOR_MOMENT / LENGTH], 3)
     weighted = parts.scaled / sd[:, None, :]
-    information = weighted @ np.swapaxes(weighted, 1, 2) + np.diag(prior**-2)
+    information = weighted @ np.swapaxes(weighted, 1, 2) + np.diag(PRIOR**-2)
     root = np.linalg.inv(np.linalg.cholesky(information))  # C = rootᵀ root
     C = np.swapaxes(root, 1, 2) @ root
     gain = SCALE[:, None] * (C @ (weighted / sd[:, None, :]))

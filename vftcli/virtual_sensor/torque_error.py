@@ -45,21 +45,20 @@ class Disturbance:
         Args:
             free: Unloaded samples of the log, used where there is no free run. (T,)
         """
-        everywhere = np.ones(len(self.terms.t), dtype=bool)
-        loaded, quiet = Part(self.terms, ~free), Part(self.terms, free)
+        n, loaded, quiet = self.terms.joints, Part(self.terms, ~free), Part(self.terms, free)
         if self.free is not None:
-            loaded = Part(self.terms, everywhere)
-            quiet = Part(self.free, np.ones(len(self.free.t), dtype=bool))
+            loaded, quiet = (
+                Part(terms, np.ones(len(terms.t), dtype=bool)) for terms in (self.terms, self.free)
+            )
         try:
             spectra = spectra_of(loaded, [quiet])
         except ParameterError:  # too short for a spectrum: nothing is known of the lag's part
-            return {o.name: np.zeros(self.terms.joints) for o in self.observers}
-        n = self.terms.joints
-        missed = {}
-        for observer in self.observers:
-            response = observer.frequency_response(spectra.frequency, spectra.step, n)
-            missed[observer.name] = np.sqrt(spectra.missed(response))
-        return missed
+            return {o.name: np.zeros(n) for o in self.observers}
+        f, step = spectra.frequency, spectra.step
+        return {
+            o.name: np.sqrt(spectra.missed(o.frequency_response(f, step, n)))
+            for o in self.observers
+        }
 
 
 @dataclass(frozen=True, kw_only=True)

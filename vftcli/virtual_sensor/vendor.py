@@ -1,6 +1,7 @@
 """Which convention a vendor's wrench is in: sign, axes, lag and gain fitted against ours."""
 
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
@@ -28,16 +29,14 @@ class AxesFit:
         matrix: The signed permutation of axes that fits best. (3, 3)
         gain: Factor on top of it.
         correlation: Correlation of theirs with it, all axes together.
-        rms: What it leaves unexplained, per axis of theirs. (3,) [N]
     """
 
     matrix: Array
     gain: float
     correlation: float
-    rms: Array
 
     def __post_init__(self) -> None:
-        seal(self, "matrix", "rms")
+        seal(self, "matrix")
 
     @property
     def derived(self) -> bool:
@@ -46,17 +45,10 @@ class AxesFit:
 
     @property
     def words(self) -> str:
-        """The axes, as "+x +z −y"."""
-        return axes_words(self.matrix)
-
-
-def axes_words(matrix: Array) -> str:
-    """A signed permutation in words: where each of their axes lies in ours."""
-    places = np.argmax(np.abs(matrix), axis=1)
-    signs = np.sign(matrix[np.arange(3), places])
-    return " ".join(
-        f"{'+' if s > 0 else '−'}{'xyz'[k]}" for s, k in zip(signs, places, strict=True)
-    )
+        """Where each of their axes lies in ours, as "+x +z −y"."""
+        places = np.argmax(np.abs(self.matrix), axis=1)
+        signs = np.where(self.matrix.sum(axis=1) > 0, "+", "−")
+        return " ".join(f"{sign}{'xyz'[k]}" for sign, k in zip(signs, places, strict=True))
 
 
 def fit_axes(ours: Array, theirs: Array) -> AxesFit:
@@ -77,15 +69,15 @@ def fit_axes(ours: Array, theirs: Array) -> AxesFit:
 
 def permutation(Q: Array) -> Array:
     """The signed permutation nearest to an orthogonal matrix. (3, 3)"""
-    orders = [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)]
-    best = max(orders, key=lambda order: float(np.sum(np.abs(Q[np.arange(3), order]))))
+    size = np.abs(Q)
+    best = max(permutations(range(3)), key=lambda order: float(np.sum(size[np.arange(3), order])))
     P = np.zeros((3, 3))
     P[np.arange(3), best] = np.sign(Q[np.arange(3), best])
     return P
 
 
 def fit_signs(x: Array, y: Array, matrix: Array) -> AxesFit:
-    """Gain, correlation and remainder of centred forces under a given matrix."""
+    """Gain and correlation of centred forces under a given matrix."""
     z = x @ matrix.T
     power = float(np.sum(z**2))
     gain = float(np.sum(z * y)) / power if power > 0 else float("nan")
@@ -94,7 +86,6 @@ def fit_signs(x: Array, y: Array, matrix: Array) -> AxesFit:
         matrix=matrix,
         gain=gain,
         correlation=float(np.sum(z * y)) / scale if scale > 0 else float("nan"),
-        rms=np.sqrt(np.mean((y - z) ** 2, axis=0)),
     )
 
 

@@ -80,7 +80,7 @@ class VirtualSensor:
         for torque in torques:
             if torque.tau.shape != q.shape:
                 raise ShapeError(f"{torque.name}: torque {torque.tau.shape} against q {q.shape}")
-        deviations = [deviation_of(torque, (sd or {}).get(torque.name)) for torque in torques]
+        errors = [torque_sd_of(torque, (sd or {}).get(torque.name)) for torque in torques]
         values = np.empty((len(torques), samples, 6))
         spread = np.empty((len(torques), samples, 6))
         residual = np.empty((len(torques), samples))
@@ -92,7 +92,7 @@ class VirtualSensor:
             sigma[span] = parts.sigma_min
             for k, torque in enumerate(torques):
                 tau = torque.tau[span]
-                values[k, span], spread[k, span] = self.solve(parts, X, tau, deviations[k].sd[span])
+                values[k, span], spread[k, span] = self.solve(parts, X, tau, errors[k][0][span])
                 if n > 6:
                     residual[k, span] = np.linalg.norm(null_space(parts, tau), axis=1)
         masked = sigma < self.least_sigma
@@ -106,7 +106,7 @@ class VirtualSensor:
                 sigma_min=sigma,
                 masked=masked,
                 null_space=handed_over(residual[k].copy()) if n > 6 else None,
-                remarks=deviations[k].remarks,
+                remarks=(errors[k][1],),
             )
             for k, torque in enumerate(torques)
         )
@@ -150,22 +150,11 @@ class ForceArrow(NamedTuple):
     force: Array
 
 
-class TorqueDeviation(NamedTuple):
-    """Standard deviation of an estimate's joint torques, and where it comes from.
+def torque_sd_of(torque: ExternalTorque, given: Array | None) -> tuple[Array, Remark]:
+    """The torque error a wrench's covariance starts from, and where it comes from.
 
-    Attributes:
-        sd: One a sample and joint. (T, n) [N·m]
-        remarks: Where it comes from.
-    """
-
-    sd: Array
-    remarks: tuple[Remark, ...]
-
-
-def deviation_of(torque: ExternalTorque, given: Array | None) -> TorqueDeviation:
-    """The torque error a wrench's covariance starts from: given, the observer's own, or assumed.
-
-    Zero is raised to a micronewton-metre, so that weights stay finite.
+    It is the given one, the observer's own, or an assumed one. (T, n) [N·m] Zero is raised to a
+    micronewton-metre, so that weights stay finite.
     """
     where = Where(torque.name)
     sd: Array | float
@@ -177,4 +166,4 @@ def deviation_of(torque: ExternalTorque, given: Array | None) -> TorqueDeviation
         sd, remark = TORQUE_SD, caution("band-assumed", where, torque_sd_Nm=TORQUE_SD)
     least = np.maximum(np.asarray(sd, dtype=np.float64), 1e-6)
     # A view: one row stands for every sample without being copied.
-    return TorqueDeviation(np.broadcast_to(least, torque.tau.shape), (remark,))
+    return np.broadcast_to(least, torque.tau.shape), remark

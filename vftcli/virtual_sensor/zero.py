@@ -22,8 +22,8 @@ SETTLING = 1.0
 LEAST_SPAN = 0.5
 """Shortest unloaded start. [s]"""
 
-FORCE_STEP, MOMENT_STEP = 3.0, 0.6
-"""A departure from the start's own level that counts as load whatever the noise. [N], [N·m]"""
+STEPS = np.repeat([3.0, 0.6], 3)
+"""A departure from the start's own level that counts as load whatever the noise. [N, N·m]"""
 
 BACK = 0.3
 """An unloaded start ends this long before the load shows: it began to rise earlier. [s]"""
@@ -191,8 +191,8 @@ def unloaded_start(wrench: Wrench) -> Span | None:
     """The span from the start over which the wrench keeps its first level, None if too short. [s]
 
     That level is the median of the first half second after `SETTLING`; the span ends where a
-    median over 0.1 s leaves it by `SPREADS` robust standard deviations and by at least `FORCE_STEP`
-    or `MOMENT_STEP`. A load that hangs from the first sample on cannot be told from drift.
+    median over 0.1 s leaves it by `SPREADS` robust standard deviations and by at least
+    `STEPS`. A load that hangs from the first sample on cannot be told from drift.
     """
     t = wrench.t - wrench.t[0]
     known = np.all(np.isfinite(wrench.known), axis=1)
@@ -203,8 +203,7 @@ def unloaded_start(wrench: Wrench) -> Span | None:
     level = np.median(wrench.values[first], axis=0)
     # 1.4826 turns a median absolute deviation into a normal standard deviation.
     spread = 1.4826 * np.median(np.abs(wrench.values[first] - level), axis=0)
-    least = np.repeat([FORCE_STEP, MOMENT_STEP], 3)
-    away = np.any(np.abs(wrench.values - level) > np.maximum(least, SPREADS * spread), axis=1)
+    away = np.any(np.abs(wrench.values - level) > np.maximum(STEPS, SPREADS * spread), axis=1)
     loaded = lasting(away & known, t, 0.1) & (t >= SETTLING)
     stop = float(t[np.argmax(loaded)]) - BACK if loaded.any() else float(t[-1])
     if stop - SETTLING < LEAST_SPAN:
@@ -228,16 +227,15 @@ def zero_warning(wrench: Wrench, drift: Drift) -> tuple[Remark, ...]:
     It does where the wrench changes within it, or lies far from the level of the log's start.
     """
     where = Where(wrench.name, span=drift.span)
-    least = np.repeat([FORCE_STEP, MOMENT_STEP], 3)
     start = unloaded_start(wrench)
     if start is not None:
         level = zero_drift(wrench, start)
         away = np.abs(drift.mean - level.mean) - SPREADS * level.sd
-        if worst := largest_excess(away, least):
+        if worst := largest_excess(away, STEPS):
             return (warning("zero-far-from-start", where, start_s=list(start), **worst),)
     inside = wrench.between(*drift.span)
     swing = np.percentile(inside, 95, axis=0) - np.percentile(inside, 5, axis=0)
-    if worst := largest_excess(swing, 4.0 * least):
+    if worst := largest_excess(swing, 4.0 * STEPS):
         return (warning("zero-swings", where, **worst),)
     return ()
 
