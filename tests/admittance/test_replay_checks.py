@@ -5,19 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vftcli.admittance import replay_checks as checks
 from vftcli.admittance.joints import JointPath
 from vftcli.admittance.law import controllers
 from vftcli.admittance.metrics import Drag
 from vftcli.admittance.motion import AxisMotion
 from vftcli.admittance.parameters import from_table
-from vftcli.admittance.replay_checks import (
-    arm_moved,
-    drags_at_rest,
-    implausible_travel,
-    limits_met,
-    nothing_dragged,
-    unknown_force,
-)
 from vftcli.robots import load_robot
 from vftcli.signals.wrench import Wrench
 
@@ -42,9 +35,9 @@ NONE = np.zeros(2, dtype=np.int64)
 
 
 def test_nothing_is_said_of_a_replay_without_trouble() -> None:
-    assert limits_met(TWO, motion(), path(), NONE) == ()
-    assert implausible_travel(PARAMETERS, TWO, motion(), path()) == ()
-    assert arm_moved(np.full((5, 6), 0.005)) == ()
+    assert checks.limits_met(TWO, motion(), path(), NONE) == ()
+    assert checks.implausible_travel(PARAMETERS, TWO, motion(), path()) == ()
+    assert checks.arm_moved(np.full((5, 6), 0.005)) == ()
 
 
 def test_each_limit_is_told_with_its_number_and_its_controller() -> None:
@@ -56,7 +49,7 @@ def test_each_limit_is_told_with_its_number_and_its_controller() -> None:
     x[20:, 1, 0] = np.inf
     clipped[3:6, 0, 2] = clipped[5, 0, 3] = True
     reached[30:40, 1] = False
-    found = limits_met(TWO, motion(x, clipped), path(reached, 1.5), np.array([0, 7]))
+    found = checks.limits_met(TWO, motion(x, clipped), path(reached, 1.5), np.array([0, 7]))
     assert "the first at 3.000 s" in " ".join(str(remark) for remark in found)
     told = {(r.code, r.where.about): dict(r.values) for r in found}
     first, second = (controller.name for controller in TWO)
@@ -78,7 +71,7 @@ def test_travel_counts_where_poses_are_out_of_reach(mode: str, code: str) -> Non
     reached = np.ones((ROWS, 2), dtype=bool)
     reached[10, 1] = False
     parameters = replace(PARAMETERS, threshold_mode=mode)
-    (remark,) = implausible_travel(parameters, TWO, motion(x), path(reached))
+    (remark,) = checks.implausible_travel(parameters, TWO, motion(x), path(reached))
     assert remark.code == code
     assert remark.values["travel_m"] == pytest.approx(1.0)  # not the other controller's 9 m
 
@@ -87,11 +80,11 @@ def test_the_axis_nearest_to_its_threshold_is_named() -> None:
     wrench = np.zeros((10, 6))
     wrench[4, 0], wrench[5, 4] = -10.0, 0.75 * PARAMETERS.threshold[4]
     wrench[6] = np.nan
-    (remark,) = nothing_dragged(wrench, PARAMETERS, dragged=False)
+    (remark,) = checks.nothing_dragged(wrench, PARAMETERS, dragged=False)
     assert remark.values["axis"] == "ry"
     assert remark.values["share"] == pytest.approx(0.75)
-    assert nothing_dragged(wrench, PARAMETERS, dragged=True) == ()
-    assert nothing_dragged(wrench[:0], PARAMETERS, dragged=False) == ()
+    assert checks.nothing_dragged(wrench, PARAMETERS, dragged=True) == ()
+    assert checks.nothing_dragged(wrench[:0], PARAMETERS, dragged=False) == ()
 
 
 def drag(begin: int, release: int, axis: int = 2) -> Drag:
@@ -100,7 +93,7 @@ def drag(begin: int, release: int, axis: int = 2) -> Drag:
 
 def test_a_long_drag_of_an_arm_at_rest_is_told_once_an_axis() -> None:
     logged = np.zeros((100, 6))
-    found = drags_at_rest([drag(0, 30), drag(40, 90), drag(10, 25, axis=0)], logged, 0.1)
+    found = checks.drags_at_rest([drag(0, 30), drag(40, 90), drag(10, 25, axis=0)], logged, 0.1)
     assert [(r.values["axis"], r.values["duration_s"]) for r in found] == [
         ("z", pytest.approx(5.0))
     ]
@@ -110,9 +103,9 @@ def test_a_moving_arm_is_dragged_as_it_should_be() -> None:
     t = np.arange(100) * 0.1
     there = np.zeros((100, 6))
     there[:, 0] = 0.3 * np.sin(2 * np.pi * t / 2.0)  # back where it was after every 2 s
-    assert len(drags_at_rest([drag(0, 90)], there, 0.1)) == 1  # each sample meets itself
+    assert len(checks.drags_at_rest([drag(0, 90)], there, 0.1)) == 1  # each sample meets itself
     there[:, 0] = 0.1 * t
-    assert drags_at_rest([drag(0, 90)], there, 0.1) == ()
+    assert checks.drags_at_rest([drag(0, 90)], there, 0.1) == ()
 
 
 def test_unknown_samples_are_counted() -> None:
@@ -120,13 +113,13 @@ def test_unknown_samples_are_counted() -> None:
     wrench = Wrench(
         name="x", t=np.arange(10.0), values=np.zeros((10, 6)), frame="base", masked=masked
     )
-    (remark,) = unknown_force(wrench)
+    (remark,) = checks.unknown_force(wrench)
     assert remark.values["samples"] == 3
-    assert unknown_force(replace(wrench, masked=np.zeros(10, dtype=bool))) == ()
+    assert checks.unknown_force(replace(wrench, masked=np.zeros(10, dtype=bool))) == ()
 
 
 def test_a_log_that_moves_is_told_how_far() -> None:
     logged = np.zeros((5, 6))
     logged[3, :3], logged[4, 3:] = [0.03, 0.0, 0.04], 1.0
-    (remark,) = arm_moved(logged)
+    (remark,) = checks.arm_moved(logged)
     assert remark.values["distance_m"] == pytest.approx(0.05)

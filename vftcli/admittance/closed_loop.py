@@ -5,7 +5,9 @@ would hold: positions and velocities with noise, and the drive torque averaged o
 interval (or its last instant). Between two control periods the servo holds the last command.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from vftcli.admittance.motion import Recursion
 from vftcli.admittance.online import OnlineKalman
 from vftcli.admittance.replay import deviation_of
 from vftcli.admittance.stability import check_stable
+from vftcli.admittance.thresholds import passing_force
 from vftcli.observers.kalman import KalmanObserver
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
@@ -72,16 +75,15 @@ class ClosedLoop:
         return Wrench(name="controller", t=self.t, values=self.estimate, frame="base")
 
 
-@dataclass(kw_only=True)
-class Log:
-    """What the loop writes down, one row a control period."""
+class Row(NamedTuple):
+    """What the loop writes down of one control period; see `ClosedLoop`."""
 
-    t: list[float]
-    estimate: list[Array]
-    dragged: list[Mask]
-    commanded: list[Array]
-    q: list[Array]
-    reached: list[bool]
+    t: float
+    estimate: Array
+    dragged: Mask
+    commanded: Array
+    q: Array
+    reached: bool
 
 
 class Sensors:
@@ -160,11 +162,8 @@ class Loop:
         size = np.abs(wrench)
         release = p.threshold * (1.0 - np.asarray(p.hysteresis))
         self.dragged = (size > p.threshold) | (self.dragged & (size > release))
-        force = wrench
-        if p.threshold_mode == "soft":
-            force = np.sign(wrench) * np.maximum(size - p.threshold, 0.0)
         x, v, turn = self.law.x.copy(), self.law.v.copy(), self.law.turn.copy()
-        self.law.step(np.where(self.dragged, force, 0.0), self.dragged)
+        self.law.step(np.where(self.dragged, passing_force(wrench, p), 0.0), self.dragged)
         q, self.reached = self.solve(self.law.x[0])
         if self.reached:
             self.q_before, self.q_command = self.q_command, q
@@ -231,7 +230,7 @@ def run_closed_loop(
     arm = still_arm(scenario, controller.parameters.period, seed)
     sensors = Sensors(arm, torque)
     loop = Loop(arm, controller, observer, sensors)
-    log = Log(t=[], estimate=[], dragged=[], commanded=[], q=[], reached=[])
+    log: list[Row] = []
     every_sample = steps_in(sensors.interval, arm.scenario.step, "sampling interval")
     every_control = steps_in(controller.parameters.period, arm.scenario.step, "control period")
     forward = arm.servo.feed_forward(loop.reference)[0]
@@ -239,7 +238,7 @@ def run_closed_loop(
         if k % every_sample == 0:
             loop.sample()
         if k % every_control == 0:
-            write_down(log, loop, zero)
+            log.append(act(loop, zero))
             forward = arm.servo.feed_forward(loop.reference)[0]
             if has_run_away(loop):
                 break
@@ -280,18 +279,14 @@ def steps_in(interval: float, step: float, what: str) -> int:
     return count
 
 
-def write_down(log: Log, loop: Loop, zero: tuple[float, float] | None) -> None:
-    """Act once and write down what happened."""
+def act(loop: Loop, zero: tuple[float, float] | None) -> Row:
+    """Act once, or wait until the span of the zero is over, and write down what happened."""
     t = loop.arm.t
     # A controller that followed its own drift would never find the zero of a still arm.
     waits = zero is not None and t <= zero[1]
     wrench = loop.rest(counts=zero is not None and t >= zero[0]) if waits else loop.control()
-    log.t.append(t)
-    log.estimate.append(wrench)
-    log.dragged.append(loop.dragged.copy())
-    log.commanded.append(loop.law.x[0].copy())
-    log.q.append(loop.arm.q.copy())
-    log.reached.append(loop.reached)
+    commanded, q = loop.law.x[0].copy(), loop.arm.q.copy()
+    return Row(t, wrench, loop.dragged.copy(), commanded, q, loop.reached)
 
 
 def has_run_away(loop: Loop) -> bool:
@@ -301,16 +296,15 @@ def has_run_away(loop: Loop) -> bool:
     return bool(not np.all(np.isfinite(x)) or np.linalg.norm(x[:3]) > FARTHEST or fast)
 
 
-def closed_loop_of(loop: Loop, log: Log, zero: tuple[float, float] | None) -> ClosedLoop:
+def closed_loop_of(loop: Loop, log: Sequence[Row], zero: tuple[float, float] | None) -> ClosedLoop:
     """Put the run together; the truth is the simulator's."""
-    arm, t = loop.arm, np.array(log.t)
-    complete = arm.history.rows == arm.steps
-    simulation = observe(arm) if complete else None
+    arm = loop.arm
+    t, estimate, dragged, commanded, q, reached = map(np.array, zip(*log, strict=True))
+    simulation = observe(arm) if arm.history.rows == arm.steps else None
     truth = np.full((len(t), 6), np.nan)
     if simulation is not None:
         seen = simulation.truth
         truth = resample_columns(t, seen.t, seen.wrench)
-    estimate = np.array(log.estimate)
     if zero is not None:
         estimate[t < zero[0]] = np.nan
     return ClosedLoop(
@@ -318,11 +312,11 @@ def closed_loop_of(loop: Loop, log: Log, zero: tuple[float, float] | None) -> Cl
         t=t,
         estimate=estimate,
         truth=truth,
-        dragged=np.array(log.dragged),
-        commanded=np.array(log.commanded),
-        q=np.array(log.q),
-        moved=deviation_of(loop.solver, loop.start, np.array(log.q)),
-        reached=np.array(log.reached),
+        dragged=dragged,
+        commanded=commanded,
+        q=q,
+        moved=deviation_of(loop.solver, loop.start, q),
+        reached=reached,
         zero=loop.zero,
         simulation=simulation,
     )

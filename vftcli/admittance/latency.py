@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vftcli.admittance.closed_loop import ClosedLoop
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 
 STARTED = 5e-3
 """Displacement of the flange at which it is said to have moved. [m]"""
@@ -80,7 +80,7 @@ def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
     )
 
 
-def first_true(flags: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], start: int) -> int | None:
+def first_true(flags: Mask, start: int) -> int | None:
     """First row from `start` on that is set, or None."""
     found = np.flatnonzero(flags[start:])
     return start + int(found[0]) if found.size else None

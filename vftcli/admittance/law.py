@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vftcli.admittance.parameters import Admittance
-from vftcli.signals.arrays import Array, check_shape, frozen
+from vftcli.signals.arrays import Array, check_shape, seal
 from vftcli.signals.errors import ParameterError
 
 KINDS = ("traditional", "variable")
@@ -36,8 +36,8 @@ class Controller:
     parameters: Admittance
 
     def __post_init__(self) -> None:
+        seal(self, "alpha", "rate", "damping")
         for name in ("alpha", "rate", "damping"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
             check_shape(getattr(self, name), (6,), name, "the controller")
 
     @property

@@ -77,10 +77,9 @@ def rows_of(
     record ends or the next drag begins is None.
     """
     rows = [
-        row
+        row_of(controller, motion, n, drag, wrench)
         for n, controller in enumerate(controllers)
         for drag in drags
-        for row in [row_of(controller, motion, n, drag, wrench)]
     ]
     first = {(r["axis"], r["drag"]): r for r in rows if r["controller"] == "traditional"}
     for row in rows:

@@ -171,13 +171,17 @@ def from_table(
     plain = {name: table[name] for name in PLAIN if name in table}
     plain |= {k: v for k, v in settings.get("admittance", {}).items() if k in PLAIN}
     check_complete(values, plain, robot, has_table=bool(table))
-    return Admittance(
-        **{name: value for name, value in values.items() if name != "xi"},
-        xi=filled_xi(values),
+    xi = values.pop("xi", None)
+    found = Admittance(
+        **values,
         period=number(plain["period"], "admittance.period"),
         threshold_mode=str(plain.get("threshold_mode", "hard")),
         source=str(plain.get("source", "")),
     )
+    if xi is None:
+        return found
+    # Axes without a ξ of their own keep that of the drag phase.
+    return replace(found, xi=np.where(np.isnan(xi), found.damping_ratio, xi))
 
 
 PLAIN = ("period", "threshold_mode", "source", "start", "confidence")
@@ -227,17 +231,6 @@ def check_complete(
             f"{robot}: no admittance.period; give the control period [s] in its [admittance] or "
             "with --set admittance.period=0.008"
         )
-
-
-def filled_xi(values: Mapping[str, Array]) -> Array | None:
-    """ξ where it is given, and B_d/(2√(M_d K_d)) on the other axes; None where it is on none."""
-    xi = values.get("xi")
-    if xi is None:
-        return None
-    # A wrong sign is refused by the type, with the axis's name; here it must only not be rooted.
-    product = np.where(values["mass"] * values["stiffness"] > 0, values["mass"], np.nan)
-    own = values["damping"] / (2.0 * np.sqrt(product * values["stiffness"]))
-    return np.where(np.isnan(xi), own, xi)
 
 
 def number(value: Any, what: str) -> float:  # noqa: ANN401 - TOML is untyped
@@ -301,18 +294,13 @@ def release_deviation(assignments: Sequence[str]) -> Array:
         ParameterError: If an axis is unknown, or a value is no finite number.
     """
     x = np.zeros(6)
+    form = f"AXIS=VALUE with an axis of {', '.join(AXES)}, as x=0.3 [m] or rz=0.5 [rad]"
     for part in ",".join(assignments).split(","):
-        axis, equals, text = part.partition("=")
-        try:
-            value = float(text)
-        except ValueError:
-            value = np.nan
-        if not equals or axis.strip() not in AXES or not np.isfinite(value):
-            raise ParameterError(
-                f"--release {part!r} is not AXIS=VALUE with an axis of {', '.join(AXES)}, as x=0.3 "
-                "[m] or rz=0.5 [rad]"
-            )
-        x[AXES.index(axis.strip())] = value
+        axis, text = assignment(part, "--release", form)
+        value = numbers(text)
+        if axis not in AXES or value is None or not np.isfinite(value[0]):
+            raise ParameterError(f"--release {part!r} is not {form}")
+        x[AXES.index(axis)] = value[0]
     if np.any(np.linalg.norm(x[3:]) >= np.pi):
         raise ParameterError(
             f"--release turns by {np.linalg.norm(x[3:]):.3g} rad; it must be less than π"

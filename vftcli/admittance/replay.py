@@ -1,15 +1,15 @@
 """Replay: one force record, or one release, through several controllers, and what came of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from vftcli.admittance.joints import FlangeSolver, JointPath, follow
 from vftcli.admittance.law import Controller, energy, printed_energy
-from vftcli.admittance.metrics import drags_of, releases_of, rows_of
-from vftcli.admittance.motion import AxisMotion, run
+from vftcli.admittance.metrics import Drag, drags_of, releases_of, rows_of
+from vftcli.admittance.motion import AxisMotion, release, run
 from vftcli.admittance.parameters import Admittance
 from vftcli.admittance.replay_checks import (
     arm_moved,
@@ -75,13 +75,13 @@ class Replay:
     parameters: Admittance
     controllers: tuple[Controller, ...]
     verdicts: tuple[Verdict, ...]
-    source: Remark
+    source: Remark = field(default_factory=lambda: fact("force-of-release"))
     start: Array
     wrench: Array
     phases: Phases
     motion: AxisMotion
     path: JointPath
-    logged: Array | None
+    logged: Array | None = None
     lyapunov: Lyapunov
     rows: tuple[dict[str, Any], ...]
     remarks: tuple[Remark, ...]
@@ -118,36 +118,25 @@ def replay(
     clock, (force, q) = on_control_clock(wrench.t, (wrench.known, q), parameters.period)
     start = solver.check_start(q[0])
     split = phases(force, parameters)
-    motion = started_at(run(controllers, split.force, split.dragged), float(clock[0]))
-    path = follow(solver, start, motion.x, parameters.period)
+    motion = run(controllers, split.force, split.dragged)
+    motion = replace(motion, t=motion.t + clock[0])
     drags = drags_of(split, parameters.period)
-    logged = deviation_of(solver, start, q)
-    rows = rows_of(controllers, motion, drags, np.nan_to_num(force))
-    lyapunov = lyapunov_along(controllers, motion, split.dragged)
-    remarks = (
-        *unknown_force(wrench),
-        *complaints,
-        *nothing_dragged(force, parameters, bool(drags)),
-        *drags_at_rest(drags, logged, parameters.period),
-        *limits_met(controllers, motion, path, lyapunov.rises),
-        *implausible_travel(parameters, controllers, motion, path),
-        *arm_moved(logged),
+    found = judge_motion(
+        solver, start, parameters, controllers, verdicts, motion, split, drags, force
     )
-    return Replay(
-        robot=robot,
-        parameters=parameters,
-        controllers=tuple(controllers),
-        verdicts=verdicts,
+    logged = deviation_of(solver, start, q)
+    return replace(
+        found,
         source=source,
-        start=start,
-        wrench=force,
-        phases=split,
-        motion=motion,
-        path=path,
         logged=logged,
-        lyapunov=lyapunov,
-        rows=tuple(rows),
-        remarks=remarks,
+        remarks=(
+            *unknown_force(wrench),
+            *complaints,
+            *nothing_dragged(force, parameters, bool(drags)),
+            *drags_at_rest(drags, logged, parameters.period),
+            *found.remarks,
+            *arm_moved(logged),
+        ),
     )
 
 
@@ -184,29 +173,53 @@ def replay_release(
     verdicts, complaints = check_stable(controllers, force_unstable=force_unstable, release=x)
     solver = FlangeSolver(robot)
     q = solver.check_start(start)
-    length = duration or settling(controllers, x)
-    steps = int(np.ceil(length / parameters.period - 1e-9))
-    force, dragged = np.zeros((steps, 6)), np.zeros((steps, 6), dtype=bool)
-    motion = run(controllers, force, dragged, x)
-    path = follow(solver, q, motion.x, parameters.period)
-    lyapunov = lyapunov_along(controllers, motion, dragged)
-    rows = rows_of(controllers, motion, releases_of(x, steps + 1), force)
+    motion = release(controllers, x, duration or settling(controllers, x))
+    force = np.zeros((len(motion.t) - 1, 6))
+    still = Phases(np.zeros_like(force, dtype=bool), force)
+    drags = releases_of(x, len(motion.t))
+    found = judge_motion(solver, q, parameters, controllers, verdicts, motion, still, drags, force)
+    return replace(found, remarks=(*complaints, *found.remarks))
+
+
+def judge_motion(
+    solver: FlangeSolver,
+    start: Array,
+    parameters: Admittance,
+    controllers: Sequence[Controller],
+    verdicts: tuple[Verdict, ...],
+    motion: AxisMotion,
+    split: Phases,
+    drags: Sequence[Drag],
+    force: Array,
+) -> Replay:
+    """Follow a motion with the joints, and tell its energies, its figures and what limits it met.
+
+    Args:
+        solver: The arm's.
+        start: Joint positions of the target pose. (n,) [rad]
+        parameters: Shared parameters.
+        controllers: The controllers.
+        verdicts: Their stability.
+        motion: Their motion.
+        split: The phases of the force.
+        drags: Its drags.
+        force: Force on the robot, NaN where unknown. (T, 6) [N, N·m]
+    """
+    path = follow(solver, start, motion.x, parameters.period)
+    lyapunov = lyapunov_along(controllers, motion, split.dragged)
     return Replay(
-        robot=robot,
+        robot=solver.robot,
         parameters=parameters,
         controllers=tuple(controllers),
         verdicts=verdicts,
-        source=fact("force-of-release"),
-        start=q,
+        start=start,
         wrench=force,
-        phases=Phases(dragged, force),
+        phases=split,
         motion=motion,
         path=path,
-        logged=None,
         lyapunov=lyapunov,
-        rows=tuple(rows),
+        rows=tuple(rows_of(controllers, motion, drags, np.nan_to_num(force))),
         remarks=(
-            *complaints,
             *limits_met(controllers, motion, path, lyapunov.rises),
             *implausible_travel(parameters, controllers, motion, path),
         ),
@@ -243,11 +256,6 @@ def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[
     return clock, [column[newest] for column in values]
 
 
-def started_at(motion: AxisMotion, begin: float) -> AxisMotion:
-    """The same motion on a clock that starts at `begin`. [s]"""
-    return AxisMotion(t=motion.t + begin, x=motion.x, v=motion.v, clipped=motion.clipped)
-
-
 def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
     """Where the log's own arm was, as a deviation from the start pose. (T, 6) [m, rad]"""
     from vftcli.robots.kinematics import link_poses
@@ -270,7 +278,6 @@ def lyapunov_along(
             corrected[:, n] = energy(controller, motion.x[:, n], motion.v[:, n])
             printed[:, n] = printed_energy(controller, motion.x[:, n], motion.v[:, n])
     recovering = np.concatenate([~dragged[:1], ~dragged]) if len(dragged) else np.ones((1, 6), bool)
-    recovering[1:] &= True
     rises = np.array([count_rises(corrected[:, n], ~dragged) for n in range(shape[1])])
     for values in (corrected, printed):
         values[~np.broadcast_to(recovering[:, None, :], shape)] = np.nan

@@ -51,22 +51,21 @@ class Verdict(NamedTuple):
         Args:
             safe: Axes whose lack of a speed limit does not matter, None for none. (6,)
         """
-        where = Where(self.controller.name)
-        found = [
-            warning("law-unstable-in-drag", where, axis=AXES[k], number=float(self.drag[k]))
-            for k in np.flatnonzero(self.drag >= DISCRETE_BOUND)
-        ]
+        where, risky = Where(self.controller.name), ~self.limited & np.isfinite(self.escape)
         # Without a speed limit the number is infinite, and the escape says what that means.
-        found += [
-            warning("law-unstable-at-limit", where, axis=AXES[k], number=float(self.recovery[k]))
-            for k in np.flatnonzero((self.recovery >= DISCRETE_BOUND) & self.limited)
-        ]
-        escapes = (
-            ~self.limited & np.isfinite(self.escape) & ~np.asarray(False if safe is None else safe)
+        at_limit = (self.recovery >= DISCRETE_BOUND) & self.limited
+        numbers = (
+            ("law-unstable-in-drag", self.drag >= DISCRETE_BOUND, self.drag),
+            ("law-unstable-at-limit", at_limit, self.recovery),
         )
+        found = [
+            warning(code, where, axis=AXES[k], number=float(number[k]))
+            for code, wrong, number in numbers
+            for k in np.flatnonzero(wrong)
+        ]
         found += [
             warning("law-escapes", where, axis=AXES[k], bound=float(self.escape[k]), unit=UNITS[k])
-            for k in np.flatnonzero(escapes)
+            for k in np.flatnonzero(risky if safe is None else risky & ~safe)
         ]
         return tuple(found)
 

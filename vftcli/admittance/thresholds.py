@@ -35,10 +35,15 @@ def phases(wrench: Array, parameters: Admittance) -> Phases:
     size = np.abs(wrench)
     release = parameters.threshold * (1.0 - np.asarray(parameters.hysteresis))
     dragged = held(size > parameters.threshold, size <= release)
-    force = wrench
-    if parameters.threshold_mode == "soft":
-        force = np.sign(wrench) * np.maximum(size - parameters.threshold, 0.0)
-    return Phases(dragged, np.where(dragged, force, 0.0))
+    return Phases(dragged, np.where(dragged, passing_force(wrench, parameters), 0.0))
+
+
+def passing_force(wrench: Array, parameters: Admittance) -> Array:
+    """The force that enters the law on a dragged axis, by the threshold's mode. (…, 6) [N, N·m]"""
+    if parameters.threshold_mode == "hard":
+        return wrench
+    excess: Array = np.sign(wrench) * np.maximum(np.abs(wrench) - parameters.threshold, 0.0)
+    return excess
 
 
 def held(on: Mask, off: Mask) -> Mask:

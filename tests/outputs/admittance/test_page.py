@@ -1,9 +1,21 @@
 import json
 import re
 
+import numpy as np
+import pytest
+
+from vftcli.admittance.law import variable
+from vftcli.admittance.parameters import from_table
 from vftcli.admittance.replay import Replay
+from vftcli.admittance.stability import judge
 from vftcli.outputs.admittance.files import admittance_record
-from vftcli.outputs.admittance.page import UNITS, payload, render_admittance
+from vftcli.outputs.admittance.page import (
+    UNITS,
+    deviations_from_paper,
+    payload,
+    render_admittance,
+)
+from vftcli.robots import load_robot
 
 
 def test_the_page_shows_every_part(release: Replay) -> None:
@@ -42,3 +54,23 @@ def test_without_a_drag_the_page_says_so(release: Replay) -> None:
     still = replace(release, rows=())
     page = render_admittance(still, admittance_record(still, None, None, ""), "r")
     assert "No axis was dragged." in page
+
+
+def parameters(name: str):
+    return from_table(load_robot(name).admittance, name, {})
+
+
+@pytest.mark.parametrize(
+    ("name", "figures"), [("ur5", ("0.510", "0.671")), ("panda", ("2.74", "1.06"))]
+)
+def test_damping_ratios(name: str, figures: tuple[str, str]) -> None:
+    ratio = parameters(name).damping_ratio
+    for value, figure in zip((ratio[0], ratio[3]), figures, strict=True):
+        assert figure in deviations_from_paper()["ξ is stated."]
+        assert value == pytest.approx(float(figure), abs=0.5 * 10.0 ** -len(figure.split(".")[1]))
+
+
+def test_the_escape_bound_of_the_ur5s_rotation() -> None:
+    assert "18°" in deviations_from_paper()["Rotation has a speed limit."]
+    bound = judge(variable(parameters("ur5"))).escape[3]
+    assert np.degrees(bound) == pytest.approx(18.0, abs=0.5)

@@ -1,12 +1,13 @@
 """The page of an admittance replay: Figs 6/9, 7/10, 12/13 and Tables III/IV for the user's log."""
 
+import tomllib
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vftcli.admittance.closed_loop import ClosedLoop
-from vftcli.admittance.deviations_from_paper import DIFFERENCES
 from vftcli.admittance.law import Controller
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
@@ -37,12 +38,18 @@ UNITS = {"x": ("m", "rad"), "v": ("m/s", "rad/s"), "force": ("N", "N·m"), "ener
 """Chart → unit of a translational and of a rotational axis."""
 
 
+def deviations_from_paper() -> dict[str, str]:
+    """What is done otherwise than in the paper → why, from the table beside this file."""
+    text = Path(__file__).with_name("deviations_from_paper.toml").read_text(encoding="utf-8")
+    return {entry["what"]: entry["why"] for entry in tomllib.loads(text)["difference"]}
+
+
 def render_admittance(
     replay: Replay, record: Mapping[str, Any], title: str, run: ClosedLoop | None = None
 ) -> str:
     """The page: self-contained, nothing is loaded from anywhere."""
     text = f"Admittance replay on {replay.robot.title or replay.robot.name}: {replay.source}"
-    differences = bullets(f"{what} {why}" for what, why in DIFFERENCES)
+    differences = bullets(f"{what} {why}" for what, why in deviations_from_paper().items())
     parts = (
         headline(title, text),
         facts_section(replay),
