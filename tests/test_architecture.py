@@ -47,7 +47,7 @@ FILES = (
     "cli/",  # asks before it overwrites
     "outputs/",
     "readers/",
-    "observers/gains_file.py",
+    "observers/settings.py",  # gains in a file of their own
     "robots/profile.py",
     "robots/robot.py",
     "robots/urdf.py",

@@ -1,4 +1,7 @@
-"""Where observer parameters come from: the command line, the robot file, and what is left over."""
+"""Where observer parameters come from: the command line, the robot file, a file of gains, and what
+is left over; and what goes over what."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +15,8 @@ from vftcli.observers import (
     build_observers,
     observer_settings,
 )
+from vftcli.observers.settings import load_gains, overlay_gains
+from vftcli.observers.table import sections
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 
@@ -61,18 +66,19 @@ def test_a_bare_robot_gets_ten_per_second_and_is_told() -> None:
     assert "10" in str(remarks[0])
 
 
-@pytest.mark.parametrize(
-    ("assignment", "words"),
-    [
-        ("gmo.gain", "is not OBSERVER.PARAMETER=VALUE"),
-        ("gmo.gian=3", "Did you mean gain"),
-        ("gm.gain=3", "Did you mean gmo"),
-        ("gmo.gain=fast", "is not a number"),
-        ("gmo.gain=1,nan,3,4,5,6", "must be finite"),
-    ],
-)
-def test_a_malformed_assignment_says_what_is_wrong(assignment: str, words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
+MALFORMED = {
+    "gmo.gain": "is not OBSERVER.PARAMETER=VALUE",
+    "gmo.gian=3": "Did you mean gain",
+    "gm.gain=3": "Did you mean gmo",
+    "gmo.gain=fast": "is not a number",
+    "gmo.gain=1,nan,3,4,5,6": "must be finite",
+}
+"""Assignment → what is said of it."""
+
+
+@pytest.mark.parametrize("assignment", MALFORMED)
+def test_a_malformed_assignment_says_what_is_wrong(assignment: str) -> None:
+    with pytest.raises(ParameterError, match=MALFORMED[assignment]):
         observer_settings([assignment])
 
 
@@ -86,3 +92,40 @@ def test_another_number_of_gains_is_refused() -> None:
 def test_an_unknown_observer_lists_what_there_is() -> None:
     with pytest.raises(ParameterError, match="there is fdo, gmo, kfo-fe, kfo-zoh"):
         build_observers(["kalman"], setup("ur5"))
+
+
+def test_sections_are_read_as_a_robot_file_s(tmp_path: Path) -> None:
+    path = tmp_path / "gains.toml"
+    path.write_text("[observers.gmo]\ngain = [1.0, 2.0]\n[observers.kfo-rts]\nr_diag = 0.1\n")
+    assert load_gains(path, sections()) == {
+        "gmo": {"gain": [1.0, 2.0]},
+        "kfo-rts": {"r_diag": 0.1},
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("not toml", "not a TOML file of gains"),
+        ("gain = 1.0", r"no \[observers"),
+        ("[observers]\ngain = 1.0", r"no \[observers"),
+        ("[observers.gmoo]\ngain = 1.0", "Did you mean gmo"),
+        ("[observers.gmo]\ngian = 1.0", "Did you mean gain"),
+    ],
+)
+def test_what_is_no_gains_file_is_refused(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "gains.toml"
+    path.write_text(text)
+    with pytest.raises(ParameterError, match=words):
+        load_gains(path, sections())
+
+
+def test_the_upper_layer_wins_parameter_by_parameter() -> None:
+    under = {"kfo": {"r_diag": 1.0, "q_p_diag": 2.0}, "fdo": {"omega": 3.0}}
+    over = {"kfo": {"r_diag": 9.0}, "gmo": {"gain": 4.0}}
+    assert overlay_gains(under, over) == {
+        "kfo": {"r_diag": 9.0, "q_p_diag": 2.0},
+        "fdo": {"omega": 3.0},
+        "gmo": {"gain": 4.0},
+    }
+    assert under["kfo"]["r_diag"] == 1.0  # the robot's own is left alone

@@ -1,12 +1,12 @@
 """What a user may choose of the observers: which run, with which gains, in which form."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from vftcli.observers.observer import Observer
-from vftcli.observers.settings import Settings
+from vftcli.observers.settings import Gains, Settings, load_gains, overlay_gains
 from vftcli.observers.table import (
     DEFAULT,
     OBSERVERS,
@@ -118,10 +118,8 @@ class ObserverChoice:
         observers, on_match = match_observers(observers, self.match, setup)
         return observers, (*remarks, *on_match)
 
-    def gains_over(self, gains: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Mapping[str, Any]]:
+    def gains_over(self, gains: Gains) -> Gains:
         """A robot's gains with those of the gains file put over them."""
         if self.gains_file is None:
             return gains
-        from vftcli.observers.gains_file import load_gains, overlay_gains
-
         return overlay_gains(gains, load_gains(self.gains_file, sections()))

@@ -1,6 +1,8 @@
 """Observer parameters: what the command line sets, what the robot file gives, what is left over."""
 
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,9 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import assignment, did_you_mean, numbers
 
 Value = float | str | list[float]
+Gains = Mapping[str, Mapping[str, Any]]
+"""Section of a file → parameter → number, list or word."""
+
 Settings = dict[str, dict[str, Value]]
 """Section ("fdo", "gmo", "kfo", or one observer's own name) → parameter → value."""
 
@@ -76,6 +81,38 @@ def parse_value(parameter: str, text: str, whole: str) -> Value:
     if not all(np.isfinite(values)):
         raise ParameterError(f"--set {whole!r}: every number must be finite")
     return values[0] if len(values) == 1 else list(values)
+
+
+def load_gains(path: Path, sections: Mapping[str, Sequence[str]]) -> Gains:
+    """Read gains from a file of their own, ``[observers.*]`` as in a robot file.
+
+    Args:
+        path: A TOML file with ``[observers.SECTION]`` tables.
+        sections: Sections and parameters there are.
+
+    Raises:
+        ParameterError: If it is no such file, or names a section or parameter there is not.
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ParameterError(f"{path}: not a TOML file of gains: {error}") from None
+    gains = document.get("observers")
+    if not isinstance(gains, dict) or not all(isinstance(v, dict) for v in gains.values()):
+        raise ParameterError(
+            f"{path}: no [observers.*] tables; a gains file is what vftcli tune writes, as "
+            "[observers.gmo] gain = 10.0"
+        )
+    for section, table in gains.items():
+        for parameter in table:
+            check_name(section, parameter, sections)
+    return gains
+
+
+def overlay_gains(under: Gains, over: Gains) -> Gains:
+    """Gains of one source with those of another put over them, parameter by parameter."""
+    names = dict.fromkeys((*under, *over))
+    return {name: {**under.get(name, {}), **over.get(name, {})} for name in names}
 
 
 def parameters_given(

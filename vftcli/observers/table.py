@@ -1,7 +1,7 @@
 """The table of observers: what each is called, and how it is built from what was given."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer, per_joint
 from vftcli.observers.settings import (
     PARAMETERS,
+    Gains,
     Settings,
     joint_values,
     parameters_given,
@@ -39,7 +40,7 @@ class Setup(NamedTuple):
         spectra: What the log shows of noise and contact, None where its free part is not known.
     """
 
-    gains: Mapping[str, Mapping[str, Any]]
+    gains: Gains
     settings: Settings
     joints: int
     step: float
