@@ -38,7 +38,7 @@ def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off(drive: 
     np.testing.assert_allclose(corrected.tau, PUSH, atol=1e-9)
     plain = difference(loaded, [pairing], "period", None)
     np.testing.assert_allclose(plain.tau, FREE_MODEL - MODEL + PUSH, atol=1e-9)
-    assert np.all(corrected.floor < plain.floor)
+    assert np.all(corrected.error.floor < plain.error.floor)
 
 
 def test_rungs_without_their_clock_are_left_out(drive: Make) -> None:

@@ -51,7 +51,7 @@ def tune_gains(
     from vftcli.outputs.listings import tuned_grid
     from vftcli.outputs.log.run_record import jsonable
     from vftcli.pipeline import AnalysisChoice, model, read
-    from vftcli.refinement.tuning import gains_document, parse_goal, tune_all
+    from vftcli.refinement.tuning import parse_goal, tune_all
     from vftcli.repetition.free_run import Models
     from vftcli.robots.writing import lines_of
     from vftcli.signals.errors import ParameterError
@@ -73,7 +73,8 @@ def tune_gains(
     tuned = tune_all(found.spectra, wanted)
     heading = [command_line(), f"goal: {goal}", f"robot: {arm.name}", *notes]
     comments = "".join(f"# {line}\n" for line in heading)
-    write_text(output, comments + "".join(lines_of(gains_document(tuned))), force)
+    gains = {"observers": {line.section: dict(line.gains) for line in tuned}}
+    write_text(output, comments + "".join(lines_of(gains)), force)
     if json:
         rows = [jsonable({**line._asdict()}) for line in tuned]
         say_json({"goal": goal, "notes": notes, "observers": rows})

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.observers.spectra import Spectra
 from vftcli.refinement.baseline import Baseline, FreeReading
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.arrays import Array, Mask
@@ -37,7 +38,7 @@ class Budget(NamedTuple):
         return np.asarray(np.sqrt(np.sum(squares, axis=0)))
 
 
-def budget(found: Baseline, reading: FreeReading) -> Budget:
+def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
     """Divide an observer's error into its causes, each estimated from the log.
 
     Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. What else the observer
@@ -45,11 +46,8 @@ def budget(found: Baseline, reading: FreeReading) -> Budget:
     velocity explain it, the rest of the model otherwise. Stiction at rest is the dry friction a
     standing joint may hide, F_c/√3, times the share of the time that it stands.
     """
-    name, spectra = reading.observer.name, found.spectra
-    n = found.terms.joints
-    if spectra is None:
-        return Budget(name, {cause: np.zeros(n) for cause in CAUSES})
-    response = reading.observer.frequency_response(spectra.frequency, spectra.step, n)
+    observer = reading.observer
+    response = observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
     read = reading.rms**2
     share: Array = np.abs(response) ** 2
     noise = np.minimum(np.sum(spectra.floor * share, axis=0) * spectra.width, read)
@@ -66,7 +64,7 @@ def budget(found: Baseline, reading: FreeReading) -> Budget:
         "bandwidth": spectra.missed(response),
         STICTION: hidden,
     }
-    return Budget(name, {cause: np.sqrt(value) for cause, value in squares.items()})
+    return Budget(observer.name, {cause: np.sqrt(value) for cause, value in squares.items()})
 
 
 def friction_share(dq: Array, tau: Array) -> Array:

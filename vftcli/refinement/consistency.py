@@ -38,7 +38,7 @@ class Consistency(NamedTuple):
         inside: Share of ν²/S below its 95 % bound. (n,)
         correlation: Autocorrelation of ν one sample apart, 0 for a true model. (n,)
         coloured: Share of the first 20 lags beyond 95 % of white noise, 0.05 for a true model. (n,)
-        loudest: Frequency below which half of the free part's power lies. (n,) [Hz]
+        loudest: Frequency below which half of S_n's power lies, NaN without spectra. (n,) [Hz]
     """
 
     name: str
@@ -65,13 +65,17 @@ def consistency(
     nis = nu**2 / (settled.prior.p11 + model.r)
     lags = autocorrelation(nu)
     bound = 1.96 / np.sqrt(len(nu))
+    loudest = np.full(n, np.nan)
+    if found.spectra is not None:
+        total = np.cumsum(found.spectra.free, axis=0)
+        loudest = found.spectra.frequency[np.argmax(total >= 0.5 * total[-1], axis=0)]
     return Consistency(
         name=observer.name,
         nis=np.asarray(nis.mean(axis=0)),
         inside=np.asarray(np.mean(nis <= CHI_SQUARE_95, axis=0)),
         correlation=lags[0],
         coloured=np.asarray(np.mean(np.abs(lags) > bound, axis=0)),
-        loudest=half_power(found),
+        loudest=loudest,
     )
 
 
@@ -79,12 +83,3 @@ def autocorrelation(x: Array) -> Array:
     """Correlation of a series with itself 1…`LAGS` samples later. (LAGS, n)"""
     power = np.maximum(np.sum(x**2, axis=0), np.finfo(float).tiny)
     return np.array([np.sum(x[k:] * x[:-k], axis=0) / power for k in range(1, LAGS + 1)])
-
-
-def half_power(found: Baseline) -> Array:
-    """Frequency below which half of the power of S_n lies, NaN without spectra. (n,) [Hz]"""
-    spectra = found.spectra
-    if spectra is None:
-        return np.full(found.terms.joints, np.nan)
-    total = np.cumsum(spectra.free, axis=0)
-    return np.asarray(spectra.frequency[np.argmax(total >= 0.5 * total[-1], axis=0)])

@@ -61,15 +61,14 @@ def refine(
     readings = [free_reading(found, observer, estimate) for observer, estimate in pairs]
     banded = [reading._replace(estimate=with_band(found, reading)) for reading in readings]
     finished = remove(found, banded)
-    budgets: tuple[Budget, ...] = ()
-    if found.spectra is not None:
-        budgets = tuple(budget(found, reading) for reading in readings)
+    spectra = found.spectra
+    budgets = [] if spectra is None else [budget(found, spectra, reading) for reading in readings]
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
     return Refinement(
         estimates=finished.estimates,
         baseline=found,
         curves=curves,
-        budgets=budgets,
+        budgets=tuple(budgets),
         consistency=tuple(c for o, e in pairs if (c := consistency(found, o, e)) is not None),
         removed=removal,
         remarks=(

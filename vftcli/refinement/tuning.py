@@ -228,8 +228,3 @@ def crossings(power: Array, frequency: Array, threshold: Array) -> Array:
     sides = [np.exp(-((threshold - m) ** 2) / (2.0 * variance)) for m in (offset, -offset)]
     beyond = np.where(offset >= threshold, np.inf, 0.0)
     return np.asarray(3600.0 * often * (sides[0] + sides[1]) + beyond)
-
-
-def gains_document(lines: tuple[Tuned, ...]) -> dict[str, Any]:
-    """The ``[observers.*]`` tables of a gains file."""
-    return {"observers": {line.section: dict(line.gains) for line in lines}}

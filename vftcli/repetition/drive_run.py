@@ -23,25 +23,25 @@ class DriveRun:
         t: Clock. (T,) [s]
         q: Joint positions. (T, n) [rad]
         dq: Joint velocities. (T, n) [rad/s]
+        standing: Where a joint stands still. (T, n)
+        standstill_s: Length of the stop a sample belongs to, 0 where the joint moves. (T, n) [s]
         torque: Drive torque. (T, n) [N·m]
         model: Drive torque the model expects of the motion without contact, ṗ − Cᵀq̇ + g + F_f,
             with ṗ by central differences. (T, n) [N·m]
         momentum: p = M q̇. (T, n) [kg·m²/s]
         coulomb: Dry friction of each joint by the robot's model, 0 without one. (n,) [N·m]
-        standstill_s: Length of the stop a sample belongs to, 0 where the joint moves. (T, n) [s]
-        standing: Where a joint stands still. (T, n)
     """
 
     name: str
     t: Array
     q: Array
     dq: Array
+    standing: Mask
+    standstill_s: Array
     torque: Array
     model: Array
     momentum: Array
     coulomb: Array
-    standstill_s: Array
-    standing: Mask
 
     @property
     def step(self) -> float:

@@ -168,8 +168,8 @@ def white(x: Array, moving: Mask) -> Array:
 def rms(x: Array, where: Mask) -> Array:
     """Root mean square of each column over the chosen samples, over all if none is. (n,)"""
     where = np.where(np.any(where, axis=0), where, True)
-    result: Array = np.sqrt(np.sum(np.where(where, x**2, 0.0), axis=0) / np.sum(where, axis=0))
-    return result
+    square = np.sum(np.where(where, x**2, 0.0), axis=0) / np.sum(where, axis=0)
+    return np.asarray(np.sqrt(square))
 
 
 def local_rms(x: Array, step: float) -> Array:
@@ -178,8 +178,7 @@ def local_rms(x: Array, step: float) -> Array:
     total = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(x**2, axis=0)])
     here = np.arange(len(x))
     first, last = np.maximum(here - width, 0), np.minimum(here + width + 1, len(x))
-    result: Array = np.sqrt((total[last] - total[first]) / (last - first)[:, None])
-    return result
+    return np.asarray(np.sqrt((total[last] - total[first]) / (last - first)[:, None]))
 
 
 def stopped(motion: DriveRun, pairings: Sequence[Pairing]) -> Array:

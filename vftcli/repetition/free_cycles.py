@@ -59,8 +59,9 @@ def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
     also = [
         c for c in range(cycles.whole) if c == freest or differs_by_noise(motion, cycles, freest, c)
     ]
-    if len(also) == cycles.whole:
-        also = also[:-1] if len(also) > 1 else also
+    if len(also) == cycles.whole > 1:
+        # Something must be left that the free cycles can be laid under.
+        also.pop()
     return FreeCycles(tuple(also), residual)
 
 
@@ -72,8 +73,7 @@ def residuals(motion: DriveRun, cycles: Cycles) -> Array:
     number = cycles.number(motion.t)
     square = np.array([np.mean(gap[number == c] ** 2, axis=0) for c in range(cycles.whole)])
     relative = np.sqrt(square / np.maximum(square.min(axis=0), 1e-12))
-    mean: Array = relative.mean(axis=1)
-    return mean
+    return np.asarray(relative.mean(axis=1))
 
 
 def differs_by_noise(motion: DriveRun, cycles: Cycles, freest: int, other: int) -> bool:
@@ -83,4 +83,4 @@ def differs_by_noise(motion: DriveRun, cycles: Cycles, freest: int, other: int) 
     pairing = pairing._replace(times=np.where(only, pairing.times, np.nan))
     found = difference(motion, [pairing], "model", band(motion.step, None)[0])
     shown = np.sqrt(np.nanmean(found.tau**2, axis=0))
-    return bool(np.all(shown <= ALIKE * found.floor))
+    return bool(np.all(shown <= ALIKE * found.error.floor))

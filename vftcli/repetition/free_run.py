@@ -87,11 +87,6 @@ class FreeRun:
     run: ModelledRun
     log: ModelledRun
 
-    @property
-    def recording(self) -> Recording:
-        """The free run as it was read."""
-        return self.run.recording
-
     @cached_property
     def _alignment(self) -> "Alignment | ReferenceTorqueError":
         from vftcli.repetition.alignment import align
@@ -100,6 +95,11 @@ class FreeRun:
             return align(self.log.recording, self.recording)
         except ReferenceTorqueError as error:
             return error
+
+    @property
+    def recording(self) -> Recording:
+        """The free run as it was read."""
+        return self.run.recording
 
     @property
     def is_same_motion(self) -> bool:

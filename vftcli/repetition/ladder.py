@@ -68,11 +68,6 @@ class Difference(NamedTuple):
             return fact(code, rung=self.rung, **values)
         return fact(f"{code}-filtered", rung=self.rung, cutoff_Hz=self.cutoff, **values)
 
-    @property
-    def floor(self) -> Array:
-        """Expected root-mean-square error. (n,) [N·m]"""
-        return self.error.floor
-
 
 def differences(
     motion: DriveRun,
@@ -130,11 +125,11 @@ def most_certain(made: Sequence[Difference]) -> Difference:
 
     Compared is the mean over trusted joints of expected error relative to the lowest rung's.
     """
-    lowest = made[0].floor
+    lowest = made[0].error.floor
     trusted = made[0].error.trusted_joints
     chosen, least = made[0], 1.0
     for candidate in made[1:]:
-        share = float(np.mean((candidate.floor / lowest)[trusted]))
+        share = float(np.mean((candidate.error.floor / lowest)[trusted]))
         if share < WORTH * least:
             chosen, least = candidate, share
     return chosen

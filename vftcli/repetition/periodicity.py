@@ -66,7 +66,7 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     x = resample_columns(np.arange(t[0], t[-1], step), t, q)
     spread = float(np.sqrt(np.mean((x - x.mean(axis=0)) ** 2) * x.shape[1]))
     closest = (float("nan"), float("inf"))
-    for lag in valleys(distances(x), len(x), step, stated):
+    for lag in valleys(distances(x), step, stated):
         seconds, deviation = lag * step, returned(t, q, lag * step)
         if deviation <= SHORTLIST * spread:
             seconds = refined_period(t, q, seconds)
@@ -74,7 +74,17 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
         if deviation <= RETURNS * spread:
             return Period(seconds, deviation)
         closest = min(closest, (seconds, deviation), key=lambda c: c[1])
-    raise ReferenceTorqueError(no_repetition(recording, closest, stated))
+    wanted = f" near {stated:g} s" if stated is not None else ""
+    seconds, deviation = closest
+    near = (
+        f" (closest after {seconds:.4g} s, where three quarters of them are more than "
+        f"{deviation:.2g} rad off)"
+    )
+    raise ReferenceTorqueError(
+        f"{recording.name}: no repetition found{wanted}: the joint positions do not return within "
+        f"the log{near if np.isfinite(deviation) else ''}; give a free run of the same motion "
+        "with --free"
+    )
 
 
 def check_stated(recording: Recording, stated: float | None, duration: float) -> None:
@@ -129,13 +139,12 @@ def distances(x: Array) -> Array:
     energy = np.concatenate([[0.0], np.cumsum(np.sum(x**2, axis=1))])
     lag = np.arange(samples)
     total = energy[samples - lag] + energy[samples] - energy[lag] - 2.0 * product
-    mean: Array = np.maximum(total, 0.0) / (samples - lag)
-    return mean
+    return np.asarray(np.maximum(total, 0.0) / (samples - lag))
 
 
-def valleys(distance: Array, samples: int, step: float, stated: float | None) -> list[float]:
+def valleys(distance: Array, step: float, stated: float | None) -> list[float]:
     """Lags at local minima of the distance that leave enough overlap, shortest first. [samples]"""
-    low, high = 4, int((1.0 - LEAST_REPEATED) * samples)
+    low, high = 4, int((1.0 - LEAST_REPEATED) * len(distance))
     if stated is not None:
         low = max(2, int(np.floor((1.0 - AROUND) * stated / step)))
         high = min(high, int(np.ceil((1.0 + AROUND) * stated / step)) + 1)
@@ -190,19 +199,3 @@ def period_step(t: Array, q: Array, period: float, multiples: NDArray[np.int64])
         move += float(np.sum(share * slope * distance))
         weight += float(np.sum(share * slope**2))
     return float(np.clip(move / weight, -0.1 * period, 0.1 * period)) if weight > 0 else 0.0
-
-
-def no_repetition(recording: Recording, closest: tuple[float, float], stated: float | None) -> str:
-    """One line on why no period was found."""
-    wanted = f" near {stated:g} s" if stated is not None else ""
-    seconds, deviation = closest
-    near = ""
-    if np.isfinite(deviation):
-        near = (
-            f" (closest after {seconds:.4g} s, where three quarters of them are more than "
-            f"{deviation:.2g} rad off)"
-        )
-    return (
-        f"{recording.name}: no repetition found{wanted}: the joint positions do not return within "
-        f"the log{near}; give a free run of the same motion with --free"
-    )

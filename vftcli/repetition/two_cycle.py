@@ -94,11 +94,14 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
         t=log.recording.t,
         tau=chosen.tau,
         sd=np.hypot(chosen.error.sd * scale, change),
-        floor=np.hypot(chosen.floor * scale, change),
+        floor=np.hypot(chosen.error.floor * scale, change),
         moving=moving,
         remarks=(
             *partners.remarks,
-            *(step.remark("alignment-floor", floor_Nm=step.floor.tolist()) for step in ladder),
+            *(
+                step.remark("alignment-floor", floor_Nm=step.error.floor.tolist())
+                for step in ladder
+            ),
             chosen.remark(
                 "alignment-chosen" if len(ladder) > 1 else "alignment-asked",
                 title=RUNGS[chosen.rung].title,
