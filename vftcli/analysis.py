@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
@@ -65,11 +64,6 @@ class Analysis:
     def robot(self) -> Robot:
         """The arm as it was used."""
         return self.motion.log.robot
-
-    @property
-    def terms(self) -> DynamicsTerms:
-        """P and μ along the log."""
-        return self.motion.log.terms
 
     @property
     def torques(self) -> tuple[ExternalTorque, ...]:

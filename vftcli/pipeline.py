@@ -61,11 +61,6 @@ class AnalysisChoice:
         return self.wrench.zero.log if self.wrench is not None else None
 
     @property
-    def free_logs(self) -> set[Path]:
-        """Every log of a free run, whatever it is for: one file may serve several options."""
-        return {*self.free.logs} | ({self.zero_log} if self.zero_log is not None else set())
-
-    @property
     def looks_back(self) -> bool:
         """Whether anything is asked that needs the complete log and its free part."""
         asked = self.refinement.looks_back or self.free.is_asked
@@ -112,9 +107,11 @@ def read(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Mod
     literal = choice.observers.as_printed
     log = models.of(recording, robot, literal=literal)
     runs: dict[Path | None, FreeRun] = {}
-    for path in choice.free_logs:
-        free = choice.library.open(path, choice.read.whole)
-        runs[path] = FreeRun(run=models.of(free, robot, literal=literal), log=log)
+    # One file may be the free run of several options.
+    for path in {*choice.free.logs, choice.zero_log}:
+        if path is not None:
+            free = choice.library.open(path, choice.read.whole)
+            runs[path] = FreeRun(run=models.of(free, robot, literal=literal), log=log)
     given = tuple(runs[path] for path in choice.free.logs)
     return FreeMotion(log=log, choice=choice.free, runs=given, zero=runs.get(choice.zero_log))
 

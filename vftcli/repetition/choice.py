@@ -84,15 +84,9 @@ class FreeChoice:
         alignment: str = AUTOMATIC,
         low_pass: str = AUTOMATIC,
     ) -> "FreeChoice":
-        """The choice that the options of a command state.
+        """The choice that the options of a command state, each the word after its option.
 
-        Args:
-            free: The words of every ``--free LOG|A:B``.
-            free_part: ``A:B``, the same as ``--free A:B``.
-            period: See the attribute.
-            free_cycles: ``1`` or ``1,2`` or ``1-3``.
-            alignment: See the attribute.
-            low_pass: A cutoff in Hz, "none", or "auto".
+        A word of `free` is a log or a span ``A:B``, as `free_part` is.
 
         Raises:
             ParameterError: If a span is malformed.

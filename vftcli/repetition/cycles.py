@@ -75,9 +75,8 @@ def segment(recording: Recording, period: Period) -> Cycles:
 
 def comes_back(t: Array, q: Array, shift: float) -> Mask:
     """Whether the arm is at the same place `shift` seconds away. (T,)"""
-    there = t + shift
-    distance = np.abs(resample_columns(there, t, q) - q).max(axis=1)
-    return np.asarray((there >= t[0]) & (there <= t[-1]) & (distance <= ON_PATH))
+    distance = np.abs(resample_columns(t + shift, t, q, np.nan) - q).max(axis=1)
+    return np.asarray(distance <= ON_PATH)
 
 
 def settled(t: Array, on_path: Mask, seconds: float) -> float:

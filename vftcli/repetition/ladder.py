@@ -111,12 +111,11 @@ def difference(
             f"{motion.name}: only {np.count_nonzero(known)} samples have a partner in the free "
             "run; record a longer one, or choose other free cycles with --free-cycles"
         )
+    corrected = RUNGS[name].corrected
     tau = np.full(raw.shape, np.nan)
-    wanted = raw[known] + change[known] if RUNGS[name].corrected else raw[known]
+    wanted = raw[known] + change[known] if corrected else raw[known]
     tau[known] = wanted if cutoff is None else low_pass(motion.t[known], wanted, cutoff)
-    error = error_model(
-        motion, pairings, raw, change, corrected=RUNGS[name].corrected, cutoff=cutoff
-    )
+    error = error_model(motion, pairings, raw, change, corrected=corrected, cutoff=cutoff)
     return Difference(name, cutoff, tau, error)
 
 

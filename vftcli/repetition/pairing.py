@@ -39,10 +39,7 @@ class Pairing(NamedTuple):
 
     def there(self, x: Array) -> Array:
         """Columns of a signal of the free run at the paired instants, NaN where there is none."""
-        known = self.known
-        result = np.full((len(self.times), x.shape[1]), np.nan)
-        result[known] = resample_columns(self.times[known], self.free.t, x)
-        return result
+        return resample_columns(self.times, self.free.t, x)
 
 
 def pair_with_cycle(motion: DriveRun, cycles: Cycles, free: int, period: float) -> Pairing:

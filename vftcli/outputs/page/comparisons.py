@@ -23,7 +23,8 @@ HEADS = (
 def selection_guide(analysis: Analysis) -> str:
     """Which observer for what, by what was computed on this log."""
     # Measured here and now: the time a sample takes is that of this machine.
-    found = facts(analysis.observers, analysis.tunings, analysis.terms, analysis.errors)
+    terms = analysis.motion.log.terms
+    found = facts(analysis.observers, analysis.tunings, terms, analysis.errors)
     if not found:
         return ""
     computed = Grid(
