@@ -19,11 +19,6 @@ PANDA_PY = ("q", "dq", "tau_J", "tau_ext_hat_filtered", "O_F_ext_hat_K")
 """The fields of libfranka's state that are taken from panda-py's get_log()."""
 
 
-def read_npz(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read an .npz file: one array a signal, or whatever --columns names."""
-    return read_arrays(file, npz_arrays(file), request)
-
-
 def npz_arrays(file: LogFile) -> dict[str, Column]:
     """The arrays of an .npz file by name, unpacked within bounds.
 
@@ -108,6 +103,5 @@ def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
 NPZ = Reader(
     name="npz",
     recognises=lambda file: file.head.startswith(b"PK\x03\x04") and b".npy" in file.head[:4096],
-    read=read_npz,
-    columns=True,
+    read=lambda file, request: read_arrays(file, npz_arrays(file), request),
 )

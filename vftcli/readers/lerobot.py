@@ -86,5 +86,4 @@ LEROBOT = Reader(
     name="lerobot",
     recognises=lambda file: "meta" in file.entries and (file.path / "meta" / "info.json").is_file(),
     read=read_lerobot,
-    columns=True,
 )

@@ -188,18 +188,17 @@ OLD = Reader(
     name="libfranka-csv-old",
     recognises=lambda file: file.first_line.startswith(b"duration, success rate, q[0]"),
     read=read_old,
-    columns=True,
 )
 
 NEW = Reader(
     name="libfranka-csv",
     recognises=lambda file: file.first_line.startswith(b"time,success_rate,state.q[0]"),
     read=read_new,
-    columns=True,
 )
 
 STATES = Reader(
     name="libfranka-json",
     recognises=lambda file: file.first_line.lstrip().startswith(b'{"O_T_EE"'),
     read=read_states,
+    columns=False,
 )

@@ -1,7 +1,8 @@
 """Parquet tables: flat columns, or columns of lists as LeRobot writes them."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 from io import BytesIO
@@ -143,27 +144,18 @@ def is_number(kind: Any) -> bool:  # noqa: ANN401 - a pyarrow type
     return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
 
 
-class guarded:  # noqa: N801 - a context manager reads as a verb
+@contextmanager
+def guarded(path: Path) -> Iterator[None]:
     """Turn the errors of the Parquet decoder into a LogError that names the file."""
+    import pyarrow as pa
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __enter__(self) -> None:
-        """Nothing to do."""
-
-    def __exit__(self, kind: Any, error: Any, _trace: Any) -> None:  # noqa: ANN401
-        """Translate what the decoder raised.
-
-        Raises:
-            LogError: If it raised.
-        """
-        import pyarrow as pa
-
-        damaged = (pa.ArrowException, OSError, ValueError, KeyError, MemoryError, OverflowError)
-        if isinstance(error, damaged):
-            reason = str(error).split("\n")[0][:120]
-            raise LogError(f"{self.path}: a damaged Parquet file ({reason})") from None
+    try:
+        yield
+    except (
+        pa.ArrowException, OSError, ValueError, KeyError, MemoryError, OverflowError,
+    ) as error:  # fmt: skip
+        reason = str(error).split("\n")[0][:120]
+        raise LogError(f"{path}: a damaged Parquet file ({reason})") from None
 
 
 def read_parquet(file: LogFile, request: ReadChoice) -> RawLog:
@@ -199,8 +191,5 @@ def refuse_episodes(table: ParquetTable) -> None:
 
 
 PARQUET = Reader(
-    name="parquet",
-    recognises=lambda file: file.head.startswith(b"PAR1"),
-    read=read_parquet,
-    columns=True,
+    name="parquet", recognises=lambda file: file.head.startswith(b"PAR1"), read=read_parquet
 )

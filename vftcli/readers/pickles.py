@@ -189,5 +189,4 @@ PICKLE = Reader(
         file.head[:1] == b"\x80" and file.head[1:2] in {b"\2", b"\3", b"\4", b"\5"}
     ),
     read=read_pickle,
-    columns=True,
 )

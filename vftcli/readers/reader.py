@@ -176,7 +176,7 @@ class Reader:
     recognises: Callable[[LogFile], bool] = field(repr=False)
     read: Callable[[LogFile, ReadChoice], RawLog] = field(repr=False)
     general: bool = False
-    columns: bool = False
+    columns: bool = True
 
     @property
     def words(self) -> Mapping[str, str]:

@@ -73,11 +73,6 @@ def read_rtde(table: Table, request: ReadChoice) -> RawLog:
     return replace(raw, payload_mass=raw.constants[0], payload_com=raw.constants[1:])
 
 
-def read_rtde_text(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read a text file of either client."""
-    return read_rtde(TextTable(file), request)
-
-
 class BinaryTable:
     """The official client's binary file: two lines of text, then big-endian records."""
 
@@ -143,19 +138,18 @@ def is_binary(file: LogFile) -> bool:
 OFFICIAL = Reader(
     name="ur-csv",
     recognises=lambda file: not is_binary(file) and has_rtde_names(file, b" "),
-    read=read_rtde_text,
-    columns=True,
+    read=lambda file, request: read_rtde(TextTable(file), request),
 )
 
 BINARY = Reader(
     name="ur-binary",
     recognises=is_binary,
     read=lambda file, request: read_rtde(BinaryTable(file), request),
+    columns=False,
 )
 
 UR_RTDE = Reader(
     name="ur-rtde",
     recognises=lambda file: has_rtde_names(file, b","),
-    read=read_rtde_text,
-    columns=True,
+    read=lambda file, request: read_rtde(TextTable(file), request),
 )

@@ -162,11 +162,6 @@ def check_npy_header(file: LogFile, size: int) -> None:
         )
 
 
-def read_text(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read a text table, headed or described."""
-    return from_table(TextTable(file), request)
-
-
 def is_headed(file: LogFile) -> bool:
     """Whether a text file starts with a line of column names, and then one of mostly numbers."""
     if not file.lines or (table := TextTable(file)).names is None:
@@ -181,22 +176,15 @@ def is_headed(file: LogFile) -> bool:
 HEADED = Reader(
     name="table",
     recognises=is_headed,
-    read=read_text,
+    read=lambda file, request: from_table(TextTable(file), request),
     general=True,
-    columns=True,
 )
 
 HEADERLESS = Reader(
     name="headerless",
     recognises=lambda file: bool(file.lines) and TextTable(file).names is None,
-    read=read_text,
+    read=lambda file, request: from_table(TextTable(file), request),
     general=True,
-    columns=True,
 )
 
-NPY = Reader(
-    name="npy",
-    recognises=lambda file: file.head.startswith(b"\x93NUMPY"),
-    read=read_npy,
-    columns=True,
-)
+NPY = Reader(name="npy", recognises=lambda file: file.head.startswith(b"\x93NUMPY"), read=read_npy)

@@ -17,25 +17,10 @@ def is_bag_folder(file: LogFile) -> bool:
     return file.is_folder and bool(storage_files(file))
 
 
-ROS1 = Reader(
-    name="rosbag1",
-    recognises=lambda file: file.head.startswith(ROSBAG1),
-    read=read_bag,
-    columns=True,
-)
+ROS1 = Reader(name="rosbag1", recognises=lambda file: file.head.startswith(ROSBAG1), read=read_bag)
 
-ROS2 = Reader(name="rosbag2", recognises=is_bag_folder, read=read_bag, columns=True)
+ROS2 = Reader(name="rosbag2", recognises=is_bag_folder, read=read_bag)
 
-DB3 = Reader(
-    name="db3",
-    recognises=lambda file: file.head.startswith(SQLITE),
-    read=read_bag,
-    columns=True,
-)
+DB3 = Reader(name="db3", recognises=lambda file: file.head.startswith(SQLITE), read=read_bag)
 
-MCAP = Reader(
-    name="mcap",
-    recognises=lambda file: file.head.startswith(MCAP_MAGIC),
-    read=read_bag,
-    columns=True,
-)
+MCAP = Reader(name="mcap", recognises=lambda file: file.head.startswith(MCAP_MAGIC), read=read_bag)

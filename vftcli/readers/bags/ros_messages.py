@@ -1,13 +1,14 @@
 """ROS 2 messages that vftcli knows by itself: their definitions, for reading bags and for writing.
 
-Bags of ROS 2 Humble and older hold no definitions, and a bag that is written needs them. Names,
-types and order of Franka's fields are those published in frankarobotics/franka_ros2 (0.1.10).
+Bags of ROS 2 Humble and older hold no definitions, and a bag that is written needs them.
 """
 
 import re
 import struct
+import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,104 +18,11 @@ from vftcli.readers.bags.container import Bytes, Channel
 from vftcli.readers.bags.layout import SIZES, Field, LayoutError, Types, fields_of, short, types_of
 from vftcli.signals.errors import LogError, OutputError
 
-FRANKA_ERRORS = (
-    "joint_position_limits_violation cartesian_position_limits_violation "
-    "self_collision_avoidance_violation joint_velocity_violation cartesian_velocity_violation "
-    "force_control_safety_violation joint_reflex cartesian_reflex "
-    "max_goal_pose_deviation_violation max_path_pose_deviation_violation "
-    "cartesian_velocity_profile_safety_violation "
-    "joint_position_motion_generator_start_pose_invalid "
-    "joint_motion_generator_position_limits_violation "
-    "joint_motion_generator_velocity_limits_violation "
-    "joint_motion_generator_velocity_discontinuity "
-    "joint_motion_generator_acceleration_discontinuity "
-    "cartesian_position_motion_generator_start_pose_invalid "
-    "cartesian_motion_generator_elbow_limit_violation "
-    "cartesian_motion_generator_velocity_limits_violation "
-    "cartesian_motion_generator_velocity_discontinuity "
-    "cartesian_motion_generator_acceleration_discontinuity "
-    "cartesian_motion_generator_elbow_sign_inconsistent "
-    "cartesian_motion_generator_start_elbow_invalid "
-    "cartesian_motion_generator_joint_position_limits_violation "
-    "cartesian_motion_generator_joint_velocity_limits_violation "
-    "cartesian_motion_generator_joint_velocity_discontinuity "
-    "cartesian_motion_generator_joint_acceleration_discontinuity "
-    "cartesian_position_motion_generator_invalid_frame "
-    "force_controller_desired_force_tolerance_violation controller_torque_discontinuity "
-    "start_elbow_sign_inconsistent communication_constraints_violation power_limit_violation "
-    "joint_p2p_insufficient_torque_for_planning tau_j_range_violation instability_detected"
-)
+MESSAGES = Path(__file__).parent / "messages.toml"
+"""The definitions of ROS 2's own types that are written, and of Franka's state."""
 
-FRANKA: dict[str, str] = {
-    "franka_msgs/Errors": "\n".join(f"bool {name}" for name in FRANKA_ERRORS.split()),
-    "franka_msgs/Elbow": """float64[2] position
-float64[2] desired_position
-float64[2] commanded_position
-float64[2] commanded_velocity
-float64[2] commanded_acceleration
-""",
-    "franka_msgs/CollisionIndicators": """geometry_msgs/Vector3 is_cartesian_linear_collision
-geometry_msgs/Vector3 is_cartesian_angular_collision
-geometry_msgs/Vector3 is_cartesian_linear_contact
-geometry_msgs/Vector3 is_cartesian_angular_contact
-float64[7] is_joint_collision
-float64[7] is_joint_contact
-""",
-    "franka_msgs/FrankaRobotState": """uint8 ROBOT_MODE_OTHER=0
-uint8 ROBOT_MODE_IDLE=1
-uint8 ROBOT_MODE_MOVE=2
-uint8 ROBOT_MODE_GUIDING=3
-uint8 ROBOT_MODE_REFLEX=4
-uint8 ROBOT_MODE_USER_STOPPED=5
-uint8 ROBOT_MODE_AUTOMATIC_ERROR_RECOVERY=6
-std_msgs/Header header
-franka_msgs/CollisionIndicators collision_indicators
-sensor_msgs/JointState measured_joint_state
-sensor_msgs/JointState desired_joint_state
-sensor_msgs/JointState measured_joint_motor_state
-float64[7] ddq_d
-float64[7] dtau_j
-sensor_msgs/JointState tau_ext_hat_filtered
-franka_msgs/Elbow elbow
-geometry_msgs/WrenchStamped k_f_ext_hat_k
-geometry_msgs/WrenchStamped o_f_ext_hat_k
-geometry_msgs/InertiaStamped inertia_ee
-geometry_msgs/InertiaStamped inertia_load
-geometry_msgs/InertiaStamped inertia_total
-geometry_msgs/PoseStamped o_t_ee
-geometry_msgs/PoseStamped o_t_ee_d
-geometry_msgs/PoseStamped o_t_ee_c
-geometry_msgs/PoseStamped f_t_ee
-geometry_msgs/PoseStamped ee_t_k
-geometry_msgs/TwistStamped o_dp_ee_d
-geometry_msgs/TwistStamped o_dp_ee_c
-geometry_msgs/AccelStamped o_ddp_ee_c
-float64 time
-float64 control_command_success_rate
-uint8 robot_mode
-franka_msgs/Errors current_errors
-franka_msgs/Errors last_motion_errors
-""",
-}
-"""Type of Franka's state → its definition."""
-
-ROS: dict[str, str] = {
-    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec",
-    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id",
-    "std_msgs/String": "string data",
-    "sensor_msgs/JointState": """std_msgs/Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-""",
-    "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z",
-    "geometry_msgs/Wrench": "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque",
-    "geometry_msgs/WrenchStamped": "std_msgs/Header header\ngeometry_msgs/Wrench wrench",
-}
-"""Types of ROS 2's own packages that are written, here so that writing needs no type store."""
-
-DEFINITIONS = {**ROS, **FRANKA}
+ROS, FRANKA = tomllib.loads(MESSAGES.read_text(encoding="utf-8")).values()
+DEFINITIONS: dict[str, str] = {**ROS, **FRANKA}
 """Message type as package/Name → its definition."""
 
 LINE = re.compile(r"(?P<type>[\w/]+)(?:\[(?P<many>\d*)\])? (?P<name>\w+)")
