@@ -79,6 +79,11 @@ class OutputFolder:
         path.parent.mkdir(parents=True, exist_ok=True)
         return path
 
+    def write(self, name: str, text: str) -> None:
+        """Write a text file, with the same bytes on every system."""
+        # On Windows the same bytes as elsewhere: digests of outputs can be compared.
+        (self / name).write_text(text, encoding="utf-8", newline="\n")
+
     def __enter__(self) -> Self:
         """Refuse what must not be overwritten, and make the temporary folder."""
         if self.path.exists() and not self.path.is_dir():
@@ -86,7 +91,9 @@ class OutputFolder:
         for name in self.names:
             refuse_existing(self.path / name, self.force)
         try:
-            self.made = make_folders(self.path)
+            # Outermost first, to be removed again if nothing comes of it.
+            self.made = [p for p in (self.path, *self.path.parents) if not p.exists()][::-1]
+            self.path.mkdir(parents=True, exist_ok=True)
             check_writable(self.path)
             # Inside the folder, so that the files only change their names when they are moved.
             self.temporary = self.path / f".{os.urandom(4).hex()}.partial"
@@ -103,19 +110,17 @@ class OutputFolder:
         _trace: TracebackType | None,
     ) -> None:
         """Move the files into place, or leave nothing."""
-        if error is None:
-            try:
+        try:
+            if error is None:
                 self._move()
-            except OSError as failure:
-                self._discard()
-                raise unwritable(self.path, failure) from None
-            except OutputError:
-                self._discard()
-                raise
-            self.temporary.rmdir()
-            return
-        self._discard()
-        if isinstance(error, OSError) and self._concerns(error):
+        except OSError as failure:
+            raise unwritable(self.path, failure) from None
+        finally:
+            self._discard()
+        # Of an error elsewhere its own words say more.
+        if isinstance(error, OSError) and (
+            error.filename is None or str(error.filename).startswith(str(self.path))
+        ):
             raise unwritable(self.path, error) from None
 
     def _move(self) -> None:
@@ -130,8 +135,6 @@ class OutputFolder:
             for file, target in zip(files, targets, strict=True):
                 target.parent.mkdir(parents=True, exist_ok=True)
                 file.replace(target)
-        for folder in sorted((p for p in self.temporary.rglob("*")), reverse=True):
-            folder.rmdir()
 
     def _discard(self) -> None:
         """Remove the temporary folder and the folders that were made, if they are empty."""
@@ -140,10 +143,6 @@ class OutputFolder:
         for folder in reversed(self.made):
             if folder.is_dir() and not any(folder.iterdir()):
                 folder.rmdir()
-
-    def _concerns(self, error: OSError) -> bool:
-        """Whether an error of the operating system is about this folder."""
-        return error.filename is None or str(error.filename).startswith(str(self.path))
 
 
 @contextmanager
@@ -190,13 +189,6 @@ def numbered(names: Iterable[str]) -> list[str]:
             free, number = f"{name}-{number}", number + 1
         found.append(free)
     return found
-
-
-def make_folders(path: Path) -> list[Path]:
-    """Make a folder and its missing parents; return those made, outermost first."""
-    missing = [p for p in (path, *path.parents) if not p.exists()]
-    path.mkdir(parents=True, exist_ok=True)
-    return missing[::-1]
 
 
 def check_writable(folder: Path) -> None:

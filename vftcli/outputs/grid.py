@@ -161,32 +161,30 @@ def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ..
 
 def terminal(grid: Grid) -> str:
     """A table as text, two blanks between columns, each line ended."""
-    heads = [column.heading for column in grid.columns]
-    table = [[cell.text + cell.mark for cell in row] for row in grid.cells]
-    if grid.marked:
-        heads = [h if c.words else f"{h} " for h, c in zip(heads, grid.columns, strict=True)]
-        for texts, row in zip(table, grid.cells, strict=True):
-            for k, (cell, column) in enumerate(zip(row, grid.columns, strict=True)):
-                texts[k] += "" if column.words or cell.mark else " "
+    # Where numbers may bear a mark, those without one keep its place.
+    rooms = [" " * (grid.marked and not column.words) for column in grid.columns]
+    heads = [c.heading + room for c, room in zip(grid.columns, rooms, strict=True)]
+    table = [
+        [cell.text + (cell.mark or room) for cell, room in zip(row, rooms, strict=True)]
+        for row in grid.cells
+    ]
     if any(heads):
         table.insert(0, heads)
     widths = [
         max(column.width, *(len(texts[k]) for texts in table), 0)
         for k, column in enumerate(grid.columns)
     ]
-    lines = [terminal_line(texts, grid.columns, widths) for texts in table]
+    # Words stand to the left of their columns, numbers to the right.
+    lines = [
+        "  ".join(
+            text.ljust(width) if column.words else text.rjust(width)
+            for text, column, width in zip(texts, grid.columns, widths, strict=True)
+        ).rstrip()
+        for texts in table
+    ]
     if grid.summaries:
         lines.insert(-grid.summaries, "-" * len(lines[0]))
     return "".join(f"{line}\n" for line in ([grid.caption] if grid.caption else []) + lines)
-
-
-def terminal_line(texts: Sequence[str], columns: Sequence[Column], widths: Sequence[int]) -> str:
-    """One row with words to the left and numbers to the right of their columns."""
-    placed = [
-        text.ljust(width) if column.words else text.rjust(width)
-        for text, column, width in zip(texts, columns, widths, strict=True)
-    ]
-    return "  ".join(placed).rstrip()
 
 
 def markdown(grid: Grid) -> str:

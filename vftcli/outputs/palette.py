@@ -36,6 +36,11 @@ def colours_of(estimates: Sequence[ExternalTorque]) -> dict[str, str]:
     return {name: COLOURS.get(name) or spare[name] for name in names}
 
 
+def styles_of(estimates: Sequence[ExternalTorque]) -> dict[str, tuple[str, bool]]:
+    """Each estimate's colour, and whether its line is dashed."""
+    return {name: (colour, name in DASHED) for name, colour in colours_of(estimates).items()}
+
+
 def rgb(colour: str) -> tuple[int, int, int]:
     """Red, green and blue of ``#rrggbb``, each from 0 to 255."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)

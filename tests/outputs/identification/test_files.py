@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from vftcli.outputs.identification import files
+from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.identification.files import write_identification
 from vftcli.robots import load_robot
 from vftcli.signals.errors import OutputError
@@ -51,14 +51,14 @@ def test_a_failure_at_the_last_file_leaves_everything_as_it_was(found, tmp_path,
     result, log = found
     path = tmp_path / "mine.toml"
     path.write_text("earlier", encoding="utf-8")
-    last = files.write_text
+    write = OutputFolder.write
 
-    def failing(target, text):
-        if target.suffix == ".toml":
+    def failing(folder, name, text):
+        if name.endswith(".toml"):
             raise OutputError("the disk is full")
-        last(target, text)
+        write(folder, name, text)
 
-    monkeypatch.setattr(files, "write_text", failing)
+    monkeypatch.setattr(OutputFolder, "write", failing)
     with pytest.raises(OutputError, match="disk is full"):
         write_identification(path, result, [log], "", force=True)
     assert [p.name for p in tmp_path.iterdir()] == ["mine.toml"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.page import render, render_index
+from vftcli.outputs.page.page import render, render_index
 from vftcli.outputs.page.payload import payload
 from vftcli.outputs.page.sections import joint_values
 from vftcli.outputs.page.shell import script_json

@@ -1,9 +1,10 @@
 """What `vftcli admit` writes: the page, motion.parquet, the comparison, run.json."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import polars as pl
 
 from vftcli.admittance.closed_loop import ClosedLoop
 from vftcli.admittance.parameters import AXES, PER_AXIS
@@ -17,9 +18,6 @@ from vftcli.outputs.grid import json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, to_json, versions
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import AXES as FORCES
-
-if TYPE_CHECKING:
-    import polars as pl
 
 FILES = (
     "index.html",
@@ -39,14 +37,12 @@ CONVENTIONS = {
 }
 
 
-def motion_table(replay: Replay) -> "pl.DataFrame":
+def motion_table(replay: Replay) -> pl.DataFrame:
     """Everything along time, flat columns; what is not known is null.
 
     ``t`` [s]; ``force/fx``… [N, N·m]; ``x/<controller>/x``… [m, rad]; ``v/<controller>/x``…;
     ``q/<controller>/1``… [rad]; ``reached/<controller>`` 1 or 0; ``logged/x``… [m, rad].
     """
-    import polars as pl
-
     motion, columns = replay.motion, {"t": replay.motion.t}
     for k, name in enumerate(FORCES):
         columns[f"force/{name}"] = padded(replay.wrench[:, k])
@@ -63,13 +59,6 @@ def motion_table(replay: Replay) -> "pl.DataFrame":
         for k, axis in enumerate(AXES):
             columns[f"logged/{axis}"] = padded(replay.logged[:, k])
     return pl.DataFrame({k: np.ascontiguousarray(v) for k, v in columns.items()}).fill_nan(None)
-
-
-def title_of(recording: Recording | None, run: ClosedLoop | None) -> str:
-    """What the page is called: the log, the simulated scenario, or a release."""
-    if run is not None and run.simulation is not None:
-        return f"{run.simulation.scenario.name}, closed loop"
-    return recording.name if recording is not None else "release"
 
 
 def admittance_record(
@@ -141,7 +130,9 @@ def write_admittance(
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     record = admittance_record(replay, recording, run, command)
-    title = title_of(recording, run)
+    title = recording.name if recording is not None else "release"
+    if run is not None and run.simulation is not None:
+        title = f"{run.simulation.scenario.name}, closed loop"
     texts = {
         "index.html": render_admittance(replay, record, title, run),
         "comparison.csv": comparison_csv(replay.rows),
@@ -150,6 +141,6 @@ def write_admittance(
     }
     with OutputFolder(path, force, FILES) as folder:
         for name, text in texts.items():
-            (folder / name).write_text(text, encoding="utf-8", newline="\n")
+            folder.write(name, text)
         motion_table(replay).write_parquet(folder / "motion.parquet", compression="zstd")
         write_ghosts(folder / "recording.rrd", replay, title)

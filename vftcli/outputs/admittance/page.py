@@ -56,7 +56,13 @@ def render_admittance(
         remarks(replay.remarks),
         closed_loop_section(run),
         comparison_section(replay),
-        charts_section(),
+        "<h2>Force and motion over time</h2>",
+        soft(
+            "Deviation of the flange (Figs 6b, 9b, 7, 10, 13), force with the threshold band (Figs "
+            "6a, 9a, 12), speed with its limit, and the Lyapunov function W of the recovery phases "
+            "beside the printed V, which rises."
+        ),
+        chart_places("Axis", "Controller"),
         f"<h2>Parameters</h2>{html(parameter_grid(replay))}",
         f"<h2>Stability before motion</h2>{html(stability_grid(replay))}",
         soft(
@@ -120,16 +126,6 @@ def comparison_section(replay: Replay) -> str:
         "drags."
     )
     return f"<h2>Comparison</h2>{html(grid)}{words}"
-
-
-def charts_section() -> str:
-    """Where the script puts the charts, and how to read them."""
-    words = soft(
-        "Deviation of the flange (Figs 6b, 9b, 7, 10, 13), force with the threshold band (Figs 6a, "
-        "9a, 12), speed with its limit, and the Lyapunov function W of the recovery phases beside "
-        "the printed V, which rises."
-    )
-    return f"<h2>Force and motion over time</h2>{words}{chart_places('Axis', 'Controller')}"
 
 
 def payload(replay: Replay, run: ClosedLoop | None) -> dict[str, Any]:

@@ -55,10 +55,7 @@ def comparison_grid(
 ) -> Grid:
     """Every controller on the same force; by axis and drag, so that they stand under each other.
 
-    Args:
-        rows: As the replay made them.
-        name_of: What a row's controller is called.
-        title: Of the table.
+    `name_of` tells what a row's controller is called.
     """
     # Sorting keeps the order of the controllers within a drag.
     ordered = sorted(rows, key=lambda row: (AXES.index(row["axis"]), row["drag"]))

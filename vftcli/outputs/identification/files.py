@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from vftcli.identification.result import Identification
-from vftcli.outputs.files import OutputFolder, write_text
+from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.identification.page import render_identification
 from vftcli.outputs.identification.recording import write_identification_rrd
 from vftcli.outputs.log.run_record import (
@@ -43,12 +43,7 @@ def write_identification(
 ) -> str:
     """Write all files or none; those of an earlier run stay as they were if one fails.
 
-    Args:
-        path: The robot file.
-        found: What to write.
-        logs: Every log that was read.
-        command: The command line.
-        force: Whether files that are there may be replaced.
+    `logs` are all that were read, also those that no fit used.
 
     Returns:
         The text of `run.json`.
@@ -68,7 +63,7 @@ def write_identification(
     with OutputFolder(path.parent, force, names.values()) as folder:
         write_identification_rrd(folder / names["rrd"], found)
         for kind, text in texts.items():
-            write_text(folder / names[kind], text)
+            folder.write(names[kind], text)
     return texts["run"]
 
 

@@ -38,10 +38,14 @@ def render_identification(found: Identification, record: Mapping[str, Any]) -> s
     """The page as text: self-contained, nothing is loaded from anywhere."""
     logs = ", ".join(dict.fromkeys(t.recording.name for t in found.traces)) or found.robot.name
     text = f"{found.robot.title}: method {found.method}, from {logs}"
+    residuals = ""
+    if not found.residuals.is_empty():
+        words = "Measured less predicted torque, from the first to the last movement."
+        residuals = f"<h2>Residuals</h2>{html(residual_grid(found))}{soft(words)}"
     parts = (
         headline(found.robot.name, text),
         remarks(found.remarks),
-        residual_section(found),
+        residuals,
         velocity_section(found),
         parameter_section(found),
         series_section(found),
@@ -51,14 +55,6 @@ def render_identification(found: Identification, record: Mapping[str, Any]) -> s
     )
     data = payload(found) if found.traces else None
     return document(f"{found.robot.name}: identification", "".join(parts), data)
-
-
-def residual_section(found: Identification) -> str:
-    """RMS per joint of every log, identified beside profile."""
-    if found.residuals.is_empty():
-        return ""
-    words = "Measured less predicted torque, from the first to the last movement."
-    return f"<h2>Residuals</h2>{html(residual_grid(found))}{soft(words)}"
 
 
 def parameter_section(found: Identification) -> str:

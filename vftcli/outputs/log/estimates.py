@@ -1,6 +1,6 @@
 """What `vftcli estimate` writes: the estimates as flat columns, `run.json`, extras on demand."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,8 +8,6 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.files import OutputFolder, one_line
-from vftcli.outputs.log.mcap_output import write_mcap
-from vftcli.outputs.log.rerun_recording import write_rrd
 from vftcli.outputs.log.run_record import run_record, to_json
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import OutputError
@@ -109,12 +107,8 @@ def write_csv(path: Path, analysis: Analysis) -> None:
     estimates_table(analysis).write_csv(path, float_precision=9)
 
 
-EXTRAS: dict[str, tuple[str, Callable[[Path, Analysis], None]]] = {
-    "csv": ("estimates.csv", write_csv),
-    "mcap": ("estimates.mcap", write_mcap),
-    "rrd": ("recording.rrd", write_rrd),
-}
-"""Flag → file name and its writer."""
+EXTRAS = {"csv": "estimates.csv", "mcap": "estimates.mcap", "rrd": "recording.rrd"}
+"""Flag → file name."""
 
 
 def write_estimate_folder(
@@ -129,11 +123,15 @@ def write_estimate_folder(
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     record = to_json(run_record(analysis, command))
-    names = ["estimates.parquet", "run.json", *(EXTRAS[extra][0] for extra in extras)]
+    # After the record: it names the packages that are loaded, and these made no number.
+    from vftcli.outputs.log.mcap_output import write_mcap
+    from vftcli.outputs.log.rerun_recording import write_rrd
+
+    writers = {"csv": write_csv, "mcap": write_mcap, "rrd": write_rrd}
+    names = ["estimates.parquet", "run.json", *(EXTRAS[extra] for extra in extras)]
     with OutputFolder(path, force, names) as folder:
         write_estimates(folder / "estimates.parquet", analysis)
         for extra in extras:
-            name, write = EXTRAS[extra]
-            write(folder / name, analysis)
-        (folder / "run.json").write_text(record, encoding="utf-8")
+            writers[extra](folder / EXTRAS[extra], analysis)
+        folder.write("run.json", record)
     return record

@@ -65,12 +65,7 @@ def joint_topic(
 
 
 def write_mcap(path: Path, analysis: Analysis) -> None:
-    """Write the recording's torques and its estimates.
-
-    Args:
-        path: Where to; an existing file is replaced.
-        analysis: What to write.
-    """
+    """Write the recording's torques and its estimates; an existing file is replaced."""
     # The log's own names, so that the URDF moves with its /joint_states.
     names = analysis.recording.joint_names or analysis.robot.chain.names
     description = urdf_text(analysis.robot, names)

@@ -12,7 +12,7 @@ from vftcli.outputs.log.estimates import write_estimates
 from vftcli.outputs.log.rerun_recording import write_rrd
 from vftcli.outputs.log.run_record import run_record, to_json
 from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds
-from vftcli.outputs.page import render, render_index
+from vftcli.outputs.page.page import render, render_index
 
 if TYPE_CHECKING:
     import polars as pl
@@ -53,6 +53,8 @@ def write_reports(
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
+    import polars as pl
+
     # One folder a log, called as its file without the ending.
     places = numbered(Path(a.recording.name).stem or "log" for a in analyses)
     # All names that any log may have are declared, so that --force removes stale ones.
@@ -62,12 +64,13 @@ def write_reports(
             fill(folder, f"{place}/", analysis, command)
             for place, analysis in zip(places, analyses, strict=True)
         ]
-        index = render_index(list(zip(places, analyses, strict=True)))
-        put(folder / "index.html", index)
-        put_errors(folder, "", combined(analyses), paper_bounds(analyses))
-        text = listed([to_json(record) for record in records])
-        put(folder / "run.json", text)
-        return text
+        folder.write("index.html", render_index(list(zip(places, analyses, strict=True))))
+        found = [a.errors for a in analyses if a.errors is not None]
+        together = pl.concat(found, how="diagonal") if found else None
+        put_errors(folder, "", together, paper_bounds(analyses))
+        texts = ",\n".join(to_json(record).rstrip("\n") for record in records)
+        folder.write("run.json", f"[\n{texts}\n]\n")
+        return f"[\n{texts}\n]\n"
 
 
 def fill(folder: OutputFolder, place: str, analysis: Analysis, command: str) -> dict[str, Any]:
@@ -75,18 +78,12 @@ def fill(folder: OutputFolder, place: str, analysis: Analysis, command: str) -> 
     record = run_record(analysis, command)
     # The page shows the record that is written beside it, not one of its own.
     analysis = replace(analysis, run=record)
-    put(folder / f"{place}index.html", render(analysis))
+    folder.write(f"{place}index.html", render(analysis))
     write_rrd(folder / f"{place}recording.rrd", analysis)
     write_estimates(folder / f"{place}estimates.parquet", analysis)
     put_errors(folder, place, analysis.errors, paper_bounds([analysis]))
-    put(folder / f"{place}run.json", to_json(record))
+    folder.write(f"{place}run.json", to_json(record))
     return record
-
-
-def put(path: Path, text: str) -> None:
-    """Write text with the same bytes on every system."""
-    # On Windows the same bytes as elsewhere: digests of outputs can be compared.
-    path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def put_errors(
@@ -96,18 +93,4 @@ def put_errors(
     if errors is None:
         return
     for name, text_of in ERROR_TABLES.items():
-        put(folder / f"{place}{name}", text_of(errors, bounds))
-
-
-def combined(analyses: Sequence[Analysis]) -> "pl.DataFrame | None":
-    """All errors in one table, None where no log has any."""
-    import polars as pl
-
-    found = [a.errors for a in analyses if a.errors is not None]
-    return pl.concat(found, how="diagonal") if found else None
-
-
-def listed(texts: Sequence[str]) -> str:
-    """Texts of JSON objects put together as one JSON array."""
-    together = ",\n".join(text.rstrip("\n") for text in texts)
-    return f"[\n{together}\n]\n"
+        folder.write(f"{place}{name}", text_of(errors, bounds))

@@ -7,6 +7,7 @@ import numpy as np
 import polars as pl
 
 from vftcli.outputs.grid import DASH, Column, Grid, GridCell, joint_columns, significant
+from vftcli.signals.arrays import Array, Mask
 
 AT_FLOOR = 1.2
 """An RMSE within this factor of the reference's floor cannot be told from the reference's own."""
@@ -36,18 +37,18 @@ class Block(NamedTuple):
     reference: str
     joints: tuple[int, ...]
     observers: tuple[str, ...]
-    rmse: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
-    floor: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+    rmse: Array
+    floor: Array
     samples: tuple[int, int]
     untrusted: tuple[int, ...] = ()
 
     @property
-    def at_floor(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    def at_floor(self) -> Mask:
         """Where the reference cannot tell the error from its own. (observers, joints)"""
         return np.asarray(self.rmse <= AT_FLOOR * self.floor)
 
     @property
-    def best(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    def best(self) -> Mask:
         """The smallest RMSE of each joint, and what prints the same. (observers, joints)"""
         # Compared as printed, so that two equal texts in one column are both bold.
         least = np.where(np.isfinite(self.rmse), self.rmse, np.inf).min(axis=0)
@@ -98,10 +99,12 @@ def block(rows: pl.DataFrame) -> Block:
     observers = tuple(str(name) for name in rows["observer"].unique(maintain_order=True))
     rmse = np.full((len(observers), len(joints)), np.nan)
     floor = np.full(len(joints), np.nan)
-    for row in rows.iter_rows(named=True):
+    # Null is what polars has for unknown.
+    known = rows.with_columns(pl.col("rmse_Nm", "reference_floor_Nm").fill_null(float("nan")))
+    for row in known.iter_rows(named=True):
         at = joints.index(row["joint"])
-        rmse[observers.index(row["observer"]), at] = nan_or(row["rmse_Nm"])
-        floor[at] = nan_or(row["reference_floor_Nm"])
+        rmse[observers.index(row["observer"]), at] = row["rmse_Nm"]
+        floor[at] = row["reference_floor_Nm"]
     # Joints may differ in how many samples have a reference.
     counts = rows["samples"].drop_nulls().to_list() or [0]
     doubtful = rows.filter(~pl.col("reference_trusted").fill_null(True))["joint"].unique().sort()
@@ -117,12 +120,7 @@ def block(rows: pl.DataFrame) -> Block:
     )
 
 
-def nan_or(value: float | None) -> float:
-    """A number of the table as a float; null, which polars has for unknown, as NaN."""
-    return float("nan") if value is None else float(value)
-
-
-def mean_of(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
+def mean_of(values: Array) -> float:
     """The mean over the joints that are known, NaN if none is."""
     finite = values[np.isfinite(values)]
     return float(finite.mean()) if finite.size else float("nan")

@@ -17,7 +17,6 @@ from vftcli.analysis import Analysis
 from vftcli.observers.auto_tuning import AutoTuned
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.robot import Robot
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
 
@@ -46,12 +45,8 @@ PACKAGES = {
 
 
 def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
-    """Everything `run.json` holds.
-
-    Args:
-        analysis: What was run.
-        command: The command line, as the user typed it.
-    """
+    """Everything `run.json` holds, the command line as the user typed it."""
+    reference = analysis.reference
     return {
         "command": command,
         "versions": versions(),
@@ -61,7 +56,14 @@ def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
             observer_record(observer, analysis.tunings.get(observer.name))
             for observer in analysis.observers
         ],
-        "reference": reference_record(analysis.reference),
+        # What the estimates were judged by, with its own error.
+        "reference": None
+        if reference is None
+        else {
+            "name": reference.name,
+            "floor_Nm": reference.floor,
+            "notes": list(reference.remarks),
+        },
         "wrench": wrench_record(analysis),
         "complete_log": refinement_record(analysis),
         "conventions": CONVENTIONS,
@@ -191,17 +193,6 @@ def parameters(observer: Observer) -> dict[str, Any]:
         field.name: jsonable(getattr(observer, field.name))
         for field in fields(observer)
         if field.init
-    }
-
-
-def reference_record(reference: ExternalTorque | None) -> dict[str, Any] | None:
-    """What the estimates were judged by, its own error and remarks on it; None without one."""
-    if reference is None:
-        return None
-    return {
-        "name": reference.name,
-        "floor_Nm": reference.floor,
-        "notes": list(reference.remarks),
     }
 
 

@@ -33,12 +33,7 @@ SURE = 0.05
 
 
 def to_terminal(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
-    """All tables of the errors as text, with the meaning of their marks.
-
-    Args:
-        errors: The tidy error table.
-        bounds: What the paper reports of a log's arm, by the log's label.
-    """
+    """All tables of the tidy error table as text, with the meaning of their marks."""
     found = blocks(errors)
     if not found:
         return "no errors to show: the estimates and the reference have no sample in common\n"

@@ -27,15 +27,6 @@ def paper_bounds(analyses: "Iterable[Analysis]") -> PaperBounds:
     }
 
 
-def axis_columns() -> tuple[Column, ...]:
-    """Columns fx to mz, forces in newtons and moments in newton-metres."""
-    letters = ("F_x", "F_y", "F_z", "M_x", "M_y", "M_z")
-    return tuple(
-        Column(axis, unit_of(axis), symbol=f"${letter}$")
-        for axis, letter in zip(AXES, letters, strict=True)
-    )
-
-
 def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Iterator[Grid]:
     """RMSE of the wrenches, one table for each recording and reference that has wrench rows."""
     for group in logs_of(errors, "axis"):
@@ -49,14 +40,17 @@ def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Itera
             (name, *(values.get(axis) for axis in AXES)) for name, values in found.items()
         ]
         # The paper compares with a sensor; beside a simulated truth its bounds mean nothing.
-        if reference == "sensor" and recording in (bounds or {}):
-            force, moment = (bounds or {})[recording]
+        if reference == "sensor" and (limits := (bounds or {}).get(recording)):
+            force, moment = limits
             rows.append(("paper, UR5", *[f"< {force:g}"] * 3, *[f"< {moment:g}"] * 3))
         samples = max(group["samples"].drop_nulls().to_list() or [0])
         yield Grid(
             title=f"{recording} against {reference}, wrench, {samples} unmasked samples",
             quantity="RMSE",
-            columns=(Column("observer", words=True), *axis_columns()),
+            columns=(
+                Column("observer", words=True),
+                *(Column(a, unit_of(a), symbol=f"${a[0].upper()}_{a[1]}$") for a in AXES),
+            ),
             rows=tuple(rows),
             swatches=True,
         )

@@ -7,13 +7,12 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.log.rmse_tables import blocks
-from vftcli.outputs.page.charts import STRETCHES, Chart, ChartLine, packed, packed_over_frequency
+from vftcli.outputs.page.charts import Chart, ChartLine, packed, packed_over_frequency
 from vftcli.outputs.page.refinement_part import spectra_chart, tuning_chart
 from vftcli.outputs.page.wrench_part import condition_charts
-from vftcli.outputs.palette import DASHED, colours_of
+from vftcli.outputs.palette import colours_of, styles_of
 from vftcli.robots.drive import drive_torque
-from vftcli.signals.arrays import Array
-from vftcli.signals.external_torque import COVERS, ExternalTorque
+from vftcli.signals.external_torque import COVERS
 from vftcli.signals.wrench import AXES, unit_of
 
 RESTING = "#c2410c"
@@ -28,21 +27,18 @@ QUIETEST = 1e-12
 
 def payload(analysis: Analysis) -> dict[str, Any]:
     """Charts, their labels and their common span, as the page's script takes them."""
-    t = analysis.t
+    t, n = analysis.t, analysis.recording.joints
+    found = blocks(analysis.errors) if analysis.errors is not None else ()
     wrenches = [*wrench_charts(analysis), *condition_charts(analysis)]
     return {
-        "joints": analysis.recording.joints,
-        "labels": joint_labels(analysis),
+        "joints": n,
+        # A dagger where the reference is not to be trusted, as in the tables.
+        "labels": found[0].joint_heads if found else [f"J{j}" for j in range(1, n + 1)],
         "span": [float(t[0]), float(t[-1])],
         "charts": [packed(chart, t) for chart in time_charts(analysis)],
         "wrenches": [{**packed(chart, t), "at": 0} for chart in wrenches],
         "responses": [*responses(analysis), *refinement_charts(analysis)],
     }
-
-
-def is_decimated(analysis: Analysis) -> bool:
-    """Whether the page shows fewer samples than the log has."""
-    return analysis.recording.samples > 2 * STRETCHES
 
 
 def time_charts(analysis: Analysis) -> Iterator[Chart]:
@@ -61,19 +57,16 @@ def time_charts(analysis: Analysis) -> Iterator[Chart]:
 
 
 def estimate_series(analysis: Analysis) -> tuple[ChartLine, ...]:
-    """Every observer's torque in its colour."""
-    colours = colours_of(analysis.estimates)
+    """Every observer's torque in its colour, within its 95 % band where it has one."""
+    styles = styles_of(analysis.estimates)
+    lines = (ChartLine(e.name, e.tau, *styles[e.name]) for e in analysis.estimates)
+    # Half the width of a band is its root mean square over time: one number a joint.
     return tuple(
-        ChartLine(e.name, e.tau, colours[e.name], e.name in DASHED, half_band(e))
-        for e in analysis.estimates
+        line
+        if e.error_sd is None
+        else line._replace(half=COVERS * np.sqrt(np.mean(e.error_sd**2, axis=0)))
+        for line, e in zip(lines, analysis.estimates, strict=True)
     )
-
-
-def half_band(estimate: ExternalTorque) -> Array | None:
-    """Half the width of the 95 % band, its root mean square over time. (n,)"""
-    if estimate.error_sd is None:
-        return None
-    return np.asarray(COVERS * np.sqrt(np.mean(estimate.error_sd**2, axis=0)))
 
 
 def reference_series(analysis: Analysis) -> tuple[ChartLine, ...]:
@@ -89,13 +82,6 @@ def reference_series(analysis: Analysis) -> tuple[ChartLine, ...]:
     return (whole, ChartLine("reference while the joint rests", resting, RESTING))
 
 
-def joint_labels(analysis: Analysis) -> list[str]:
-    """J1, J2, …; a dagger where the reference is not to be trusted, as in the tables."""
-    n, errors = analysis.recording.joints, analysis.errors
-    found = blocks(errors) if errors is not None else ()
-    return found[0].joint_heads if found else [f"J{j}" for j in range(1, n + 1)]
-
-
 def motion_charts(analysis: Analysis) -> Iterator[Chart]:
     """What the log measured: drive torque, positions, velocities."""
     recording = analysis.recording
@@ -108,15 +94,12 @@ def motion_charts(analysis: Analysis) -> Iterator[Chart]:
 
 def wrench_charts(analysis: Analysis) -> Iterator[Chart]:
     """One chart an axis of the wrench, where wrenches were asked for."""
-    colours = colours_of(analysis.estimates)
+    styles = styles_of(analysis.estimates)
     found = sorted(analysis.wrenches, key=lambda wrench: wrench.name != "reference")
     for k, axis in enumerate(AXES if found else ()):
         lines = tuple(
             ChartLine(
-                legend_name(analysis, w.name),
-                w.known[:, k : k + 1],
-                colours.get(w.name, "ink"),
-                w.name in DASHED,
+                legend_name(analysis, w.name), w.known[:, [k]], *styles.get(w.name, ("ink", False))
             )
             for w in found
         )
@@ -134,13 +117,13 @@ def responses(analysis: Analysis) -> list[dict[str, Any]]:
     """Gain, phase and delay of every observer over frequency, up to half the sample rate."""
     step, n = analysis.recording.median_step, analysis.recording.joints
     frequency = np.geomspace(1e-2, 0.5 / step, FREQUENCIES)
-    colours = colours_of(analysis.estimates)
+    styles = styles_of(analysis.estimates)
     gains, phases, delays = [], [], []
     for observer in analysis.observers:
         response = observer.frequency_response(frequency, step, n)
         # Unwrapped, or a delay would jump by a period wherever the phase passes −180°.
         phase = np.degrees(np.unwrap(np.angle(response), axis=0))
-        style = (colours[observer.name], observer.name in DASHED)
+        style = styles[observer.name]
         decibel = 20.0 * np.log10(np.maximum(np.abs(response), QUIETEST))
         gains.append(ChartLine(observer.name, decibel, *style))
         phases.append(ChartLine(observer.name, phase, *style))

@@ -1,6 +1,5 @@
 """Sections of the report of one log: facts, errors, charts over time, observers."""
 
-from collections.abc import Sequence
 from html import escape
 from itertools import groupby
 from operator import itemgetter
@@ -11,6 +10,7 @@ import polars as pl
 
 from vftcli.analysis import Analysis
 from vftcli.observers import OBSERVERS
+from vftcli.observers.observer import Observer
 from vftcli.outputs.grid import Column, Grid, GridCell, html, signed, significant
 from vftcli.outputs.log.rmse_tables import (
     blocks,
@@ -21,7 +21,6 @@ from vftcli.outputs.log.rmse_tables import (
 from vftcli.outputs.log.run_record import observer_record
 from vftcli.outputs.log.wrench_tables import axis_grids, paper_bounds
 from vftcli.outputs.page.charts import STRETCHES
-from vftcli.outputs.page.payload import is_decimated
 from vftcli.outputs.page.shell import chart_places, fact_list, folded, soft
 from vftcli.signals.arrays import Array
 
@@ -86,7 +85,7 @@ def series_section(analysis: Analysis) -> str:
     """The charts over time; the script fills them."""
     count = analysis.recording.samples
     drawn = f"All {count} samples are drawn."
-    if is_decimated(analysis):
+    if count > 2 * STRETCHES:
         drawn = (
             f"The log has {count} samples. The page keeps the lowest and the highest sample of "
             f"each of {STRETCHES} equal stretches, at their own times, so that no spike is lost; "
@@ -109,7 +108,7 @@ def observers_section(analysis: Analysis) -> str:
         rows=tuple(observer_row(analysis, observer.name) for observer in analysis.observers),
         swatches=True,
     )
-    parameters = "".join(parameter_row(analysis, o.name) for o in analysis.observers)
+    parameters = "".join(parameter_row(o) for o in analysis.observers)
     return (
         f'<h2>Observers</h2>{html(grid)}<h3>Frequency response</h3><div class="responses" '
         'id="responses"></div><h3>Parameters</h3>'
@@ -135,22 +134,20 @@ def joint_values(values: Array) -> str:
     if len(set(texts)) == 1:
         return texts[0]
     numbered = groupby(enumerate(texts, start=1), key=itemgetter(1))
-    runs = [(text, [j for j, _ in members]) for text, members in numbered]
-    return "<br>".join(f'<span class="which">{joint_range(js)}</span> {text}' for text, js in runs)
+    lines = []
+    for text, members in numbered:
+        joints = [f"J{j}" for j, _ in members]
+        which = joints[0] if len(joints) == 1 else f"{joints[0]}–{joints[-1]}"
+        lines.append(f'<span class="which">{which}</span> {text}')
+    return "<br>".join(lines)
 
 
-def joint_range(joints: Sequence[int]) -> str:
-    """Neighbouring joints as one text: J2, or J1–J3."""
-    return f"J{joints[0]}" if len(joints) == 1 else f"J{joints[0]}–J{joints[-1]}"
-
-
-def parameter_row(analysis: Analysis, name: str) -> str:
+def parameter_row(observer: Observer) -> str:
     """One observer's parameters as they were used."""
-    observer = next(o for o in analysis.observers if o.name == name)
     # The record has parameters as JSON can hold them, also those of a wrapped observer.
     used = observer_record(observer, None)["parameters"]
     text = "; ".join(f"{key} = {value_text(value)}" for key, value in used.items())
-    return f"<dt>{escape(name)}</dt><dd>{escape(text)}</dd>"
+    return f"<dt>{escape(observer.name)}</dt><dd>{escape(text)}</dd>"
 
 
 def value_text(value: Any) -> str:  # noqa: ANN401 - whatever JSON can hold

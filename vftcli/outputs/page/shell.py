@@ -124,36 +124,26 @@ def provenance(record: Mapping[str, Any]) -> str:
     """Command, versions, input, robot and what was repaired: enough to make it again."""
     versions = ", ".join(f"{name} {number}" for name, number in record.get("versions", {}).items())
     command = str(record.get("command") or "through the Python interface")
-    table = {**input_facts(record.get("input")), **robot_facts(record.get("robot") or {})}
-    parts = [
-        f"<h2>Provenance</h2><pre>{escape(command)}</pre>",
-        pairs({**table, "Versions": versions}),
-    ]
+    robot, source = record.get("robot") or {}, record.get("input")
+    table = {}
+    if source is not None:
+        table = {
+            "Log": f"{source.get('path') or 'in memory'} ({source.get('format')})",
+            "Log sha256": source.get("sha256") or "–",
+            "Clock": source.get("clock"),
+            "Rows": f"{source.get('rows')} in the file, {source.get('duplicates')} repeated stamps "
+            f"dropped, {source.get('samples')} used",
+        }
+    table |= {
+        "Robot": f"{robot.get('name')} ({robot.get('file') or 'built in'})",
+        "Robot sha256": robot.get("sha256") or "–",
+        "Versions": versions,
+    }
+    parts = [f"<h2>Provenance</h2><pre>{escape(command)}</pre>", pairs(table)]
     for name in ("repairs", "warnings", "notes"):
         lines = record.get(name) or ()
         parts.append(f"<h3>{name.capitalize()}</h3>")
         parts.append(bullets(lines) if lines else soft("none"))
-    if notes := (record.get("robot") or {}).get("notes"):
+    if notes := robot.get("notes"):
         parts.append(f"<h3>Notes on the robot file</h3>{bullets(notes)}")
     return "".join(parts)
-
-
-def input_facts(source: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Which log it was; nothing where there was none."""
-    if source is None:
-        return {}
-    return {
-        "Log": f"{source.get('path') or 'in memory'} ({source.get('format')})",
-        "Log sha256": source.get("sha256") or "–",
-        "Clock": source.get("clock"),
-        "Rows": f"{source.get('rows')} in the file, {source.get('duplicates')} repeated stamps "
-        f"dropped, {source.get('samples')} used",
-    }
-
-
-def robot_facts(robot: Mapping[str, Any]) -> dict[str, Any]:
-    """Which robot profile was used, and the digest of its file."""
-    return {
-        "Robot": f"{robot.get('name')} ({robot.get('file') or 'built in'})",
-        "Robot sha256": robot.get("sha256") or "–",
-    }

@@ -10,8 +10,8 @@ from vftcli.outputs.grid import Column, Entry, Grid, html, significant
 from vftcli.outputs.log.wrench_tables import drift_grid
 from vftcli.outputs.page.charts import Chart, ChartLine
 from vftcli.outputs.page.shell import soft
-from vftcli.outputs.palette import DASHED, colours_of
-from vftcli.signals.arrays import Array, Mask
+from vftcli.outputs.palette import styles_of
+from vftcli.signals.arrays import Array
 from vftcli.virtual_sensor.detection import ContactScore
 from vftcli.virtual_sensor.frames import FRAMES
 from vftcli.virtual_sensor.sensor_reading import SensorReading
@@ -26,21 +26,30 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
     if sensed is None or not sensed.wrenches:
         return
     # σ_min and the mask follow from the pose, so that every observer has the same.
-    first, colours = sensed.wrenches[0], colours_of(analysis.estimates)
+    first, styles = sensed.wrenches[0], styles_of(analysis.estimates)
     if first.sigma_min is not None:
         least = np.array([sensed.sensor.least_sigma])
         sigma = (ChartLine("σ_min of J", column(first.sigma_min)),)
         yield Chart("sigma_min", "What the pose can tell: σ_min", "m", sigma, least, "masked below")
     if first.hidden.any():
         blown = tuple(
-            ChartLine(w.name, masked_force(w.values, w.hidden), colours[w.name], w.name in DASHED)
+            # The norm of the force, where it is masked only.
+            ChartLine(
+                w.name,
+                np.where(
+                    w.hidden[:, None],
+                    np.linalg.norm(w.values[:, :3], axis=1, keepdims=True),
+                    np.nan,
+                ),
+                *styles[w.name],
+            )
             for w in sensed.wrenches
         )
         title = f"|force| by {sensed.sensor.solver} in the masked samples, not to be believed"
         yield Chart("blow-up", title, "N", blown)
     if first.null_space is not None:
         left = tuple(
-            ChartLine(w.name, column(w.null_space), colours[w.name], w.name in DASHED)
+            ChartLine(w.name, column(w.null_space), *styles[w.name])
             for w in sensed.wrenches
             if w.null_space is not None
         )
@@ -55,12 +64,6 @@ def column(values: Array) -> Array:
     return values[:, None]
 
 
-def masked_force(values: Array, hidden: Mask) -> Array:
-    """Norm of the force in masked samples, NaN elsewhere. (T, 1) [N]"""
-    norm = np.linalg.norm(values[:, :3], axis=1)
-    return column(np.where(hidden, norm, np.nan))
-
-
 def wrench_section(analysis: Analysis) -> str:
     """Words, tables and the place of the charts, "" where no wrench was asked for."""
     sensed = analysis.virtual_sensor
@@ -69,7 +72,7 @@ def wrench_section(analysis: Analysis) -> str:
     grids = [drift_grid(sensed.drifts, spans=True)] if sensed.drifts else []
     if analysis.contacts:
         grids += [contact_grid(analysis.contacts), trade_off_grid(analysis.contacts)]
-    meaning = f"Force and moment ON the robot in {escape(FRAMES[sensed.sensor.frame])}; "
+    axes, solver = FRAMES[sensed.sensor.frame], sensed.sensor.solver
     return "".join(
         (
             "<h2>Wrench over time</h2>",
@@ -77,7 +80,7 @@ def wrench_section(analysis: Analysis) -> str:
                 "Force and moment on the robot, as the virtual sensor tells them; the line breaks "
                 "where the pose cannot."
             ),
-            soft(f"{meaning}solver {escape(sensed.sensor.solver)}."),
+            soft(f"Force and moment ON the robot in {escape(axes)}; solver {escape(solver)}."),
             masked_words(sensed),
             *map(html, grids),
             '<div class="responses" id="wrenches"></div>',
