@@ -47,14 +47,14 @@ def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -
 
 
 def test_the_recording_shows_both_edges_of_the_last_band(worked_up: Analysis) -> None:
-    lines = line_groups(worked_up)["External torque"][0]
-    upper = lines.values[:, lines.names.index("rts-auto 95 % upper")]
-    lower = lines.values[:, lines.names.index("rts-auto 95 % lower")]
+    plot = line_groups(worked_up)["External torque"][0]
+    lines = {line.name: line.values for line in plot.lines}
+    upper, lower = (lines[f"rts-auto 95 % {edge}"] for edge in ("upper", "lower"))
     estimate = worked_up.estimates[-1]
     assert estimate.error_sd is not None
     np.testing.assert_allclose(0.5 * (upper + lower), estimate.tau[:, 0], atol=1e-9)
     np.testing.assert_allclose(upper - lower, 2 * 1.96 * estimate.error_sd[:, 0], rtol=1e-9)
-    assert not any("kfo-auto 95 %" in name for name in lines.names)
+    assert not any("kfo-auto 95 %" in name for name in lines)
 
 
 def test_run_json_records_what_was_chosen(worked_up: Analysis) -> None:
