@@ -9,11 +9,11 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.virtual_sensor.solvers import TORQUE_SD
 from vftcli.virtual_sensor.torque_error import (
-    Disturbance,
     from_band,
     from_default,
     from_free_part,
     given_error,
+    lag_sd,
 )
 
 T = np.arange(0.0, 40.0, 0.01)
@@ -59,10 +59,10 @@ def test_a_default_stands_for_a_covariance_only_under_a_prior() -> None:
 def test_a_free_part_measures_the_spread_about_its_mean() -> None:
     one = torque()
     free = T < 20.0
-    found = from_free_part([one], free, None, None)
+    found = from_free_part([one], free, None, {})
     np.testing.assert_allclose(found.sd["gmo"], one.tau[free].std(axis=0))
     rms = {"gmo": np.array([3.0, 4.0])}
-    np.testing.assert_array_equal(from_free_part([one], free, rms, None).sd["gmo"], [3.0, 4.0])
+    np.testing.assert_array_equal(from_free_part([one], free, rms, {}).sd["gmo"], [3.0, 4.0])
 
 
 def test_the_lag_adds_what_it_leaves_out_of_the_contacts() -> None:
@@ -72,18 +72,18 @@ def test_the_lag_adds_what_it_leaves_out_of_the_contacts() -> None:
     p = np.concatenate([np.zeros((1, 1)), np.cumsum(gained, axis=0)])
     terms = DynamicsTerms(t=T, p=p, mu=np.zeros_like(p))
     observers = (MomentumObserver(gain=5.0),)
-    lag = Disturbance(terms=terms, observers=observers).lag(T < 20.0)["gmo"]
+    lag = lag_sd(terms, observers, None, T < 20.0)["gmo"]
     omega = 2 * np.pi * 0.5
     expected = 8.0 / np.sqrt(2) * omega / np.hypot(omega, 5.0)
     # windows of a few seconds spread the line over ± .5 Hz, where |1 − H| bends
     assert lag[0] == pytest.approx(expected, rel=0.1)
     run = DynamicsTerms(t=T, p=np.zeros_like(p), mu=np.zeros_like(p))
-    beside = Disturbance(terms=terms, observers=observers, free=run).lag(T < 0.0)["gmo"]
+    beside = lag_sd(terms, observers, run, T < 0.0)["gmo"]
     # over the whole log half of the samples are in contact: 1/√2 of it
     assert beside[0] == pytest.approx(expected / np.sqrt(2), rel=0.1)
 
 
 def test_a_part_too_short_for_a_spectrum_adds_nothing() -> None:
     terms = DynamicsTerms(t=T, p=np.zeros((len(T), 1)), mu=np.zeros((len(T), 1)))
-    lag = Disturbance(terms=terms, observers=(MomentumObserver(gain=5.0),)).lag(T < 0.05)
+    lag = lag_sd(terms, (MomentumObserver(gain=5.0),), None, T < 0.05)
     np.testing.assert_array_equal(lag["gmo"], [0.0])

@@ -66,16 +66,13 @@ def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
     far = way > (STARTED if axis < 3 else TURNED)
     before = run.moved[max(k - 3, 0) : k + 1, part]
     speed = np.linalg.norm(before[-1] - before[0]) / max(t[k] - t[max(k - 3, 0)], 1e-9)
-    begin = first_true(felt, k)
     ends = first_true(~there, k)
-    gone = None if ends is None else first_true(~felt, ends)
-    moving = first_true(far, k)
     return Latency(
         axis=axis,
         force=float(t[k]),
-        detection=None if begin is None else float(t[begin] - t[k]),
-        motion=None if moving is None else float(t[moving] - t[k]),
-        withdrawal=None if gone is None or ends is None else float(t[gone] - t[ends]),
+        detection=time_until(felt, k, t),
+        motion=time_until(far, k, t),
+        withdrawal=None if ends is None else time_until(~felt, ends, t),
         rested=bool(speed < STILL[0 if axis < 3 else 1]),
     )
 
@@ -84,3 +81,9 @@ def first_true(flags: Mask, start: int) -> int | None:
     """First row from `start` on that is set, or None."""
     found = np.flatnonzero(flags[start:])
     return start + int(found[0]) if found.size else None
+
+
+def time_until(flags: Mask, start: int, t: Array) -> float | None:
+    """Time from row `start` to the first row from there on that is set, or None. [s]"""
+    row = first_true(flags, start)
+    return None if row is None else float(t[row] - t[start])

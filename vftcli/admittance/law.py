@@ -92,7 +92,8 @@ def controllers(
     Raises:
         ParameterError: If a kind is unknown or an α is not positive.
     """
-    wanted = check_kinds(kinds) or KINDS
+    check_kinds(kinds)
+    wanted = kinds or KINDS
     found = [traditional(parameters)] if "traditional" in wanted else []
     if "variable" in wanted:
         variants = [parameters.with_alpha(a) for a in dict.fromkeys(alphas)] or [parameters]
@@ -100,15 +101,10 @@ def controllers(
     return tuple(found)
 
 
-def check_kinds(kinds: Sequence[str]) -> Sequence[str]:
-    """Names of kinds as they are.
-
-    Raises:
-        ParameterError: If one is not in `KINDS`.
-    """
+def check_kinds(kinds: Sequence[str]) -> None:
+    """Raise a ParameterError that lists the kinds if one is not in `KINDS`."""
     if unknown := [kind for kind in kinds if kind not in KINDS]:
         raise ParameterError(f"no controller {unknown[0]!r}; there is {', '.join(KINDS)}")
-    return kinds
 
 
 def kinetic_shape(u: Array) -> Array:

@@ -41,7 +41,6 @@ class Drag:
 
 def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
     """The drags of every axis along a record of T forces (rows 0 … T of the motion)."""
-    rows = len(phases.dragged) + 1
     found: list[Drag] = []
     for axis in range(6):
         spans: list[list[int]] = []
@@ -50,7 +49,7 @@ def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
                 spans[-1][1] = release
             else:
                 spans.append([begin, release])
-        ends = [*(begin for begin, _ in spans[1:]), rows - 1][: len(spans)]
+        ends = [*(begin for begin, _ in spans[1:]), len(phases.dragged)][: len(spans)]
         found += [
             Drag(axis=axis, number=k + 1, begin=begin, release=release, end=end + 1)
             for k, ((begin, release), end) in enumerate(zip(spans, ends, strict=True))

@@ -21,13 +21,11 @@ class NullSpaceVerdict(NamedTuple):
     Attributes:
         name: The observer.
         threshold: `MARGIN` times the largest norm in the free part. [N·m]
-        above: Samples above it: contact elsewhere on the arm, or a wrong model. (T,)
-        share: Share of the samples above it.
+        share: Share of the samples above it: contact elsewhere on the arm, or a wrong model.
     """
 
     name: str
     threshold: float
-    above: Mask
     share: float
 
     @property
@@ -50,5 +48,5 @@ def contact_elsewhere(wrench: Wrench, free: Mask) -> NullSpaceVerdict | None:
         return None
     # The largest, not a quantile: the free part holds no contact, so all of it is error.
     threshold = MARGIN * float(np.nanmax(wrench.null_space[free]))
-    above: Mask = np.nan_to_num(wrench.null_space) > threshold
-    return NullSpaceVerdict(wrench.name, threshold, above, float(np.mean(above)))
+    share = float(np.mean(np.nan_to_num(wrench.null_space) > threshold))
+    return NullSpaceVerdict(wrench.name, threshold, share)

@@ -1,7 +1,8 @@
 """From a log, its free motion and the estimates to what the virtual sensor says of it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import chain as chained
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from vftcli.observers.observer import Observer
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Mask
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution
@@ -23,12 +24,12 @@ from vftcli.virtual_sensor.mounting import find_mounting, without_tool_weight
 from vftcli.virtual_sensor.null_space import contact_elsewhere
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.torque_error import (
-    Disturbance,
     TorqueError,
     from_band,
     from_default,
     from_free_part,
     given_error,
+    lag_sd,
 )
 from vftcli.virtual_sensor.vendor import check_vendor
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
@@ -78,8 +79,8 @@ def sense(
     torques = less_free_run(estimates, free_run)
     zero = zero_spans(choice.zero, raw)
     quiet = motion.zero.run.terms if motion.zero is not None else None
-    lags = Disturbance(terms=terms, observers=observers, free=quiet)
-    error = torque_error(choice, torques, zero.chosen(t), free_run, lags)
+    lag = partial(lag_sd, terms, observers, quiet)
+    error = torque_error(choice, torques, zero.chosen(t), free_run, lag)
     wrenches = sensor.wrenches(torques, recording.q, chain, dict(error.sd))
     bands = (error.remark,) if error.remark else tuple(r for w in wrenches for r in w.remarks)
     # Drifts span by span: the first of each observer is its zero.
@@ -135,7 +136,7 @@ def torque_error(
     torques: Sequence[ExternalTorque],
     free: Mask,
     free_run: FreeRunTorque | None,
-    disturbance: Disturbance,
+    lag: Callable[[Mask], Mapping[str, Array]],
 ) -> TorqueError:
     """The torque error behind the band: what was given, else measured, else assumed.
 
@@ -144,13 +145,14 @@ def torque_error(
         torques: The estimates.
         free: Samples of the zero spans; none if no zero was given. (T,)
         free_run: What a free run reads, or None.
-        disturbance: What tells the observers' lag.
+        lag: What each observer's lag leaves out of the contacts, by the free samples (T,); called
+            only where it counts, as it takes spectra of the whole log.
     """
     if choice.torque_sd is not None:
         return given_error(choice.torque_sd, torques)
     if free_run is not None or np.count_nonzero(free) > 1:
         rms = None if free_run is None else free_run.rms
-        return from_free_part(torques, free, rms, disturbance)
+        return from_free_part(torques, free, rms, lag(free))
     if torques and all(torque.error_sd is not None for torque in torques):
         return from_band(torques)
     return from_default(torques, choice.solver)

@@ -139,15 +139,10 @@ SOLVERS: dict[str, Callable[[Decomposition, Array], Solution]] = {
 """Name at the command line → what turns a decomposed Jacobian and torque sd (T, n) into A and B."""
 
 
-def check_solver(name: str) -> str:
-    """Return the solver's name.
-
-    Raises:
-        ParameterError: If there is no such solver.
-    """
+def check_solver(name: str) -> None:
+    """Raise a ParameterError that lists the solvers if there is none of that name."""
     if name not in SOLVERS:
         raise ParameterError(f"no solver {name!r} for a wrench; there is {', '.join(SOLVERS)}")
-    return name
 
 
 def null_space(parts: Decomposition, tau: Array) -> Array:

@@ -25,40 +25,30 @@ OWN = "own"
 """The word for the observers' own covariance as the torque error."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Disturbance:
-    """The raw disturbance of a log, and of a free run if there is one.
+def lag_sd(
+    terms: DynamicsTerms,
+    observers: Sequence[Observer],
+    free_run: DynamicsTerms | None,
+    free: Mask,
+) -> Mapping[str, Array]:
+    """What each observer's lag leaves out of the contacts, standard deviation. (n,) [N·m]
 
-    Attributes:
+    Args:
         terms: p and μ along the log.
-        free: p and μ along the free run, or None.
-        observers: The observers whose lag is asked for.
+        observers: The observers.
+        free_run: p and μ along a free run, or None.
+        free: Unloaded samples of the log, used where there is no free run. (T,)
     """
-
-    terms: DynamicsTerms
-    observers: Sequence[Observer]
-    free: DynamicsTerms | None = None
-
-    def lag(self, free: Mask) -> Mapping[str, Array]:
-        """What each observer's lag leaves out of the contacts, standard deviation. (n,) [N·m]
-
-        Args:
-            free: Unloaded samples of the log, used where there is no free run. (T,)
-        """
-        n, loaded, quiet = self.terms.joints, Part(self.terms, ~free), Part(self.terms, free)
-        if self.free is not None:
-            loaded, quiet = (
-                Part(terms, np.ones(len(terms.t), dtype=bool)) for terms in (self.terms, self.free)
-            )
-        try:
-            spectra = spectra_of(loaded, [quiet])
-        except ParameterError:  # too short for a spectrum: nothing is known of the lag's part
-            return {o.name: np.zeros(n) for o in self.observers}
-        f, step = spectra.frequency, spectra.step
-        return {
-            o.name: np.sqrt(spectra.missed(o.frequency_response(f, step, n)))
-            for o in self.observers
-        }
+    loaded, quiet = Part(terms, ~free), Part(terms, free)
+    if free_run is not None:
+        loaded, quiet = (Part(run, np.ones(len(run.t), dtype=bool)) for run in (terms, free_run))
+    n = terms.joints
+    try:
+        spectra = spectra_of(loaded, [quiet])
+    except ParameterError:  # too short for a spectrum: nothing is known of the lag's part
+        return {observer.name: np.zeros(n) for observer in observers}
+    f, step = spectra.frequency, spectra.step
+    return {o.name: np.sqrt(spectra.missed(o.frequency_response(f, step, n))) for o in observers}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +108,7 @@ def from_free_part(
     torques: Sequence[ExternalTorque],
     free: Mask,
     rms: Mapping[str, Array] | None,
-    disturbance: Disturbance | None,
+    lag: Mapping[str, Array],
 ) -> TorqueError:
     """The error of the free part and of the lag, as the module's equation has it.
 
@@ -126,9 +116,8 @@ def from_free_part(
         torques: The estimates.
         free: Unloaded samples. (T,)
         rms: Root mean square over a free run, or None to take the spread over `free`. (n,) [N·m]
-        disturbance: What tells the lag, or None to leave it out.
+        lag: What each observer's lag leaves out of the contacts; see `lag_sd`. (n,) [N·m]
     """
-    lag = disturbance.lag(free) if disturbance is not None else {}
     sd = {}
     for torque in torques:
         quiet = rms[torque.name] if rms is not None else np.nanstd(torque.tau[free], axis=0)
