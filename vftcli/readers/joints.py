@@ -3,6 +3,8 @@
 import re
 from collections.abc import Sequence
 
+from vftcli.signals.arrays import Array
+
 UR_NAMES = (
     "shoulder_pan_joint",
     "shoulder_lift_joint",
@@ -33,6 +35,19 @@ def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:
         if order:
             return order
     return tuple(range(len(names)))
+
+
+def in_order(column: Array, order: Sequence[int], names: int) -> Array:
+    """A joint signal's columns in an order, where it has one a name; others as they are.
+
+    Args:
+        column: (T, k), or (T,) of what is no joint signal.
+        order: Places of the arm's joints among the names.
+        names: How many names there are, a gripper's fingers among them.
+    """
+    if column.ndim != 2 or column.shape[1] != names:
+        return column
+    return column[:, list(order)]
 
 
 def _franka_order(names: Sequence[str]) -> tuple[int, ...]:

@@ -1,4 +1,4 @@
-"""What every container of messages yields: channels, and batches of their messages."""
+"""Containers of messages: their files on disk, and the channels and batches that each yields."""
 
 import struct
 from collections.abc import Callable, Sequence
@@ -10,12 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.readers.reader import LogFile
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark
 
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]
 Encoding = Literal["ros1", "cdr", "json", "protobuf", "other"]
+
+ROSBAG1 = b"#ROSBAG V2.0\n"
+MCAP = b"\x89MCAP0\r\n"
+SQLITE = b"SQLite format 3\0"
+
+STORAGE = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
+"""Endings of the files of a bag folder that hold messages."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +80,10 @@ class MessageRun(NamedTuple):
     messages: int
     length: int
     back: int
+
+
+RUN_AFTER = 3
+"""Messages of one kind in a row after which a longer run is looked for at once."""
 
 
 def batch_of(
@@ -132,6 +144,23 @@ class Ingest:
         """Remember a remark once."""
         if remark not in self.remarks:
             self.remarks.append(remark)
+
+
+def storage_files(file: LogFile) -> list[str]:
+    """The storage files of a bag folder, in the order in which they were recorded.
+
+    Names in metadata.yaml are not followed: only files that lie in the folder itself are read.
+    """
+    names = {n for n in file.entries if n.endswith(STORAGE) and (file.path / n).is_file()}
+    plain = {n for n in names if n.removesuffix(".zstd").removesuffix(".zst") not in names - {n}}
+    return sorted(plain, key=_numbers_in)
+
+
+def _numbers_in(name: str) -> tuple[list[int], str]:
+    """What sorts bag_10.mcap behind bag_9.mcap."""
+    stem = name.split(".", maxsplit=1)[0]
+    tail = stem.rpartition("_")[2]
+    return ([int(tail)] if tail.isdigit() else [], name)
 
 
 def printable(name: str) -> str:

@@ -9,7 +9,7 @@ from vftcli.readers.bags.container import Batch, Channel, Ingest, Integers
 from vftcli.readers.bags.kinds import KINDS, Kind, constant_in, paths_in
 from vftcli.readers.bags.layout import LayoutError, MessageLayout, Types, Walker
 from vftcli.readers.bags.ros_messages import types_for
-from vftcli.readers.joints import kinematic_order
+from vftcli.readers.joints import in_order, kinematic_order
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 
@@ -162,7 +162,11 @@ class Decoder:
         # Some drivers publish joints alphabetically; every message of a layout has one order.
         mixed = order != tuple(range(len(names)))
         if mixed:
-            signals = {n: _picked(n, v, order, len(names)) for n, v in signals.items()}
+            # Of an arm of six joints the wrench has as many columns, but they are no joints.
+            signals = {
+                n: v if n == "wrench" else in_order(v, order, len(names))
+                for n, v in signals.items()
+            }
             names = tuple(names[k] for k in order)
         frame = "".join(layout.texts.get(kind.frame, ()))
         robot = None
@@ -185,13 +189,6 @@ class Decoder:
             for channel, topic in self.topics.items()
             for key, parts in topic.parts.items()
         ]
-
-
-def _picked(signal: str, value: Array, order: tuple[int, ...], width: int) -> Array:
-    """A joint signal's columns in kinematic order; others as they are."""
-    if signal == "wrench" or value.shape[1] != width:
-        return value
-    return value[:, list(order)]
 
 
 def _stamps(layout: MessageLayout, batch: Batch, offsets: Integers) -> Integers | None:

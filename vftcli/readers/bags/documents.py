@@ -2,13 +2,14 @@
 
 import json
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from vftcli.readers.bags.container import Batch, Channel, Ingest
-from vftcli.readers.joints import kinematic_order, robot_of
+from vftcli.readers.joints import in_order, kinematic_order, robot_of
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, from_table
@@ -180,34 +181,25 @@ def _read(
     request: ReadChoice,
 ) -> RawLog:
     """The documents of one channel as a table, read by aliases or by --columns."""
+    names = _names(rows[0])
+    order = kinematic_order(names)
     columns: dict[str, Column] = {}
     for key, first in rows[0].items():
-        values = [row.get(key) for row in rows]
-        if (column := _column(first, values)) is not None:
-            columns[key] = column
-    names = _names(rows[0])
-    if names:
-        columns = {k: _ordered(v, names) for k, v in columns.items()}
+        column = _column(first, [row.get(key) for row in rows])
+        if column is not None and not key.lower().startswith(("timestamp", "stamp", "header")):
+            columns[key] = in_order(column, order, len(names)) if names else column
     clock = "log time of the recorder"
-    columns = {
-        k: v
-        for k, v in columns.items()
-        if not k.lower().startswith(("timestamp", "stamp", "header"))
-    }
     if (stamps := _stamps(rows)) is not None:
         clock = f"stamps in the messages of {channel.topic}"
         columns["timestamp_ns" if stamps.dtype == np.int64 else "timestamp"] = stamps
     else:
         columns["timestamp_ns"] = np.array(times, dtype=np.int64)
     table = ArrayTable(path=f"{file.path}: topic {channel.topic}", columns=columns)
-    ordered = tuple(names[k] for k in kinematic_order(names))
-    more: dict[str, Any] = {"clock_name": clock}
-    if request.columns is None and ordered:
-        raw = from_table(table, request, **more)
-        from dataclasses import replace
-
-        return replace(raw, joint_names=ordered, robot_hint=robot_of(ordered))
-    return from_table(table, request, **more)
+    raw = from_table(table, request, clock_name=clock)
+    if request.columns is not None or not names:
+        return raw
+    ordered = tuple(names[k] for k in order)
+    return replace(raw, joint_names=ordered, robot_hint=robot_of(ordered))
 
 
 def _names(row: dict[str, Any]) -> tuple[str, ...]:
@@ -215,13 +207,6 @@ def _names(row: dict[str, Any]) -> tuple[str, ...]:
     names = row.get("name", [])
     good = isinstance(names, list) and all(isinstance(name, str) for name in names)
     return tuple(names) if good else ()
-
-
-def _ordered(column: Column, names: Sequence[str]) -> Column:
-    """A joint signal's columns in kinematic order; others as they are."""
-    if column.ndim != 2 or column.shape[1] != len(names):
-        return column
-    return column[:, list(kinematic_order(names))]
 
 
 def _column(first: Any, values: list[Any]) -> Column | None:  # noqa: ANN401

@@ -1,7 +1,7 @@
 """The bag formats: ROS 1 bags, ROS 2 bags as folder or bare file, and other MCAP files."""
 
-from vftcli.readers.bags.storage import MCAP as MCAP_MAGIC
-from vftcli.readers.bags.storage import ROSBAG1, SQLITE, storage_files
+from vftcli.readers.bags.container import MCAP as MCAP_MAGIC
+from vftcli.readers.bags.container import ROSBAG1, SQLITE, storage_files
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 
 
@@ -12,14 +12,13 @@ def read_bag(file: LogFile, request: ReadChoice) -> RawLog:
     return reading.read_bag(file, request)
 
 
-def is_bag_folder(file: LogFile) -> bool:
-    """Whether a folder holds ROS 2 storage files."""
-    return file.is_folder and bool(storage_files(file))
-
-
 ROS1 = Reader(name="rosbag1", recognises=lambda file: file.head.startswith(ROSBAG1), read=read_bag)
 
-ROS2 = Reader(name="rosbag2", recognises=is_bag_folder, read=read_bag)
+ROS2 = Reader(
+    name="rosbag2",
+    recognises=lambda file: file.is_folder and bool(storage_files(file)),
+    read=read_bag,
+)
 
 DB3 = Reader(name="db3", recognises=lambda file: file.head.startswith(SQLITE), read=read_bag)
 

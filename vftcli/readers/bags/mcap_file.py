@@ -10,6 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from vftcli.readers.bags.container import (
+    MCAP,
+    RUN_AFTER,
     Batch,
     Bytes,
     Channel,
@@ -24,7 +26,6 @@ from vftcli.readers.bags.container import (
     u64,
     unpack_chunk,
 )
-from vftcli.readers.bags.storage import MCAP
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
@@ -35,8 +36,6 @@ MESSAGE_HEAD = 22
 """Bytes of a message before its data: channel, sequence, log time, publish time."""
 LOG_TIME = 16
 """How far before its data a message's log time stands."""
-RUN_AFTER = 3
-"""Messages of one kind in a row after which a longer run is looked for at once."""
 
 ENCODINGS: dict[str, Encoding] = {
     "cdr": "cdr", "ros1": "ros1", "json": "json", "protobuf": "protobuf",

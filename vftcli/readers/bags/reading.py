@@ -5,10 +5,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from vftcli.readers.bags import db3, mcap_file, rosbag1
-from vftcli.readers.bags.container import Batch, Ingest
+from vftcli.readers.bags.container import MCAP, ROSBAG1, SQLITE, Batch, Ingest, storage_files
 from vftcli.readers.bags.decode import Decoder
 from vftcli.readers.bags.documents import Documents, read_documents
-from vftcli.readers.bags.storage import MCAP, ROSBAG1, SQLITE, storage_files
 from vftcli.readers.bags.topics import aligned
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, open_log
 from vftcli.signals.errors import LogError

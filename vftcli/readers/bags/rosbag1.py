@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.readers.bags.container import (
+    ROSBAG1,
+    RUN_AFTER,
     Batch,
     Channel,
     Ingest,
@@ -22,14 +24,11 @@ from vftcli.readers.bags.container import (
     u32,
     unpack_chunk,
 )
-from vftcli.readers.bags.storage import ROSBAG1
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
 OP_MESSAGE, OP_BAG, OP_INDEX, OP_CHUNK, OP_CHUNK_INFO, OP_CONNECTION = 2, 3, 4, 5, 6, 7
 MAX_HEADER = 64 * 1024
-RUN_AFTER = 3
-"""Messages of one kind in a row after which a longer run is looked for at once."""
 
 Header = dict[bytes, bytes]
 
