@@ -1,7 +1,9 @@
 """Aliases: the names under which users' tables hold the signals, found without being told."""
 
 import re
+import tomllib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers.joints import kinematic_order
@@ -16,31 +18,11 @@ OWN_STAMPS = "t_src_ns"
 """The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes them."""
 
 ALIASES: dict[str, tuple[str, ...]] = {
-    "q": (
-        "q", "actual_q", "state.q", "joint_pos", "joint_position", "position", "positions",
-        "joint_positions", "q_actual", "observation.state",
-    ),
-    "dq": (
-        "dq", "qd", "actual_qd", "state.dq", "velocity", "velocities", "joint_vel",
-        "joint_velocity", "joint_velocities", "qd_actual", "dq_actual",
-    ),
-    "torque": (
-        "tau", "tau_j", "state.tau_j", "effort", "efforts", "torque", "torques", "joint_torque",
-        "joint_torques", "motor_torque", "motor_torques_measured",
-    ),
-    "current": (
-        "actual_current", "current", "currents", "i_actual", "motor_current", "joint_current",
-        "i",
-    ),
-    "tau_ext": (
-        "tau_ext", "tau_ext_hat_filtered", "motor_torques_external", "tau_ext_vendor",
-    ),
-    "target_q": ("target_q", "q_d", "q_target", "target_position"),
-    "target_dq": ("target_dq", "target_qd", "dq_d", "qd_target", "target_velocity"),
-    "target_current": ("target_current", "current_d", "i_target"),
-    "target_torque": ("target_torque", "target_moment", "tau_d"),
-    "temperature": ("temperature", "joint_temperature", "joint_temperatures"),
-}  # fmt: skip
+    field: tuple(names)
+    for field, names in tomllib.loads(
+        (Path(__file__).parent / "aliases.toml").read_text(encoding="utf-8")
+    ).items()
+}
 """Field of Recording → names its columns go by, in lower case and without their index."""
 
 TURNED = {"tau_ext_hat_filtered", "motor_torques_external"}

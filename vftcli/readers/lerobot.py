@@ -1,12 +1,13 @@
 """LeRobot datasets, versions 2 and 3: a folder of Parquet files with meta/info.json."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vftcli.readers.parquet import EPISODE, ParquetTable
+from vftcli.readers.parquet import ParquetTable
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.tables import from_table
 from vftcli.signals.errors import LogError
@@ -27,9 +28,7 @@ def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
         raise LogError(f"{file.path}: a LeRobot dataset without data/**/*.parquet.")
     table = ParquetTable(files[0], files[0])
     rows, first = None, 0
-    if EPISODE in (table.names or ()):
-        episodes = table.load([(table.names or ()).index(EPISODE)], None)
-        numbers = next(iter(episodes.values()))
+    if (numbers := table.episodes()).size:
         first = int(numbers[0])
         rows = np.flatnonzero(numbers == numbers[0])
     table = ParquetTable(files[0], files[0], rows)
@@ -39,9 +38,7 @@ def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
         episodes=str(info.get("total_episodes", "an unknown number"))[:20],
         rate_Hz=str(info.get("fps", "unknown"))[:20],
     )
-    request = ReadChoice(
-        columns=request.columns or default_columns(table, info), signals=request.signals
-    )
+    request = replace(request, columns=request.columns or default_columns(table, info))
     return from_table(table, request, remarks=(remark,))
 
 

@@ -95,6 +95,13 @@ class ParquetTable:
                 table = table.take(self._rows)
             return {c: self._numbers(table.column(names[c]), c, clock) for c in columns}
 
+    def episodes(self) -> Column:
+        """The episode of each row, as datasets of LeRobot number them; none elsewhere. (T,)"""
+        if self.names is None or EPISODE not in self.names:
+            return np.empty(0)
+        column = self.names.index(EPISODE)
+        return self.load([column], None)[column]
+
     def _numbers(self, values: Any, column: int, clock: int | None) -> Column:  # noqa: ANN401
         """A column as numbers; whole stamps stay whole, times become nanoseconds."""
         import pyarrow as pa
@@ -162,8 +169,7 @@ def read_parquet(file: LogFile, request: ReadChoice) -> RawLog:
     """Read a Parquet file: ours, a user's, or one file of a LeRobot dataset."""
     source = file.path if file.wrapping is None else file.content
     table = ParquetTable(file.path, source)
-    if EPISODE in (table.names or ()):
-        refuse_episodes(table)
+    refuse_episodes(table)
     raw = from_table(table, request)
     told = table.told()
     names = tuple(str(name) for name in told.get("joint_names") or ())
@@ -181,9 +187,7 @@ def refuse_episodes(table: ParquetTable) -> None:
     Raises:
         LogError: With the episodes' number and what to do.
     """
-    episodes = table.load([(table.names or ()).index(EPISODE)], None)
-    number = len(np.unique(next(iter(episodes.values()))))
-    if number > 1:
+    if (number := len(np.unique(table.episodes()))) > 1:
         raise LogError(
             f"{table.path}: holds {number} episodes, each with its own clock. Give the dataset's "
             "folder (its first episode is read), or save one episode to its own file."

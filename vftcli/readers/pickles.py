@@ -7,6 +7,7 @@ import pickletools
 import warnings
 from collections import OrderedDict
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -180,7 +181,7 @@ def _read_frankapy(file: LogFile, log: dict[Any, Any], request: ReadChoice) -> R
         for signal, name in (("t[s]", "time"), ("q[rad]", "q"), ("dq", "dq"), ("tau", "tau_J"))
         if name in kept
     )
-    return read_arrays(file, kept, ReadChoice(columns=columns, signals=request.signals))
+    return read_arrays(file, kept, replace(request, columns=columns))
 
 
 PICKLE = Reader(
