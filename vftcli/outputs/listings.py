@@ -53,12 +53,7 @@ def friction_words(robot: "Robot", j: int) -> str:
 
 
 def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
-    """Gains that were found and what to expect of them, joint by joint.
-
-    Args:
-        tuned: One an observer.
-        with_alarms: Whether a threshold was given, so that false alarms can be told.
-    """
+    """Gains that were found for each observer and what to expect of them, joint by joint."""
     rows: list[tuple[str | float, ...]] = []
     for line in tuned:
         values = {

@@ -11,12 +11,7 @@ from vftcli.signals.pose import rotation_onto, rpy_angles
 
 
 def urdf_text(robot: Robot, names: tuple[str, ...]) -> str:
-    """URDF of the arm as it was used, the payload merged into its last link.
-
-    Args:
-        robot: The arm.
-        names: Joint names, base to tip.
-    """
+    """URDF of the arm as it was used, the payload in its last link; joint names base to tip."""
     chain = robot.loaded_chain
     shapes = capsules(chain)
     parts = [f"<robot name={quoteattr(robot.name)}>", link("base", shapes[0], "")]

@@ -208,12 +208,8 @@ def force_arrow(
     """The force of the virtual sensor at the drawn poses, None for an arm of less than six joints.
 
     It is that of the wrench that was asked for, its zero removed, as the tables have it; where none
-    was asked for, that of the estimate as it stands, at the flange.
-
-    Args:
-        analysis: What was found.
-        poses: The poses that are drawn.
-        sampled: Which samples of the log they are. (S,)
+    was asked for, that of the estimate as it stands, at the flange. The drawn poses are those of
+    the log's samples `sampled`. (S,)
     """
     source, chain = force_source(analysis.estimates), analysis.robot.chain
     if source is None or chain.joints < 6:

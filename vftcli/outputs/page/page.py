@@ -37,11 +37,7 @@ def render(analysis: Analysis) -> str:
 
 
 def render_index(analyses: Sequence[tuple[str, Analysis]]) -> str:
-    """The page over several reports.
-
-    Args:
-        analyses: Sub-folder of each report, relative to the index, and its analysis.
-    """
+    """The page over several reports, each told by its sub-folder, relative to the index."""
     words = (Column(head, words=True) for head in ("Log", "Robot", "Reference"))
     numbers = map(Column, ("Span [s]", "Samples", "Best mean RMSE [N·m]", "Floor"))
     overview = Grid(

@@ -11,7 +11,7 @@ from vftcli.outputs.log.wrench_tables import drift_grid
 from vftcli.outputs.page.charts import Chart, ChartLine
 from vftcli.outputs.page.shell import soft
 from vftcli.outputs.palette import styles_of
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.virtual_sensor.detection import ContactScore
 from vftcli.virtual_sensor.frames import FRAMES
 from vftcli.virtual_sensor.sensor_reading import SensorReading
@@ -33,16 +33,7 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
         yield Chart("sigma_min", "What the pose can tell: σ_min", "m", sigma, least, "masked below")
     if first.hidden.any():
         blown = tuple(
-            # The norm of the force, where it is masked only.
-            ChartLine(
-                w.name,
-                np.where(
-                    w.hidden[:, None],
-                    np.linalg.norm(w.values[:, :3], axis=1, keepdims=True),
-                    np.nan,
-                ),
-                *styles[w.name],
-            )
+            ChartLine(w.name, masked_force(w.values, w.hidden), *styles[w.name])
             for w in sensed.wrenches
         )
         title = f"|force| by {sensed.sensor.solver} in the masked samples, not to be believed"
@@ -62,6 +53,12 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
 def column(values: Array) -> Array:
     """One series as a chart's only column. (T, 1)"""
     return values[:, None]
+
+
+def masked_force(values: Array, hidden: Mask) -> Array:
+    """Norm of the force in masked samples, NaN elsewhere. (T, 1) [N]"""
+    norm = np.linalg.norm(values[:, :3], axis=1)
+    return column(np.where(hidden, norm, np.nan))
 
 
 def wrench_section(analysis: Analysis) -> str:
