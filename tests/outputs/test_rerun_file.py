@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 import rerun.chunk
 
+from vftcli.outputs.plots import Lines, PlotLine, Tab
 from vftcli.outputs.rerun_file import (
-    Lines,
-    PlotLine,
-    Tab,
     drawable,
     finish,
     rerun_file,
@@ -32,15 +30,6 @@ def rows_of(path: Path, entity: str, ending: str) -> list:
                 if name.endswith(ending):
                     found += batch.column(name).to_pylist()
     return found
-
-
-def test_the_axis_shows_all_lines_with_room() -> None:
-    low, high = lines("/a", np.array([[1.0, -3.0], [2.0, np.nan]])).ends
-    assert (low, high) == pytest.approx((-3.25, 2.25))  # a twentieth of 5 on either side
-    empty = lines("/a", np.full((3, 1), np.nan)).ends
-    assert empty[0] < empty[1]
-    flat = lines("/a", np.ones((3, 1))).ends
-    assert flat[0] < 1.0 < flat[1]
 
 
 def test_plots_and_words_of_two_clocks_read_back(tmp_path: Path) -> None:

@@ -9,13 +9,11 @@ from vftcli.admittance.replay import Replay
 from vftcli.outputs.admittance.tables import comparison_text, parameter_text
 from vftcli.outputs.arm import motion
 from vftcli.outputs.palette import REFERENCE, SPARE, rgb
+from vftcli.outputs.plots import Lines, PlotLine, Tab
 from vftcli.outputs.rerun_file import (
     FORCE,
     NEWTON_PER_METRE,
     ArmView,
-    Lines,
-    PlotLine,
-    Tab,
     rerun_file,
     send_arm,
     send_force,

@@ -14,7 +14,8 @@ from vftcli.identification.result import Identification, Trace
 from vftcli.outputs.files import numbered
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.palette import REFERENCE, SPARE
-from vftcli.outputs.rerun_file import Lines, PlotLine, Tab, rerun_file
+from vftcli.outputs.plots import Lines, PlotLine, Tab
+from vftcli.outputs.rerun_file import rerun_file
 from vftcli.signals.remarks import explanation
 
 

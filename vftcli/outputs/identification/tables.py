@@ -59,12 +59,7 @@ def shape_choice_grid(choices: pl.DataFrame) -> Grid:
     """How the friction models competed on what was left out of the fit."""
     return Grid(
         title="RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen",
-        columns=(
-            Column("friction", words=True),
-            Column("joint"),
-            Column("RMS [N·m]"),
-            Column(""),
-        ),
+        columns=(Column("friction", words=True), *map(Column, ("joint", "RMS [N·m]", ""))),
         rows=tuple(
             (r["friction"], f"J{r['joint']}", r["cv_rms_Nm"], "chosen" if r["chosen"] else "")
             for r in choices.iter_rows(named=True)
@@ -74,14 +69,10 @@ def shape_choice_grid(choices: pl.DataFrame) -> Grid:
 
 def base_grid(base: pl.DataFrame) -> Grid:
     """Base parameters as the least squares gave them."""
+    numbers = (Column(head, form=signed) for head in ("value (SI)", "sd"))
     return Grid(
         title="Weighted least squares, before physical consistency",
-        columns=(
-            Column("parameter", words=True),
-            Column("value (SI)", form=signed),
-            Column("sd", form=signed),
-            Column("determined"),
-        ),
+        columns=(Column("parameter", words=True), *numbers, Column("determined")),
         rows=tuple(
             (r["parameter"], r["value"], r["sd"], "yes" if r["determined"] else "no")
             for r in base.iter_rows(named=True)

@@ -18,16 +18,8 @@ from vftcli.outputs.log.run_record import CONVENTIONS, all_remarks
 from vftcli.outputs.log.tables import to_markdown
 from vftcli.outputs.log.wrench_tables import paper_bounds
 from vftcli.outputs.palette import REFERENCE, SPARE, colours_of
-from vftcli.outputs.rerun_file import (
-    NEWTON_PER_METRE,
-    ArmView,
-    Lines,
-    PlotLine,
-    Tab,
-    rerun_file,
-    send_arm,
-    send_force,
-)
+from vftcli.outputs.plots import Lines, PlotLine, Tab
+from vftcli.outputs.rerun_file import NEWTON_PER_METRE, ArmView, rerun_file, send_arm, send_force
 from vftcli.robots.drive import drive_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS, ExternalTorque
