@@ -143,16 +143,16 @@ def test_the_pull_is_the_strongest_of_the_nearly_best():
     chain = load_robot("ur5").chain
     true = chain_parameters(perturbed(chain, 2))
     triangles, _ = stacked(chain, true, noise=2.0)
-    found = fit_consistent(triangles, chain_parameters(chain))
-    best = min(found.errors.values())
-    near = [weight for weight, error in found.errors.items() if error <= 1.01 * best]
-    assert set(found.errors) == set(WEIGHTS)
-    assert found.weight == max(near)
+    x, weight, errors = fit_consistent(triangles, chain_parameters(chain))
+    best = min(errors.values())
+    near = [pull for pull, error in errors.items() if error <= 1.01 * best]
+    assert set(errors) == set(WEIGHTS)
+    assert weight == max(near)
     # rows are divided by their noise: the misfit left out is one standard deviation and more by
     # what 36 parameters of 4/5 of 1800 rows cost
     assert 1.0 < best < 1.0 + 3 * 36 / 1440
     start = starting_point(triangles.layout, chain_parameters(chain))
-    np.testing.assert_array_equal(found.x, fit_at(triangles, start, found.weight, start))
+    np.testing.assert_array_equal(x, fit_at(triangles, start, weight, start))
 
 
 def test_a_strong_pull_gives_the_profile_back():

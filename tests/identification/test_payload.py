@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from vftcli.identification.payload import (
-    LoadSolution,
     NotSameMotionError,
+    Solution,
     find_time_shift,
     fit_all_joints,
+    load_at_flange,
     load_friction,
     names_of,
     payload_from_pair,
@@ -33,17 +34,17 @@ def still(seconds=2.0):
     return Recording(t=t, q=zero, dq=zero, torque=zero)
 
 
-def solution(mass, com, sd=(0.01, 0.001, 0.002, 0.003)):
-    """A solved load of this mass at `com` in the last link's frame of a Panda."""
+def load(mass, com, sd=(0.01, 0.001, 0.002, 0.003), logs=()):
+    """A load of this mass that was solved for at `com` in the last link's frame of a Panda."""
     x = np.array([mass, *(mass * np.array(com))])
-    return LoadSolution(x, np.array(sd), np.zeros(7), (still(),), SOURCE)
+    return load_at_flange(Solution(x, np.array(sd), np.zeros(7)), PANDA, logs, SOURCE)
 
 
 def test_the_load_is_moved_to_flange_axes():
     chain = PANDA.chain
     com = np.array([0.02, -0.01, 0.05])
     in_link = chain.flange_rotation @ com + chain.flange_translation
-    fit = solution(2.0, in_link).at_flange(PANDA)
+    fit = load(2.0, in_link)
     np.testing.assert_allclose(fit.payload.com, com, atol=1e-12)
     assert (fit.payload.mass, fit.mass_sd) == (2.0, 0.01)
     # the Panda's flange is not turned against its last link: sd of m·c over m
@@ -62,12 +63,12 @@ def test_the_load_is_moved_to_flange_axes():
 )
 def test_what_cannot_be_a_load_is_refused(mass, sd, com, words):
     with pytest.raises(IdentificationError, match=words):
-        solution(mass, [0, 0, com], (sd, 0.1, 0.1, 0.1)).at_flange(PANDA)
+        load(mass, [0, 0, com], (sd, 0.1, 0.1, 0.1))
 
 
 def test_a_log_is_known_as_an_object_not_by_its_name():
     log, twin = still(), still()
-    fit = solution(1.0, [0, 0, 0])._replace(loaded=(log,)).at_flange(PANDA)
+    fit = load(1.0, [0, 0, 0], logs=[log])
     assert fit.carried_by(log)
     assert not fit.carried_by(twin)
     assert names_of([log, twin]) == "recording, recording"
@@ -91,8 +92,8 @@ def test_each_joint_counts_by_its_own_residual():
 def test_friction_grows_with_the_load_where_the_joint_moves():
     rng = np.random.default_rng(1)
     q, sign = rng.uniform(-1, 1, (20, 6)), np.sign(rng.standard_normal((20, 6)))
-    load = Payload(mass=2.0, com=np.zeros(3), inertia=np.zeros((3, 3)))
-    loaded = UR5.with_payload(load)
+    mass = Payload(mass=2.0, com=np.zeros(3), inertia=np.zeros((3, 3)))
+    loaded = UR5.with_payload(mass)
     x = (chain_parameters(loaded.loaded_chain) - chain_parameters(UR5.chain))[-LINK:][:4]
     columns = load_friction(UR5, q, sign, x)
     growth = np.abs(gravity_torque(loaded, q)) - np.abs(gravity_torque(UR5, q))

@@ -18,6 +18,7 @@ from vftcli.identification.result import (
     number,
 )
 from vftcli.robots import Payload, load_robot
+from vftcli.robots.writing import robot_toml
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import fact
 
@@ -127,11 +128,13 @@ def test_traces_give_rows_and_rms(prepared):
         ("recording", 5, "train", "profile", 1, 7.0, 100),
         ("recording", 5, "train", "profile", 2, 8.0, 100),
     ]
-    np.testing.assert_array_equal(trace.dq, motion.dq)
 
 
-def test_the_mean_is_over_one_logs_joints_under_one_model():
-    many = found()
-    both = many.mean_rms("log.csv", "profile")
-    assert both == pytest.approx(0.123456 * 1.5 + 1.5)  # both logs bear that name
-    assert many.mean_rms("other.csv") == 0.0
+def test_what_a_paper_printed_of_the_profile_is_not_said_of_another_arm():
+    assert UR5.published
+    assert "published" in UR5.document
+    robot = with_provenance(found(), "mine", [log("a.csv")], [log("a.csv")], None)
+    assert robot.published == {}
+    assert "published" not in robot.document
+    assert "published" in UR5.document
+    assert "[published]" not in robot_toml(robot)

@@ -6,6 +6,7 @@ import pytest
 from vftcli.identification.friction_shapes import FrictionColumns
 from vftcli.identification.target_method import gravity_remarks, target_numbers, target_remarks
 from vftcli.identification.targets import (
+    UNKNOWN,
     ControllerModel,
     Estimate,
     Targets,
@@ -22,7 +23,7 @@ from vftcli.signals.errors import IdentificationError
 
 UR5 = load_robot("ur5")
 K, J, GRAVITY = 10.0, 3.0, 1.001
-KNOWN, UNKNOWN = Estimate(2.0, 0.01, True), Estimate(float("nan"), float("inf"), False)
+KNOWN = Estimate(2.0, 0.01, True)
 
 
 @pytest.fixture

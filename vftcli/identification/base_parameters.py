@@ -103,6 +103,11 @@ class BaseParameters(NamedTuple):
     determined: tuple[bool, ...]
     full: Array
 
+    def rows(self) -> list[tuple[str, float, float, bool]]:
+        """Name, estimate, standard deviation and whether it is determined, one row each."""
+        columns = (self.names, self.values.tolist(), self.sd.tolist(), self.determined)
+        return list(zip(*columns, strict=True))
+
 
 def base_parameters(triangles: Triangles, start: Array) -> BaseParameters:
     """Weighted least squares of the base parameters; directions without data keep the start.

@@ -168,20 +168,6 @@ def solve(problem: Problem, x: Array) -> Array:
     )
 
 
-class ConsistentFit(NamedTuple):
-    """A physical model.
-
-    Attributes:
-        x: All unknowns. (size,)
-        weight: Weight of the distance to the profile.
-        errors: Weight → cross-validated misfit, in standard deviations of the residual.
-    """
-
-    x: Array
-    weight: float
-    errors: dict[float, float]
-
-
 def starting_point(layout: ParameterColumns, x: Array) -> Array:
     """Physical parameters near x to measure the distance from. (size,)"""
     start = x.copy()
@@ -202,12 +188,16 @@ def fit_at(
     return solve(Problem(R * shrink, z * shrink, start, triangles.layout, weight), x)
 
 
-def fit_consistent(triangles: Triangles, profile: Array) -> ConsistentFit:
+def fit_consistent(triangles: Triangles, profile: Array) -> tuple[Array, float, dict[float, float]]:
     """Fit a physical model, its pull to the profile chosen by cross-validation.
 
     Args:
         triangles: The stacked equations.
         profile: The profile's parameters with fitted friction. (size,)
+
+    Returns:
+        All unknowns (size,), the weight of the distance, and the cross-validated misfit of every
+        weight, in standard deviations of the residual.
     """
     start = starting_point(triangles.layout, profile)
     # Strongest first: each fit starts where the last one, pulled harder, ended.
@@ -221,7 +211,7 @@ def fit_consistent(triangles: Triangles, profile: Array) -> ConsistentFit:
     errors = {weight: float(np.sqrt(total / rows)) for weight, total in totals.items()}
     best = min(errors.values())
     weight = max(w for w, error in errors.items() if error <= MARGIN * best)
-    return ConsistentFit(fit_at(triangles, start, weight, start), weight, errors)
+    return fit_at(triangles, start, weight, start), weight, errors
 
 
 def nearest_physical(triangles: Triangles, profile: Array, weight: float = WEIGHTS[0]) -> Array:

@@ -6,7 +6,6 @@ from vftcli.identification.friction_shapes import round_digits
 from vftcli.identification.method_result import (
     DETERMINED,
     MethodResult,
-    at_joint,
     check_friction,
     friction_numbers,
     friction_source,
@@ -16,7 +15,7 @@ from vftcli.identification.method_result import (
 from vftcli.identification.result import Number, number
 from vftcli.identification.training import Training, fit_without_contacts
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.remarks import caution
+from vftcli.signals.remarks import Where, caution
 
 LEAST_SLOPE = 0.05
 """Slope of measured over expected torque below which a current does not follow its torque."""
@@ -32,10 +31,10 @@ def friction_method(data: Training) -> MethodResult:
     for j, found in enumerate(fits):
         if found is None:
             continue
-        count = len(found.shape.terms)
+        count, where = len(found.shape.terms), Where(joints=(j + 1,))
         values, sd = found.fit.values.copy(), found.fit.sd.copy()
         if data.fit_constants and not found.constant:
-            remarks.append(caution("unloaded-drive-constant", at_joint(j)))
+            remarks.append(caution("unloaded-drive-constant", where))
         if found.constant and constants is not None:
             # Torque was made from currents with the profile's K. Where the rigid body's torque
             # comes out as scale times what it must be, the true K is K / scale, and so are all
@@ -54,7 +53,7 @@ def friction_method(data: Training) -> MethodResult:
                 rotor[j] = round_digits(J.value)
             else:
                 found_here = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
-                remarks.append(caution("undetermined-rotor-inertia", at_joint(j), **found_here))
+                remarks.append(caution("undetermined-rotor-inertia", where, **found_here))
         frictions[j] = found.shape.friction(values[:count], friction_source(data, "friction", sd))
         numbers += friction_numbers(j, found.shape, values, sd, profile_friction(robot)[j])
         remarks += check_friction(j, frictions[j], data)

@@ -2,12 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 import polars as pl
 
-from vftcli.identification.base_parameters import BaseParameters
-from vftcli.identification.friction_fit import ShapeChoice
 from vftcli.identification.friction_method import friction_method
 from vftcli.identification.method_result import MethodResult
 from vftcli.identification.payload import (
@@ -30,7 +29,7 @@ from vftcli.identification.result import (
 from vftcli.identification.scoring import score, score_remarks
 from vftcli.identification.target_method import targets_method
 from vftcli.identification.training import Training, prepare_training
-from vftcli.identification.whole_arm import base_method, consistent_method
+from vftcli.identification.whole_arm import whole_arm
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import IdentificationError, ParameterError
 from vftcli.signals.identity import refuse_repeated_logs
@@ -38,8 +37,8 @@ from vftcli.signals.recording import Recording
 
 METHODS: dict[str, Callable[[Training], MethodResult]] = {
     "friction": friction_method,
-    "base": base_method,
-    "consistent": consistent_method,
+    "base": partial(whole_arm, method="base"),
+    "consistent": partial(whole_arm, method="consistent"),
     "targets": targets_method,
 }
 """Name at the command line → method."""
@@ -115,14 +114,18 @@ def identify(
         new, numbers = with_load(new, load, numbers)
         remarks.append(load.origin)
     rows = [row for k, trace in enumerate(traces, start=1) for row in trace.rows(k)]
+    choices = [(c.joint, c.shape.words, c.error, c.chosen) for c in result.shape_choices]
+    base = None
+    if result.base is not None:
+        base = pl.DataFrame(result.base.rows(), schema=BASE, orient="row")
     found = Identification(
         robot=new,
         profile=robot,
         method=method,
         residuals=pl.DataFrame(rows, schema=RESIDUALS, orient="row"),
         parameters=pl.DataFrame(numbers, schema=PARAMETERS, orient="row"),
-        shape_choices=shape_choice_table(result.shape_choices),
-        base=base_table(result.base),
+        shape_choices=pl.DataFrame(choices, schema=SHAPE_CHOICES, orient="row"),
+        base=base,
         traces=traces,
         processing=task.processing.settings_record(logs[0].median_step),
         remarks=tuple(remarks),
@@ -141,17 +144,13 @@ def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -
                 f"{free.name}, given as free of load, is the heavier one; swap the two logs"
             )
         return fit
-    if len(logs) == 2 and all(joints_travel(r) for r in logs):
+    # A pair repeats a motion: in both logs some joint travels further than it would at rest.
+    if len(logs) == 2 and all(np.ptp(r.q, axis=0).max() > 0.05 for r in logs):
         try:
             return payload_from_pair(logs[0], logs[1], bare)
         except NotSameMotionError:
             pass  # two different motions with the load: their poses at rest may still tell it
     return payload_from_poses(logs, bare)
-
-
-def joints_travel(recording: Recording) -> bool:
-    """Whether some joint travels further than it would at rest."""
-    return bool(np.max(np.ptp(recording.q, axis=0)) > 0.05)
 
 
 def free_logs(
@@ -173,17 +172,3 @@ def with_load(robot: Robot, load: LoadFit, numbers: list[Number]) -> tuple[Robot
     for key, value, sd in zip(("com_x", "com_y", "com_z"), found.com, load.com_sd, strict=True):
         more.append(number(last, key, value, sd, nothing, bool(sd < 0.05)))
     return robot.with_payload(found), [*numbers, *more]
-
-
-def shape_choice_table(choices: Sequence[ShapeChoice]) -> pl.DataFrame:
-    """The friction candidates and their errors, by `SHAPE_CHOICES`."""
-    rows = [(c.joint, c.shape.words, c.error, c.chosen) for c in choices]
-    return pl.DataFrame(rows, schema=SHAPE_CHOICES, orient="row")
-
-
-def base_table(base: BaseParameters | None) -> pl.DataFrame | None:
-    """Base parameters by `BASE`; None for a method that has none."""
-    if base is None:
-        return None
-    rows = zip(base.names, base.values.tolist(), base.sd.tolist(), base.determined, strict=True)
-    return pl.DataFrame(list(rows), schema=BASE, orient="row")

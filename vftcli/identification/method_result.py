@@ -37,11 +37,6 @@ class MethodResult(NamedTuple):
     remarks: list[Remark]
 
 
-def at_joint(j: int) -> Where:
-    """The place of a remark about joint j, counted from 0."""
-    return Where(joints=(j + 1,))
-
-
 def friction_numbers(
     j: int, shape: Shape, values: Array, sd: Array, before: JointFriction
 ) -> list[Number]:
@@ -74,7 +69,7 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> list[Rema
             "is another robot; check --columns and --robot"
         )
     if np.any(torque < 0):
-        return [caution("negative-friction", at_joint(j), least_Nm=float(torque.min()))]
+        return [caution("negative-friction", Where(joints=(j + 1,)), least_Nm=float(torque.min()))]
     return []
 
 
@@ -82,10 +77,11 @@ def held_joints(data: Training) -> list[Remark]:
     """Remarks on joints that do not move, or never both ways."""
     remarks = []
     for j in range(data.robot.joints):
+        where = Where(joints=(j + 1,))
         if not data.excited.moves[j]:
-            remarks.append(fact("static-joint", at_joint(j)))
+            remarks.append(fact("static-joint", where))
         elif not data.excited.reverses[j]:
-            remarks.append(caution("one-way-joint", at_joint(j)))
+            remarks.append(caution("one-way-joint", where))
     return remarks
 
 

@@ -13,6 +13,7 @@ from vftcli.identification.processing import (
     prepare,
     zero_phase,
 )
+from vftcli.identification.result import root_mean_square
 from vftcli.robots.chain import Payload
 from vftcli.robots.drive import drive_torque
 from vftcli.robots.friction import SMOOTHING
@@ -79,47 +80,44 @@ class LoadFit(NamedTuple):
         return any(log is recording for log in self.loaded)
 
 
-class LoadSolution(NamedTuple):
-    """The equations' solution before it is known whether it can be a load.
+class Solution(NamedTuple):
+    """Mass and first moments in the last link's frame, before they are known to be a load's.
 
     Attributes:
-        x: Mass and first moments in the last link's frame. (4,) [kg, kg·m]
-        sd: Standard deviations. (4,)
+        x: The solution. (4,) [kg, kg·m]
+        sd: Its standard deviations. (4,)
         residual: RMS left in each joint. (n,) [N·m]
-        loaded: The logs with the load.
-        origin: How it was found.
     """
 
     x: Array
     sd: Array
     residual: Array
-    loaded: tuple[Recording, ...]
-    origin: Remark
 
-    def at_flange(self, robot: Robot) -> LoadFit:
-        """The load in flange axes.
 
-        Raises:
-            IdentificationError: If the mass is not positive, uncertain, or lies out of reach.
-        """
-        names = names_of(self.loaded)
-        mass, sd = float(self.x[0]), float(self.sd[0])
-        if mass <= 0 or sd > 0.5 * mass:
-            raise IdentificationError(
-                f"{names}: no load can be told: mass {mass:.3g} ± {sd:.2g} kg; "
-                "use poses or motions in which gravity loads several joints differently"
-            )
-        chain = robot.chain
-        R = chain.flange_rotation
-        com = R.T @ (self.x[1:STATIC] / mass - chain.flange_translation)
-        spread = np.sqrt(np.diag(R.T @ np.diag((self.sd[1:STATIC] / mass) ** 2) @ R))
-        if (away := float(np.linalg.norm(com))) > REACH:
-            raise IdentificationError(
-                f"{names}: the load's centre of mass comes out {away:.2g}"
-                " m from the flange; the logs do not fit this robot"
-            )
-        load = Payload(mass=mass, com=com, inertia=np.zeros((3, 3)))
-        return LoadFit(load, sd, spread, self.residual, self.loaded, self.origin)
+def load_at_flange(
+    found: Solution, robot: Robot, loaded: Sequence[Recording], origin: Remark
+) -> LoadFit:
+    """A solution as a load in flange axes.
+
+    Raises:
+        IdentificationError: If the mass is not positive, uncertain, or lies out of reach.
+    """
+    names, mass, sd = names_of(loaded), float(found.x[0]), float(found.sd[0])
+    if mass <= 0 or sd > 0.5 * mass:
+        raise IdentificationError(
+            f"{names}: no load can be told: mass {mass:.3g} ± {sd:.2g} kg; "
+            "use poses or motions in which gravity loads several joints differently"
+        )
+    R = robot.chain.flange_rotation
+    com = R.T @ (found.x[1:STATIC] / mass - robot.chain.flange_translation)
+    spread = np.sqrt(np.diag(R.T @ np.diag((found.sd[1:STATIC] / mass) ** 2) @ R))
+    if (away := float(np.linalg.norm(com))) > REACH:
+        raise IdentificationError(
+            f"{names}: the load's centre of mass comes out {away:.2g}"
+            " m from the flange; the logs do not fit this robot"
+        )
+    load = Payload(mass=mass, com=com, inertia=np.zeros((3, 3)))
+    return LoadFit(load, sd, spread, found.residual, tuple(loaded), origin)
 
 
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
@@ -132,13 +130,15 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
         NotSameMotionError: If the logs are not the same motion.
         IdentificationError: If they differ by no load.
     """
-    solution = solve_pair(second, first, robot)
+    loaded = second
+    solution, origin = solve_pair(second, first, robot)
     if solution.x[0] < 0:
-        solution = solve_pair(first, second, robot)
-    return solution.at_flange(robot)
+        loaded = first
+        solution, origin = solve_pair(first, second, robot)
+    return load_at_flange(solution, robot, (loaded,), origin)
 
 
-def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> LoadSolution:
+def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> tuple[Solution, Remark]:
     """Fit what the loaded log's torque has beyond the free one's at the same phase."""
     processing = Processing()
     motion = prepare(loaded, robot, processing)
@@ -166,7 +166,7 @@ def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> LoadSolution
         shift_s=round(-shift, 3) + 0.0,
         distance_mrad=1e3 * distance,
     )
-    return LoadSolution(x, sd, np.sqrt(np.mean(left**2, axis=0)), (loaded,), origin)
+    return Solution(x, sd, root_mean_square(left)), origin
 
 
 def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
@@ -189,19 +189,17 @@ def fit_all_joints(A: Array, y: Array, usable: Array, passes: int = 3) -> Array:
         w = np.sqrt(usable) / scale
         x = solve((A * w[:, :, None]).reshape(-1, A.shape[2]), (y * w).ravel())
         left = y - np.einsum("knp,p->kn", A, x)
-        scale = np.maximum(np.sqrt(np.mean(left**2, axis=0)), 1e-9)
+        scale = np.maximum(root_mean_square(left), 1e-9)
     return x
 
 
 def parameter_sd(A: Array, left: Array, usable: Array) -> Array:
     """Standard deviations, the residuals' correlation along time counted. (k,)"""
-    scale = np.maximum(np.sqrt(np.mean(left**2, axis=0)), 1e-9)
+    scale = np.maximum(root_mean_square(left), 1e-9)
     w = np.sqrt(usable) / scale
     flat, rest = (A * w[:, :, None]).transpose(1, 0, 2), (left * w).T
-    fit = fit_column(
-        flat.reshape(-1, A.shape[2]), rest.ravel(), (usable.T.ravel() > 0).astype(float)
-    )
-    return fit.sd
+    used = (usable.T.ravel() > 0).astype(float)
+    return fit_column(flat.reshape(-1, A.shape[2]), rest.ravel(), used).sd
 
 
 def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:
@@ -255,8 +253,7 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     x = fit_all_joints(Y, extra, usable)
     left = extra - np.einsum("knp,p->kn", Y, x)
     sd, origin = parameter_sd(Y, left, usable), fact("load-from-poses", poses=len(q))
-    solution = LoadSolution(x, sd, np.std(left, axis=0), tuple(recordings), origin)
-    return solution.at_flange(robot)
+    return load_at_flange(Solution(x, sd, np.std(left, axis=0)), robot, recordings, origin)
 
 
 def resting_poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:

@@ -38,8 +38,11 @@ def with_provenance(
         name=name or f"{profile.name}-identified",
         title=f"{profile.title or profile.name}, identified",
         path=None,
+        published={},
     )
     document = robot_document(named)
+    # The profile's published numbers are those of the arm of the paper, not of this one.
+    document.pop("published", None)
     new = f"identified ({found.method}) from {names_of(trained)}"
     old = f"profile {profile.name}"
     sure = found.parameters.filter("determined")

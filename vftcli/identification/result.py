@@ -10,7 +10,6 @@ import polars as pl
 from vftcli.identification.processing import PreparedLog
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
-from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 
 RESIDUALS = pl.Schema(
@@ -121,21 +120,6 @@ class Trace(NamedTuple):
     before: Array
 
     @property
-    def recording(self) -> Recording:
-        """The log that was scored."""
-        return self.motion.recording
-
-    @property
-    def t(self) -> Array:
-        """Time of each sample. (M,) [s]"""
-        return self.motion.t
-
-    @property
-    def dq(self) -> Array:
-        """Velocities. (M, n) [rad/s]"""
-        return self.motion.dq
-
-    @property
     def residual(self) -> Array:
         """Measured less predicted. (M, n) [N·m]"""
         difference: Array = self.measured - self.predicted
@@ -148,7 +132,7 @@ class Trace(NamedTuple):
 
     def rows(self, index: int) -> list[tuple[str, int, str, str, int, float, int]]:
         """Rows of `RESIDUALS`, this log being the one of this index."""
-        name, samples = self.recording.name, self.motion.samples
+        name, samples = self.motion.recording.name, self.motion.samples
         return [
             (name, index, self.role, model, j, float(value), samples)
             for model, values in (("identified", self.rms), ("profile", self.before))
@@ -183,8 +167,3 @@ class Identification:
     traces: tuple[Trace, ...]
     processing: Mapping[str, Any] = field(default_factory=dict)
     remarks: tuple[Remark, ...] = ()
-
-    def mean_rms(self, log: str, model: str = "identified") -> float:
-        """Mean over the joints of one log's RMS under one model. [N·m]"""
-        rows = self.residuals.filter((pl.col("log") == log) & (pl.col("model") == model))
-        return float(rows["rms_Nm"].mean() or 0.0)  # type: ignore[arg-type]

@@ -93,8 +93,11 @@ def score_remarks(robot: Robot, traces: Sequence[Trace]) -> list[Remark]:
     for test in held_out:
         for other in train:
             if (share := repeated_share(other.motion, test.motion)) >= REPEATED:
-                values = {"training_log": other.recording.name, "share_percent": 100.0 * share}
-                where = Where(test.recording.name)
+                values = {
+                    "training_log": other.motion.recording.name,
+                    "share_percent": 100.0 * share,
+                }
+                where = Where(test.motion.recording.name)
                 remarks.append(caution("repeated-trajectory", where, **values))
     if not train:
         return remarks
@@ -115,7 +118,7 @@ def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]
         trace: The held-out log.
         trained: RMS of the training logs. (n,) [N·m]
     """
-    motion, name = trace.motion, trace.recording.name
+    motion, name = trace.motion, trace.motion.recording.name
     worse = np.flatnonzero(trace.rms > WORSE * trained).tolist()
     if not worse:
         return []

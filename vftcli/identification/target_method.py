@@ -8,7 +8,6 @@ import numpy as np
 from vftcli.identification.friction_shapes import round_digits
 from vftcli.identification.method_result import (
     MethodResult,
-    at_joint,
     friction_numbers,
     friction_source,
     profile_friction,
@@ -17,7 +16,7 @@ from vftcli.identification.result import Number, number
 from vftcli.identification.targets import SHAPES, ControllerModel, controller_models
 from vftcli.identification.training import Training
 from vftcli.robots.robot import Robot
-from vftcli.signals.remarks import Remark, caution, fact
+from vftcli.signals.remarks import Remark, Where, caution, fact
 
 SAME_GRAVITY = 3e-4
 """Relative difference of gravity that is not remarked on: a third of that of 9.82 to 9.81 m/s²."""
@@ -67,7 +66,7 @@ def target_numbers(j: int, model: ControllerModel, robot: Robot) -> list[Number]
 
 def target_remarks(j: int, model: ControllerModel, robot: Robot) -> list[Remark]:
     """What the targets leave open in joint j (from 0), so that the profile's numbers stay."""
-    remarks, where = [], at_joint(j)
+    remarks, where = [], Where(joints=(j + 1,))
     if not model.constant.known:
         found = {"profile_NmA": profile_constant(robot, j)}
         if np.isfinite(model.constant.sd):

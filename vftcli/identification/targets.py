@@ -21,7 +21,7 @@ from vftcli.identification.processing import (
     prepare,
     zero_phase,
 )
-from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.identification.scoring import rigid_torque
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
@@ -59,6 +59,9 @@ class Estimate(NamedTuple):
     value: float
     sd: float
     known: bool
+
+
+UNKNOWN = Estimate(float("nan"), float("inf"), False)
 
 
 class ControllerModel(NamedTuple):
@@ -113,11 +116,6 @@ def read_targets(recording: Recording, robot: Robot) -> Targets:
     motion = prepare(recording, robot, Processing(cutoff=CUTOFF))
     load = gravity_torque(robot, recording.q)
     smooth = zero_phase(recording.t, asked, CUTOFF)
-    phi = chain_parameters(robot.loaded_chain)
-    rigid = [
-        torque_regressor(robot.chain, motion.q[s], motion.dq[s], motion.ddq[s]) @ phi
-        for s in motion.chunks()
-    ]
     return Targets(
         recording=recording,
         motion=motion,
@@ -125,7 +123,7 @@ def read_targets(recording: Recording, robot: Robot) -> Targets:
         current=motion.filtered(wanted),
         moment=smooth[motion.kept],
         lead=derivative(recording.t, smooth)[motion.kept],
-        rigid=np.concatenate(rigid),
+        rigid=rigid_torque(robot, motion),
         gravity=gravity_torque(robot, motion.q),
     )
 
@@ -171,12 +169,10 @@ def constant_at_rest(j: int, logs: Sequence[Targets]) -> Estimate:
     """K from the ratio at rest, where friction asks for nothing; sd from the current's digits."""
     points = []
     for log in logs:
-        current, moment = log.recording.target_current, log.recording.target_torque
-        dq, t = log.recording.dq, log.recording.t
-        if current is None or moment is None or dq is None:
-            continue
+        recording, t = log.recording, log.recording.t
+        current, moment = recording.require("target_current"), recording.require("target_torque")
         step = resolution(current[:, j])
-        at_rest = np.all(np.abs(dq) <= log.motion.processing.still, axis=1)
+        at_rest = np.all(np.abs(recording.require("dq")) <= log.motion.processing.still, axis=1)
         for start, stop in runs_of(at_rest):
             inside = (t[start:stop] > t[start] + SETTLE) & (t[start:stop] < t[stop - 1] - SETTLE)
             if np.count_nonzero(inside) > 3:
@@ -186,7 +182,7 @@ def constant_at_rest(j: int, logs: Sequence[Targets]) -> Estimate:
                 ):
                     points.append((float(np.median(i)), float(np.median(m)), step))
     if not points:
-        return Estimate(float("nan"), float("inf"), False)
+        return UNKNOWN
     i, m, steps = np.array(points).T
     value = float(i @ m / (i @ i))
     scatter = float(np.std(m - value * i)) if len(i) > 1 else 0.0
@@ -219,7 +215,7 @@ def constant_in_motion(j: int, logs: Sequence[Targets]) -> Estimate:
                 found.append(1.0 / float(fit.values[0]))
                 spread.append(float(fit.sd[0] / fit.values[0] ** 2))
     if len(found) < len(SPEEDS):
-        return Estimate(float("nan"), float("inf"), False)
+        return UNKNOWN
     value = float(np.median(found))
     sd = float(np.hypot(np.median(spread), 0.5 * np.ptp(found)))
     return Estimate(value, sd, sd <= CONSTANT_KNOWN * value)
@@ -243,9 +239,8 @@ def rotor_inertia(j: int, logs: Sequence[Targets]) -> tuple[Estimate, Estimate]:
         for log in logs
     ]
     rows = np.concatenate(stacked)
-    nothing = Estimate(float("nan"), float("inf"), False)
     if np.std(rows[:, 0]) < 1e-2:
-        return nothing, nothing
+        return UNKNOWN, UNKNOWN
     used = np.ones(len(rows))
     fit = fit_column(rows[:, :-1], rows[:, -1], used)
     # Half of what robustness changes is added to the spread: an account of the model's error.

@@ -128,8 +128,9 @@ def fit_frictions(data: Training, weights: Sequence[Array]) -> list[JointFit | N
             fits.append(None)
             continue
         found = fit_joint(data, j, weights, data.fit_constants)
-        # A joint that carries little cannot tell its constant from its friction.
-        if data.fit_constants and not constant_known(found.fit):
+        # A joint that carries little cannot tell its constant, the last coefficient, from friction.
+        known = found.fit.sd[-1] < CONSTANT_KNOWN * abs(found.fit.values[-1])
+        if data.fit_constants and not known:
             found = fit_joint(data, j, weights, False)
         fits.append(found)
     return fits
@@ -141,11 +142,6 @@ def fit_joint(data: Training, j: int, weights: Sequence[Array], constant: bool) 
     shape, choices = choose_shape(j, given)
     fit = fit_column(given.columns(j, shape), given.y, given.weights)
     return JointFit(shape, fit, choices, constant)
-
-
-def constant_known(fit: ColumnFit) -> bool:
-    """Whether a joint's load tells its drive constant: the last coefficient, 1 by the profile."""
-    return bool(fit.sd[-1] < CONSTANT_KNOWN * abs(fit.values[-1]))
 
 
 def data_of_joint(data: Training, j: int, weights: Sequence[Array], constant: bool) -> JointData:

@@ -33,18 +33,11 @@ from vftcli.signals.errors import IdentificationError
 from vftcli.signals.remarks import Remark, fact
 
 
-def base_method(data: Training) -> MethodResult:
-    """Base parameters by weighted least squares; the file gets the nearest physical model."""
-    return whole_arm(data, "base")
-
-
-def consistent_method(data: Training) -> MethodResult:
-    """A physical model near the profile, its pull chosen by cross-validation."""
-    return whole_arm(data, "consistent")
-
-
 def whole_arm(data: Training, method: str) -> MethodResult:
     """Identify all parameters of the arm together.
+
+    Method "base" takes base parameters by weighted least squares, and the file gets the nearest
+    physical model; "consistent" a physical model near the profile, its pull cross-validated.
 
     Friction models are chosen twice: with the profile's links, and again with the links that come
     out, so that an error of the profile is not taken for friction.

@@ -52,7 +52,7 @@ def test_the_held_out_log_is_drawn_over_time(found):
     trace = shown_trace(result)
     assert trace.role == "held-out"
     data = payload(result)
-    assert data["span"] == [float(trace.t[0]), float(trace.t[-1])]
+    assert data["span"] == [float(trace.motion.t[0]), float(trace.motion.t[-1])]
     assert [chart["key"] for chart in data["charts"]] == ["torque", "left", "dq"]
     assert [line["name"] for line in data["charts"][0]["series"]] == ["measured", "predicted"]
 

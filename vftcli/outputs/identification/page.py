@@ -36,7 +36,9 @@ WIDTH, HEIGHT, EDGE = 360, 220, 40
 
 def render_identification(found: Identification, record: Mapping[str, Any]) -> str:
     """The page as text: self-contained, nothing is loaded from anywhere."""
-    logs = ", ".join(dict.fromkeys(t.recording.name for t in found.traces)) or found.robot.name
+    logs = (
+        ", ".join(dict.fromkeys(t.motion.recording.name for t in found.traces)) or found.robot.name
+    )
     text = f"{found.robot.title}: method {found.method}, from {logs}"
     residuals = ""
     if not found.residuals.is_empty():
@@ -77,8 +79,8 @@ def velocity_section(found: Identification) -> str:
         return ""
     plots = "".join(velocity_plot(found.traces, j) for j in range(found.robot.joints))
     key = "".join(
-        f'<span style="color:{colour}">● {escape(trace.recording.name)} ({trace.role})</span> '
-        for trace, colour in coloured(found.traces)
+        f'<span style="color:{colour}">● {escape(t.motion.recording.name)} ({t.role})</span> '
+        for t, colour in coloured(found.traces)
     )
     return (
         f'<h2>Residual over velocity</h2><p class="soft">{key}</p><div class="plots">{plots}</div>'
@@ -93,7 +95,7 @@ def coloured(traces: Sequence[Trace]) -> list[tuple[Trace, str]]:
 def velocity_plot(traces: Sequence[Trace], j: int) -> str:
     """SVG of one joint: residual over velocity, each log in its colour."""
     # One scale for all logs of a joint, or their dots could not be compared.
-    speed = max(float(np.max(np.abs(t.dq[:, j]))) for t in traces) or 1.0
+    speed = max(float(np.max(np.abs(t.motion.dq[:, j]))) for t in traces) or 1.0
     sizes = np.concatenate([np.abs(t.residual[:, j]) for t in traces])
     # A few samples at reversals are far off; they are drawn at the edge.
     high = float(np.quantile(sizes, 0.995)) or 1.0
@@ -116,8 +118,8 @@ def velocity_plot(traces: Sequence[Trace], j: int) -> str:
 
 def scatter(trace: Trace, j: int, speed: float, high: float, colour: str) -> str:
     """One log's dots as a single path of short strokes."""
-    pick = np.unique(np.linspace(0, len(trace.t) - 1, DOTS).astype(int))
-    x = EDGE + (WIDTH - EDGE) * (trace.dq[pick, j] / speed + 1.0) / 2.0
+    pick = np.unique(np.linspace(0, len(trace.motion.t) - 1, DOTS).astype(int))
+    x = EDGE + (WIDTH - EDGE) * (trace.motion.dq[pick, j] / speed + 1.0) / 2.0
     y = HEIGHT / 2 * (1.0 - np.clip(trace.residual[pick, j] / high, -1.0, 1.0))
     # One path of strokes without length: 600 circles a log and joint would make a slow page.
     path = "".join(f"M{a:.1f} {b:.1f}h.01" for a, b in zip(x, y, strict=True))
@@ -131,7 +133,7 @@ def series_section(found: Identification) -> str:
     """Where the script draws torques over time."""
     if not found.traces:
         return ""
-    name = escape(shown_trace(found).recording.name)
+    name = escape(shown_trace(found).motion.recording.name)
     return (
         f"<h2>Torques over time: {name}</h2>"
         f"{soft('The Rerun recording holds every log.')}{chart_places()}"
@@ -153,12 +155,12 @@ def payload(found: Identification) -> dict[str, Any]:
     charts = (
         Chart("torque", "Drive torque, filtered", "N·m", (measured, predicted), height=1.5),
         Chart("left", "Measured − predicted", "N·m", (ChartLine("residual", trace.residual),)),
-        Chart("dq", "Velocity", "rad/s", (ChartLine("velocity", trace.dq),)),
+        Chart("dq", "Velocity", "rad/s", (ChartLine("velocity", trace.motion.dq),)),
     )
     return {
         "joints": found.robot.joints,
-        "span": [float(trace.t[0]), float(trace.t[-1])],
-        "charts": [packed(chart, trace.t) for chart in charts],
+        "span": [float(trace.motion.t[0]), float(trace.motion.t[-1])],
+        "charts": [packed(chart, trace.motion.t) for chart in charts],
         "responses": [],
     }
 

@@ -26,7 +26,7 @@ def write_identification_rrd(path: Path, found: Identification) -> None:
         OutputError: If it cannot be written whole.
     """
     # An entity's path may hold no blank; names of files may. A log may be there in two roles.
-    names = [re.sub(r"[^A-Za-z0-9_.-]", "_", trace.recording.name) for trace in found.traces]
+    names = [re.sub(r"[^A-Za-z0-9_.-]", "_", t.motion.recording.name) for t in found.traces]
     entities = zip(found.traces, numbered(names), strict=True)
     tabs = [tab for trace, entity in entities for tab in tabs_of(trace, entity)]
     with rerun_file(path, found.robot.name, tabs, {"Summary": summary(found)}):
@@ -46,15 +46,15 @@ def tabs_of(trace: Trace, entity: str) -> tuple[Tab, Tab]:
         torque.append(Lines(f"/torque/{entity}/{joint}", f"{joint} drive torque [N·m]", both))
         title = f"{joint} measured − predicted [N·m]"
         residual.append(Lines(f"/residual/{entity}/{joint}", title, [left]))
-    title = f"{trace.recording.name} ({trace.role})"
-    return Tab(title, trace.t, torque), Tab(f"{title}: residual", trace.t, residual)
+    t, title = trace.motion.t, f"{trace.motion.recording.name} ({trace.role})"
+    return Tab(title, t, torque), Tab(f"{title}: residual", t, residual)
 
 
 def summary(found: Identification) -> str:
     """What was identified, from what, and the remarks."""
     logs = [
-        f"- {escape_markdown(t.recording.name)} ({t.role}): sha256 "
-        f"{t.recording.source.sha256 or 'unknown'}, mean RMS "
+        f"- {escape_markdown(t.motion.recording.name)} ({t.role}): sha256 "
+        f"{t.motion.recording.source.sha256 or 'unknown'}, mean RMS "
         f"{np.mean(t.rms):.3f} N·m"
         for t in found.traces
     ]
