@@ -29,7 +29,7 @@ def motion(prepared, sines):
 
 
 def trace(motion, residual, role="held-out"):
-    return Trace(motion, role, residual, np.zeros_like(residual), np.zeros(motion.joints))
+    return Trace(motion, role, residual, np.zeros_like(residual), np.zeros(motion.q.shape[1]))
 
 
 def test_rms_is_the_root_of_the_mean_square():

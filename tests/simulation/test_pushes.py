@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.hand import HandSpec
-from vftcli.simulation.hard_stop import StopSpec
 from vftcli.simulation.pushes import STYLES, LoadSpec, Place, ProfileSpec, PushesSpec
+from vftcli.simulation.springs import HandSpec, StopSpec
 from vftcli.simulation.touch import RandomWalkSpec, draw_walk
 
 HERE = Place(np.eye(3), np.array([0.4, 0.1, 0.3]), np.zeros(3), np.zeros(3))

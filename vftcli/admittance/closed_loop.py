@@ -300,7 +300,7 @@ def closed_loop_of(loop: Loop, log: Sequence[Row], zero: tuple[float, float] | N
     """Put the run together; the truth is the simulator's."""
     arm = loop.arm
     t, estimate, dragged, commanded, q, reached = map(np.array, zip(*log, strict=True))
-    simulation = observe(arm) if arm.history.rows == arm.steps else None
+    simulation = observe(arm) if arm.made == arm.steps else None
     truth = np.full((len(t), 6), np.nan)
     if simulation is not None:
         seen = simulation.truth

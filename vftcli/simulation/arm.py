@@ -1,6 +1,6 @@
 """The simulated arm with its servo and its contacts, one inner step at a time."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -21,30 +21,19 @@ CHECK_STEPS = 10
 """Inner steps between two looks at whether the arm still moves like an arm."""
 RUNAWAY = 200.0
 """Joint velocity no arm reaches. [rad/s]"""
-JOINT_HISTORY = (
-    *("q", "v", "a", "tau", "friction"),
-    *("target_q", "target_dq", "target_ddq", "walk"),
-)
-"""Fields of a History that hold a number a joint."""
 
 
-@dataclass(kw_only=True)
-class History:
-    """What happened, one row an inner step; row k covers the time from k·step to (k+1)·step.
+@dataclass(frozen=True, kw_only=True)
+class JointSignals:
+    """What the joints truly did, one row an instant.
 
     Attributes:
-        step: Inner step. [s]
-        q, v: State at the start of the step. (N, n) [rad, rad/s]
-        a: Acceleration over the step. (N, n) [rad/s²]
-        tau: Drive torque over the step. (N, n) [N·m]
-        friction: Friction torque over the step. (N, n) [N·m]
-        target_q, target_dq, target_ddq: The reference at the start of the step. (N, n)
-        wrenches: Wrench of each contact at the middle of the step. (N, C, 6) [N, N·m]
-        walk: Joint torque of the random walks. (N, n) [N·m]
-        rows: Steps made so far.
+        q, v, a: Positions, velocities, accelerations. (N, n) [rad, rad/s, rad/s²]
+        tau: Drive torque. (N, n) [N·m]
+        friction: Friction torque. (N, n) [N·m]
+        target_q, target_dq, target_ddq: The reference. (N, n)
     """
 
-    step: float
     q: Array
     v: Array
     a: Array
@@ -53,16 +42,36 @@ class History:
     target_q: Array
     target_dq: Array
     target_ddq: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class History(JointSignals):
+    """What happened, one row an inner step; row k covers the time from k·step to (k+1)·step.
+
+    State and reference are those at the start of a step, all else holds over it.
+
+    Attributes:
+        step: Inner step. [s]
+        wrenches: Wrench of each contact at the middle of the step. (N, C, 6) [N, N·m]
+        walk: Joint torque of the random walks. (N, n) [N·m]
+    """
+
+    step: float
     wrenches: Array
     walk: Array
-    rows: int = field(default=0)
 
     @classmethod
     def room(cls, step: float, steps: int, joints: int, contacts: int) -> "History":
         """Return room for `steps` steps, and one more for the state after the last."""
         rows = steps + 1
-        arrays = {name: np.zeros((rows, joints)) for name in JOINT_HISTORY}
-        return cls(step=step, rows=0, wrenches=np.zeros((rows, contacts, 6)), **arrays)
+        arrays = {field.name: np.zeros((rows, joints)) for field in fields(JointSignals)}
+        walk, wrenches = np.zeros((rows, joints)), np.zeros((rows, contacts, 6))
+        return cls(step=step, wrenches=wrenches, walk=walk, **arrays)
+
+    def until(self, rows: int) -> "History":
+        """The first rows alone."""
+        names = [field.name for field in fields(self) if field.name != "step"]
+        return replace(self, **{name: getattr(self, name)[:rows] for name in names})
 
 
 class Arm:
@@ -78,7 +87,8 @@ class Arm:
         plant: Its dynamics.
         servo: Its position controller.
         touching: Its contacts.
-        history: What happened so far.
+        history: What happened so far, room for the rest.
+        steps, made: Inner steps of the run, and those made so far.
     """
 
     def __init__(self, scenario: Scenario, seed: int, start: Reference, duration: float) -> None:
@@ -103,7 +113,7 @@ class Arm:
         q, v = start.q[0], start.dq[0]
         self.plant = Plant(self.true.chain.to_pinocchio(), self.true.friction, q, v, h)
         self.servo = Servo(scenario.servo, self.true.nominal, h)
-        self.steps = int(np.ceil(duration / h - 1e-9))
+        self.steps, self.made = int(np.ceil(duration / h - 1e-9)), 0
         self.touching = Touching(
             scenario.contacts, self.robot.chain, self.steps, h, self.seeds["contacts"]
         )
@@ -113,7 +123,7 @@ class Arm:
     @property
     def t(self) -> float:
         """True time since the start of the run. [s]"""
-        return self.history.rows * self.scenario.step
+        return self.made * self.scenario.step
 
     @property
     def q(self) -> Array:
@@ -144,7 +154,7 @@ class Arm:
 
     def step(self, q_d: Array, dq_d: Array, ddq_d: Array, forward: Array) -> None:
         """Make one inner step with a feed-forward torque `forward` (n,) [N·m] already known."""
-        history, plant, k = self.history, self.plant, self.history.rows
+        history, plant, k = self.history, self.plant, self.made
         if k >= self.steps:
             raise ParameterError(f"the run was prepared for {self.steps} steps and has made them")
         tau = self.servo.torque(forward, q_d, dq_d, plant.q, plant.v)
@@ -160,7 +170,7 @@ class Arm:
         else:
             plant.advance(tau)
         history.a[k], history.friction[k] = plant.a, plant.friction
-        history.rows = k + 1
+        self.made = k + 1
         if k % CHECK_STEPS == 0:
             self.check_motion()
 
@@ -186,18 +196,17 @@ class Arm:
         What has no value after the last step keeps its last one.
         """
         self.check_motion()
-        history, k = self.history, self.history.rows
+        history, k = self.history, self.made
         history.q[k], history.v[k] = self.plant.q, self.plant.v
         for name in ("target_q", "target_dq", "target_ddq", "tau", "friction", "a"):
             array = getattr(history, name)
             array[k] = array[k - 1]
         for walk in self.touching.walks:
             history.walk[:k] += walk.torque[:k]
-        return history
+        return history.until(k + 1)
 
     def mean_torque(self, interval: float) -> Array:
         """Mean drive torque over the last `interval` [s], as the log measures it. (n,) [N·m]"""
         rows = max(round(interval / self.scenario.step), 1)
-        k = self.history.rows
-        mean: Array = self.history.tau[max(k - rows, 0) : max(k, 1)].mean(axis=0)
+        mean: Array = self.history.tau[max(self.made - rows, 0) : max(self.made, 1)].mean(axis=0)
         return mean / self.true.gain + self.true.offset

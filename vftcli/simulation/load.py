@@ -78,24 +78,16 @@ def apply_override(table: dict[str, Any], override: str) -> None:
 
 def section_of(node: Any, part: str, where: str) -> Any:  # noqa: ANN401 - TOML values
     """Return the section or the named contact `part` of a parsed table, made if not there."""
-    found = (
-        node.setdefault(part, {}) if isinstance(node, dict) else contact_named(node, part, where)
-    )
+    if isinstance(node, list):
+        node = {str(c.get("name")): c for c in reversed(node) if isinstance(c, dict)}
+        if part not in node:
+            raise ParameterError(
+                unknown_name(f"contact {where!r}", part, [*node][::-1] or ["none"])
+            )
+    found = node.setdefault(part, {})
     if not isinstance(found, dict | list):
         raise ParameterError(f"{where} is a value, not a section")
     return found
-
-
-def contact_named(contacts: list[Any], name: str, where: str) -> Any:  # noqa: ANN401
-    """The contact table of a name among the scenario's contacts.
-
-    Raises:
-        ParameterError: If no contact bears it.
-    """
-    there = [str(c.get("name")) for c in contacts if isinstance(c, dict)]
-    if name not in there:
-        raise ParameterError(unknown_name(f"contact {where!r}", name, there or ["none"]))
-    return contacts[there.index(name)]
 
 
 def parse_value(text: str) -> Any:  # noqa: ANN401

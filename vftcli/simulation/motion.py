@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from vftcli.signals.arrays import Array
+
+Number = TypeVar("Number", float, Array)
 
 
 class Reference(NamedTuple):
@@ -92,7 +94,9 @@ class Stretches:
             rows = np.flatnonzero(which == k)
             length = float(self.times[k, 1] - self.times[k, 0])
             u = np.clip((t[rows] - self.times[k, 0]) / length, 0.0, 1.0)
-            s, ds, dds = minimum_jerk(u, length)
+            s = minimum_jerk(u)
+            ds = 30.0 * u**2 * (1.0 - u) ** 2 / length
+            dds = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / length**2
             first, second = chebyshev.chebder(path), chebyshev.chebder(path, 2)
             x = 2.0 * s - 1.0
             slope = 2.0 * chebyshev.chebval(x, first).T
@@ -108,9 +112,7 @@ def straight_paths(points: Sequence[Array]) -> tuple[Array, ...]:
     return tuple(np.vstack([0.5 * (a + b), 0.5 * (b - a)]) for a, b in pairwise(points))
 
 
-def minimum_jerk(u: Array, length: float) -> tuple[Array, Array, Array]:
-    """Way 10u³ − 15u⁴ + 6u⁵ from 0 to 1 over u in [0, 1], with its time derivatives."""
-    way = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-    speed = 30.0 * u**2 * (1.0 - u) ** 2 / length
-    acceleration = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / length**2
-    return way, speed, acceleration
+def minimum_jerk(u: Number) -> Number:
+    """The way 10u³ − 15u⁴ + 6u⁵ from 0 to 1 over u in [0, 1]."""
+    way: Number = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    return way

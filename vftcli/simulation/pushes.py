@@ -2,7 +2,7 @@
 
 A contact acts at `point` of a link (`link` 0: the flange, else the link of that joint) with a
 wrench ON the robot in base axes. Given profiles, hung loads and pushes drawn at random are here;
-`hand` and `hard_stop` answer the arm's motion.
+those of `springs` answer the arm's motion.
 """
 
 import math

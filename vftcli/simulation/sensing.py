@@ -7,7 +7,7 @@ import numpy as np
 from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.arm import Arm, History
+from vftcli.simulation.arm import Arm, History, JointSignals
 from vftcli.simulation.scenario import SensingSpec
 
 USUAL_RATE = {"current": 125.0, "link_torque": 1000.0, "joint_torque": 500.0}
@@ -15,28 +15,18 @@ USUAL_RATE = {"current": 125.0, "link_torque": 1000.0, "joint_torque": 500.0}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Samples:
-    """The sampling of a run: when, and the true signals then.
+class Samples(JointSignals):
+    """The sampling of a run: when, and the true signals then, one row a sample.
+
+    The drive torque is averaged over the sampling interval, or that at the instant.
 
     Attributes:
         time: True time of each sample. (M,) [s]
         stamp: The same on the log's clock, before jitter. (M,) [s]
-        q, v, a: True positions, velocities, accelerations. (M, n)
-        tau: True drive torque, averaged over the sampling interval or at the instant. (M, n) [N·m]
-        friction: True friction torque at the instant. (M, n) [N·m]
-        target_q, target_dq, target_ddq: The reference. (M, n)
     """
 
     time: Array
     stamp: Array
-    q: Array
-    v: Array
-    a: Array
-    tau: Array
-    friction: Array
-    target_q: Array
-    target_dq: Array
-    target_ddq: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,18 +87,17 @@ def sample_run(arm: Arm) -> Samples:
     """The true signals of a finished run at the instants of the log's own, drifting clock."""
     spec, history = arm.scenario.sensing, arm.close()
     rate = log_rate(spec, arm.robot)
-    end = history.rows * history.step
+    grid = np.arange(len(history.q), dtype=float) * history.step
+    end = grid[-1]
     count = int(np.floor(end * (1.0 + spec.clock_drift) * rate + 1e-6)) + 1
     stamp = np.arange(count, dtype=float) / rate
     time = np.minimum(stamp / (1.0 + spec.clock_drift), end)
-    grid = np.arange(history.rows + 1, dtype=float) * history.step
     interval = 1.0 / rate / (1.0 + spec.clock_drift)
     names = ("q", "v", "target_q", "target_dq", "target_ddq")
-    states = {name: interpolate(time, grid, getattr(history, name)[: len(grid)]) for name in names}
+    states = {name: interpolate(time, grid, getattr(history, name)) for name in names}
     middle = grid[:-1] + 0.5 * history.step
     steps = {
-        name: interpolate(time, middle, getattr(history, name)[:-1][: history.rows])
-        for name in ("a", "friction")
+        name: interpolate(time, middle, getattr(history, name)[:-1]) for name in ("a", "friction")
     }
     tau = average_torque(history, grid, time, interval if spec.torque == "average" else 0.0)
     return Samples(time=time, stamp=stamp, tau=tau, **states, **steps)
@@ -133,13 +122,12 @@ def average_torque(history: History, grid: Array, time: Array, interval: float) 
     exact. The first sample has no interval before it and reports the first step's torque.
     """
     span = max(interval, history.step)
-    total = np.zeros_like(history.tau[: len(grid)])
-    np.cumsum(history.tau[: history.rows] * history.step, axis=0, out=total[1:])
+    total = np.zeros_like(history.tau)
+    np.cumsum(history.tau[:-1] * history.step, axis=0, out=total[1:])
     begin = np.maximum(time - span, 0.0)
     end = np.maximum(time, grid[1])
-    mean: Array = (interpolate(end, grid, total) - interpolate(begin, grid, total)) / (end - begin)[
-        :, None
-    ]
+    grown = interpolate(end, grid, total) - interpolate(begin, grid, total)
+    mean: Array = grown / (end - begin)[:, None]
     return mean
 
 

@@ -9,9 +9,8 @@ from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import cross
-from vftcli.simulation.hand import HandSpec
-from vftcli.simulation.hard_stop import StopSpec
 from vftcli.simulation.pushes import LoadSpec, Place, ProfileSpec, PushesSpec, Touch
+from vftcli.simulation.springs import HandSpec, StopSpec
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -54,10 +54,10 @@ class Truth:
 
 def truth_of(arm: Arm, samples: Samples) -> Truth:
     """Evaluate the contacts at the log's sampling instants."""
-    history, touching = arm.history, arm.touching
-    middle = (np.arange(history.rows, dtype=float) + 0.5) * history.step
-    wrenches = interpolate(samples.time, middle, history.wrenches[: history.rows])
-    walk = interpolate(samples.time, middle, history.walk[: history.rows])
+    history, touching = arm.history.until(arm.made), arm.touching
+    middle = (np.arange(arm.made, dtype=float) + 0.5) * history.step
+    wrenches = interpolate(samples.time, middle, history.wrenches)
+    walk = interpolate(samples.time, middle, history.walk)
     model = arm.plant.model
     data = model.createData()
     tau_ext, wrench = walk.copy(), np.zeros((len(samples.time), 6))
@@ -67,7 +67,7 @@ def truth_of(arm: Arm, samples: Samples) -> Truth:
         wrench[k] = flange
     contacts = {m.name: wrenches[:, c] for c, m in enumerate(touching.mounted) if not m.on_flange}
     walks = {
-        w.name: interpolate(samples.time, middle, w.torque[: history.rows]) for w in touching.walks
+        w.name: interpolate(samples.time, middle, w.torque[: arm.made]) for w in touching.walks
     }
     return Truth(
         t=samples.stamp,

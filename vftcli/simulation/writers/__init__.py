@@ -9,8 +9,7 @@ from vftcli.simulation.schema import unknown_name
 from vftcli.simulation.writers.libfranka import write_libfranka
 from vftcli.simulation.writers.parquet import write_parquet
 from vftcli.simulation.writers.rosbag2 import write_rosbag2
-from vftcli.simulation.writers.rtde import write_rtde
-from vftcli.simulation.writers.ur_rtde import write_ur_rtde
+from vftcli.simulation.writers.rtde import write_rtde, write_ur_rtde
 
 WRITERS: dict[str, Callable[[Path, Simulation], None]] = {
     "rtde": write_rtde,
@@ -35,6 +34,3 @@ def usual_format(simulation: Simulation, wanted: str = "") -> str:
     if name not in WRITERS:
         raise ParameterError(unknown_name(f"log format {name!r}", name, WRITERS))
     return name
-
-
-__all__ = ["USUAL", "WRITERS", "usual_format"]

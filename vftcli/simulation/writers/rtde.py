@@ -1,4 +1,8 @@
-"""UR's official RTDE client: one header row, single spaces, CR LF."""
+"""UR's two RTDE recorders.
+
+The official client writes one header row, single spaces and CR LF; SDU's ur_rtde commas, LF, every
+double with six decimals, and `safety_mode` in place of `safety_status`.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -76,9 +80,22 @@ CONSTANTS: dict[str, tuple[Any, ...]] = {
 
 
 def write_rtde(path: Path, simulation: Simulation) -> None:
-    """Write the log as the official client's text CSV."""
+    """Write the log as the official client's text CSV, each number in its shortest form."""
     columns = ur_columns(simulation, recipe(simulation))
-    write_table(path, columns, separator=" ", end="\r\n")
+    texts = [list(map(repr, values)) for values in columns.values()]
+    write_table(path, [*columns], texts, separator=" ", end="\r\n")
+
+
+def write_ur_rtde(path: Path, simulation: Simulation) -> None:
+    """Write the log as `startFileRecording` of ur_rtde does."""
+    names = ["safety_mode" if n == "safety_status" else n for n in recipe(simulation)]
+    names = [n for n in names if n != "joint_position_deviation_ratio"]
+    columns = ur_columns(simulation, names)
+    texts = [
+        [f"{v:.6f}" if isinstance(v, float) else str(v) for v in values]
+        for values in columns.values()
+    ]
+    write_table(path, [*columns], texts, separator=",", end="\n")
 
 
 def recipe(simulation: Simulation) -> list[str]:
@@ -175,8 +192,9 @@ def linear_momentum(simulation: Simulation) -> Array:
     )
 
 
-def write_table(path: Path, columns: dict[str, list[Any]], separator: str, end: str) -> None:
-    """Write columns as text, each number in the shortest form that reads back the same."""
-    texts = [list(map(repr, values)) for values in columns.values()]
-    lines = [separator.join(columns), *map(separator.join, zip(*texts, strict=True))]
+def write_table(
+    path: Path, names: list[str], columns: list[list[str]], separator: str, end: str
+) -> None:
+    """Write columns of text under a row of their names."""
+    lines = [separator.join(names), *map(separator.join, zip(*columns, strict=True))]
     path.write_bytes((end.join(lines) + end).encode("ascii"))

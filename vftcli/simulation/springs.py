@@ -1,4 +1,4 @@
-"""A hand that holds the arm by a spring and a damper."""
+"""Contacts that answer the arm's motion by spring and damper: a hand, and a hard stop."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -7,6 +7,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.simulation.motion import minimum_jerk
 from vftcli.simulation.pushes import ORIGIN, Place, Vector
 
 
@@ -84,7 +85,7 @@ class Hand:
             self.grip, self.held_at, self.held_as = k, place.position, place.rotation
         spec = self.spec
         u = min((t - spec.spans[k][0]) / spec.reach, 1.0) if spec.reach > 0 else 1.0
-        way = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+        way = minimum_jerk(u)
         move = np.array(spec.moves[k]) if spec.moves else np.zeros(3)
         turn = np.array(spec.turns[k]) if spec.turns else np.zeros(3)
         gap = self.held_at + way * move - place.position
@@ -103,3 +104,49 @@ class Hand:
         goal = pin.exp3(turn) @ self.held_as
         error: Array = pin.log3(goal @ rotation.T)
         return error
+
+
+@dataclass(frozen=True, kw_only=True)
+class StopSpec:
+    """A hard stop: a plane that pushes back when the point goes beyond it.
+
+    Attributes:
+        name: Name of the contact.
+        through: A point of the plane in the base frame. (3,) [m]
+        normal: Its normal, pointing to the free side. (3,)
+        stiffness: Stiffness of the plane. [N/m]
+        damping: Damping while pressed. [N·s/m]
+        link: The link that meets it; 0 for the flange.
+        point: The point in the link's frame. (3,) [m]
+    """
+
+    KIND: ClassVar[str] = "stop"
+    name: str
+    through: Vector
+    normal: Vector = (0.0, 0.0, 1.0)
+    stiffness: float = 2e4
+    damping: float = 200.0
+    link: int = 0
+    point: Vector = ORIGIN
+
+    def start(self, rng: np.random.Generator, duration: float) -> "StopSpec":
+        """The stop itself: nothing is drawn, and it remembers nothing."""
+        del rng, duration
+        if not any(self.normal):
+            raise ParameterError(f"contacts.{self.name}.normal has no length")
+        return self
+
+    def active(self, t: float) -> bool:
+        """A stop is always there; whether it is met shows in its wrench."""
+        del t
+        return True
+
+    def wrench(self, t: float, place: Place) -> Array:
+        """Push along the normal, never a pull. (6,) [N, N·m]"""
+        del t
+        normal = np.array(self.normal) / float(np.linalg.norm(self.normal))
+        depth = float(normal @ (np.array(self.through) - place.position))
+        if depth <= 0.0:
+            return np.zeros(6)
+        size = max(self.stiffness * depth - self.damping * float(normal @ place.velocity), 0.0)
+        return np.concatenate([size * normal, np.zeros(3)])
