@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from vftcli.identification.payload import (
+    LoadSolution,
     NotSameMotionError,
-    Solution,
     find_time_shift,
     fit_all_joints,
     load_at_flange,
@@ -37,7 +37,7 @@ def still(seconds=2.0):
 def load(mass, com, sd=(0.01, 0.001, 0.002, 0.003), logs=()):
     """A load of this mass that was solved for at `com` in the last link's frame of a Panda."""
     x = np.array([mass, *(mass * np.array(com))])
-    return load_at_flange(Solution(x, np.array(sd), np.zeros(7)), PANDA, logs, SOURCE)
+    return load_at_flange(LoadSolution(x, np.array(sd), np.zeros(7)), PANDA, logs, SOURCE)
 
 
 def test_the_load_is_moved_to_flange_axes():

@@ -80,7 +80,7 @@ class LoadFit(NamedTuple):
         return any(log is recording for log in self.loaded)
 
 
-class Solution(NamedTuple):
+class LoadSolution(NamedTuple):
     """Mass and first moments in the last link's frame, before they are known to be a load's.
 
     Attributes:
@@ -95,7 +95,7 @@ class Solution(NamedTuple):
 
 
 def load_at_flange(
-    found: Solution, robot: Robot, loaded: Sequence[Recording], origin: Remark
+    found: LoadSolution, robot: Robot, loaded: Sequence[Recording], origin: Remark
 ) -> LoadFit:
     """A solution as a load in flange axes.
 
@@ -138,7 +138,7 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
     return load_at_flange(solution, robot, (loaded,), origin)
 
 
-def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> tuple[Solution, Remark]:
+def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> tuple[LoadSolution, Remark]:
     """Fit what the loaded log's torque has beyond the free one's at the same phase."""
     processing = Processing()
     motion = prepare(loaded, robot, processing)
@@ -166,7 +166,7 @@ def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> tuple[Soluti
         shift_s=round(-shift, 3) + 0.0,
         distance_mrad=1e3 * distance,
     )
-    return Solution(x, sd, root_mean_square(left)), origin
+    return LoadSolution(x, sd, root_mean_square(left)), origin
 
 
 def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
@@ -253,7 +253,7 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     x = fit_all_joints(Y, extra, usable)
     left = extra - np.einsum("knp,p->kn", Y, x)
     sd, origin = parameter_sd(Y, left, usable), fact("load-from-poses", poses=len(q))
-    return load_at_flange(Solution(x, sd, np.std(left, axis=0)), robot, recordings, origin)
+    return load_at_flange(LoadSolution(x, sd, np.std(left, axis=0)), robot, recordings, origin)
 
 
 def resting_poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:
