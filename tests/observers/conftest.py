@@ -24,3 +24,20 @@ def momentum_of(t: np.ndarray, external: np.ndarray, noise: float = 0.0) -> Dyna
     white = np.random.default_rng(3).normal(0.0, noise, external.shape)
     p = np.cumsum(dt * (middle + white), axis=0)
     return DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))
+
+
+@pytest.fixture
+def wandering() -> Callable[..., DynamicsTerms]:
+    """Makes the terms of a momentum that wanders, on a clock of 8 ms that may jitter."""
+    return random_walk
+
+
+def random_walk(
+    samples: int = 1500, jitter: float = 0.0, seed: int = 0, joints: int = 6
+) -> DynamicsTerms:
+    """A momentum that walks at random by 0.1 kg·m²/s a sample, and μ of 5 N·m, both white."""
+    rng = np.random.default_rng(seed)
+    steps = 0.008 * (1 + jitter * rng.uniform(-1, 1, samples - 1))
+    t = np.concatenate([[0.0], np.cumsum(steps)])
+    p = 2.0 + np.cumsum(rng.normal(0, 0.1, (samples, joints)), axis=0)
+    return DynamicsTerms(t=t, p=p, mu=rng.normal(0, 5, (samples, joints)))

@@ -1,5 +1,7 @@
 """Kalman observers against a dense textbook filter, SciPy's Riccati and matrix exponential."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_are
@@ -16,6 +18,8 @@ Q_P = np.array([0.01, 0.01, 0.01, 0.02, 0.02, 0.02])
 Q_TAU = np.full(6, 5000.0)
 STEP = 0.008
 
+TermsOf = Callable[..., DynamicsTerms]
+
 
 def paper(scheme: str, convention: str = "density", **more: object) -> KalmanObserver:
     return KalmanObserver(
@@ -26,14 +30,6 @@ def paper(scheme: str, convention: str = "density", **more: object) -> KalmanObs
         noise_convention=convention,
         **more,
     )
-
-
-def terms(samples: int = 1500, jitter: float = 0.0, seed: int = 0) -> DynamicsTerms:
-    rng = np.random.default_rng(seed)
-    steps = STEP * (1 + jitter * rng.uniform(-1, 1, samples - 1))
-    t = np.concatenate([[0.0], np.cumsum(steps)])
-    p = 2.0 + np.cumsum(rng.normal(0, 0.1, (samples, 6)), axis=0)
-    return DynamicsTerms(t=t, p=p, mu=rng.normal(0, 5, (samples, 6)))
 
 
 def dense(observer: KalmanObserver, log: DynamicsTerms) -> tuple[np.ndarray, np.ndarray]:
@@ -66,8 +62,10 @@ def dense(observer: KalmanObserver, log: DynamicsTerms) -> tuple[np.ndarray, np.
 @pytest.mark.parametrize("convention", NOISE_CONVENTIONS)
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
-def test_agrees_with_the_dense_textbook_filter(scheme: str, convention: str, jitter: float) -> None:
-    observer, log = paper(scheme, convention), terms(jitter=jitter)
+def test_agrees_with_the_dense_textbook_filter(
+    scheme: str, convention: str, jitter: float, wandering: TermsOf
+) -> None:
+    observer, log = paper(scheme, convention), wandering(jitter=jitter)
     tau, sd = dense(observer, log)
     estimate = observer.estimate(log)
     # the decoupled filter is the same filter; 1500 steps of rounding at values of 100 N·m
@@ -76,14 +74,14 @@ def test_agrees_with_the_dense_textbook_filter(scheme: str, convention: str, jit
 
 
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
-def test_decay_agrees_with_the_dense_textbook_filter(scheme: str) -> None:
-    observer, log = paper(scheme, decay=3.0), terms(samples=600)
+def test_decay_agrees_with_the_dense_textbook_filter(scheme: str, wandering: TermsOf) -> None:
+    observer, log = paper(scheme, decay=3.0), wandering(samples=600)
     tau, _ = dense(observer, log)
     np.testing.assert_allclose(observer.estimate(log).tau, tau, atol=1e-9)
 
 
-def test_as_printed_agrees_with_the_dense_filter_on_mu_alone() -> None:
-    observer, log = paper("fe", as_printed=True), terms(samples=600)
+def test_as_printed_agrees_with_the_dense_filter_on_mu_alone(wandering: TermsOf) -> None:
+    observer, log = paper("fe", as_printed=True), wandering(samples=600)
     tau, _ = dense(observer, log)
     np.testing.assert_allclose(observer.estimate(log).tau, tau, atol=1e-10)
 
@@ -146,10 +144,10 @@ def test_started_from_the_stationary_prior_there_is_no_transient() -> None:
 
 
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
-def test_a_users_initial_covariance_is_followed_exactly(scheme: str) -> None:
+def test_a_users_initial_covariance_is_followed_exactly(scheme: str, wandering: TermsOf) -> None:
     """Blocks run side by side give the plain loop's covariances, transient and all."""
     start = np.array([[50.0] * 6, [3.0] * 6, [4e4] * 6])
-    observer, log = paper(scheme, initial_covariance=start), terms(samples=800, jitter=0.3)
+    observer, log = paper(scheme, initial_covariance=start), wandering(samples=800, jitter=0.3)
     steps = steps_of(log.t)
     P = start.copy()
     expected = []
@@ -227,9 +225,9 @@ def test_frequency_response_is_that_of_the_filter() -> None:
     np.testing.assert_allclose(sine + 1j * cosine, response, atol=1e-9)  # transient long gone
 
 
-def test_forward_euler_refuses_a_decay_it_cannot_hold() -> None:
+def test_forward_euler_refuses_a_decay_it_cannot_hold(wandering: TermsOf) -> None:
     with pytest.raises(ParameterError, match=r"unstable: decay·Ts = 2\.4"):
-        paper("fe", decay=300.0).estimate(terms(samples=50))
+        paper("fe", decay=300.0).estimate(wandering(samples=50))
 
 
 @pytest.mark.parametrize(

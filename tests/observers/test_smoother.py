@@ -1,5 +1,7 @@
 """The smoother against a dense Rauch–Tung–Striebel textbook implementation, and its symmetries."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -11,26 +13,12 @@ from vftcli.robots.terms import DynamicsTerms
 R, Q_P, Q_TAU = np.array([0.5, 1.3]), np.array([0.01, 0.02]), np.array([5000.0, 5000.0])
 STEP = 0.008
 
+TermsOf = Callable[..., DynamicsTerms]
+
 
 def smoother(scheme: str = "fe", convention: str = "density", **more: object) -> KalmanSmoother:
-    return KalmanSmoother(
-        filter=KalmanObserver(
-            discretisation=scheme,
-            r_diag=R,
-            q_p_diag=Q_P,
-            q_tau_diag=Q_TAU,
-            noise_convention=convention,
-            **more,
-        )
-    )
-
-
-def wandering(samples: int, jitter: float, seed: int = 0) -> DynamicsTerms:
-    rng = np.random.default_rng(seed)
-    steps = STEP * (1 + jitter * rng.uniform(-1, 1, samples - 1))
-    t = np.concatenate([[0.0], np.cumsum(steps)])
-    p = 2.0 + np.cumsum(rng.normal(0, 0.1, (samples, 2)), axis=0)
-    return DynamicsTerms(t=t, p=p, mu=rng.normal(0, 5, (samples, 2)))
+    own = {"r_diag": R, "q_p_diag": Q_P, "q_tau_diag": Q_TAU, "noise_convention": convention}
+    return KalmanSmoother(filter=KalmanObserver(discretisation=scheme, **own, **more))
 
 
 def dense_rts(smooth: KalmanSmoother, log: DynamicsTerms) -> tuple[np.ndarray, np.ndarray]:
@@ -72,8 +60,10 @@ def dense_rts(smooth: KalmanSmoother, log: DynamicsTerms) -> tuple[np.ndarray, n
 @pytest.mark.parametrize("convention", ["density", "discrete", "literal"])
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
-def test_agrees_with_a_dense_textbook_smoother(scheme: str, convention: str, jitter: float) -> None:
-    smooth, log = smoother(scheme, convention), wandering(700, jitter)
+def test_agrees_with_a_dense_textbook_smoother(
+    scheme: str, convention: str, jitter: float, wandering: TermsOf
+) -> None:
+    smooth, log = smoother(scheme, convention), wandering(700, jitter, joints=2)
     tau, sd = dense_rts(smooth, log)
     estimate = smooth.estimate(log)
     # the same answer through another recursion: rounding at values of some 100 N·m
@@ -81,9 +71,9 @@ def test_agrees_with_a_dense_textbook_smoother(scheme: str, convention: str, jit
     np.testing.assert_allclose(estimate.sd, sd, rtol=1e-9)
 
 
-def test_agrees_with_the_dense_smoother_from_a_users_covariance() -> None:
+def test_agrees_with_the_dense_smoother_from_a_users_covariance(wandering: TermsOf) -> None:
     start = np.array([[4.0, 4.0], [1.0, 1.0], [900.0, 900.0]])
-    smooth, log = smoother(initial_covariance=start), wandering(300, 0.0)
+    smooth, log = smoother(initial_covariance=start), wandering(300, 0.0, joints=2)
     plain = smoother()
     far = slice(150, None)
     # after 1.2 s, twelve time constants, the start no longer matters: e⁻¹²·700 N·m
@@ -143,8 +133,8 @@ def test_the_bandwidth_is_that_of_the_formula() -> None:
     assert not np.any(tuning.delay)
 
 
-def test_it_knows_more_than_the_filter() -> None:
-    log = wandering(500, 0.1)
+def test_it_knows_more_than_the_filter(wandering: TermsOf) -> None:
+    log = wandering(500, 0.1, joints=2)
     smooth = smoother()
     before, after = smooth.filter.estimate(log).sd, smooth.estimate(log).sd
     assert before is not None

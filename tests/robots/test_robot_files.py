@@ -11,32 +11,35 @@ from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.urdf import chain_from_model
 from vftcli.signals.errors import RobotError
 
-TWO_LINKS = """schema = 1
+HEAD = """schema = 1
 name = "planar"
 dof = 2
 convention = "xyz-rpy"
 torque_source = "joint_torque"
 
-[[joints]]
-name = "shoulder"
-xyz = [0.0, 0.0, 0.1]
-rpy = [1.5707963267948966, 0.0, 0.0]
-mass = 2.0
-com = [0.25, 0.0, 0.0]
-inertia = [0.001, 0.0, 0.0, 0.02, 0.0, 0.02]
+"""
 
-[[joints]]
-name = "elbow"
-xyz = [0.5, 0.0, 0.0]
-rpy = [0.0, 0.0, 0.0]
-mass = 1.0
-com = [0.2, 0.0, 0.0]
-inertia = [0.001, 0.0, 0.0, 0.01, 0.0, 0.01]
-[joints.friction]
+JOINT = """[[joints]]
+name = "{}"
+xyz = {}
+rpy = {}
+mass = {}
+com = {}
+inertia = {}
+"""
+
+FRICTION = """[joints.friction]
 model = "coulomb-viscous"
 coulomb = 1.0
 viscous = 0.5
 """
+
+TENSORS = ([0.001, 0.0, 0.0, 0.02, 0.0, 0.02], [0.001, 0.0, 0.0, 0.01, 0.0, 0.01])
+SHOULDER = JOINT.format(
+    "shoulder", [0.0, 0.0, 0.1], [np.pi / 2, 0.0, 0.0], 2.0, [0.25, 0.0, 0.0], TENSORS[0]
+)
+ELBOW = JOINT.format("elbow", [0.5, 0.0, 0.0], [0.0] * 3, 1.0, [0.2, 0.0, 0.0], TENSORS[1])
+TWO_LINKS = HEAD + SHOULDER + "\n" + ELBOW + FRICTION
 
 
 def written(folder: Path, text: str, name: str = "arm.toml") -> Path:
