@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, interval, numbers
+from vftcli.signals.parsing import assignment, check_known, did_you_mean, interval, numbers
 
 
 @pytest.mark.parametrize(
@@ -36,3 +36,14 @@ def test_assignments() -> None:
 def test_assignments_that_are_none(text: str) -> None:
     with pytest.raises(ParameterError, match=r"--set .* is not KEY=VALUE"):
         assignment(text, "--set", "KEY=VALUE")
+
+
+def test_only_a_name_that_is_near_is_asked_for() -> None:
+    assert did_you_mean("gian", ("gain", "omega")) == " Did you mean gain?"
+    assert did_you_mean("speed", ("gain", "omega")) == ""
+
+
+def test_an_unknown_word_is_refused_with_what_there_is() -> None:
+    check_known("fe", {"fe": 1, "zoh": 2}, "unheard")
+    with pytest.raises(ParameterError, match=r"^discretisation 'rk4'; there is fe, zoh$"):
+        check_known("rk4", {"fe": 1, "zoh": 2}, "discretisation 'rk4'")

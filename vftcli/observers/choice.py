@@ -12,11 +12,11 @@ from vftcli.observers.table import (
     OBSERVERS,
     Setup,
     build_observers,
-    check_observer,
     observer_settings,
     sections,
 )
 from vftcli.robots.robot import Robot
+from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class ObserverChoice:
 
     def __post_init__(self) -> None:
         for name in self.names:
-            check_observer(name)
+            check_known(name, OBSERVERS, f"no observer {name!r}")
 
     @classmethod
     def parsed(

@@ -19,6 +19,7 @@ from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series, frozen, handed_over
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.parsing import check_known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,15 +58,9 @@ class KalmanObserver:
     as_printed: bool = False
 
     def __post_init__(self) -> None:
-        if self.discretisation not in DISCRETISATIONS:
-            raise ParameterError(
-                f"discretisation {self.discretisation!r}; there is {', '.join(DISCRETISATIONS)}"
-            )
-        if self.noise_convention not in NOISE_CONVENTIONS:
-            raise ParameterError(
-                f"kfo.noise_convention is {self.noise_convention!r}; "
-                f"there is {', '.join(NOISE_CONVENTIONS)}"
-            )
+        scheme, convention = self.discretisation, self.noise_convention
+        check_known(scheme, DISCRETISATIONS, f"discretisation {scheme!r}")
+        check_known(convention, NOISE_CONVENTIONS, f"kfo.noise_convention is {convention!r}")
         for name in ("r_diag", "q_p_diag", "q_tau_diag", "decay"):
             value = frozen(np.atleast_1d(np.asarray(getattr(self, name), dtype=np.float64)))
             # The paper gives A_τ = −a, its tables a: either sign means the same decay.

@@ -19,6 +19,7 @@ from vftcli.observers.settings import (
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, Where, caution, fact
 
 if TYPE_CHECKING:
@@ -241,17 +242,6 @@ def observer_settings(assignments: Sequence[str]) -> Settings:
     return parse_settings(assignments, sections())
 
 
-def check_observer(name: str) -> str:
-    """An observer's name as it is.
-
-    Raises:
-        ParameterError: If there is no such observer.
-    """
-    if name not in OBSERVERS:
-        raise ParameterError(f"no observer {name!r}; there is {', '.join(OBSERVERS)}")
-    return name
-
-
 def build_observers(
     names: Sequence[str], setup: Setup
 ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
@@ -260,7 +250,9 @@ def build_observers(
     Raises:
         ParameterError: If a name or a parameter is not one there is, or is out of range.
     """
-    made = [OBSERVERS[check_observer(name)].build(setup) for name in dict.fromkeys(names)]
+    for name in names:
+        check_known(name, OBSERVERS, f"no observer {name!r}")
+    made = [OBSERVERS[name].build(setup) for name in dict.fromkeys(names)]
     # Several observers may miss one and the same gain: that is remarked on once.
     remarks: list[Remark] = []
     for _, own in made:

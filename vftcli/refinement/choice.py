@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import check_known
 
 NOTHING = "none"
 """The word for a bias that stays."""
@@ -27,10 +27,7 @@ class RefinementChoice:
     remove_bias: str = NOTHING
 
     def __post_init__(self) -> None:
-        if self.remove_bias not in REMOVALS:
-            raise ParameterError(
-                f"--remove-bias {self.remove_bias!r}; there is {', '.join(REMOVALS)}"
-            )
+        check_known(self.remove_bias, REMOVALS, f"--remove-bias {self.remove_bias!r}")
 
     @classmethod
     def parsed(cls, *, bands: bool = False, remove_bias: str | None = None) -> "RefinementChoice":

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from vftcli.robots import PROFILES, Robot, load_robot
-from vftcli.signals.errors import ParameterError, RobotError
+from vftcli.signals.errors import RobotError
+from vftcli.signals.parsing import check_known
 from vftcli.signals.recording import Recording
 
 FRICTION = ("profile", "none")
@@ -28,8 +29,7 @@ class RobotChoice:
     payload: str | None = None
 
     def __post_init__(self) -> None:
-        if self.friction not in FRICTION:
-            raise ParameterError(f"--friction {self.friction!r}; there is {', '.join(FRICTION)}")
+        check_known(self.friction, FRICTION, f"--friction {self.friction!r}")
 
     @classmethod
     def parsed(

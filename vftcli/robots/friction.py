@@ -6,7 +6,7 @@ import numpy as np
 
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import check_known
 
 SMOOTHING = 0.01
 """Velocity at which the smoothed sign tanh(q̇/smoothing) reaches tanh(1), by default. [rad/s]"""
@@ -114,8 +114,7 @@ def friction_torque(
         if joint.model != "none":
             groups.setdefault((joint.model, tuple(sorted(joint.parameters))), []).append(j)
     for (model, keys), joints in groups.items():
-        if model not in MODELS:
-            raise ParameterError(f"no friction model {model!r}; there is {', '.join(MODELS)}")
+        check_known(model, MODELS, f"no friction model {model!r}")
         values = {key: np.array([friction[j].parameters[key] for j in joints]) for key in keys}
         every = len(joints) == dq.shape[1]
         if load is not None and "load_coulomb" in values:

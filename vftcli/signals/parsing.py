@@ -12,6 +12,12 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f" Did you mean {close[0]}?" if close else ""
 
 
+def check_known(word: str, known: Iterable[str], complaint: str) -> None:
+    """Raise a ParameterError of the complaint and of what there is unless a word is known."""
+    if word not in (there := list(known)):
+        raise ParameterError(f"{complaint}; there is {', '.join(there)}")
+
+
 def interval(text: str) -> tuple[float, float]:
     """First and last time of ``A:B``, infinite where an end is left out. [s]
 

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.errors import ParameterError, RobotError
+from vftcli.signals.errors import RobotError
+from vftcli.signals.parsing import check_known
 
 LENGTH = 0.3
 """Length by which moments are made comparable with forces. [m]"""
@@ -141,8 +142,7 @@ SOLVERS: dict[str, Callable[[Decomposition, Array], Solution]] = {
 
 def check_solver(name: str) -> None:
     """Raise a ParameterError that lists the solvers if there is none of that name."""
-    if name not in SOLVERS:
-        raise ParameterError(f"no solver {name!r} for a wrench; there is {', '.join(SOLVERS)}")
+    check_known(name, SOLVERS, f"no solver {name!r} for a wrench")
 
 
 def null_space(parts: Decomposition, tau: Array) -> Array:
