@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vftcli.readers import read
-from vftcli.repetition.alignment import align
+from vftcli.repetition.alignment import align, uniform
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 
@@ -113,3 +113,27 @@ def test_of_equal_fits_the_longest_overlap_counts(
     # Any whole period that leaves nothing out is right; the push pulls by its own share.
     off = (found.shift - free.t[first] + 0.5 * 3.7) % 3.7 - 0.5 * 3.7
     assert off == pytest.approx(0.0, abs=5e-3)
+
+
+def test_a_uniform_clock_ends_with_the_log() -> None:
+    """On its own step a log keeps its samples, the last one too; on half the step one between."""
+    log = wandering()
+    np.testing.assert_allclose(uniform(log, 0.01), log.q, atol=1e-12)
+    half = uniform(log, 0.005)
+    assert len(half) == 2 * log.samples - 1
+    np.testing.assert_allclose(half[1::2], 0.5 * (log.q[1:] + log.q[:-1]), atol=1e-12)
+
+
+def test_a_path_that_nearly_repeats_is_laid_where_it_is_the_same() -> None:
+    """A spiral, 3 % wider with each turn of 4 s: turns 1 to 3 on turns 2 to 4.
+
+    One turn off, all three would overlap, but 3 % apart: thirty times what a servo repeats within.
+    """
+    t = 0.01 * np.arange(1600)
+    phase = 0.5 * np.pi * t[:, None] + np.array([0.0, 1.0, 2.0])
+    log = Recording(t=t, q=0.3 * (1.0 + 0.03 * t[:, None] / 4.0) * np.sin(phase))
+    first = replace(log, t=t[:1200], q=log.q[:1200])
+    later = replace(log, t=t[400:] - t[400], q=log.q[400:])
+    found = align(first, later)
+    assert found.shift == pytest.approx(-4.0, abs=1e-6)  # both logs hold the same samples
+    assert found.deviation < 1e-6

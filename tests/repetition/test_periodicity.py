@@ -9,7 +9,7 @@ import pytest
 
 from vftcli.readers import read
 from vftcli.repetition.cycles import segment
-from vftcli.repetition.periodicity import find_period
+from vftcli.repetition.periodicity import find_period, moving_part
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 
@@ -116,3 +116,12 @@ def test_a_clock_of_bursts_leaves_no_lag_to_look_at() -> None:
     log = Recording(t=t, q=q, dq=np.ones_like(q))
     with pytest.raises(ReferenceTorqueError, match="no repetition found"):
         find_period(log)
+
+
+def test_positions_alone_tell_where_the_arm_rests(repeated: Make) -> None:
+    """Rests of 1 s before and after 4 cycles of 3.7 s; velocities are differences along time."""
+    log = repeated(hold=1.0)
+    t, q = moving_part(replace(log, dq=None))
+    # A joint counts as standing from 0.1 s before its rest to 0.1 s after it.
+    assert (t[0], t[-1]) == (pytest.approx(1.1, abs=0.03), pytest.approx(15.7, abs=0.03))
+    np.testing.assert_array_equal(q, moving_part(log)[1])

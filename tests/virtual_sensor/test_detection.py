@@ -95,3 +95,11 @@ def test_the_free_part_lasts_from_settling_to_the_first_contact() -> None:
     assert learned_free(T, ())[-2]
     with pytest.raises(ParameterError, match=r"begins at 1.05 s.*--zero A:B"):
         learned_free(T, find_contacts(T, push(3.0, 1.05)))
+
+
+def test_false_alarms_count_by_the_hour_of_the_whole_log() -> None:
+    """One alarm in 19.99 s, of which the push holds 5 to 6.99 s: one in 18.00 s, 200 an hour."""
+    tau = reference(2.0).tau + np.column_stack([push(2.0, 12.0, 13.0), np.zeros(len(T))])
+    (score,) = judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, reference(2.0))
+    assert score.detection.false_alarms == 1
+    assert score.detection.false_alarms_per_h == pytest.approx(200.0)

@@ -136,3 +136,11 @@ def test_a_log_without_a_wrench_has_no_convention() -> None:
     recording = log(flange, None)
     without = Recording(t=recording.t, q=recording.q)
     assert check_vendor(without, ours_in_base(recording, flange), load_robot("ur5").chain) is None
+
+
+def test_a_field_of_zeros_fits_no_axes_and_has_no_correlation() -> None:
+    """Some controllers log zeros where no sensor is fitted: their gain is 0, 0/0 correlates not."""
+    ours = pushes()[:, :3]
+    fit = fit_axes(ours, np.zeros_like(ours))
+    assert fit.gain == 0.0
+    assert np.isnan(fit.correlation)

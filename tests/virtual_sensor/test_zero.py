@@ -59,6 +59,14 @@ def test_the_unloaded_start_ends_where_the_load_begins() -> None:
     assert span[1] == pytest.approx(4.7, abs=0.02)
 
 
+def test_the_unloaded_start_of_a_log_without_a_load_ends_with_it() -> None:
+    """From the second in which observers settle, on a clock that begins at 3 s, to the last."""
+    t = 3.0 + np.arange(0.0, 10.0, 0.01)
+    values = DRIFT + 0.05 * np.random.default_rng(0).standard_normal((len(t), 6))
+    span = unloaded_start(Wrench(name="kfo-fe", t=t, values=values, frame="base"))
+    assert span == (pytest.approx(4.0), pytest.approx(t[-1]))
+
+
 def test_a_log_too_short_or_masked_has_no_unloaded_start() -> None:
     assert unloaded_start(hung(masked=True)) is None
     t = np.arange(0.0, 1.2, 0.01)

@@ -1,0 +1,67 @@
+"""Which cycles are taken to be free: the one with the least residual, and those like it."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from vftcli.repetition.cycles import Cycles
+from vftcli.repetition.drive_run import DriveRun
+from vftcli.repetition.free_cycles import find_free_cycles
+from vftcli.signals.errors import ReferenceTorqueError
+
+T = 0.01 * np.arange(1200)
+
+CYCLES = Cycles(period=4.0, begin=0.0, end=12.0)
+"""Three whole ones."""
+
+Make = Callable[..., DriveRun]
+
+
+@pytest.fixture
+def pushed(drive_of: Make) -> Callable[..., DriveRun]:
+    """Two joints that swing every 4 s with 0.1 N·m of noise, pushed by 5 N·m at some instants."""
+
+    def make(*instants: float) -> DriveRun:
+        phase = 0.5 * np.pi * T[:, None] + np.array([0.0, 1.0])
+        torque = 0.1 * np.random.default_rng(2).standard_normal((len(T), 2))
+        for instant in instants:
+            torque -= 5.0 * np.exp(-(((T - instant) / 0.3) ** 2))[:, None]
+        return drive_of(T, np.sin(phase), 0.5 * np.pi * np.cos(phase), torque=torque)
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("instants", "free"),
+    [
+        ((2.0,), (1, 2)),
+        ((6.0,), (0, 2)),
+        ((10.0,), (0, 1)),
+        ((2.0, 6.0), (2,)),
+        ((6.0, 10.0), (0,)),
+    ],
+)
+def test_all_cycles_without_a_push_are_free(
+    pushed: Callable[..., DriveRun], instants: tuple[float, ...], free: tuple[int, ...]
+) -> None:
+    found = find_free_cycles(pushed(*instants), CYCLES)
+    assert found.numbers == free
+    assert found.residuals is not None
+    # 5 N·m for half a second against noise of 0.1 N·m that is low-passed at 5 Hz: 40 times.
+    assert np.all((found.residuals > 10.0) == ~np.isin(np.arange(3), free))
+
+
+def test_of_cycles_that_are_all_alike_the_last_is_left_to_be_compared(
+    pushed: Callable[..., DriveRun],
+) -> None:
+    found = find_free_cycles(pushed(), CYCLES)
+    assert found.numbers == (0, 1)
+    assert found.residuals is not None
+    np.testing.assert_allclose(found.residuals, 1.0, atol=0.5)  # noise alone
+    assert found.remark(CYCLES.whole).code == "free-cycles-found"
+
+
+def test_a_log_shorter_than_a_cycle_has_no_free_one(pushed: Callable[..., DriveRun]) -> None:
+    with pytest.raises(ReferenceTorqueError, match=r"no whole cycle of 13 s.*--free"):
+        find_free_cycles(pushed(), Cycles(period=13.0, begin=0.0, end=12.0))
