@@ -8,6 +8,7 @@ from vftcli.evaluation.selection import (
     Facts,
     advice,
     best,
+    computation_time,
     facts,
     mean_rmse,
     step_response,
@@ -94,3 +95,29 @@ def test_white_noise_of_a_ramp_is_that_of_its_second_differences() -> None:
     # A standard deviation of 20 000 samples, to 1/√(2·20 000), three times that for what overlaps.
     assert white_noise(x)[0] == pytest.approx(0.7, rel=0.02)
     assert np.isnan(white_noise(x[:2])[0])
+
+
+def test_the_slowest_joint_decides_and_noise_is_the_joints_mean() -> None:
+    """Joints of 50 and 5 1/s against observers that have one of them on both joints."""
+    found = []
+    for gain in ([50.0, 5.0], 50.0, 5.0):
+        observer = MomentumObserver(gain=np.array(gain))
+        found += facts([observer], {"gmo": observer.tuning(STEP, 2)}, same_on_both(), None)
+    both, fast, slow = found
+    assert both.response == slow.response > fast.response
+    assert both.delay == slow.delay > fast.delay
+    assert both.noise == pytest.approx(0.5 * (fast.noise + slow.noise), rel=1e-12)
+    assert both.passed == pytest.approx(0.5 * (fast.passed + slow.passed), rel=1e-12)
+
+
+def same_on_both() -> DynamicsTerms:
+    """The first joint's noise on both joints."""
+    log = terms()
+    return DynamicsTerms(t=log.t, p=log.p, mu=np.repeat(log.mu[:, :1], 2, axis=1))
+
+
+def test_the_shortest_of_three_runs_is_the_time_a_sample(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock that reads 5, 2 and 3 s of computation for 4000 samples: 0.5 ms a sample."""
+    clock = iter([0.0, 5.0, 10.0, 12.0, 20.0, 23.0])
+    monkeypatch.setattr("vftcli.evaluation.selection.perf_counter", lambda: next(clock))
+    assert computation_time(MomentumObserver(gain=20.0), terms()) == pytest.approx(5e-4)

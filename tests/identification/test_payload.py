@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.identification.payload import (
+    REACH,
     LoadSolution,
     NotSameMotionError,
     find_time_shift,
@@ -202,3 +203,22 @@ def test_what_settles_at_the_edges_of_a_rest_does_not_count():
     spoilt = Recording(t=recording.t, q=recording.q, dq=recording.dq, current=settling)
     torque = resting_poses([spoilt], UR5)[1]
     np.testing.assert_allclose(torque, gravity_torque(UR5, POSES), atol=1e-9)
+
+
+def test_the_limits_of_a_load_themselves():
+    """No mass is no load; one known to half, or as far away as a load may be, just is."""
+    with pytest.raises(IdentificationError, match="no load can be told: mass 0"):
+        load(0.0, [0, 0, 0], (0.0, 0.1, 0.1, 0.1))
+    # the Panda's flange lies along z of its last link and is not turned against it
+    far = PANDA.chain.flange_translation + np.array([REACH, 0.0, 0.0])
+    assert load(1.0, far, (0.5, 0.1, 0.1, 0.1)).payload.com[0] == REACH
+
+
+def test_a_joint_that_a_load_does_not_reach_counts_for_nothing():
+    """Zeros on both sides, as of a base joint with a vertical axis, leave nothing to divide by."""
+    rng = np.random.default_rng(4)
+    A = rng.standard_normal((100, 3, 2))
+    A[:, 0] = 0.0
+    x = np.array([1.5, -0.5])
+    found = fit_all_joints(A, np.einsum("knp,p->kn", A, x), np.ones((100, 3)))
+    np.testing.assert_allclose(found, x, rtol=1e-9)

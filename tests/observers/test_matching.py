@@ -101,3 +101,20 @@ def test_printed_formulas_are_not_matched() -> None:
     observers, _ = build_observers(DEFAULT, how)
     with pytest.raises(ParameterError, match="--as-printed"):
         match_observers(observers, parse_target("delay=0.05"), how)
+
+
+@pytest.mark.parametrize(
+    ("names", "codes"),
+    [
+        (["gmo"], ["bandwidth-matched"]),
+        (["fdo", "kfo-zoh"], ["bandwidth-matched"]),
+        (["fdo", "gmo"], ["bandwidth-matched", "first-order-observers-alike"]),
+    ],
+)
+def test_first_order_observers_are_called_alike_where_both_run(
+    names: list[str], codes: list[str]
+) -> None:
+    observers, _ = build_observers(names, setup())
+    _, remarks = match_observers(observers, parse_target("bandwidth=3"), setup())
+    assert [remark.code for remark in remarks] == codes
+    assert remarks[0].values == {"bandwidth_Hz": 3.0}

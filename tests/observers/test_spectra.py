@@ -142,3 +142,13 @@ def test_neighbours_are_averaged_over_a_fifth_of_the_frequency() -> None:
     assert found[20] == pytest.approx(1.0)  # 4 neighbours either side
     assert found[4] == 0.0
     assert np.flatnonzero(found).tolist() == list(range(17, 26))
+
+
+def test_octaves_are_half_an_octave_apart() -> None:
+    """The seventh half octave above the first bin, 5.66 to 11.3 Hz, is the only quiet one."""
+    f = np.arange(101) * 0.5
+    free = np.where((f >= 5.5) & (f <= 11.5), 1.0, 100.0)[:, None]
+    spectra = Spectra(frequency=f, free=free, loaded=free, step=0.01, segments=(1, 1))
+    np.testing.assert_allclose(spectra.floor[f <= 11.0], 1.0)
+    # beyond it the free part itself, averaged over a fifth of the frequency
+    np.testing.assert_allclose(spectra.floor[f >= 15.0], 100.0)

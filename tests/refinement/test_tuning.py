@@ -114,3 +114,41 @@ def test_a_tuned_file_goes_into_a_comparison(tmp_path: Path) -> None:
     again = runner.invoke(app, asked)
     assert isinstance(again.exception, VftError)
     assert "--force" in str(again.exception)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.5, -0.5])
+def test_a_constant_error_brings_one_threshold_nearer(offset: float) -> None:
+    """2 Hz of 1 N·m rms about an offset m: 2·3600·(e^{−(h−m)²/2} + e^{−(h+m)²/2}) an hour."""
+    f = np.linspace(0.0, 10.0, 1001)
+    power = np.where(np.isclose(f, 2.0), 1.0, 0.0)[:, None]
+    power[0] = offset**2
+    expected = 7200.0 * (np.exp(-0.5 * (2.0 - offset) ** 2) + np.exp(-0.5 * (2.0 + offset) ** 2))
+    assert crossings(power, f, np.array([2.0]))[0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_an_offset_at_the_threshold_is_an_alarm_without_end() -> None:
+    power = np.array([[4.0], [1.0]])
+    assert crossings(power, np.array([0.0, 2.0]), np.array([2.0]))[0] == np.inf
+
+
+def test_the_one_rate_of_filtered_dynamics_lies_between_those_of_the_joints() -> None:
+    """It has the smallest mean error; each joint by itself could have less."""
+    fdo, gmo, *_ = tune_all(spectra(0.3), parse_goal("rmse"))
+    assert fdo.gains["omega"] == fdo.rate[0] == fdo.rate[1]
+    assert np.min(gmo.rate) < fdo.rate[0] < np.max(gmo.rate)
+    assert np.all(gmo.rmse < fdo.rmse)
+
+
+def test_a_threshold_is_one_or_one_a_joint() -> None:
+    with pytest.raises(ParameterError, match=r"--threshold has 3 values; .* each of 2 joints"):
+        tune_all(spectra(), parse_goal("rmse", "1,2,3"))
+    for line in tune_all(spectra(), parse_goal("rmse", "1,2")):
+        assert line.alarms is not None
+
+
+@pytest.mark.parametrize("name", ["kfo-zoh", "kfo-rts"])
+def test_a_kalman_filters_rate_is_the_fourth_root_of_its_densities(name: str) -> None:
+    """ω_n⁴ = Q_τ/R under ``density``, whatever R the log's noise asks for."""
+    (line,) = (x for x in tune_all(spectra(0.3), parse_goal("rmse")) if x.observer == name)
+    ratio = np.array(line.gains["q_tau_diag"]) / np.array(line.gains["r_diag"])
+    np.testing.assert_allclose(ratio**0.25, line.rate, rtol=1e-12)
