@@ -8,29 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.cli import main
-
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 
 Run = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """Run the command line as installed; return its exit code, stdout and stderr."""
-
-    def call(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr("sys.argv", ["vftcli", *map(str, words)])
-        try:
-            main()
-        except SystemExit as stop:
-            code = stop.code if isinstance(stop.code, int) else 1
-        else:
-            code = 0
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return call
 
 
 def table(rows: int = 400, joints: int = 6) -> list[list[str]]:

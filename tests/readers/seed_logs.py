@@ -3,8 +3,9 @@
 import gzip
 import json
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -238,13 +239,20 @@ def rosbag1(path: Path, *, compression: str = "") -> Path:
     if compression:
         writer.set_compression(Writer.CompressionFormat[compression])
     writer.chunk_threshold = 16 * 1024
+    write_messages(writer, messages, store, store.serialize_ros1)
+    return path
+
+
+def write_messages(
+    writer: Any, messages: Iterable[Any], store: Any, serialise: Callable[[Any, str], Any]
+) -> None:
+    """Write messages into a bag, each topic's connection made when it is first needed."""
     with writer:
         connections = {}
         for topic, kind, time, message in messages:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)
-            writer.write(connections[topic], time, store.serialize_ros1(message, kind))
-    return path
+            writer.write(connections[topic], time, serialise(message, kind))
 
 
 def rosbag2(folder: Path, *, storage: str = "mcap", mode: str = "", method: str = "") -> Path:
@@ -256,12 +264,7 @@ def rosbag2(folder: Path, *, storage: str = "mcap", mode: str = "", method: str 
     writer = Writer(folder, version=9, storage_plugin=plugin)
     if mode:
         writer.set_compression(CompressionMode[mode], CompressionFormat[method or "ZSTD"])
-    with writer:
-        connections = {}
-        for topic, kind, time, message in messages:
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, kind, typestore=store)
-            writer.write(connections[topic], time, store.serialize_cdr(message, kind))
+    write_messages(writer, messages, store, store.serialize_cdr)
     return folder
 
 

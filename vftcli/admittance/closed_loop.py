@@ -299,24 +299,20 @@ def has_run_away(loop: Loop) -> bool:
 def closed_loop_of(loop: Loop, log: Sequence[Row], zero: tuple[float, float] | None) -> ClosedLoop:
     """Put the run together; the truth is the simulator's."""
     arm = loop.arm
-    t, estimate, dragged, commanded, q, reached = map(np.array, zip(*log, strict=True))
+    columns = dict(zip(Row._fields, map(np.array, zip(*log, strict=True)), strict=True))
+    t = columns["t"]
     simulation = observe(arm) if arm.made == arm.steps else None
     truth = np.full((len(t), 6), np.nan)
     if simulation is not None:
         seen = simulation.truth
         truth = resample_columns(t, seen.t, seen.wrench)
     if zero is not None:
-        estimate[t < zero[0]] = np.nan
+        columns["estimate"][t < zero[0]] = np.nan
     return ClosedLoop(
         controller=loop.controller,
-        t=t,
-        estimate=estimate,
         truth=truth,
-        dragged=dragged,
-        commanded=commanded,
-        q=q,
-        moved=deviation_of(loop.solver, loop.start, q),
-        reached=reached,
+        moved=deviation_of(loop.solver, loop.start, columns["q"]),
         zero=loop.zero,
         simulation=simulation,
+        **columns,
     )
