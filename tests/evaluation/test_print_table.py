@@ -95,3 +95,20 @@ def test_floors_and_unknown_errors_stand_in_their_joints() -> None:
     assert np.isfinite(np.delete(found.ours["fdo"], 1)).all()
     assert found.floor[[0, 1, 3, 4, 5]] == pytest.approx([0.1, 0.2, 0.4, 0.5, 0.6])
     assert np.isnan(found.floor[2])
+
+
+PRINTED = """
+5.6601 5.2106 4.7472 4.8555
+4.2443 3.8767 3.6219 3.6475
+4.6620 5.1080 4.0874 4.1538
+1.5379 1.2939 1.3828 1.3345
+1.2137 1.1976 1.3221 1.3164
+0.9443 0.9322 0.9355 0.9440
+"""
+"""Table I as the paper prints it: a row a joint; FDO, GMO, KFO by FE, KFO by ZOH. [N·m]"""
+
+
+def test_table_1_is_the_papers() -> None:
+    rows = [[float(x) for x in line.split()] for line in PRINTED.strip().splitlines()]
+    columns = dict(zip(("fdo", "gmo", "kfo-fe", "kfo-zoh"), zip(*rows, strict=True), strict=True))
+    assert dict(TABLE_1.rmse) == columns
