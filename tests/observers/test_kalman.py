@@ -261,3 +261,12 @@ def test_gains_are_found_for_a_covariance_that_forgets_slowly() -> None:
         full = I_LC @ np.array([[p11, p12], [p12, p22]]) @ I_LC.T + np.outer(L, L) * m.r[0]
         P = np.array([full[0, 0], full[0, 1], full[1, 1]])
     np.testing.assert_allclose(found, P[2], rtol=1e-9)
+
+
+@pytest.mark.parametrize("scheme", ["fe", "zoh"])
+def test_half_the_power_passes_at_the_bandwidth(scheme: str) -> None:
+    """The continuous filter is ω²/(s² + 2ζωs + ω²): solved for |H|² = ½ where it is tuned."""
+    tuning = paper(scheme).tuning(STEP, 6)
+    s, omega = 2j * np.pi * tuning.bandwidth, tuning.omega_n
+    response = omega**2 / (s**2 + 2.0 * tuning.zeta * omega * s + omega**2)
+    np.testing.assert_allclose(np.abs(response) ** 2, 0.5, rtol=1e-12)  # rounding
