@@ -5,13 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.doctor.examination import examine, hypotheses, no_fit, robot_findings
+from vftcli.doctor.examination import (
+    Examination,
+    examine,
+    guess_robot,
+    hypotheses,
+    no_fit,
+    robot_findings,
+)
 from vftcli.doctor.fit import RobotMatch
 from vftcli.robots import Payload, Robot, load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import Remark, fact, warning
 
 UR10E, PANDA = load_robot("ur10e"), load_robot("panda")
 T = 0.01 * np.arange(1000)
@@ -62,9 +69,9 @@ def test_constants_are_compared_with_the_robot_that_fits_and_with_none_else() ->
     torque = log.require("torque") + 1.0  # also where gravity does not act, for its drive constant
     current = torque / (1.06 * np.asarray(UR10E.torque_constant))
     told = replace(log, torque=None, current=current, target_current=current, target_torque=torque)
-    (remark,) = of_code(examine(told, {"ur10e": UR10E}).findings, "drive-constants")
+    (remark,) = of_code(examine(told, UR10E).findings, "drive-constants")
     assert remark.values["worst_percent"] == pytest.approx(6.0)
-    other = examine(replace(told, target_torque=-torque), {"ur10e": UR10E})
+    other = examine(replace(told, target_torque=-torque), UR10E)
     assert of_code(other.findings, "no-robot-fits-at-rest")
     assert not of_code(other.findings, "drive-constants")
 
@@ -127,7 +134,7 @@ def test_a_load_that_the_controller_knows_nothing_of_is_a_warning() -> None:
 @pytest.mark.parametrize(("misfit", "told"), [(0.07, True), (0.09, False)])
 def test_a_torque_of_the_other_sign_is_told_up_to_its_misfit(misfit: float, told: bool) -> None:
     """In one pose no load can be fitted, so the planted share is the misfit to rounding."""
-    examination = examine(held(PANDA, -1 / (1 - misfit)), {"panda": PANDA})
+    examination = examine(held(PANDA, -1 / (1 - misfit)), PANDA)
     found = of_code(examination.findings, "effort-unit")
     assert len(found) == told
     for remark in found:
@@ -141,7 +148,7 @@ def test_a_torque_of_the_other_sign_is_told_up_to_its_misfit(misfit: float, told
 
 
 def test_an_effort_is_tried_on_profiles_with_as_many_joints_only() -> None:
-    examination = examine(held(PANDA, -1.0), {"ur10e": UR10E, "panda": PANDA})
+    examination = examine(held(PANDA, -1.0), PANDA)
     found = of_code(examination.findings, "effort-unit")
     assert [remark.values["robot"] for remark in found] == ["panda"]
 
@@ -197,3 +204,29 @@ def test_why_no_robot_fits_a_log_whose_effort_is_inverted(inverted: int, code: s
     turned = np.where(np.arange(7) < inverted, -1.0, 1.0) * np.sign(dq)
     log = Recording(t=t, q=q, dq=dq, torque=turned)
     assert no_fit(log, (match("panda", 0.5, fits=False),)).code == code
+
+
+def test_what_makes_results_meaningless_is_refused_and_a_load_never() -> None:
+    found = (
+        warning("other-robot"),
+        warning("effort-sign"),
+        warning("unmodelled-load"),
+        fact("time-unit"),
+    )
+    examination = Examination(recording=held(), findings=found, robots=())
+    assert [finding.code for finding in examination.refusals()] == ["other-robot", "effort-sign"]
+    # identification makes the arm fit
+    assert [f.code for f in examination.refusals(fitting=False)] == ["effort-sign"]
+
+
+def test_a_robot_is_guessed_by_the_maker_s_own_model_alone() -> None:
+    """A Panda's torques: by the vendor's residual the maker's model, alone a measurement."""
+    log = creeping()
+    assert guess_robot(log)[0] is None
+    told = replace(log, tau_ext=np.full_like(log.q, 1e-3))
+    match, fits = guess_robot(told)
+    assert match is not None
+    assert match.robot == "panda"
+    assert [fit.robot for fit in fits] == ["panda", "fr3"]
+    # a Panda with 2 % more torque is no Panda to 1 %
+    assert guess_robot(replace(told, torque=1.02 * log.require("torque")))[0] is None

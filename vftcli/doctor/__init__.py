@@ -1,7 +1,15 @@
 """The log doctor: what is wrong with a log, how one sees it, what it does, what to do."""
 
-from vftcli.doctor.examination import Examination, examine
+from vftcli.doctor.examination import Examination, examine, guess_robot
 from vftcli.doctor.findings import FindingWords, finding_record, in_words
 from vftcli.doctor.fit import RobotMatch
 
-__all__ = ["Examination", "FindingWords", "RobotMatch", "examine", "finding_record", "in_words"]
+__all__ = [
+    "Examination",
+    "FindingWords",
+    "RobotMatch",
+    "examine",
+    "finding_record",
+    "guess_robot",
+    "in_words",
+]

@@ -41,12 +41,14 @@ class Evidence(NamedTuple):
         torque: The torque. (T, n) [N·m]
         limit: Misfit up to which a profile fits.
         friction: Whether friction is in it.
+        by_maker: Whether it is the maker's own model rather than what the drives measured.
     """
 
     name: str
     torque: Array
     limit: float
     friction: bool
+    by_maker: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +61,7 @@ class RobotMatch:
         fits: Whether that is as good as the kind of evidence allows.
         evidence: Which torque was explained, in words.
         load: Mass of the unknown load that was fitted, 0 if none. [kg]
+        by_maker: Whether the maker's own model was explained rather than a measured effort.
     """
 
     robot: str
@@ -66,6 +69,7 @@ class RobotMatch:
     fits: bool
     evidence: str
     load: float
+    by_maker: bool = False
 
     def __str__(self) -> str:
         """The fit in a few words."""
@@ -109,6 +113,7 @@ def best_fit(
                 fits=misfit < item.limit,
                 evidence=item.name,
                 load=load,
+                by_maker=item.by_maker,
             )
         )
     return min(found, key=lambda fit: (not fit.fits, fit.misfit), default=None)
@@ -118,9 +123,11 @@ def evidences(recording: Recording, robot: Robot) -> Iterator[Evidence]:
     """The torques of a log that a model should explain; measured ones if nothing is better."""
     torque, vendor = recording.torque, recording.tau_ext
     if recording.target_torque is not None and np.any(recording.target_torque):
-        yield Evidence("the controller's own model", recording.target_torque, 0.1, friction=False)
+        own = recording.target_torque
+        yield Evidence("the controller's own model", own, 0.1, friction=False, by_maker=True)
     elif torque is not None and vendor is not None and np.any(vendor):
-        yield Evidence("torque less the vendor's residual", torque + vendor, 0.1, friction=True)
+        name, own = "torque less the vendor's residual", torque + vendor
+        yield Evidence(name, own, 0.1, friction=True, by_maker=True)
     else:
         yield from measured(recording, robot)
 
