@@ -48,9 +48,8 @@ FILES = (
     "outputs/",
     "readers/",
     "observers/settings.py",  # gains in a file of their own
-    "robots/profile.py",
     "robots/robot.py",
-    "robots/urdf.py",
+    "robots/robot_file.py",
     "robots/writing.py",
     "signals/identity.py",  # the digest of what was read
     "signals/remarks.py",  # the catalogue of words

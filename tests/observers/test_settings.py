@@ -15,9 +15,10 @@ from vftcli.observers import (
     build_observers,
     observer_settings,
 )
+from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.settings import load_gains, overlay_gains
 from vftcli.observers.table import sections
-from vftcli.robots import load_robot
+from vftcli.robots import PROFILES, load_robot
 from vftcli.signals.errors import ParameterError
 
 
@@ -111,6 +112,13 @@ def test_sections_are_read_as_a_robot_file_s(tmp_path: Path) -> None:
         ("[observers]\ngain = 1.0", r"no \[observers"),
         ("[observers.gmoo]\ngain = 1.0", "Did you mean gmo"),
         ("[observers.gmo]\ngian = 1.0", "Did you mean gain"),
+        ("[observers.gmo]\ngain = true", "gmo.gain holds True; give a number or one a joint"),
+        ('[observers.gmo]\ngain = [1, "2"]', "gmo.gain holds '2'; give a number"),
+        ("[observers.gmo]\ngain = [nan]", "gmo.gain: nan is out of range"),
+        ("[observers.fdo]\nomega = 1e20", r"fdo.omega: 1e\+20 is out of range; .* at most 1e\+06"),
+        ("[observers.kfo]\nr_diag = 1e300", r"kfo.r_diag: 1e\+300 is out of range"),
+        ("[observers.kfo]\nnoise_convention = 3", "must be a word in quotes"),
+        (f"x = {'[' * 5000}", "not a TOML file of gains: .*nested too deep"),
     ],
 )
 def test_what_is_no_gains_file_is_refused(tmp_path: Path, text: str, words: str) -> None:
@@ -118,6 +126,14 @@ def test_what_is_no_gains_file_is_refused(tmp_path: Path, text: str, words: str)
     path.write_text(text)
     with pytest.raises(ParameterError, match=words):
         load_gains(path, sections())
+
+
+def test_a_robot_file_s_gains_are_checked_like_a_gains_file_s(tmp_path: Path) -> None:
+    text = PROFILES["ur5"].read_text(encoding="utf-8")
+    path = tmp_path / "arm.toml"
+    path.write_text(text.replace("[observers.gmo]", "[observers.gmoo]"), encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"arm.toml: no observer 'gmoo'.* Did you mean gmo"):
+        ObserverChoice().build(load_robot(path), 0.008)
 
 
 def test_the_upper_layer_wins_parameter_by_parameter() -> None:

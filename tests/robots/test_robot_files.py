@@ -1,5 +1,6 @@
 """Users' own robot files: what is accepted, and that a complaint names the line that is wrong."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -81,10 +82,43 @@ def test_a_planar_arm_weighs_what_the_textbook_says(tmp_path: Path) -> None:
         ('"xyz-rpy"', '"dh"', "line 4: convention is 'dh'; it is one of standard-dh, modified-dh"),
         ("joint_torque", "amps", "line 5: torque_source is 'amps'"),
         ('"joint_torque"', '"current"', "line 7: joint 1 .*torque_constant is missing"),
-        ("coulomb-viscous", "sticky", "line 23: joint 2 .*friction model is 'sticky'"),
+        ("coulomb-viscous", "sticky", "line 23: joint 2 .*: model is 'sticky'"),
         ("viscous = 0.5", "vicous = 0.5", "line 22: joint 2 .*viscous is missing"),
         ("schema = 1", "schema = 2", "line 1: schema is 2; this version reads schema 1"),
         ("dof = 2", "dof = = 2", r"not valid TOML: .*line 3"),
+        ("dof = 2", "dof = true", "line 3: dof is True but"),
+        ("dof = 2", f"dof = {'9' * 5000}", "not valid TOML: Exceeds the limit"),
+        ("dof = 2", f"x = {'[' * 5000}", "not valid TOML: nested too deep"),
+        ('name = "planar"', "name = 3", "line 2: name is 3; it must be text in quotes"),
+        ('name = "planar"', "notes = nan", "line 2: notes is nan; it must be text in quotes, or"),
+        ('name = "planar"', "sources = [3]", r"line 2: sources is \[3\]; it must be tables"),
+        ('name = "planar"', 'flange_d = ["a", "b"]', "line 2: flange_d is .* a finite number"),
+        ('name = "planar"', "ee_rpy = [0, 180, 0]", "line 2: ee_rpy is 180 rad; on a robot it"),
+        ('"xyz-rpy"', "[]", r"line 4: convention is \[\]; it is one of standard-dh"),
+        ('"coulomb-viscous"', "[]", r"line 23: joint 2 \(elbow\): model is \[\]; it is one of"),
+        ('"coulomb-viscous"', "{}", r"line 23: joint 2 \(elbow\): model is {}; it is one of"),
+        ('"elbow"', '"shoulder"', "line 16: joint 2 .*: name is 'shoulder', as another joint's"),
+        ("mass = 1.0", "mass = 1e308", r"line 19: .*mass is 1e\+308 kg; on a robot it lies"),
+        ("mass = 1.0", f"mass = {10**400}", "line 19: .*mass is 1000.*; it must be a finite"),
+        ("viscous = 0.5", "viscous = 1e20", r"line 25: .*viscous is 1e\+20 N·m·s/rad; on a robot"),
+        ("coulomb = 1.0", f"coulomb = {10**20}", "line 24: .*coulomb is 1e.20 N·m; on a robot"),
+        ("mass = 1.0", "mass = 1.0\nrotor_inertia = 1e308", "line 20: .*rotor_inertia is 1e.308"),
+        ("mass = 1.0", "mass = 1.0\nq_min = 1\nq_max = 0", "q_min is 1 rad, not below q_max 0"),
+        ("viscous = 0.5", "viscous = 0.5\n[observers.gmo]\ngain = nan", "line 27: gain is nan; it"),
+        ("viscous = 0.5", "viscous = 0.5\n[observers]\ngmo = 3", "line 27: gmo must be a section"),
+        ("viscous = 0.5", "viscous = 0.5\n[admittance]\nperiod = true", "line 27: period is True"),
+        (
+            "viscous = 0.5",
+            "viscous = 0.5\n[admittance]\nmass = 3",
+            "line 27: no key 'mass'; it has",
+        ),
+        ("viscous = 0.5", "viscous = 0.5\n[admittance]\nstart = 3", "line 27: start is 3; it must"),
+        (
+            "viscous = 0.5",
+            "viscous = 0.5\n[admittance.position]\nmass = [nan]",
+            r"line 27: mass is \[nan\]; it must be a number or one an axis",
+        ),
+        ("dof = 2", "payload = 2", r"line 3: payload must be a section \[payload\]"),
     ],
 )
 def test_a_complaint_names_the_line(tmp_path: Path, old: str, new: str, words: str) -> None:
@@ -94,7 +128,7 @@ def test_a_complaint_names_the_line(tmp_path: Path, old: str, new: str, words: s
 
 
 def test_a_missing_file_and_a_binary_one_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(RobotError, match="cannot be read as a robot file"):
+    with pytest.raises(RobotError, match="no such robot file"):
         load_robot(tmp_path / "nowhere.toml")
     (tmp_path / "noise.toml").write_bytes(bytes(range(128, 256)))
     with pytest.raises(RobotError, match="not text"):
@@ -184,9 +218,11 @@ def test_a_toml_beside_the_urdf_must_match_its_joints(tmp_path: Path) -> None:
     ("text", "words"),
     [
         (URDF.format(kind="prismatic"), "joint 'a' is a .*not revolute"),
-        ("<robot", "not a URDF that Pinocchio can read"),
+        ("<robot", "not a URDF, which is XML: unclosed token"),
+        ("<model/>", "its first element is <model>, not <robot>"),
+        ('<!DOCTYPE r [<!ENTITY a "1">]><robot/>', "defines XML entities"),
         ('<robot name="x"><link name="base"/></robot>', "no moving joint"),
-        (URDF.format(kind="revolute").replace('value="3"', 'value="-3"'), "mass is -3 kg"),
+        (URDF.format(kind="revolute").replace('value="3"', 'value="-3"'), "mass value is -3 kg"),
         (
             URDF.format(kind="revolute").replace('<parent link="one"/>', '<parent link="base"/>'),
             "branches off",
@@ -199,7 +235,45 @@ def test_a_urdf_that_is_no_serial_revolute_arm_is_refused(
     with pytest.raises(RobotError, match=words) as caught:
         load_robot(written(tmp_path, text, "arm.urdf"))
     assert "\n" not in str(caught.value)
-    capfd.readouterr()  # the URDF parser's own words
+    assert capfd.readouterr() == ("", "")  # the URDF parser's own words stand in the error
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('value="3"', 'value=""', "link 'one': mass value is ''; it must be a number"),
+        ('value="3"', 'value="heavy"', "link 'one': mass value is 'heavy'; it must be a number"),
+        ('value="3"', 'value="1,2,3"', "link 'one': mass value is '1,2,3'"),
+        ('value="1.5"', 'value="1_5"', "link 'two': mass value is '1_5'"),
+        ('value="3"', 'value="nan"', "link 'one': mass value is 'nan'"),
+        ('value="3"', 'value="1e20"', "link 'one': mass value is 1e.20 kg; on a robot it lies"),
+        ('value="3"', 'kilograms="3"', "link 'one': <mass> has no value"),
+        ('<mass value="3"/>', "", "link 'one': <inertial> has no <mass>"),
+        ('ixx="0.03"', 'ixx="1 2 3 4"', "link 'one': inertia ixx is '1 2 3 4'; .* a number"),
+        ('ixx="0.03" ', "", "link 'one': <inertia> has no ixx"),
+        ('"0.1 0.2 0.05"', '"0.1 0.2"', "link 'one': origin xyz is .* it must be 3 numbers"),
+        ('"0.2 0.1 0"', '"0 90 0"', "joint 'a': origin rpy is 90 rad; on a robot it lies"),
+        ('axis xyz="1 2 -0.5"', 'axis xyz="0 0 0"', "joint 'a': axis is '0 0 0'"),
+        ('axis xyz="1 2 -0.5"', 'axis xyz="z"', "joint 'a': axis xyz is 'z'; it must be 3"),
+        ('lower="-1"', 'lower="-1rad"', "joint 'b': limit lower is '-1rad'"),
+        ('<joint name="b"', '<joint name="a"', "not a URDF that Pinocchio can read: .*unique"),
+    ],
+)
+def test_what_is_no_number_in_a_urdf_is_refused_by_its_link(
+    tmp_path: Path, old: str, new: str, words: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    text = URDF.format(kind="revolute")
+    assert text.count(old) >= 1
+    with pytest.raises(RobotError, match=words) as caught:
+        load_robot(written(tmp_path, text.replace(old, new, 1), "arm.urdf"))
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_urdf_without_mass_is_refused(tmp_path: Path) -> None:
+    text = re.sub(r"<inertial>.*?</inertial>", "", URDF.format(kind="revolute"), flags=re.DOTALL)
+    with pytest.raises(RobotError, match="all moving bodies together weigh 0 kg"):
+        load_robot(written(tmp_path, text, "arm.urdf"))
 
 
 def test_the_pinocchio_model_gives_back_the_chain(tmp_path: Path) -> None:

@@ -1,12 +1,13 @@
 """Robot files written and read back."""
 
+import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from vftcli.robots import PROFILES, JointFriction, Payload, load_robot
-from vftcli.robots.writing import robot_toml, value_text
+from vftcli.robots.writing import lines_of, robot_toml, value_text
 from vftcli.signals.errors import RobotError
 
 CHAIN = ("rotation", "translation", "mass", "com", "inertia", "rotor_inertia", "gravity")
@@ -106,3 +107,14 @@ def joint(j, parent, child, axis):
 def test_what_toml_has_not_is_refused():
     with pytest.raises(RobotError, match="cannot hold a complex"):
         value_text(1j, "here")
+
+
+def test_every_value_that_toml_has_is_written_as_it_was():
+    text = """day = 2026-01-02
+at = 2026-01-02T03:04:05+01:00
+hour = 03:04:05
+mixed = [1, {a = 2, "b c" = [true]}]
+sign = "\\U000E0001 \\u0007"
+"""
+    document = tomllib.loads(text)
+    assert tomllib.loads("".join(lines_of(document))) == document

@@ -16,7 +16,8 @@ from vftcli.admittance.parameters import (
     release_deviation,
 )
 from vftcli.robots import PROFILES, Robot, load_robot
-from vftcli.robots.profile import RobotFile
+from vftcli.robots.profile import checked_admittance
+from vftcli.robots.robot_file import RobotFile
 from vftcli.signals import parsing
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError, RobotError
@@ -96,7 +97,7 @@ class ControlChoice:
         """
         table = robot.admittance
         if self.file is not None:
-            table = RobotFile(self.file).document.get("admittance", {})
+            table = checked_admittance(RobotFile(self.file).root.section("admittance"))
         return from_table(table, robot.name, self.settings)
 
     def controllers(self, parameters: Admittance) -> tuple[Controller, ...]:

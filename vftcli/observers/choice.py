@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vftcli.observers.observer import Observer
-from vftcli.observers.settings import Gains, Settings, load_gains, overlay_gains
+from vftcli.observers.settings import Gains, Settings, check_gains, load_gains, overlay_gains
 from vftcli.observers.table import (
     DEFAULT,
     OBSERVERS,
@@ -102,6 +102,7 @@ class ObserverChoice:
         Raises:
             ParameterError: If a gain is out of range, or a match cannot be reached.
         """
+        check_gains(robot.gains, sections(), str(robot.path or robot.name))
         setup = Setup(
             gains=self.gains_over(robot.gains),
             settings=self.settings,

@@ -1,6 +1,5 @@
 """Observer parameters: what the command line sets, what the robot file gives, what is left over."""
 
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, did_you_mean, numbers
+from vftcli.signals.parsing import assignment, did_you_mean, numbers, shown, toml_tables
 
 Value = float | str | list[float]
 Gains = Mapping[str, Mapping[str, Any]]
@@ -30,6 +29,12 @@ FORM = "OBSERVER.PARAMETER=VALUE, as gmo.gain=30 or gmo.gain=5,3,4,10,10,10"
 
 WORDS = {"noise_convention"}
 """Parameters whose value is a word."""
+
+LARGEST = {"omega": 1e6, "gain": 1e6, "decay": 1e6}
+"""Parameters that are rates: no log resolves a microsecond. [1/s]"""
+
+LARGEST_VARIANCE = 1e15
+"""Every other number is a variance: 3·10⁷ N·m, or of its momentum, or gained in a second."""
 
 
 def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[str]]) -> Settings:
@@ -53,16 +58,19 @@ def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[s
     return settings
 
 
-def check_name(section: str, parameter: str, sections: Mapping[str, Sequence[str]]) -> None:
+def check_name(
+    section: str, parameter: str, sections: Mapping[str, Sequence[str]], where: str = ""
+) -> None:
     """Raise a ParameterError that lists what there is unless the name exists."""
+    start = f"{where}: " if where else ""
     if section not in sections:
         raise ParameterError(
-            f"no observer {section!r} to set.{did_you_mean(section, sections)} "
+            f"{start}no observer {section!r} to set.{did_you_mean(section, sections)} "
             f"There is {', '.join(sections)}"
         )
     if parameter not in (known := sections[section]):
         raise ParameterError(
-            f"{section} has no parameter {parameter!r}.{did_you_mean(parameter, known)} "
+            f"{start}{section} has no parameter {parameter!r}.{did_you_mean(parameter, known)} "
             f"It has {', '.join(known)}"
         )
 
@@ -78,9 +86,39 @@ def parse_value(parameter: str, text: str, whole: str) -> Value:
     values = numbers(text)
     if values is None:
         raise ParameterError(f"--set {whole!r}: {text!r} is not a number or a list")
-    if not all(np.isfinite(values)):
-        raise ParameterError(f"--set {whole!r}: every number must be finite")
+    check_numbers(parameter, values, f"--set {whole!r}")
     return values[0] if len(values) == 1 else list(values)
+
+
+def check_numbers(parameter: str, values: Iterable[Any], where: str) -> None:
+    """Raise a ParameterError unless every value is a number that a parameter can have."""
+    largest = LARGEST.get(parameter, LARGEST_VARIANCE)
+    for value in values:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ParameterError(f"{where} holds {shown(value)}; give a number or one a joint")
+        if not abs(value) <= largest:  # neither is what is not a number
+            raise ParameterError(
+                f"{where}: {shown(value)} is out of range; every number must be finite, "
+                f"at most {largest:g}"
+            )
+
+
+def check_gains(gains: Gains, sections: Mapping[str, Sequence[str]], where: str) -> None:
+    """Raise a ParameterError unless a file's gains are of observers and parameters there are.
+
+    Args:
+        gains: The ``[observers.*]`` tables.
+        sections: Sections and parameters there are.
+        where: The file, for the message.
+    """
+    for section, table in gains.items():
+        for parameter, value in table.items():
+            check_name(section, parameter, sections, where)
+            name = f"{where}: {section}.{parameter}"
+            if parameter not in WORDS:
+                check_numbers(parameter, value if isinstance(value, list) else [value], name)
+            elif not isinstance(value, str):
+                raise ParameterError(f"{name} is {shown(value)}; it must be a word in quotes")
 
 
 def load_gains(path: Path, sections: Mapping[str, Sequence[str]]) -> Gains:
@@ -94,8 +132,12 @@ def load_gains(path: Path, sections: Mapping[str, Sequence[str]]) -> Gains:
         ParameterError: If it is no such file, or names a section or parameter there is not.
     """
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        document = toml_tables(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ParameterError(f"{path}: cannot be read as gains ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise ParameterError(f"{path}: not a TOML file of gains: not text") from None
+    except ParameterError as error:
         raise ParameterError(f"{path}: not a TOML file of gains: {error}") from None
     gains = document.get("observers")
     if not isinstance(gains, dict) or not all(isinstance(v, dict) for v in gains.values()):
@@ -103,9 +145,7 @@ def load_gains(path: Path, sections: Mapping[str, Sequence[str]]) -> Gains:
             f"{path}: no [observers.*] tables; a gains file is what vftcli tune writes, as "
             "[observers.gmo] gain = 10.0"
         )
-    for section, table in gains.items():
-        for parameter in table:
-            check_name(section, parameter, sections)
+    check_gains(gains, sections, str(path))
     return gains
 
 

@@ -7,9 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from vftcli.robots.bounds import weightless
 from vftcli.robots.chain import Chain, unphysical
-from vftcli.robots.profile import UPRIGHT, RobotFile, Section, assemble, column
+from vftcli.robots.profile import UPRIGHT, assemble, column
 from vftcli.robots.robot import Limits, Robot, SensorNoise
+from vftcli.robots.robot_file import RobotFile, Section
+from vftcli.robots.urdf_text import checked_urdf, parser_words
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import rotation_onto
@@ -32,12 +35,12 @@ def load_urdf(path: Path) -> Robot:
     """
     import pinocchio as pin
 
-    if not path.is_file():
-        raise RobotError(f"{path}: no such robot file")
+    text = checked_urdf(path)
     try:
-        model = pin.buildModelFromUrdf(str(path))
+        with parser_words() as words:
+            model = pin.buildModelFromXML(text)
     except (ValueError, RuntimeError) as error:
-        reason = " ".join(str(error).split())
+        reason = " ".join([*words, *str(error).split()])
         raise RobotError(f"{path}: not a URDF that Pinocchio can read: {reason}") from None
     chain = chain_from_model(model, str(path))
     beside = path.with_suffix(".toml")
@@ -68,7 +71,7 @@ def load_urdf(path: Path) -> Robot:
 
 def matched_joints(root: Section, chain: Chain) -> list[Section]:
     """Return the ``[[joints]]`` of the TOML beside a URDF in the chain's order, matched by name."""
-    tables = {str(table.get("name")): table for table in root.values.get("joints", [])}
+    tables = {str(table.get("name")): table for table in root.tables("joints")}
     if unknown := [name for name in tables if name not in chain.names]:
         raise RobotError(
             f"{root.file.path}: no joint {unknown[0]!r} in the URDF; "
@@ -109,6 +112,8 @@ def chain_from_model(model: Any, owner: str) -> Chain:  # noqa: ANN401 - Pinocch
         coms.append(turn.T @ body.lever)
         inertias.append(turn.T @ body.inertia @ turn)
         turn_before = turn
+    if why := weightless(sum(masses)):
+        raise RobotError(f"{owner}: {why}")
     flange = flange_placement(model, len(names))
     armature = np.array(model.armature)
     slots = [model.joints[k].idx_v for k in range(1, len(names) + 1)]

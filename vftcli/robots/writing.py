@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from datetime import date, time
 from typing import Any
 
 import numpy as np
@@ -147,7 +148,7 @@ def quoted(text: str) -> str:
     """A string in TOML's double quotes, with the escapes that these need."""
     escapes = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
     out = "".join(escapes.get(c, c) for c in text)
-    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in out) + '"'
+    return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in out) + '"'
 
 
 def value_text(value: Any, key: str) -> str:  # noqa: ANN401 - whatever TOML can hold
@@ -167,6 +168,11 @@ def value_text(value: Any, key: str) -> str:  # noqa: ANN401 - whatever TOML can
             return repr(value) if math.isfinite(value) else str(value)
         case list() | tuple():
             return f"[{', '.join(value_text(item, key) for item in value)}]"
+        case Mapping():
+            pairs = (f"{bare(name)} = {value_text(item, key)}" for name, item in value.items())
+            return f"{{{', '.join(pairs)}}}"
+        case date() | time():  # a datetime is a date
+            return value.isoformat()
         case np.ndarray() | np.generic():
             return value_text(value.tolist(), key)
     raise RobotError(f"{key}: a robot file cannot hold a {type(value).__name__}")

@@ -1,7 +1,9 @@
-"""Words of the command line that rooms share: a span of time, a list of numbers, an assignment."""
+"""Words that rooms share: a span of time, a list of numbers, an assignment, a TOML text."""
 
+import tomllib
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import Any
 
 from vftcli.signals.errors import ParameterError
 
@@ -60,3 +62,23 @@ def assignment(text: str, option: str, form: str) -> tuple[str, str]:
     if not key.strip() or not value.strip():
         raise ParameterError(f"{option} {text!r} is not {form}")
     return key.strip(), value.strip()
+
+
+def shown(value: object) -> str:
+    """A value of a file as a complaint quotes it, cut where it is long."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def toml_tables(text: str) -> dict[str, Any]:
+    """The tables of a TOML text.
+
+    Raises:
+        ParameterError: If it is none.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ParameterError("not valid TOML: nested too deep") from None
+    except ValueError as error:  # TOML's own, and that of an integer of thousands of digits
+        raise ParameterError(f"not valid TOML: {error}") from None

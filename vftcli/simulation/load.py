@@ -1,6 +1,5 @@
 """Scenarios by name or file, with the user's overrides, and back to TOML."""
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -8,7 +7,7 @@ from typing import Any
 
 from vftcli.robots.writing import lines_of
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment
+from vftcli.signals.parsing import assignment, toml_tables
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.schema import section_from, unknown_name
 
@@ -58,12 +57,12 @@ def read_table(path: Path) -> dict[str, Any]:
         ParameterError: If it cannot be read, or is not TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return toml_tables(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not text"
         raise ParameterError(f"{path}: cannot be read as a scenario ({reason})") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ParameterError(f"{path}: not valid TOML: {error}") from None
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None
 
 
 def apply_override(table: dict[str, Any], override: str) -> None:
@@ -93,8 +92,8 @@ def section_of(node: Any, part: str, where: str) -> Any:  # noqa: ANN401 - TOML 
 def parse_value(text: str) -> Any:  # noqa: ANN401
     """Return a TOML value; what is none is a string."""
     try:
-        return tomllib.loads(f"x = {text}")["x"]
-    except tomllib.TOMLDecodeError:
+        return toml_tables(f"x = {text}")["x"]
+    except ParameterError:
         return text
 
 
