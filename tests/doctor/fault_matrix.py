@@ -16,7 +16,6 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from inspect import signature
 from pathlib import Path
 from typing import NamedTuple
 
@@ -101,8 +100,7 @@ def said_of(table: Table, path: Path, given: bool = True) -> tuple[Remark, ...]:
     finally:
         path.unlink()
     robot = robot_named(table.given) if given else None
-    arm = {"robot": robot} if "robot" in signature(examine).parameters else {}
-    return examine(recording, **arm).findings + recording.source.remarks
+    return examine(recording, robot).findings + recording.source.remarks
 
 
 def cell_of(fault: Fault, table: Table, sound: Sequence[Remark], path: Path) -> Cell:

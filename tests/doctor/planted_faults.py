@@ -254,7 +254,7 @@ def effort_zero(table: Table, joint: int = 5) -> Table:
     return replace(table, effort=edited(table.effort, joint, 0.0))
 
 
-def saturated(table: Table, joint: int = 2, share: float = 0.7) -> Table:
+def saturated(table: Table, joint: int = 2, share: float = 0.6) -> Table:
     column = table.effort[:, joint - 1]
     level = share * float(np.max(np.abs(column)))
     return replace(table, effort=edited(table.effort, joint, np.clip(column, -level, level)))
@@ -401,7 +401,7 @@ FAULTS: Mapping[str, Fault] = {
     "saturated_J2": Fault(saturated, ("saturation",), (2,)),
     "quantised_1mrad": Fault(quantised, ("coarse-positions",)),
     "ceiling_mount": Fault(partial(mounted, angle=180.0), ("upside-down",)),
-    "wall_mount_30deg": Fault(partial(mounted, angle=30.0), ("tilted-base",)),
+    "wall_mount_30deg": Fault(partial(mounted, angle=-30.0), ("tilted-base",)),
     "NaN_burst": Fault(nan_burst, (READER,)),
     "effort_zero_J5": Fault(effort_zero, ("zero-effort",), (5,)),
     "offset_J3_20pct": Fault(effort_offset, ("effort-offset",), (3,)),
@@ -475,8 +475,8 @@ def simulated(log: str, folder: Path) -> Table:
     return table_of(path, log, signal)
 
 
-def ur10e_log(path: Path, seconds: float = 22.0) -> Table:
-    """The first seconds of a real UR10e log without a header: t, q, dq, current and more."""
+def ur10e_log(path: Path, start: float = 2.0, stop: float = 24.0) -> Table:
+    """A span of a real UR10e log without a header: t, q, dq, current and more. [s]"""
     rows = np.loadtxt(path, delimiter=",")
     table = Table(
         t=rows[:, 0],
@@ -487,4 +487,4 @@ def ur10e_log(path: Path, seconds: float = 22.0) -> Table:
         robot="ur10e",
         given="ur10e",
     )
-    return table.between(0.0, seconds)
+    return table.between(start, stop)

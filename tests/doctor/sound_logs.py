@@ -1,0 +1,180 @@
+"""The real and simulated logs that are sound, with what is truly odd about each.
+
+Run by hand it lists every warning and caution of the doctor on each log, on its halves, its spans
+of 10 and 20 s, and on its rows thinned to 100, 50 and 25 Hz; a warning that nothing known of the
+log explains is marked `!`::
+
+    VFT_LOGS=/path/to/logs python tests/doctor/sound_logs.py
+"""
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.doctor import examine
+from vftcli.readers import read_first_recording
+from vftcli.robots import Robot, load_robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark
+
+UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+PLAIN = "t,q:6,dq:6,current:6,_:12"
+FR3 = "t[ns],q:7,dq:7,tau:7,-tau_ext:7,_:13"
+BULLET = "t=t,q=q{i},dq=dq{i},-tau=tau{i}"
+
+
+class SoundLog(NamedTuple):
+    """A log of the folder VFT_LOGS.
+
+    Attributes:
+        path: Its file.
+        columns: What ``--columns`` says of it, None where it needs no word.
+        robot: The arm's profile, or a robot file of the folder; "" where none is named.
+        known: How the codes of what is truly odd about it begin; the README of the logs says so.
+    """
+
+    path: str
+    columns: str | None = None
+    robot: str = ""
+    known: tuple[str, ...] = ()
+
+
+def ur10e(name: str, *known: str, columns: str = UR10E) -> SoundLog:
+    return SoundLog(f"ur10e/{name}", columns, "ur10e", known)
+
+
+LOGS: tuple[SoundLog, ...] = (
+    ur10e("free_14harm.csv"),
+    ur10e("free_14harm.csv", columns=PLAIN),
+    ur10e("free_12harm.csv"),
+    ur10e("free_12harm.csv", columns=PLAIN),
+    ur10e("free_12harm_40s.csv.gz"),
+    ur10e("free_10harm.csv.gz"),
+    ur10e("free_repeat_a.csv"),
+    ur10e("free_repeat_b.csv"),
+    ur10e("free_repeat_c.csv"),
+    ur10e("jointwise_2.csv"),
+    ur10e("jointwise_4.csv"),
+    ur10e("load_14harm.csv", "unmodelled-load"),
+    ur10e("push_pose.csv"),
+    SoundLog("ur10_link4/link4.csv.gz", "t,q:6,dq:6,current:6,_:6", "ur10e"),
+    SoundLog("fr3/run_a.npy", FR3, "fr3", ("gaps",)),
+    SoundLog("fr3/run_b.npy", FR3, "fr3"),
+    SoundLog("panda_exciting", None, "panda", ("repeated-stamps",)),
+    # 29 Hz, a tool that the controller does not know, and in one the wrench is not computed.
+    SoundLog(
+        "franka_bags/calib_0108.bag", None, "fr3", ("slow-rate", "zero-wrench", "unmodelled-load")
+    ),
+    SoundLog("franka_bags/calib_0308.bag", None, "fr3", ("slow-rate", "unmodelled-load")),
+    *(
+        SoundLog(f"ur3/{name}.bag", "-tau=effort", robot, known)
+        for name in ("identification", "repeat_a", "repeat_b")
+        for robot, known in (("../robots/ur3.toml", ()), ("", ("no-robot-fits",)))
+    ),
+    SoundLog("rtde/static_cb3.csv", None, "", ("payload-mismatch", "no-robot-fits")),
+    SoundLog("rtde/ur3e_25hz_cr_line_ends.csv", None, "", ("slow-rate", "no-robot-fits")),
+    SoundLog("rtde/ur3e_25hz_cr_line_ends.csv", None, "../robots/ur3e.toml", ("slow-rate",)),
+    SoundLog("rtde/blank_lines.csv", None, "", ("no-robot-fits",)),  # ten samples at rest
+    SoundLog("mujoco_ur5e/circle.csv", None, "mujoco_ur5e/robot.toml"),
+    SoundLog("libfranka_sim/pushes.csv.gz", None, "libfranka_sim/robot.toml"),
+    SoundLog("libfranka_sim/pushes.csv.gz", None, "fr3", ("unmodelled-load",)),
+    *(
+        SoundLog(f"bullet_ur5/{name}.csv.gz", BULLET, "ur5")
+        for name in ("free_5", "free_6", "free_7", "pushed_7_const", "pushed_7_vary")
+    ),
+)
+
+
+@cache
+def robot_of(log: SoundLog, folder: Path) -> Robot | None:
+    """The arm that a log is examined for, None where the doctor has to tell it."""
+    if not log.robot:
+        return None
+    return load_robot(folder / log.robot if log.robot.endswith(".toml") else log.robot)
+
+
+@cache
+def recording_of(log: SoundLog, folder: Path) -> Recording:
+    """A log, read once."""
+    path = folder / log.path
+    if path.is_dir():
+        return panda_exciting(path)
+    return read_first_recording(path, columns=log.columns)
+
+
+def panda_exciting(folder: Path) -> Recording:
+    """The Panda log of four text files, repeated stamps dropped."""
+
+    def numbers(name: str) -> Array:
+        return np.loadtxt(folder / f"exciting_traj_{name}.txt").reshape(-1, 7)
+
+    return Recording(
+        t=np.loadtxt(folder / "exciting_traj_time.txt"),
+        q=numbers("positions"),
+        dq=numbers("velocity"),
+        torque=numbers("torques"),
+    )
+
+
+def every(recording: Recording, step: int) -> Recording:
+    """Every `step`-th row of a log."""
+    rows = {name: getattr(recording, name)[::step] for name in ("t", *recording.signals)}
+    return replace(recording, **rows)
+
+
+def parts(recording: Recording) -> Iterator[tuple[str, Recording]]:
+    """The log, its halves, its spans of 10 and 20 s and its thinned rows, each with its name."""
+    yield "all", recording
+    start, length = float(recording.t[0]), recording.duration
+    for seconds in (length / 2, 20.0, 10.0):
+        count = int(length // seconds)
+        for k in range(count if count > 1 else 0):
+            first = start + k * seconds
+            part = recording.between(first, first + seconds)
+            yield f"{first - start:.0f}:{first - start + seconds:.0f}", part
+    for rate in (100, 50, 25):
+        step = round(1 / (rate * recording.median_step))
+        if step > 1 and recording.samples > 20 * step:
+            yield f"{rate} Hz", every(recording, step)
+
+
+def unexpected(
+    log: SoundLog, recording: Recording, findings: Sequence[Remark]
+) -> tuple[Remark, ...]:
+    """The warnings that nothing known of a log explains."""
+    slow = ("slow-rate",) if recording.median_step > 1 / 50 else ()  # thinned below what is told
+    known = (*log.known, *slow)
+    return tuple(f for f in findings if f.level == "warning" and not f.code.startswith(known))
+
+
+def main(names: Sequence[str]) -> int:
+    """Print the survey; return 1 if there is a warning that nothing known explains."""
+    folder = Path(os.environ["VFT_LOGS"])
+    count, wrong = 0, 0
+    for log in LOGS:
+        if names and not any(name in log.path for name in names):
+            continue
+        robot = robot_of(log, folder)
+        print(f"{log.path} for {robot.name if robot else 'any arm'}, {log.columns or 'as it is'}")
+        for part, recording in parts(recording_of(log, folder)):
+            findings = examine(recording, robot).findings
+            false = unexpected(log, recording, findings)
+            count += 1
+            wrong += bool(false)
+            for finding in findings:
+                if finding.level != "fact":
+                    sign = "!" if finding in false else " "
+                    print(f"  {sign} {part:8} {finding.level}: {finding.code}: {finding}")
+    print(f"{wrong} of {count} logs and parts have a warning that nothing known explains")
+    return min(wrong, 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
