@@ -14,6 +14,7 @@ from vftcli.signals.remarks import Remark
 if TYPE_CHECKING:
     import polars as pl
 
+    from vftcli.doctor.examination import Examination
     from vftcli.evaluation.print_table import Comparison
     from vftcli.refinement.refine import Refinement
     from vftcli.repetition.free_motion import FreeMotion
@@ -38,6 +39,7 @@ class Analysis:
         errors: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
         contacts: How each observer tells contacts, or empty where it was not asked.
         published: A printed table beside these errors, or None where none was asked for.
+        examinations: What is wrong with the log, then with its free runs.
         remarks: What the reader of the numbers should know.
         run: The command, versions and conventions, as `run.json` holds them.
     """
@@ -52,6 +54,7 @@ class Analysis:
     errors: "pl.DataFrame | None" = None
     contacts: "tuple[ContactScore, ...]" = ()
     published: "Comparison | None" = None
+    examinations: "tuple[Examination, ...]" = ()
     remarks: tuple[Remark, ...] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vftcli.doctor.examiner import Examiner
 from vftcli.observers.choice import ObserverChoice
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
@@ -19,6 +20,7 @@ from vftcli.signals.recording import Recording
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
+    from vftcli.doctor.examination import Examination
     from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.refinement.baseline import Baseline
     from vftcli.virtual_sensor.choice import WrenchChoice
@@ -37,6 +39,7 @@ class AnalysisChoice:
         wrench: What is asked of the virtual force/torque sensor, None for joint torques alone.
         reference: What the estimates are compared with, or None.
         library: Where the logs of the command are read, each once.
+        examiner: Who examines them, each once, and says whether results mean anything.
     """
 
     read: ReadChoice = field(default_factory=ReadChoice)
@@ -47,6 +50,7 @@ class AnalysisChoice:
     wrench: "WrenchChoice | None" = None
     reference: "ReferenceChoice | None" = None
     library: Library = field(default_factory=Library, repr=False, compare=False)
+    examiner: Examiner = field(default_factory=Examiner, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.zero_log is not None and self.refinement.removes_bias:
@@ -95,8 +99,9 @@ def analyse(
         models: What the command has modelled so far, for several logs that share a free run.
     """
     motion = read(recording, robot, choice, models or Models())
+    examinations = examine(motion, choice)
     baseline = model(motion, choice)
-    analysis = observe(motion, baseline, choice)
+    analysis = replace(observe(motion, baseline, choice), examinations=examinations)
     analysis = refine(analysis, baseline, choice)
     analysis = sense(analysis, choice)
     return judge(analysis, choice)
@@ -114,6 +119,17 @@ def read(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Mod
             runs[path] = FreeRun(run=models.of(free, robot, literal=literal), log=log)
     given = tuple(runs[path] for path in choice.free.logs)
     return FreeMotion(log=log, choice=choice.free, runs=given, zero=runs.get(choice.zero_log))
+
+
+def examine(motion: FreeMotion, choice: AnalysisChoice) -> tuple["Examination", ...]:
+    """Examine the log, then its free runs.
+
+    Raises:
+        ExaminationError: If a finding makes every result meaningless.
+    """
+    runs = [motion.log, *(free.run for free in (*motion.runs, motion.zero) if free is not None)]
+    found = (choice.examiner.examine(run.recording, run.robot) for run in runs)
+    return tuple(dict.fromkeys(found))
 
 
 def model(motion: FreeMotion, choice: AnalysisChoice) -> "Baseline | None":

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from vftcli.admittance.closed_loop import ClosedLoop
     from vftcli.admittance.driving_force import DrivingForce
     from vftcli.admittance.replay import Replay
+    from vftcli.doctor import Examination
     from vftcli.pipeline import AnalysisChoice
     from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
@@ -111,7 +112,7 @@ def admit(
     Example: vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9
     """
     from vftcli.admittance.choice import ControlChoice, split_settings
-    from vftcli.cli.console import command_line, say
+    from vftcli.cli.console import command_line, say, say_health
     from vftcli.outputs.admittance.files import write_admittance
 
     if sum((log is not None, bool(release.release), loop.closed_loop is not None)) != 1:
@@ -121,15 +122,25 @@ def admit(
     observers = analysis.observers.changed(assignments=others)
     analysis = analysis.changed(observers=observers)
     recording, run = None, None
+    examinations: tuple[Examination, ...] = ()
     if loop.closed_loop is not None:
         result, run = looped(loop, analysis, control)
     elif log is None:
         result = released(release, analysis, control)
     else:
-        result, recording = replayed(log, source, analysis, control)
+        result, recording, examinations = replayed(log, source, analysis, control)
+        say_health(examinations)
     show(result, run, json)
     if output is not None:
-        write_admittance(output, result, recording, run, command=command_line(), force=force)
+        write_admittance(
+            output,
+            result,
+            recording,
+            run,
+            command=command_line(),
+            force=force,
+            examinations=examinations,
+        )
         if not json:
             say(f"wrote {output}: open {output / 'index.html'}; rerun {output / 'recording.rrd'}")
 
@@ -179,7 +190,7 @@ def released(
 
 def replayed(
     log: Path, source: ForceOptions, analysis: opt.AnalysisOptions, control: "ControlChoice"
-) -> "tuple[Replay, Recording]":
+) -> "tuple[Replay, Recording, tuple[Examination, ...]]":
     """A log's force through every controller."""
     from vftcli.admittance.replay import replay
     from vftcli.readers.estimates import estimates_columns
@@ -195,6 +206,8 @@ def replayed(
     choice = chosen(analysis, log)
     recording = choice.library.open(log, choice.read)
     arm = choice.robot.load(recording)
+    if stored is None:  # estimates of an earlier run were examined in it
+        choice.examiner.examine(recording, arm)
     settings = control.parameters(arm)
     driving = force_of(recording, arm, choice, source, stored)
     result = replay(
@@ -206,7 +219,8 @@ def replayed(
         source=driving.source,
         force_unstable=control.force_unstable,
     )
-    return replace(result, remarks=(*driving.remarks, *result.remarks)), recording
+    result = replace(result, remarks=(*driving.remarks, *result.remarks))
+    return result, recording, choice.examiner.examinations
 
 
 def force_of(

@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from vftcli.analysis import Analysis
+    from vftcli.doctor import Examination
     from vftcli.signals.recording import Recording
     from vftcli.virtual_sensor.sensor_reading import SensorReading
 
@@ -40,9 +43,35 @@ def say_recording(recording: "Recording") -> None:
         say(f"  note: {remark}")
 
 
-def say_analysis(analysis: "Analysis") -> None:
-    """What was read, and what the reader of the numbers should know."""
+def say_health(examinations: "Iterable[Examination]", *, named: bool = False) -> None:
+    """One line a log on what is wrong with it, and what is meaningless though it was wanted.
+
+    Args:
+        examinations: The log's, then those of its free runs, which are told by their names.
+        named: Whether the log is told by its name too, for a command that has several.
+    """
+    from vftcli.outputs.examination import health_line, overridden_lines
+
+    made = list(examinations)
+    for line in overridden_lines(made):
+        say(line)
+    for k, examination in enumerate(made):
+        say(health_line(examination, named=named or k > 0))
+
+
+def say_analysis(analysis: "Analysis", *, named: bool = False, briefly: bool = False) -> None:
+    """What was read, what is wrong with it, and what the reader of the numbers should know.
+
+    Args:
+        analysis: The log's.
+        named: Whether the command has several logs.
+        briefly: Whether only what is wrong is told, beside JSON that says the rest.
+    """
+    if briefly:
+        say_health(analysis.examinations, named=named)
+        return
     say_recording(analysis.recording)
+    say_health(analysis.examinations, named=named)
     reference = analysis.reference.remarks if analysis.reference is not None else ()
     own = [f"{e.name}: {note}" for e in analysis.estimates for note in e.remarks]
     for note in (*analysis.robot.remarks, *analysis.remarks, *own, *reference):

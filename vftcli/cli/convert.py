@@ -24,12 +24,15 @@ def convert_log(
 
     Example: vftcli convert fixtures/ur5_circle.csv -o ur5_circle.mcap
     """
-    from vftcli.cli.console import say, say_json
+    from vftcli.cli.console import say, say_health, say_json
+    from vftcli.doctor import examine
     from vftcli.outputs.log.conversion import convert
     from vftcli.readers.library import Library
 
     recording = Library().open(log, reading.choice())
     convert(recording, output, force=force)
+    # A table may be made of any log, also of one that no estimate should be made of.
+    say_health([examine(recording)])
     if json:
         summary = {
             "output": str(output),

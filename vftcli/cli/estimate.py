@@ -43,8 +43,8 @@ def estimate(
     recording = reading.result()
     made = analyse(recording, choice.robot.load(recording), choice)
     record = write_estimate_folder(output, made, command=command_line(), extras=extras, force=force)
+    say_analysis(made, briefly=json)
     if json:
         typer.echo(record)
         return
-    say_analysis(made)
     say(f"wrote {output}")

@@ -91,6 +91,7 @@ def identify_robot(
     asked: TaskOptions,
     validation: ValidationOptions,
     free: WithoutLoad,
+    anyway: opt.Anyway = False,
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
@@ -100,7 +101,8 @@ def identify_robot(
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
-    from vftcli.cli.console import command_line, say, say_recording
+    from vftcli.cli.console import command_line, say, say_health, say_recording
+    from vftcli.doctor.examiner import Examiner
     from vftcli.identification import identify
     from vftcli.outputs.files import refuse_existing
     from vftcli.outputs.identification.files import beside, write_identification
@@ -118,11 +120,14 @@ def identify_robot(
     held_out = [library.open(log, held_out_choice) for log in validated]
     unloaded = [library.open(log, choice) for log in without_load]
     read = [*train, *held_out, *unloaded]
+    profile = chosen.load(train[0])
+    # That the profile is not the arm's is what this command is there to change.
+    examiner = Examiner(anyway=anyway, fitting=False)
     for recording in read:
         say_recording(recording)
-    profile = chosen.load(train[0])
+        say_health([examiner.examine(recording, profile)], named=len(read) > 1)
     found = identify(train, profile, task, held_out, unloaded[0] if unloaded else None)
-    record = write_identification(output, found, read, command_line(), force)
+    record = write_identification(output, found, examiner.examinations, command_line(), force)
     for remark in found.remarks:
         say(f"note: {remark}")
     say(f"wrote {', '.join(str(file) for file in beside(output).values())}")

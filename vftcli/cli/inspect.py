@@ -12,6 +12,7 @@ from vftcli.cli.bundles import taken_apart
 def inspect_log(
     log: opt.Log,
     reading: opt.ReadOptions,
+    robot: opt.RobotOptions,
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit with 1 if there is any warning, for CI.")
     ] = False,
@@ -28,7 +29,9 @@ def inspect_log(
 
     choice = reading.choice()
     recording = read_first_recording(log, format=choice.format, columns=choice.columns)
-    examination = examine(choice.within(recording))
+    recording = choice.within(recording)
+    chosen = robot.choice()
+    examination = examine(recording, chosen.load(recording) if chosen.name else None)
     if json:
         say_json(examination_record(examination))
     else:

@@ -41,6 +41,11 @@ Json = Annotated[
         help="What the command makes as JSON on stdout: rows of a table, a run record, a summary.",
     ),
 ]
+ANYWAY = (
+    "--anyway",
+    "Go on where a finding about the log makes every result meaningless; the outputs say so.",
+)
+Anyway = Annotated[bool, typer.Option(ANYWAY[0], help=ANYWAY[1])]
 Words = list[str] | None
 """The values of an option that may be repeated."""
 
@@ -252,6 +257,7 @@ class AnalysisOptions(Bundle):
     free: FreeOptions
     refinement: RefinementOptions
     wrench: WrenchOptions
+    anyway: bool = flag(*ANYWAY)
 
     def choice(
         self, library: "Library", reference: ReferenceOptions | None = None
@@ -265,6 +271,7 @@ class AnalysisOptions(Bundle):
         Raises:
             VftError: If a word is not what its room takes.
         """
+        from vftcli.doctor.examiner import Examiner
         from vftcli.pipeline import AnalysisChoice
 
         return AnalysisChoice(
@@ -276,4 +283,5 @@ class AnalysisOptions(Bundle):
             wrench=self.wrench.choice(),
             reference=reference.choice() if reference is not None else None,
             library=library,
+            examiner=Examiner(anyway=self.anyway),
         )

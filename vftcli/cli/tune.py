@@ -20,6 +20,7 @@ def tune_gains(
     robot: opt.RobotOptions,
     free: opt.FreeOptions,
     bias: opt.BiasOptions,
+    anyway: opt.Anyway = False,
     goal: Annotated[
         str,
         typer.Option(
@@ -45,12 +46,14 @@ def tune_gains(
 
     Example: vftcli tune fixtures/ur5_circle.csv --robot ur5 -o gains.toml
     """
-    from vftcli.cli.console import command_line, say, say_json, say_recording
+    from vftcli.cli.console import command_line, say, say_health, say_json, say_recording
+    from vftcli.doctor.examiner import Examiner
+    from vftcli.outputs.examination import health_record, overridden_lines
     from vftcli.outputs.files import refuse_existing, write_text
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
     from vftcli.outputs.log.run_record import jsonable
-    from vftcli.pipeline import AnalysisChoice, model, read
+    from vftcli.pipeline import AnalysisChoice, examine, model, read
     from vftcli.refinement.tuning import parse_goal, tune_all
     from vftcli.repetition.free_run import Models
     from vftcli.robots.writing import lines_of
@@ -63,23 +66,30 @@ def tune_gains(
         robot=robot.choice(),
         free=free.choice(),
         refinement=replace(bias.choice(), bands=True),
+        examiner=Examiner(anyway=anyway),
     )
     recording = choice.library.open(log, choice.read)
     arm = choice.robot.load(recording)
-    found = model(read(recording, arm, choice, Models()), choice)
+    motion = read(recording, arm, choice, Models())
+    examinations = examine(motion, choice)
+    found = model(motion, choice)
     if found is None or found.spectra is None:
         raise ParameterError(f"nothing to tune on: {found.missing if found else 'no free part'}")
     notes = [str(remark) for remark in found.remarks]
     tuned = tune_all(found.spectra, wanted)
-    heading = [command_line(), f"goal: {goal}", f"robot: {arm.name}", *notes]
+    doubts = overridden_lines(examinations)
+    heading = [*doubts, command_line(), f"goal: {goal}", f"robot: {arm.name}", *notes]
     comments = "".join(f"# {line}\n" for line in heading)
     gains = {"observers": {line.section: dict(line.gains) for line in tuned}}
     write_text(output, comments + "".join(lines_of(gains)), force)
     if json:
+        say_health(examinations)
         rows = [jsonable({**line._asdict()}) for line in tuned]
-        say_json({"goal": goal, "notes": notes, "observers": rows})
+        health = jsonable(health_record(examinations))
+        say_json({"goal": goal, "examination": health, "notes": notes, "observers": rows})
         return
     say_recording(recording)
+    say_health(examinations)
     for note in notes:
         say(f"note: {note}")
     typer.echo(terminal(tuned_grid(tuned, wanted.threshold is not None)).rstrip("\n"))

@@ -25,7 +25,8 @@ class FindingWords(NamedTuple):
 
     def __str__(self) -> str:
         """The finding on one line."""
-        return f"{self.name}: {self.evidence}. {self.consequence}. {self.remedy}."
+        parts = (self.evidence, self.consequence, self.remedy)
+        return f"{self.name}: {'. '.join(part for part in parts if part)}."
 
 
 def in_words(finding: Remark) -> FindingWords:
@@ -35,8 +36,8 @@ def in_words(finding: Remark) -> FindingWords:
         name=entry.get("name", finding.code),
         severity="warning" if finding.level == "warning" else "note",
         evidence=sentence(finding),
-        consequence=filled(entry["consequence"], finding),
-        remedy=filled(entry["remedy"], finding),
+        consequence=filled(entry.get("consequence", ""), finding),
+        remedy=filled(entry.get("remedy", ""), finding),
     )
 
 

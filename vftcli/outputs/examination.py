@@ -1,5 +1,6 @@
 """What the log doctor found, for people and for machines."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from vftcli.doctor import Examination, finding_record, in_words
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, as_record
 
 
 def examination_record(examination: Examination) -> dict[str, Any]:
@@ -84,6 +86,62 @@ def examination_text(examination: Examination) -> str:
     if not examination.findings:
         lines += ["", "nothing suspicious found"]
     return "\n".join(printable(line) for line in lines)
+
+
+def warnings_of(examination: Examination) -> tuple[Remark, ...]:
+    """Everything about a log that can make results wrong, its reader's warnings first."""
+    read = (r for r in examination.recording.source.remarks if r.level == "warning")
+    return (*read, *examination.warnings)
+
+
+def health_line(examination: Examination, *, named: bool = False) -> str:
+    """What is wrong with a log, on one line: how much, the first of it, the others' names.
+
+    Args:
+        examination: What was found.
+        named: Whether the line says which log it is about.
+    """
+    recording, found = examination.recording, warnings_of(examination)
+    head = f"{recording.name}: log health" if named else "log health"
+    if not found:
+        return f"{head}: sound"
+    count = f"{len(found)} warning{'s' if len(found) > 1 else ''}"
+    first, *others = found
+    names = list(dict.fromkeys(in_words(other).name for other in others))
+    more = f"; also {', '.join(names)}" if names else ""
+    path = recording.source.path or "LOG"
+    return printable(
+        f"{head}: {count}: {in_words(first).name}: {first}{more}; vftcli inspect {path} says more"
+    )
+
+
+def health_record(examinations: Iterable[Examination]) -> list[dict[str, Any]]:
+    """What was found in the logs of a run, as `run.json` holds it: the log's first, then others'.
+
+    `overridden` are the codes with which results mean little, though they were wanted anyway.
+    """
+    return [
+        {
+            "log": one.recording.name,
+            "sound": not warnings_of(one),
+            "overridden": [finding.code for finding in one.refusals()],
+            "read": [as_record(remark) for remark in one.recording.source.remarks],
+            "findings": [finding_record(finding) for finding in one.findings],
+        }
+        for one in examinations
+    ]
+
+
+def overridden_lines(examinations: Sequence[Examination]) -> list[str]:
+    """What stands at the top of outputs that were wanted though a finding makes them meaningless.
+
+    One line a finding; none where there is no such finding.
+    """
+    return [
+        f"MEANINGLESS unless this finding is wrong (--anyway): {one.recording.name}: {words}"
+        for one in examinations
+        for words in map(in_words, one.refusals())
+    ]
 
 
 def printable(line: str) -> str:

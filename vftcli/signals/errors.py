@@ -47,3 +47,7 @@ class OutputError(VftError):
 
 class IdentificationError(VftError):
     """A log does not determine what shall be identified from it, or contradicts the robot."""
+
+
+class ExaminationError(VftError):
+    """What the examination of a log found makes every result meaningless."""

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from vftcli.doctor import examine
 from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.identification.files import write_identification
 from vftcli.robots import load_robot
@@ -14,7 +15,7 @@ from vftcli.signals.errors import OutputError
 def test_all_files_are_written_and_the_robot_loads(found, tmp_path):
     result, log = found
     path = tmp_path / "mine.toml"
-    text = write_identification(path, result, [log], "vftcli identify", force=False)
+    text = write_identification(path, result, [examine(log)], "vftcli identify", force=False)
     assert sorted(p.name for p in tmp_path.iterdir()) == [
         "mine.html",
         "mine.rrd",
@@ -36,13 +37,13 @@ def test_all_files_are_written_and_the_robot_loads(found, tmp_path):
     assert "never" in record["processing"]["differentiation"]
     assert record["inputs"][0]["sha256"] == "0" * 64
     with pytest.raises(OutputError, match="--force"):
-        write_identification(path, result, [log], "", force=False)
+        write_identification(path, result, [examine(log)], "", force=False)
 
 
 def test_a_name_without_toml_is_refused(found, tmp_path):
     result, log = found
     with pytest.raises(OutputError, match=r"ends in \.toml"):
-        write_identification(tmp_path / "mine", result, [log], "", force=False)
+        write_identification(tmp_path / "mine", result, [examine(log)], "", force=False)
     assert not list(tmp_path.iterdir())
 
 
@@ -60,6 +61,6 @@ def test_a_failure_at_the_last_file_leaves_everything_as_it_was(found, tmp_path,
 
     monkeypatch.setattr(OutputFolder, "write", failing)
     with pytest.raises(OutputError, match="disk is full"):
-        write_identification(path, result, [log], "", force=True)
+        write_identification(path, result, [examine(log)], "", force=True)
     assert [p.name for p in tmp_path.iterdir()] == ["mine.toml"]
     assert path.read_text(encoding="utf-8") == "earlier"

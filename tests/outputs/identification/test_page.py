@@ -6,6 +6,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 
+from vftcli.doctor import examine
 from vftcli.outputs.identification.files import identification_record
 from vftcli.outputs.identification.page import payload, render_identification, shown_trace
 
@@ -31,7 +32,9 @@ class Balance(HTMLParser):
 
 def test_the_page_is_whole_and_loads_nothing(found):
     result, log = found
-    page = render_identification(result, identification_record(result, [log], "vftcli identify"))
+    page = render_identification(
+        result, identification_record(result, [examine(log)], "vftcli identify")
+    )
     checker = Balance()
     checker.feed(page)
     assert checker.open == []
@@ -59,7 +62,7 @@ def test_the_held_out_log_is_drawn_over_time(found):
 
 def test_dots_stay_inside_their_plot(found):
     result, log = found
-    page = render_identification(result, identification_record(result, [log], ""))
+    page = render_identification(result, identification_record(result, [examine(log)], ""))
     dots = np.array(re.findall(r"M(-?[\d.]+) (-?[\d.]+)h\.01", page), dtype=float)
     assert len(dots) > 1000
     assert dots[:, 0].min() >= 40.0  # right of the room for the numbers

@@ -1,5 +1,6 @@
 """What `vftcli admit` writes: the page, motion.parquet, the comparison, run.json."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,11 @@ from vftcli.admittance.closed_loop import ClosedLoop
 from vftcli.admittance.parameters import AXES, PER_AXIS
 from vftcli.admittance.replay import Replay
 from vftcli.admittance.stability import Verdict
+from vftcli.doctor.examination import Examination
 from vftcli.outputs.admittance.page import render_admittance
 from vftcli.outputs.admittance.recording import padded, write_ghosts
 from vftcli.outputs.admittance.tables import comparison_csv, latency_rows
+from vftcli.outputs.examination import health_record
 from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.grid import json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, to_json, versions
@@ -62,13 +65,18 @@ def motion_table(replay: Replay) -> pl.DataFrame:
 
 
 def admittance_record(
-    replay: Replay, recording: Recording | None, run: ClosedLoop | None, command: str
+    replay: Replay,
+    recording: Recording | None,
+    run: ClosedLoop | None,
+    command: str,
+    examinations: Sequence[Examination] = (),
 ) -> dict[str, Any]:
     """Everything that `run.json` of a replay holds."""
     p = replay.parameters
     return {
         "command": command,
         "versions": versions(),
+        "examination": health_record(examinations),
         "input": input_record(recording) if recording is not None else None,
         "robot": robot_record(replay.robot),
         "force": replay.source,
@@ -123,18 +131,19 @@ def write_admittance(
     run: ClosedLoop | None = None,
     command: str = "",
     force: bool = False,
+    examinations: Sequence[Examination] = (),
 ) -> None:
     """Write the folder of a replay, all or nothing.
 
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
-    record = admittance_record(replay, recording, run, command)
+    record = admittance_record(replay, recording, run, command, examinations)
     title = recording.name if recording is not None else "release"
     if run is not None and run.simulation is not None:
         title = f"{run.simulation.scenario.name}, closed loop"
     texts = {
-        "index.html": render_admittance(replay, record, title, run),
+        "index.html": render_admittance(replay, record, title, run, examinations),
         "comparison.csv": comparison_csv(replay.rows),
         "comparison.json": json_rows(replay.rows),
         "run.json": to_json(record),

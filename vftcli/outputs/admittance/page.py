@@ -1,7 +1,7 @@
 """The page of an admittance replay: Figs 6/9, 7/10, 12/13 and Tables III/IV for the user's log."""
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from vftcli.admittance.closed_loop import ClosedLoop
 from vftcli.admittance.law import Controller
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
+from vftcli.doctor.examination import Examination
 from vftcli.outputs.admittance.recording import colours, padded
 from vftcli.outputs.admittance.tables import (
     comparison_grid,
@@ -26,6 +27,7 @@ from vftcli.outputs.page.shell import (
     document,
     fact_list,
     headline,
+    health,
     pairs,
     provenance,
     remarks,
@@ -45,7 +47,11 @@ def deviations_from_paper() -> dict[str, str]:
 
 
 def render_admittance(
-    replay: Replay, record: Mapping[str, Any], title: str, run: ClosedLoop | None = None
+    replay: Replay,
+    record: Mapping[str, Any],
+    title: str,
+    run: ClosedLoop | None = None,
+    examinations: Sequence[Examination] = (),
 ) -> str:
     """The page: self-contained, nothing is loaded from anywhere."""
     text = f"Admittance replay on {replay.robot.title or replay.robot.name}: {replay.source}"
@@ -53,6 +59,7 @@ def render_admittance(
     parts = (
         headline(title, text),
         facts_section(replay),
+        health(examinations),
         remarks(replay.remarks),
         closed_loop_section(run),
         comparison_section(replay),

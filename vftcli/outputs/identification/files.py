@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from vftcli.doctor.examination import Examination
 from vftcli.identification.result import Identification
+from vftcli.outputs.examination import health_record, overridden_lines
 from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.identification.page import render_identification
 from vftcli.outputs.identification.recording import write_identification_rrd
@@ -19,7 +21,6 @@ from vftcli.outputs.log.run_record import (
 )
 from vftcli.robots.writing import robot_toml
 from vftcli.signals.errors import OutputError
-from vftcli.signals.recording import Recording
 
 
 def beside(path: Path) -> dict[str, Path]:
@@ -39,11 +40,11 @@ def beside(path: Path) -> dict[str, Path]:
 
 
 def write_identification(
-    path: Path, found: Identification, logs: Sequence[Recording], command: str, force: bool
+    path: Path, found: Identification, logs: Sequence[Examination], command: str, force: bool
 ) -> str:
     """Write all files or none; those of an earlier run stay as they were if one fails.
 
-    `logs` are all that were read, also those that no fit used.
+    `logs` are the examinations of all that were read, also of those that no fit used.
 
     Returns:
         The text of `run.json`.
@@ -54,9 +55,13 @@ def write_identification(
     # One folder for all four, so that they appear together or not at all.
     names = {kind: file.name for kind, file in beside(path).items()}
     record = identification_record(found, logs, command)
-    heading = [f"{found.robot.title}; written by vftcli identify, keys: docs/robots.md.", command]
+    heading = [
+        *overridden_lines(logs),
+        f"{found.robot.title}; written by vftcli identify, keys: docs/robots.md.",
+        command,
+    ]
     texts = {
-        "html": render_identification(found, record),
+        "html": render_identification(found, record, logs),
         "run": to_json(record),
         "toml": robot_toml(found.robot, heading),
     }
@@ -68,14 +73,16 @@ def write_identification(
 
 
 def identification_record(
-    found: Identification, logs: Sequence[Recording], command: str
+    found: Identification, logs: Sequence[Examination], command: str
 ) -> dict[str, Any]:
     """Everything `run.json` holds, and `--json` prints."""
+    recordings = [one.recording for one in logs]
     return {
         "command": command,
         "versions": versions(),
+        "examination": health_record(logs),
         "method": found.method,
-        "inputs": [input_record(log) for log in logs],
+        "inputs": [input_record(log) for log in recordings],
         "profile": robot_record(found.profile),
         "profile_sha256": file_sha256(found.profile.path),
         "robot": found.robot.name,
@@ -85,6 +92,6 @@ def identification_record(
         "friction_models": found.shape_choices.to_dicts(),
         "base_parameters": found.base.to_dicts() if found.base is not None else [],
         "conventions": CONVENTIONS,
-        **log_remarks(logs),
+        **log_remarks(recordings),
         "remarks": list(found.remarks),
     }

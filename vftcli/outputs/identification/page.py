@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from vftcli.doctor.examination import Examination
 from vftcli.identification.result import Identification, Trace
 from vftcli.outputs.grid import html
 from vftcli.outputs.identification.tables import (
@@ -21,6 +22,7 @@ from vftcli.outputs.page.shell import (
     document,
     folded,
     headline,
+    health,
     pairs,
     remarks,
     soft,
@@ -34,7 +36,9 @@ WIDTH, HEIGHT, EDGE = 360, 220, 40
 """Size of such a plot and room for its numbers. [px]"""
 
 
-def render_identification(found: Identification, record: Mapping[str, Any]) -> str:
+def render_identification(
+    found: Identification, record: Mapping[str, Any], examinations: Sequence[Examination] = ()
+) -> str:
     """The page as text: self-contained, nothing is loaded from anywhere."""
     logs = (
         ", ".join(dict.fromkeys(t.motion.recording.name for t in found.traces)) or found.robot.name
@@ -46,6 +50,7 @@ def render_identification(found: Identification, record: Mapping[str, Any]) -> s
         residuals = f"<h2>Residuals</h2>{html(residual_grid(found))}{soft(words)}"
     parts = (
         headline(found.robot.name, text),
+        health(examinations),
         remarks(found.remarks),
         residuals,
         velocity_section(found),

@@ -16,6 +16,7 @@ import vftcli
 from vftcli.analysis import Analysis
 from vftcli.observers.auto_tuning import AutoTuned
 from vftcli.observers.observer import Observer, Tuning
+from vftcli.outputs.examination import health_record
 from vftcli.robots.robot import Robot
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
@@ -50,6 +51,8 @@ def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
     return {
         "command": command,
         "versions": versions(),
+        # Before any number: what may make all of them wrong.
+        "examination": health_record(analysis.examinations),
         "input": input_record(analysis.recording),
         "robot": robot_record(analysis.robot),
         "observers": [

@@ -11,7 +11,7 @@ from vftcli.outputs.log.run_record import run_record
 from vftcli.outputs.page import comparisons, sections
 from vftcli.outputs.page.payload import payload
 from vftcli.outputs.page.refinement_part import refinement_section
-from vftcli.outputs.page.shell import document, headline, pairs, provenance, remarks
+from vftcli.outputs.page.shell import document, headline, health, pairs, provenance, remarks
 from vftcli.outputs.page.wrench_part import wrench_section
 
 
@@ -22,6 +22,7 @@ def render(analysis: Analysis) -> str:
     parts = (
         headline(name, f"External joint torques of {analysis.robot.name} from {name}"),
         sections.facts_section(analysis),
+        health(analysis.examinations),
         remarks([*record.get("warnings", ()), *record.get("notes", ())]),
         sections.errors_section(analysis),
         comparisons.beside_print(analysis.published),

@@ -9,6 +9,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from vftcli.doctor import Examination, in_words
+from vftcli.outputs.examination import health_line, overridden_lines, warnings_of
 from vftcli.signals.remarks import Remark, explanation
 
 HERE = Path(__file__).parent
@@ -89,6 +91,32 @@ def remarks(lines: Sequence[Remark]) -> str:
     if not lines:
         return ""
     return f'<section class="remarks"><h2>Read this first</h2>{bullets(lines)}</section>'
+
+
+def health(examinations: Sequence[Examination]) -> str:
+    """What is wrong with the logs: evidence, consequence and remedy of every finding.
+
+    Where there are warnings they stand open, above everything that they may make wrong.
+    """
+    if not examinations:
+        return ""
+    alarms = "".join(f'<p class="alarm">{escape(x)}</p>' for x in overridden_lines(examinations))
+    lines = "".join(f"<li>{escape(health_line(one, named=True))}</li>" for one in examinations)
+    parts = []
+    for one in examinations:
+        found = [*warnings_of(one), *(f for f in one.findings if f.level != "warning")]
+        for said in map(in_words, found):
+            sentences = (said.evidence, said.consequence, said.remedy)
+            steps = "".join(f"<dd>{escape(x)}.</dd>" for x in sentences if x)
+            parts.append(f"<dt>{escape(f'{said.severity}: {said.name}')}</dt>{steps}")
+    sound = not any(map(warnings_of, examinations))
+    table = f'<dl class="pairs">{"".join(parts)}</dl>'
+    told = folded("All findings", table) if sound and parts else table
+    kind = "soft" if sound else "remarks"
+    return (
+        f'<section class="{kind}" id="health"><h2>Log health</h2>{alarms}'
+        f'<ul class="plain">{lines}</ul>{told}</section>'
+    )
 
 
 def soft(text: str) -> str:
