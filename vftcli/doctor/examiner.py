@@ -9,6 +9,7 @@ from vftcli.signals.errors import ExaminationError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 
+
 class Examiner:
     """Examines the logs of one command.
 
