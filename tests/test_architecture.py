@@ -55,7 +55,6 @@ FILES = (
     "signals/remarks.py",  # the catalogue of words
     "simulation/calibration_motions.py",
     "simulation/load.py",
-    "simulation/saving.py",
     "simulation/scenario.py",
     "simulation/schema.py",
     "simulation/writers/",

@@ -34,6 +34,7 @@ def test_writes_log_truth_and_scenario(tmp_path: Path) -> None:
         "log.csv",
         "log.csv.truth.parquet",
         "log.csv.scenario.toml",
+        "log.csv.run.json",
     ]
 
 

@@ -1,8 +1,12 @@
+import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from vftcli.outputs.files import OutputFolder, atomic, numbered, write_text
+from vftcli.outputs.seals import digest
 from vftcli.signals.errors import OutputError
 
 
@@ -176,3 +180,77 @@ def test_a_move_that_fails_half_way_is_undone(
 
 def test_equal_names_get_numbers_that_are_free():
     assert numbered(["a", "b", "a", "a-2", "a"]) == ["a", "b", "a-2", "a-2-2", "a-3"]
+
+
+def sealed(folder: Path, texts: dict[str, str], force: bool = True) -> None:
+    """Write a run: the files, and a seal that lists them."""
+    with OutputFolder(folder, force, ["run.json"]) as out:
+        for name, text in texts.items():
+            out.write(name, text)
+        out.write("run.json", json.dumps({"files": out.digests()}))
+
+
+def test_files_of_the_run_before_go_if_nobody_changed_them(tmp_path: Path) -> None:
+    """Also those of another command, which this one's names do not declare, and their folders."""
+    sealed(tmp_path, {"a.txt": "a", "b.txt": "b", "sub/c.txt": "c", "mine.txt": "run's"})
+    (tmp_path / "mine.txt").write_text("mine")
+    sealed(tmp_path, {"b.txt": "new"})
+    assert names(tmp_path) == ["b.txt", "mine.txt", "run.json"]
+
+
+def test_a_seal_is_not_believed_outside_its_folder(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "precious.txt").write_text("precious")
+    lies = {"../precious.txt": digest(tmp_path / "precious.txt"), "": "", "\0": "x", "run.json": 3}
+    for files in (lies, [], None, "text"):
+        (tmp_path / "out" / "run.json").write_text(json.dumps({"files": files}))
+        sealed(tmp_path / "out", {"a.txt": "a"})
+    assert (tmp_path / "precious.txt").read_text() == "precious"
+
+
+def test_the_seal_goes_first_and_comes_last(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moved = []
+    move = Path.replace
+
+    def told(self: Path, target: Path) -> Path:
+        moved.append(self.name if self.parent == tmp_path else target.name)
+        return move(self, target)
+
+    sealed(tmp_path, {"a.txt": "a", "z.txt": "z"})
+    monkeypatch.setattr(Path, "replace", told)
+    sealed(tmp_path, {"a.txt": "a", "z.txt": "z"})
+    assert moved[0] == moved[-1] == "run.json"
+    assert len(moved) == 6  # three files go and come
+
+
+def test_leftovers_of_the_dead_go_and_those_of_the_living_stay(tmp_path: Path) -> None:
+    dead = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"],
+                          check=True, capture_output=True, text=True).stdout.strip()  # fmt: skip
+    for name in (f".vftcli-{dead}-00000000.partial", ".vftcli-x-00000000.partial", ".a.partial"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "half.txt").write_text("half")
+    with OutputFolder(tmp_path) as living:
+        living.write("a.txt", "a")
+        sealed(tmp_path, {"b.txt": "b"})
+    left = [".a.partial", ".vftcli-x-00000000.partial", "a.txt", "b.txt", "run.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == left
+
+
+def test_a_failed_run_clears_nothing(tmp_path: Path) -> None:
+    """What a killed run moved aside may be all that is left of the run before."""
+    (tmp_path / ".vftcli-999999999-00000000.partial").mkdir()
+
+    def fail() -> None:
+        with OutputFolder(tmp_path):
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert len(names(tmp_path)) == 1
+
+
+def test_half_a_letter_in_a_name_does_not_stop_a_text(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.txt", "bad\udcff.csv")
+    assert (tmp_path / "a.txt").read_text() == "bad\\udcff.csv"

@@ -7,13 +7,13 @@ import pinocchio as pin
 import pytest
 
 from vftcli.observers.momentum import MomentumObserver
+from vftcli.outputs.simulation import save
 from vftcli.robots import load_robot
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.simulation import Arm, Simulation, load_scenario, observe, prepare, simulate
 from vftcli.simulation.experiment import simulate_pair
 from vftcli.simulation.mismatch import build_arm
-from vftcli.simulation.saving import save
 from vftcli.simulation.writers.flange import flange_signals
 from vftcli.virtual_sensor.solvers import wrench_of
 
@@ -71,7 +71,8 @@ def test_same_seed_same_bytes_another_seed_another_log(tmp_path: Path) -> None:
     scenario = load_scenario("ur5-circle", ["duration=3.0", "contacts.hand.begin=0.0"])
     contents = []
     for k, seed in enumerate((7, 7, 8)):
-        files = save(simulate(scenario, seed), tmp_path / f"{k}.csv")
+        (tmp_path / str(k)).mkdir()
+        files = save({tmp_path / str(k) / "log.csv": simulate(scenario, seed)})
         contents.append([file.read_bytes() for file in files])
     assert contents[0] == contents[1]
     assert contents[0][0] != contents[2][0]

@@ -6,11 +6,11 @@ import numpy as np
 import polars as pl
 import pytest
 
+from vftcli.outputs.simulation import companions, save
 from vftcli.readers import read
 from vftcli.readers.references import read_reference
 from vftcli.signals.errors import OutputError, ParameterError
 from vftcli.simulation import Simulation, load_scenario, simulate
-from vftcli.simulation.saving import companions, save
 from vftcli.simulation.writers import WRITERS
 
 LOSSY = ["duration=2.0", "sensing.repeated=0.02", "sensing.dropped=0.02"]
@@ -54,7 +54,7 @@ def test_readers_read_back_what_is_written(
     request: pytest.FixtureRequest,
 ) -> None:
     run: Simulation = request.getfixturevalue(who)
-    save(run, tmp_path / name, form)
+    save({tmp_path / name: run}, form)
     back, mine = read(tmp_path / name), run.recording
     assert back.samples == mine.samples
     assert back.source.duplicates == mine.source.duplicates > 0
@@ -70,7 +70,7 @@ def test_readers_read_back_what_is_written(
 
 
 def test_full_recipe_has_the_columns_of_the_client(ur5: Simulation, tmp_path: Path) -> None:
-    save(ur5, tmp_path / "log.csv")
+    save({tmp_path / "log.csv": ur5})
     text = (tmp_path / "log.csv").read_bytes()
     header = text.split(b"\r\n")[0].split(b" ")
     assert len(header) == 119  # the client's default recipe
@@ -80,7 +80,7 @@ def test_full_recipe_has_the_columns_of_the_client(ur5: Simulation, tmp_path: Pa
 
 
 def test_libfranka_log_has_its_columns_and_sign(panda: Simulation, tmp_path: Path) -> None:
-    save(panda, tmp_path / "log.csv")
+    save({tmp_path / "log.csv": panda})
     lines = (tmp_path / "log.csv").read_text().splitlines()
     names = lines[0].split(",")
     assert len(names) == 87
@@ -92,18 +92,18 @@ def test_libfranka_log_has_its_columns_and_sign(panda: Simulation, tmp_path: Pat
 
 
 def test_sensor_is_logged_in_every_format(sensed: Simulation, tmp_path: Path) -> None:
-    save(sensed, tmp_path / "log.csv")
+    save({tmp_path / "log.csv": sensed})
     header = (tmp_path / "log.csv").read_text().splitlines()[0]
     assert header.endswith("ft_raw_wrench_5")
     for form, name in (("parquet", "log.parquet"), ("rosbag2", "bag")):
-        save(sensed, tmp_path / name, form)
+        save({tmp_path / name: sensed}, form)
         back = read(tmp_path / name)
         np.testing.assert_array_equal(back.require("wrench"), sensed.force_sensor)
 
 
 def test_truth_is_on_the_clock_of_the_log(ur5: Simulation, tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
-    save(ur5, path)
+    save({path: ur5})
     truth, log = read_reference(companions(path)[0], None), read(path)
     assert truth.t[0] == pytest.approx(log.source.t0, abs=1e-12)
     assert truth.tau is not None
@@ -117,11 +117,11 @@ def test_existing_files_are_kept_unless_forced(ur5: Simulation, tmp_path: Path) 
     path = tmp_path / "log.csv"
     companions(path)[0].write_text("mine")
     with pytest.raises(OutputError, match="--force"):
-        save(ur5, path)
+        save({path: ur5})
     assert not path.exists()
-    save(ur5, path, force=True)
-    save(ur5, tmp_path / "bag", "rosbag2")
-    save(ur5, tmp_path / "bag", "rosbag2", force=True)
+    save({path: ur5}, force=True)
+    save({tmp_path / "bag": ur5}, "rosbag2")
+    save({tmp_path / "bag": ur5}, "rosbag2", force=True)
     assert path.exists()
     assert sorted(p.name for p in tmp_path.iterdir() if p.name.startswith(".")) == []
 
@@ -131,9 +131,9 @@ def test_a_robot_logs_only_in_its_own_formats(
 ) -> None:
     for run, form in ((ur5, "libfranka"), (panda, "rtde"), (panda, "ur-rtde")):
         with pytest.raises(ParameterError, match="--as"):
-            save(run, tmp_path / "log", form)
+            save({tmp_path / "log": run}, form)
     with pytest.raises(ParameterError, match="Did you mean rosbag2"):
-        save(ur5, tmp_path / "log", "rosbag")
+        save({tmp_path / "log": ur5}, "rosbag")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -113,7 +113,8 @@ def admit(
     """
     from vftcli.admittance.choice import ControlChoice, split_settings
     from vftcli.cli.console import command_line, say, say_health
-    from vftcli.outputs.admittance.files import write_admittance
+    from vftcli.outputs.admittance.files import FILES, write_admittance
+    from vftcli.outputs.files import OutputFolder
 
     if sum((log is not None, bool(release.release), loop.closed_loop is not None)) != 1:
         raise typer.BadParameter("give one of LOG, --release AXIS=VALUE, --closed-loop SCENARIO")
@@ -121,6 +122,8 @@ def admit(
     control = ControlChoice.parsed(assignments=own, **controllers.words())
     observers = analysis.observers.changed(assignments=others)
     analysis = analysis.changed(observers=observers)
+    if output is not None:
+        OutputFolder(output, force, FILES).check()
     recording, run = None, None
     examinations: tuple[Examination, ...] = ()
     if loop.closed_loop is not None:

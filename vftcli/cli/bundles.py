@@ -10,6 +10,7 @@ function with one parameter an option, and hands the command the bundles put tog
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 
 import typer
@@ -106,7 +107,10 @@ def taken_apart(command: Callable[..., None]) -> Callable[..., None]:
     own = inspect.signature(command).parameters.values()
 
     def called(**values: Any) -> None:  # noqa: ANN401
-        command(**{p.name: put_together(p.name, p.annotation, values) for p in own})
+        from vftcli.outputs.files import protected
+
+        with protected(inputs_of(values)):
+            command(**{p.name: put_together(p.name, p.annotation, values) for p in own})
 
     flat = [single for p in own for single in parameters(p.name, p.annotation, p.default)]
     called.__name__, called.__doc__ = command.__name__, command.__doc__
@@ -139,6 +143,19 @@ def put_together(name: str, kind: Any, values: Mapping[str, Any]) -> Any:  # noq
         return values[name]
     declared = kind.declared().items()
     return kind(**{own: put_together(f"{name}_{own}", what, values) for own, what in declared})
+
+
+def inputs_of(values: Mapping[str, Any]) -> list[Path]:
+    """Every file and folder that the options name, but the output: nothing may write over these."""
+    found = []
+    for name, value in values.items():
+        for word in value if isinstance(value, list | tuple) else (value,):
+            path = Path(word.removeprefix("file:")) if isinstance(word, str) else word
+            # A robot or scenario without an ending is one of ours, not a file of that name.
+            is_name = name.endswith(("robot", "scenario")) and isinstance(word, str)
+            if name != "output" and isinstance(path, Path) and (path.suffix or not is_name):
+                found.append(path)
+    return found
 
 
 def is_bundle(kind: object) -> bool:

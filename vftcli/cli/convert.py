@@ -26,9 +26,10 @@ def convert_log(
     """
     from vftcli.cli.console import say, say_health, say_json
     from vftcli.doctor import examine
-    from vftcli.outputs.log.conversion import convert
+    from vftcli.outputs.log.conversion import check_conversion, convert
     from vftcli.readers.library import Library
 
+    check_conversion(output, force)
     recording = Library().open(log, reading.choice())
     convert(recording, output, force=force)
     # A table may be made of any log, also of one that no estimate should be made of.

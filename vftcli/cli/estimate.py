@@ -36,9 +36,11 @@ def estimate(
     reading = Background(lambda: library.open(log, chosen))
 
     from vftcli.cli.console import command_line, say, say_analysis
-    from vftcli.outputs.log.estimates import write_estimate_folder
+    from vftcli.outputs.files import OutputFolder
+    from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
     from vftcli.pipeline import analyse
 
+    OutputFolder(output, force, estimate_files(extras)).check()
     choice = analysis.choice(library)
     recording = reading.result()
     made = analyse(recording, choice.robot.load(recording), choice)

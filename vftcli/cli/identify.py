@@ -104,14 +104,13 @@ def identify_robot(
     from vftcli.cli.console import command_line, say, say_health, say_recording
     from vftcli.doctor.examiner import Examiner
     from vftcli.identification import identify
-    from vftcli.outputs.files import refuse_existing
+    from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.identification.files import beside, write_identification
     from vftcli.outputs.identification.tables import tables_text
     from vftcli.readers.library import Library
 
     task = asked.task(output.stem)
-    for file in beside(output).values():
-        refuse_existing(file, force)
+    OutputFolder(output.parent, force, [file.name for file in beside(output).values()]).check()
     choice, chosen = reading.choice(), robot.choice()
     held_out_choice = reading.changed(interval=validation.interval).choice()
     validated, without_load = validation.validate or [], free.logs(asked.find_payload)

@@ -33,13 +33,16 @@ def report(
     """
     from vftcli.cli.console import command_line, say, say_analysis
     from vftcli.evaluation.print_table import check_published, compare_with
-    from vftcli.outputs.log.report import write_report, write_reports
+    from vftcli.outputs.files import OutputFolder
+    from vftcli.outputs.log.report import report_files, write_report, write_reports
     from vftcli.outputs.log.tables import print_text, to_terminal
     from vftcli.outputs.log.wrench_tables import paper_bounds
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
 
-    choice = analysis.choice(Library(logs), reference)
+    library = Library(logs)
+    OutputFolder(output, force, report_files([library.label(log) for log in logs])).check()
+    choice = analysis.choice(library, reference)
     if published is not None:
         check_published(published, reference.reference)
     analyses = []

@@ -56,11 +56,11 @@ def simulate_log(
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """
-    from vftcli.cli.console import say, say_json
+    from vftcli.cli.console import command_line, say, say_json
+    from vftcli.outputs.simulation import free_path, log_folder, save
     from vftcli.simulation import load_scenario
     from vftcli.simulation.experiment import simulate_pair
     from vftcli.simulation.load import listing
-    from vftcli.simulation.saving import check_target, free_path, save
 
     if scenario == "list":
         for name, title in listing():
@@ -68,13 +68,10 @@ def simulate_log(
         return
     setup = load_scenario(scenario, experiment.settings or ())
     paths = [output, free_path(output)] if setup.pair else [output]
-    check_target(paths, force)
+    log_folder(paths, force)
     runs = simulate_pair(setup, experiment.seed, progress_bar())
-    files = [
-        str(file)
-        for path, run in zip(paths, runs, strict=True)
-        for file in save(run, path, experiment.log_format, force)
-    ]
+    places = dict(zip(paths, runs, strict=True))
+    files = [str(f) for f in save(places, experiment.log_format, force, command_line())]
     if json:
         about = {"scenario": setup.name, "seed": runs[0].seed, "files": files}
         about |= {"samples": len(runs[0].measured.rows), "robot": setup.robot}

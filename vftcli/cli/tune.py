@@ -49,7 +49,7 @@ def tune_gains(
     from vftcli.cli.console import command_line, say, say_health, say_json, say_recording
     from vftcli.doctor.examiner import Examiner
     from vftcli.outputs.examination import health_record, overridden_lines
-    from vftcli.outputs.files import refuse_existing, write_text
+    from vftcli.outputs.files import check_file, write_text
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
     from vftcli.outputs.log.run_record import jsonable
@@ -60,7 +60,7 @@ def tune_gains(
     from vftcli.signals.errors import ParameterError
 
     wanted = parse_goal(goal, threshold)
-    refuse_existing(output, force)
+    check_file(output, force)
     choice = AnalysisChoice(
         read=reading.choice(),
         robot=robot.choice(),

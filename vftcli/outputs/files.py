@@ -1,19 +1,38 @@
-"""Writing files whole or not at all, and never over something without being told to."""
+"""Writing files whole or not at all, never over an input, never over something without being told.
 
-import os
-import shutil
+New files are made in a temporary folder beside their places and renamed in the end. Several files
+that belong together have a seal: `run.json`, with the digest of every other one. It goes before
+the first of them changes and comes when the last is in its place, so that a folder without it is
+known to be incomplete, whenever a run was killed.
+"""
+
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from vftcli.outputs.partial import check_writable, held, partial_folder, to_disk
+from vftcli.outputs.seals import SEAL, digests, is_seal, sealed_files
 from vftcli.signals.errors import OutputError
+
+_inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
+
+
+@contextmanager
+def protected(inputs: Iterable[Path]) -> Iterator[None]:
+    """Let nothing write over these files for a block, nor over a file of these folders."""
+    token = _inputs.set(tuple(inputs))
+    try:
+        yield
+    finally:
+        _inputs.reset(token)
 
 
 @contextmanager
 def atomic(path: Path, force: bool = False) -> Iterator[Path]:
-    """Yield a temporary path beside `path`, which takes its place when the block ends well.
+    """Yield a temporary path, which takes the place of `path` when the block ends well.
 
     A device or pipe (``/dev/stdout``) is yielded as it is. If the block fails nothing is left.
 
@@ -22,25 +41,39 @@ def atomic(path: Path, force: bool = False) -> Iterator[Path]:
         force: Whether a file that is there may be replaced.
 
     Raises:
-        OutputError: If the file exists and `force` is not set, or it cannot be written.
+        OutputError: If the file exists and `force` is not set, is an input, or it cannot be
+            written.
     """
     path = Path(path)
     # A device cannot be replaced: `-o /dev/stdout` is written to as it is.
     if path.is_char_device() or path.is_fifo():
         yield path
         return
-    refuse_existing(path, force)
+    check_file(path, force)
     # What a link points to is replaced, not the link.
     target = path.resolve() if path.is_symlink() else path
-    temporary = target.with_name(f".{os.urandom(4).hex()}.{target.name}")
     try:
-        check_writable(target.parent)
-        yield temporary
-        temporary.replace(target)
+        with partial_folder(target.parent) as folder:
+            yield folder / target.name
+            to_disk([folder / target.name])
+            refuse_existing(path, force)
+            (folder / target.name).replace(target)
+            to_disk([target.parent])
     except OSError as error:
         raise unwritable(path, error) from None
-    finally:
-        temporary.unlink(missing_ok=True)
+
+
+def check_file(path: Path, force: bool = False) -> None:
+    """See before anything is computed whether a file could be written.
+
+    Raises:
+        OutputError: As `atomic` does.
+    """
+    try:
+        refuse_existing(path, force)
+        check_writable((path.resolve() if path.is_symlink() else path).parent)
+    except OSError as error:
+        raise unwritable(path, error) from None
 
 
 def write_text(path: Path, text: str, force: bool = False) -> None:
@@ -50,7 +83,14 @@ def write_text(path: Path, text: str, force: bool = False) -> None:
         OutputError: As `atomic` does.
     """
     with atomic(path, force) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        put_text(temporary, text)
+
+
+def put_text(path: Path, text: str) -> None:
+    """Write a text with the same bytes on every system, also with half a letter from a file."""
+    # On Windows the same bytes as elsewhere: digests of outputs can be compared. A file name may
+    # hold bytes that are no letter, which UTF-8 refuses.
+    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 class OutputFolder:
@@ -59,11 +99,12 @@ class OutputFolder:
     Until then they are in a temporary folder on the same file system; if the block fails, it goes,
     and with it every folder that was made for it. ``folder / "name"`` is where to write a file.
     With `force`, those of `names` that an earlier run left and this one does not write are removed,
-    so that all files of the folder belong together.
+    and every file that the earlier run's seal lists, so that all files of the folder belong
+    together.
 
     Raises:
-        OutputError: If the folder is a file or cannot be written, or holds one of `names` and
-            `force` is not set.
+        OutputError: If the folder is a file or cannot be written, holds one of `names` and
+            `force` is not set, or holds an input under one of them.
     """
 
     def __init__(self, path: Path, force: bool = False, names: Iterable[str] = ()) -> None:
@@ -72,6 +113,7 @@ class OutputFolder:
         self.names = tuple(names)
         self.made: list[Path] = []
         self.temporary = self.path
+        self._partial = ExitStack()
 
     def __truediv__(self, name: str) -> Path:
         """Where to write the file `name`, its folder made if need be."""
@@ -80,24 +122,36 @@ class OutputFolder:
         return path
 
     def write(self, name: str, text: str) -> None:
-        """Write a text file, with the same bytes on every system."""
-        # On Windows the same bytes as elsewhere: digests of outputs can be compared.
-        (self / name).write_text(text, encoding="utf-8", newline="\n")
+        """Write a text file."""
+        put_text(self / name, text)
+
+    def digests(self, place: str = "") -> dict[str, str]:
+        """The sha256 of every file written so far below `place`, by its name there."""
+        return digests(self.temporary / place)
+
+    def check(self) -> None:
+        """Refuse what must not be overwritten, before anything is computed or made."""
+        try:
+            if self.path.exists() and not self.path.is_dir():
+                raise OutputError(f"{self.path} is a file; -o needs the name of a folder")
+            for name in self.names:
+                refuse_existing(self.path / name, self.force)
+            for path in self._earlier():
+                refuse_input(path)
+            check_writable(next(p for p in (self.path, *self.path.parents) if p.exists()))
+        except OSError as error:
+            raise unwritable(self.path, error) from None
 
     def __enter__(self) -> Self:
         """Refuse what must not be overwritten, and make the temporary folder."""
-        if self.path.exists() and not self.path.is_dir():
-            raise OutputError(f"{self.path} is a file; -o needs the name of a folder")
-        for name in self.names:
-            refuse_existing(self.path / name, self.force)
+        self.check()
         try:
             # Outermost first, to be removed again if nothing comes of it.
             self.made = [p for p in (self.path, *self.path.parents) if not p.exists()][::-1]
             self.path.mkdir(parents=True, exist_ok=True)
             check_writable(self.path)
             # Inside the folder, so that the files only change their names when they are moved.
-            self.temporary = self.path / f".{os.urandom(4).hex()}.partial"
-            self.temporary.mkdir()
+            self.temporary = self._partial.enter_context(partial_folder(self.path))
         except OSError as error:
             self._discard()
             raise unwritable(self.path, error) from None
@@ -107,7 +161,7 @@ class OutputFolder:
         self,
         kind: type[BaseException] | None,
         error: BaseException | None,
-        _trace: TracebackType | None,
+        trace: TracebackType | None,
     ) -> None:
         """Move the files into place, or leave nothing."""
         try:
@@ -116,6 +170,7 @@ class OutputFolder:
         except OSError as failure:
             raise unwritable(self.path, failure) from None
         finally:
+            self._partial.__exit__(kind, error, trace)
             self._discard()
         # Of an error elsewhere its own words say more.
         if isinstance(error, OSError) and (
@@ -123,26 +178,46 @@ class OutputFolder:
         ):
             raise unwritable(self.path, error) from None
 
+    def _earlier(self) -> set[Path]:
+        """Every file that an earlier run may have left and that must not outlive it."""
+        declared = {self.path / name for name in self.names}
+        listed = (sealed_files(path) for path in declared if is_seal(path))
+        return declared.union(*listed)
+
     def _move(self) -> None:
         """Put every file where it belongs, after a last look that nothing is in the way."""
-        files = sorted(p for p in self.temporary.rglob("*") if not p.is_dir())
-        for file in files:
-            refuse_existing(self.path / file.relative_to(self.temporary), self.force)
-        targets = [self.path / file.relative_to(self.temporary) for file in files]
-        stale = {self.path / name for name in self.names}.difference(targets)
-        with kept_aside([*targets, *stale], self.temporary / "earlier"):
-            # Renaming within a file system is atomic for each file.
-            for file, target in zip(files, targets, strict=True):
-                target.parent.mkdir(parents=True, exist_ok=True)
-                file.replace(target)
+        files = [p for p in self.temporary.rglob("*") if not p.is_dir()]
+        places = {self.path / file.relative_to(self.temporary): file for file in files}
+        to_disk([*files, self.temporary])
+        # Runs into one folder move one after the other, or its files would be of several.
+        with held(self.path, wait=True):
+            earlier = self._earlier()
+            for path in places:
+                refuse_existing(path, self.force)
+            with kept_aside({*places, *earlier}, self.temporary / "earlier"):
+                to_disk([self.path])
+                for path in sorted(places, key=last_sealed):
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    if is_seal(path):
+                        to_disk({p.parent for p in places})
+                    # Renaming within a file system is atomic for each file.
+                    places[path].replace(path)
+            to_disk([self.path])
+            remove_empty({path.parent for path in earlier}, self.path)
 
     def _discard(self) -> None:
-        """Remove the temporary folder and the folders that were made, if they are empty."""
-        if self.temporary != self.path:
-            shutil.rmtree(self.temporary, ignore_errors=True)
+        """Remove the folders that were made, if they are empty."""
         for folder in reversed(self.made):
             if folder.is_dir() and not any(folder.iterdir()):
                 folder.rmdir()
+
+
+def last_sealed(path: Path) -> tuple[bool, int, str]:
+    """The order in which files take their places: seals last, that of the whole folder after all.
+
+    They leave their places in the opposite order.
+    """
+    return is_seal(path), -len(path.parts), str(path)
 
 
 @contextmanager
@@ -151,33 +226,67 @@ def kept_aside(paths: Iterable[Path], aside: Path) -> Iterator[None]:
 
     Args:
         paths: Files that are there or will be.
-        aside: A folder that is made for them, and goes with them when the block ends well.
+        aside: A folder that is made for them, and goes with what is around it.
     """
-    paths = list(paths)
+    paths = set(paths)
     aside.mkdir()
-    moved = [path for path in paths if path.exists() or path.is_symlink()]
-    places = [aside / str(k) for k in range(len(moved))]
+    there = sorted((p for p in paths if p.exists() or p.is_symlink()), key=last_sealed)[::-1]
+    places = [aside / str(k) for k in range(len(there))]
     try:
-        for path, place in zip(moved, places, strict=True):
+        for path, place in zip(there, places, strict=True):
             path.replace(place)
         yield
     except BaseException:
-        for path in set(paths).difference(moved):
+        for path in sorted(paths.difference(there), key=last_sealed, reverse=True):
             path.unlink(missing_ok=True)
-        for path, place in zip(moved, places, strict=True):
+        for path, place in list(zip(there, places, strict=True))[::-1]:
             # A file that could not be moved is where it was.
             if place.exists() or place.is_symlink():
                 place.replace(path)
         raise
-    shutil.rmtree(aside)
+
+
+def remove_empty(folders: Iterable[Path], top: Path) -> None:
+    """Remove folders below `top` that an earlier run filled and nothing is left in."""
+    for folder in sorted(set(folders), reverse=True):
+        if folder != top:
+            with suppress(OSError):
+                folder.rmdir()
 
 
 def refuse_existing(path: Path, force: bool) -> None:
     """Raise an OutputError if something is at `path` that must not be overwritten."""
     if path.is_dir():
         raise OutputError(f"{path} is a folder; give the name of a file")
+    refuse_input(path)
     if not force and (path.exists() or path.is_symlink()):
         raise OutputError(f"{path} exists; give another -o, or --force to overwrite it")
+
+
+def refuse_input(path: Path) -> None:
+    """Raise an OutputError if this command reads the file at `path`, whatever it is called there.
+
+    Links count: what is read through one name would be lost under all.
+    """
+    if path.exists() and any(is_read(path, given) for given in _inputs.get()):
+        raise OutputError(
+            f"{path} is what this command reads, and --force does not overwrite that either; give "
+            "another -o"
+        )
+
+
+def is_read(path: Path, given: Path) -> bool:
+    """Whether a file is one that was given to the command to read, or in a folder that was."""
+    with suppress(OSError, ValueError):
+        if given.samefile(path):
+            return True
+        if given.is_dir():
+            files = [file for file in given.iterdir() if file.is_file()]
+            inside = path.resolve().is_relative_to(given.resolve())
+            if inside or any(path.samefile(file) for file in files):
+                # A report may stand in the folder of its own log.
+                return not is_seal(path) and path not in sealed_files(path.with_name(SEAL))
+    return False
 
 
 def numbered(names: Iterable[str]) -> list[str]:
@@ -189,14 +298,6 @@ def numbered(names: Iterable[str]) -> list[str]:
             free, number = f"{name}-{number}", number + 1
         found.append(free)
     return found
-
-
-def check_writable(folder: Path) -> None:
-    """Raise the operating system's error if no file can be made in `folder`."""
-    if not folder.is_dir():
-        raise FileNotFoundError(2, "there is no such folder", str(folder))
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise PermissionError(13, "no permission to write there", str(folder))
 
 
 def unwritable(path: Path, error: OSError) -> OutputError:

@@ -29,9 +29,7 @@ class Library:
         """
         from vftcli.readers import read
 
-        choice, at = choice or ReadChoice(), absolute(path)
-        # A log that nobody announced is told from those that were, which keep their labels.
-        label = self._labels.setdefault(at, labelled([at, *self._labels])[at])
+        choice, at, label = choice or ReadChoice(), absolute(path), self.label(path)
         if (at, choice.whole) not in self._recordings:
             self._recordings[at, choice.whole] = read(
                 path,
@@ -41,6 +39,12 @@ class Library:
                 label=label,
             )
         return choice.within(self._recordings[at, choice.whole])
+
+    def label(self, path: str | Path) -> str:
+        """What a log is called, a name that no other log of the command has."""
+        at = absolute(path)
+        # A log that nobody announced is told from those that were, which keep their labels.
+        return self._labels.setdefault(at, labelled([at, *self._labels])[at])
 
     def open_logs(self, paths: Iterable[str | Path], choice: ReadChoice) -> tuple[Recording, ...]:
         """Read the logs of a command.

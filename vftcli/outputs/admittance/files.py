@@ -18,7 +18,8 @@ from vftcli.outputs.admittance.tables import comparison_csv, latency_rows
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.grid import json_rows
-from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, to_json, versions
+from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
+from vftcli.outputs.seals import SEAL
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import AXES as FORCES
 
@@ -28,7 +29,7 @@ FILES = (
     "motion.parquet",
     "comparison.csv",
     "comparison.json",
-    "run.json",
+    SEAL,
 )
 
 CONVENTIONS = {
@@ -146,10 +147,10 @@ def write_admittance(
         "index.html": render_admittance(replay, record, title, run, examinations),
         "comparison.csv": comparison_csv(replay.rows),
         "comparison.json": json_rows(replay.rows),
-        "run.json": to_json(record),
     }
     with OutputFolder(path, force, FILES) as folder:
         for name, text in texts.items():
             folder.write(name, text)
         motion_table(replay).write_parquet(folder / "motion.parquet", compression="zstd")
         write_ghosts(folder / "recording.rrd", replay, title)
+        seal(folder, SEAL, record)

@@ -16,9 +16,10 @@ from vftcli.outputs.log.run_record import (
     input_record,
     log_remarks,
     robot_record,
-    to_json,
+    seal,
     versions,
 )
+from vftcli.outputs.seals import SEAL
 from vftcli.robots.writing import robot_toml
 from vftcli.signals.errors import OutputError
 
@@ -35,7 +36,7 @@ def beside(path: Path) -> dict[str, Path]:
         "toml": path,
         "html": path.with_suffix(".html"),
         "rrd": path.with_suffix(".rrd"),
-        "run": path.with_suffix(".run.json"),
+        "run": path.with_suffix(f".{SEAL}"),
     }
 
 
@@ -62,14 +63,13 @@ def write_identification(
     ]
     texts = {
         "html": render_identification(found, record, logs),
-        "run": to_json(record),
         "toml": robot_toml(found.robot, heading),
     }
     with OutputFolder(path.parent, force, names.values()) as folder:
         write_identification_rrd(folder / names["rrd"], found)
         for kind, text in texts.items():
             folder.write(names[kind], text)
-    return texts["run"]
+        return seal(folder, names["run"], record)
 
 
 def identification_record(

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from vftcli.outputs.files import atomic
+from vftcli.outputs.files import atomic, check_file
 from vftcli.outputs.log.estimates import per_axis, per_joint
 from vftcli.outputs.log.mcap_output import (
     OutputTopic,
@@ -28,13 +28,22 @@ def convert(recording: Recording, path: Path, *, force: bool = False) -> None:
     Raises:
         OutputError: If the ending is unknown, the file exists, or it cannot be written.
     """
-    writer = WRITERS.get(path.suffix.lower())
-    if writer is None:
+    check_conversion(path, force)
+    with atomic(path, force=force) as temporary:
+        WRITERS[path.suffix.lower()](recording, temporary)
+
+
+def check_conversion(path: Path, force: bool) -> None:
+    """See before the log is read whether it could be written to `path`.
+
+    Raises:
+        OutputError: As `convert` does.
+    """
+    if path.suffix.lower() not in WRITERS:
         raise OutputError(
             f"{path}: no format ends in {path.suffix or 'nothing'!r}; there is {', '.join(WRITERS)}"
         )
-    with atomic(path, force=force) as temporary:
-        writer(recording, temporary)
+    check_file(path, force)
 
 
 def columns_of(recording: Recording) -> Iterator[tuple[str, Any]]:

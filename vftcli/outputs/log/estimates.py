@@ -8,7 +8,8 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.files import OutputFolder, one_line
-from vftcli.outputs.log.run_record import run_record, to_json
+from vftcli.outputs.log.run_record import run_record, seal
+from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import OutputError
 from vftcli.signals.wrench import AXES
@@ -111,6 +112,11 @@ EXTRAS = {"csv": "estimates.csv", "mcap": "estimates.mcap", "rrd": "recording.rr
 """Flag → file name."""
 
 
+def estimate_files(extras: Sequence[str]) -> tuple[str, ...]:
+    """Names of the files of a folder with these extras."""
+    return ("estimates.parquet", SEAL, *(EXTRAS[extra] for extra in extras))
+
+
 def write_estimate_folder(
     path: Path, analysis: Analysis, command: str, extras: Sequence[str] = (), force: bool = False
 ) -> str:
@@ -122,16 +128,14 @@ def write_estimate_folder(
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
-    record = to_json(run_record(analysis, command))
+    record = run_record(analysis, command)
     # After the record: it names the packages that are loaded, and these made no number.
     from vftcli.outputs.log.mcap_output import write_mcap
     from vftcli.outputs.log.rerun_recording import write_rrd
 
     writers = {"csv": write_csv, "mcap": write_mcap, "rrd": write_rrd}
-    names = ["estimates.parquet", "run.json", *(EXTRAS[extra] for extra in extras)]
-    with OutputFolder(path, force, names) as folder:
+    with OutputFolder(path, force, estimate_files(extras)) as folder:
         write_estimates(folder / "estimates.parquet", analysis)
         for extra in extras:
             writers[extra](folder / EXTRAS[extra], analysis)
-        folder.write("run.json", record)
-    return record
+        return seal(folder, SEAL, record)

@@ -3,16 +3,17 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.files import OutputFolder, numbered
 from vftcli.outputs.log import tables
 from vftcli.outputs.log.estimates import write_estimates
 from vftcli.outputs.log.rerun_recording import write_rrd
-from vftcli.outputs.log.run_record import run_record, to_json
+from vftcli.outputs.log.run_record import run_record, seal, versions
 from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds
 from vftcli.outputs.page.page import render, render_index
+from vftcli.outputs.seals import SEAL
 
 if TYPE_CHECKING:
     import polars as pl
@@ -25,8 +26,21 @@ ERROR_TABLES: dict[str, Callable[["pl.DataFrame", PaperBounds], str]] = {
 }
 """File name → how its text is made from the errors table."""
 
-FILES = ("index.html", "recording.rrd", "estimates.parquet", "run.json", *ERROR_TABLES)
+FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *ERROR_TABLES)
 """What a report of one log may hold; the error tables only where there is a reference."""
+
+
+def places_of(labels: Sequence[str]) -> list[str]:
+    """The sub-folder of each of several logs: called as its file without the ending."""
+    return numbered(Path(label).stem or "log" for label in labels)
+
+
+def report_files(labels: Sequence[str]) -> list[str]:
+    """Names of all files that a report of logs with these labels may hold."""
+    if len(labels) == 1:
+        return list(FILES)
+    below = [f"{place}/{name}" for place in places_of(labels) for name in FILES]
+    return ["index.html", SEAL, *ERROR_TABLES, *below]
 
 
 def write_report(path: Path, analysis: Analysis, *, command: str, force: bool = False) -> str:
@@ -39,7 +53,7 @@ def write_report(path: Path, analysis: Analysis, *, command: str, force: bool = 
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     with OutputFolder(path, force, FILES) as folder:
-        return to_json(fill(folder, "", analysis, command))
+        return fill(folder, "", analysis, command)
 
 
 def write_reports(
@@ -48,18 +62,16 @@ def write_reports(
     """Write one sub-folder a log, and above them an index, all errors in one, and run.json.
 
     Returns:
-        The text of the upper `run.json`: a list with the record of every log.
+        The texts of the logs' own `run.json`, as one JSON array.
 
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     import polars as pl
 
-    # One folder a log, called as its file without the ending.
-    places = numbered(Path(a.recording.name).stem or "log" for a in analyses)
-    # All names that any log may have are declared, so that --force removes stale ones.
-    below = [f"{place}/{name}" for place in places for name in FILES]
-    with OutputFolder(path, force, ["index.html", "run.json", *ERROR_TABLES, *below]) as folder:
+    labels = [a.recording.name for a in analyses]
+    places = places_of(labels)
+    with OutputFolder(path, force, report_files(labels)) as folder:
         records = [
             fill(folder, f"{place}/", analysis, command)
             for place, analysis in zip(places, analyses, strict=True)
@@ -68,13 +80,13 @@ def write_reports(
         found = [a.errors for a in analyses if a.errors is not None]
         together = pl.concat(found, how="diagonal") if found else None
         put_errors(folder, "", together, paper_bounds(analyses))
-        texts = ",\n".join(to_json(record).rstrip("\n") for record in records)
-        folder.write("run.json", f"[\n{texts}\n]\n")
-        return f"[\n{texts}\n]\n"
+        logs = dict(zip(places, labels, strict=True))
+        seal(folder, SEAL, {"command": command, "versions": versions(), "logs": logs})
+        return "[\n" + ",\n".join(record.rstrip("\n") for record in records) + "\n]\n"
 
 
-def fill(folder: OutputFolder, place: str, analysis: Analysis, command: str) -> dict[str, Any]:
-    """Write one log's files; return its record."""
+def fill(folder: OutputFolder, place: str, analysis: Analysis, command: str) -> str:
+    """Write one log's files; return the text of its `run.json`."""
     record = run_record(analysis, command)
     # The page shows the record that is written beside it, not one of its own.
     analysis = replace(analysis, run=record)
@@ -82,8 +94,7 @@ def fill(folder: OutputFolder, place: str, analysis: Analysis, command: str) -> 
     write_rrd(folder / f"{place}recording.rrd", analysis)
     write_estimates(folder / f"{place}estimates.parquet", analysis)
     put_errors(folder, place, analysis.errors, paper_bounds([analysis]))
-    folder.write(f"{place}run.json", to_json(record))
-    return record
+    return seal(folder, f"{place}{SEAL}", record)
 
 
 def put_errors(

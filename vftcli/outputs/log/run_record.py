@@ -17,6 +17,7 @@ from vftcli.analysis import Analysis
 from vftcli.observers.auto_tuning import AutoTuned
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.outputs.examination import health_record
+from vftcli.outputs.files import OutputFolder
 from vftcli.robots.robot import Robot
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
@@ -73,6 +74,29 @@ def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
         **log_remarks([analysis.recording]),
         "notes": all_remarks(analysis),
     }
+
+
+def seal(
+    folder: OutputFolder,
+    name: str,
+    record: Mapping[str, Any],
+    files: Mapping[str, str] | None = None,
+) -> str:
+    """Write a run's record with the digest of every file beside it, the last of them to be written.
+
+    Args:
+        folder: Where the files are.
+        name: The seal, as ``run.json``; in a sub-folder it stands for the files there.
+        record: What was run on what.
+        files: Name → sha256, where they are not all that are there.
+
+    Returns:
+        The text of the file.
+    """
+    place = name.rpartition("/")[0]
+    text = to_json({**record, "files": folder.digests(place) if files is None else files})
+    folder.write(name, text)
+    return text
 
 
 def to_json(record: Mapping[str, Any]) -> str:

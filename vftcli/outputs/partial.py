@@ -1,0 +1,111 @@
+"""Temporary folders: each belongs to a living process, and what dead ones left is cleared."""
+
+import os
+import re
+import shutil
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+if sys.platform != "win32":
+    import fcntl
+
+NAME = re.compile(r"\.vftcli-(\d+)-[0-9a-f]{8}\.partial")
+"""What a temporary folder is called; the number is that of the process that made it."""
+
+UNSURE = 60.0
+"""A folder that nobody holds is cleared at this age even if its process number is in use, which by
+then is another program's. [s]"""
+
+
+@contextmanager
+def partial_folder(parent: Path) -> Iterator[Path]:
+    """Make a folder in `parent` for a block; it goes with all that is still in it.
+
+    When the block ends well, what killed runs left in `parent` goes too.
+
+    Raises:
+        OSError: If it cannot be made.
+    """
+    path = parent / f".vftcli-{os.getpid()}-{os.urandom(4).hex()}.partial"
+    path.mkdir()
+    try:
+        # Held as long as the process lives, however it ends: so others know that it does.
+        with held(path, wait=False):
+            yield path
+    finally:
+        shutil.rmtree(path, ignore_errors=True)
+    clear_leftovers(parent)
+
+
+def clear_leftovers(parent: Path) -> None:
+    """Remove the temporary folders in `parent` whose processes are gone."""
+    for path in parent.glob(".vftcli-*.partial"):
+        found = NAME.fullmatch(path.name)
+        if found is None or path.is_symlink() or not path.is_dir():
+            continue
+        with suppress(OSError), held(path, wait=False):
+            if not is_running(int(found[1])) or time.time() - path.stat().st_mtime > UNSURE:
+                shutil.rmtree(path, ignore_errors=True)
+
+
+def is_running(process: int) -> bool:
+    """Whether a process has this number on this machine, as far as that can be told."""
+    if sys.platform == "win32":
+        return True  # asking would end it
+    try:
+        os.kill(process, 0)
+    except PermissionError:
+        return True
+    except (ProcessLookupError, OverflowError):
+        return False
+    return True
+
+
+@contextmanager
+def held(folder: Path, *, wait: bool) -> Iterator[None]:
+    """Hold a folder for a block against others that hold it; the system lets go of the dead's.
+
+    Args:
+        folder: A folder that is there.
+        wait: Whether to wait until nobody else holds it.
+
+    Raises:
+        BlockingIOError: If somebody else holds it and `wait` is not set.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    place = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(place, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            raise
+        except OSError:
+            pass  # a file system without locks: nothing holds, nothing waits
+        yield
+    finally:
+        os.close(place)
+
+
+def to_disk(paths: Iterable[Path]) -> None:
+    """Have files and folders on the disk itself, so that a later rename cannot outrun them."""
+    for path in paths:
+        # A folder cannot be opened everywhere, nor flushed on every file system.
+        with suppress(*([OSError] if path.is_dir() else [])):
+            place = os.open(path, os.O_RDONLY)
+            try:
+                os.fsync(place)
+            finally:
+                os.close(place)
+
+
+def check_writable(folder: Path) -> None:
+    """Raise the operating system's error if no file can be made in `folder`."""
+    if not folder.is_dir():
+        raise FileNotFoundError(2, "there is no such folder", str(folder))
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise PermissionError(13, "no permission to write there", str(folder))

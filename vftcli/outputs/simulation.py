@@ -1,0 +1,111 @@
+"""A simulated log with its truth, its scenario and its record beside it: all of them or none."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.log.run_record import seal, versions
+from vftcli.outputs.seals import SEAL
+from vftcli.signals.errors import OutputError
+from vftcli.simulation.experiment import Simulation
+from vftcli.simulation.load import to_toml
+
+
+def free_path(path: Path) -> Path:
+    """Where the free run of a pair goes: ``log.csv`` → ``log.free.csv``."""
+    return path.with_name(f"{path.stem}.free{path.suffix}")
+
+
+def companions(path: Path) -> tuple[Path, Path, Path]:
+    """The truth, the scenario and the record beside a log."""
+    return (
+        path.with_name(f"{path.name}.truth.parquet"),
+        path.with_name(f"{path.name}.scenario.toml"),
+        path.with_name(f"{path.name}.{SEAL}"),
+    )
+
+
+def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
+    """The folder of logs that stand beside one another, checked.
+
+    Raises:
+        OutputError: If a file exists and `force` is not set, is an input, or the folder is missing
+            or closed.
+    """
+    names: list[str] = []
+    for path in paths:
+        if not path.name:
+            raise OutputError(f"{path} is a folder; give the name of a log file with -o")
+        if path.is_dir() and not (path / "metadata.yaml").is_file():
+            raise OutputError(f"{path} is a folder and no bag; give another -o")
+        if not path.parent.is_dir():
+            raise OutputError(
+                f"{path.parent}: there is no such folder; make it, or give another -o"
+            )
+        # A bag is a folder: the files of the one that is there go when the new ones come.
+        inside = [file for file in path.rglob("*") if not file.is_dir()] if path.is_dir() else []
+        if inside and not force:
+            raise OutputError(f"{path} exists; give another -o, or --force to overwrite it")
+        names += [
+            file.relative_to(path.parent).as_posix()
+            for file in (*(inside or [path]), *companions(path))
+        ]
+    folder = OutputFolder(path.parent, force, names)
+    folder.check()
+    return folder
+
+
+def save(
+    runs: Mapping[Path, Simulation], format: str = "", force: bool = False, command: str = ""
+) -> list[Path]:
+    """Write each log, with ``PATH.truth.parquet``, ``.scenario.toml`` and ``.run.json`` beside it.
+
+    Args:
+        runs: Where each log goes → the finished run; all in one folder.
+        format: A name in `WRITERS`, or "" for the scenario's or the vendor's usual one.
+        force: Whether files that are there may be replaced.
+        command: The command line, for the record.
+
+    Returns:
+        The paths of all files; of a bag, its folder.
+
+    Raises:
+        ParameterError: If the robot cannot log in the format.
+        OutputError: As `log_folder` does, or if a file cannot be written.
+    """
+    from vftcli.simulation.writers import usual_format
+
+    formats = {path: usual_format(run, format) for path, run in runs.items()}
+    with log_folder(runs, force) as folder:
+        for path, run in runs.items():
+            write_run(folder, path, run, formats[path], command)
+    return [file for path in runs for file in (path, *companions(path))]
+
+
+def write_run(folder: OutputFolder, path: Path, run: Simulation, format: str, command: str) -> None:
+    """Write one log and what stands beside it into a folder."""
+    from vftcli.simulation.writers import WRITERS
+    from vftcli.simulation.writers.parquet import write_truth
+
+    truth, scenario, record = (file.name for file in companions(path))
+    WRITERS[format](folder / path.name, run)
+    write_truth(folder / truth, run.truth, run.scenario.sensing.start)
+    folder.write(scenario, to_toml(replace(run.scenario, format=format), run.seed))
+    own = {truth, scenario, path.name}
+    files = {n: sha for n, sha in folder.digests().items() if n.partition("/")[0] in own}
+    seal(folder, record, run_record(run, format, command), files)
+
+
+def run_record(run: Simulation, format: str, command: str) -> dict[str, Any]:
+    """What was simulated; the scenario file says all of it."""
+    return {
+        "command": command,
+        "versions": versions(),
+        "scenario": run.scenario.name,
+        "seed": run.seed,
+        "robot": run.scenario.robot,
+        "format": format,
+        "samples": len(run.measured.rows),
+    }
