@@ -463,9 +463,10 @@ SEED = 3
 
 def simulated(log: str, folder: Path) -> Table:
     """A simulated log; made in `folder` unless it is there, its truth and scenario beside it."""
+    from vftcli.simulation.saving import save
+
     from vftcli.simulation import load_scenario
     from vftcli.simulation.experiment import simulate
-    from vftcli.simulation.saving import save
 
     scenario, seconds, signal = SCENARIOS[log]
     path = folder / f"{log}.parquet"
