@@ -40,9 +40,9 @@ def test_minus_turns_the_sign_and_is_said(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("unit", "factor"), [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)])
 def test_time_units(tmp_path: Path, unit: str, factor: float) -> None:
-    rows = "\n".join(f"{k},{0.1 * k}" for k in range(5))
+    rows = "\n".join(f"{1000 * k},{0.1 * k}" for k in range(5))
     recording = read(write(tmp_path / "x", rows + "\n"), columns=f"t[{unit}],q")
-    np.testing.assert_allclose(recording.t, factor * np.arange(5), rtol=1e-12)
+    np.testing.assert_allclose(recording.t, 1000 * factor * np.arange(5), rtol=1e-12)
 
 
 def test_degrees_become_radians(tmp_path: Path) -> None:

@@ -276,7 +276,7 @@ def test_wrapped_files_read_the_same(tmp_path: Path, wrap: str) -> None:
     cut = write(tmp_path / "z", packed.read_bytes()[: len(packed.read_bytes()) // 2])
     short = read(cut)
     assert 0 < short.samples < ROWS
-    assert any("file is cut" in repair for repair in short.source.repairs)
+    assert any("file is cut" in told for told in short.source.warnings)
 
 
 def test_signals_that_nobody_asked_for_stay_unread(tmp_path: Path) -> None:

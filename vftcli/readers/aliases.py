@@ -71,6 +71,7 @@ def picks_by_alias(table: Table) -> tuple[Picks, tuple[str, ...]]:
     signals = [p for p in signals if len(p.cells) == joints or p.signal in {"q", "wrench"}]
     names_there = table.names or ()
     origin = names_there.index(OWN_STAMPS) if names_there.count(OWN_STAMPS) == 1 else None
+    origin = None if origin in table.lists else origin
     picks = checked(table, Picks(signals=tuple(signals), clock=_clock(table), origin=origin))
     names = next((g.joints for g in groups.values() if g.joints), ())
     return picks, names
@@ -120,6 +121,11 @@ def _pick_of(table: Table, signal: str, groups: dict[str, Group]) -> Pick | None
         )
     name = found[0]
     group = groups[name]
+    if not group.cells:
+        raise LogError(
+            f"{table.path}: {name} holds no number in its first row, so its width cannot be told. "
+            "Cut the rows with empty lists out, or leave the column out with --columns."
+        )
     first = group.indices[0]
     if group.indices != tuple(range(first, first + len(group.indices))):
         raise LogError(
@@ -142,7 +148,8 @@ def vendor_pick(signal: str, name: str, cells: tuple[Cell, ...]) -> Pick:
 
 def _wrench(table: Table) -> Pick | None:
     """The six columns of a wrench, None where one of them is missing."""
-    names = [name.lower() for name in table.names or ()]
+    there = enumerate(table.names or ())
+    names = ["" if column in table.lists else name.lower() for column, name in there]
     for text in WRENCHES:
         wanted = text.split()
         if all(names.count(name) == 1 for name in wanted):
@@ -163,7 +170,22 @@ def _clock(table: Table) -> Pick | None:
             f"{table.path}: {there} could each be the clock. Say which with --columns, as in "
             f"t={(table.names or ())[found[0]]},q=…"
         )
-    return Pick(signal="t", cells=(Cell(found[0]),)) if found else None
+    return Pick(signal="t", cells=(table_clock(table, found[0]),)) if found else None
+
+
+def table_clock(table: Table, column: int) -> Cell:
+    """The cell of a clock's column, which may hold lists of one number.
+
+    Raises:
+        LogError: If it holds lists of any other length.
+    """
+    length = table.lists.get(column, 1)
+    if length != 1:
+        raise LogError(
+            f"{table.path}: the clock {(table.names or ())[column]!r} holds {length} numbers a "
+            "row, but a sample has one time. Name another column with --columns, as in t=…,q=…"
+        )
+    return Cell(column, 0 if column in table.lists else None)
 
 
 def vector_picks(table: Table, names: dict[str, str], joints: Sequence[int]) -> tuple[Pick, ...]:

@@ -87,7 +87,8 @@ def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
     """
     arrays = {}
     for name, value in log.items():
-        if not isinstance(value, np.ndarray | list) or not len(value):
+        rows = value.shape[0] if isinstance(value, np.ndarray) and value.ndim else 0
+        if not (rows or (isinstance(value, list) and value)):
             continue
         try:
             array = np.asarray(value)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vftcli.readers.reader import RawLog
-from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.arrays import Array, Mask, handed_over, median
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import Remark, caution, fact
@@ -26,6 +26,9 @@ ABSURD_STAMP = 1e19
 
 ABSURD = 1e9
 """Values as large as this are no measurement in any unit; anywhere in a log they are refused."""
+
+SHORTEST_STEP, LONGEST_LOG = 1e-7, 1e11
+"""No robot is sampled ten million times a second, nor for three thousand years. [s]"""
 
 ONE_TURN, TWO_TURNS = 2 * np.pi + 0.1, 13.0
 """How far a joint goes from its zero, with a little to spare: of seven-joint arms, of any. [rad]"""
@@ -63,7 +66,8 @@ def cleaned(
     raw = without_leading_garbage(raw)
     refuse_unknown_numbers(raw, path)
     refuse_backward_steps(raw, path)
-    fresh = without_repeats(raw)
+    refuse_standing_clock(raw, path)
+    fresh = without_repeats(raw, path)
     if raw.degrees_possible:
         refuse_degrees(fresh, path)
     t = seconds(fresh)
@@ -215,6 +219,30 @@ def refuse_backward_steps(raw: RawLog, path: Path) -> None:
     )
 
 
+def refuse_standing_clock(raw: RawLog, path: Path) -> None:
+    """Raise a ClockError if the clock does not run, or not at a pace that a robot's log can have.
+
+    Raises:
+        ClockError: If all stamps are one, or lie nearer or farther apart than any robot's.
+    """
+    t = seconds(raw)
+    rows, span, steps = len(t), float(t[-1]), np.diff(t)
+    if rows < 2:
+        return
+    if span == 0:
+        raise ClockError(
+            f"{path}: the clock stands still: all {rows} samples have the stamp "
+            f"{raw.stamps[0]:.10g}. Name another column as t with --columns, or state the rate of "
+            "a log without a clock, as in t@125Hz."
+        )
+    usual = median(steps[steps > 0])
+    if not (usual >= SHORTEST_STEP and span <= LONGEST_LOG):
+        raise ClockError(
+            f"{path}: samples {usual:.3g} s apart over {span:.3g} s, which no robot's log is. Say "
+            "the unit of the clock with --columns, as in t[ms]=…, or name another column."
+        )
+
+
 def segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
     """One of several recordings in a file, counted from 1; the clock's restarts part them.
 
@@ -235,8 +263,12 @@ def segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
     return replace(kept(raw, slice(first, last), remark), first_row=raw.first_row + first)
 
 
-def without_repeats(raw: RawLog) -> RawLog:
-    """Drop rows whose stamp repeats the one before, and say so."""
+def without_repeats(raw: RawLog, path: Path) -> RawLog:
+    """Drop rows whose stamp repeats the one before, and say so.
+
+    Raises:
+        ClockError: If most rows do and are samples of their own.
+    """
     fresh = np.concatenate([[True], np.diff(raw.stamps) > 0])
     again = np.flatnonzero(~fresh)
     if again.size == 0:
@@ -244,6 +276,12 @@ def without_repeats(raw: RawLog) -> RawLog:
     changed = np.zeros(again.size, dtype=bool)
     for value in raw.signals.values():
         changed |= (value[again] != value[again - 1]).any(axis=1)
+    if 2 * int(changed.sum()) > len(raw.stamps):
+        raise ClockError(
+            f"{path}: the clock is coarser than the samples: {changed.sum()} of {len(fresh)} rows "
+            "have the stamp of the row before but other values. Name a finer column as t with "
+            "--columns, or state the rate of a log without a clock, as in t@125Hz."
+        )
     remarks = [fact("repeats-dropped" if again.size > 1 else "repeat-dropped", rows=again.size)]
     if different := int(changed.sum()):
         remarks.append(caution("repeats-differ", changed=different, repeats=again.size))

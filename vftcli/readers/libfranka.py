@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import vendor_pick
+from vftcli.readers.aliases import table_clock, vendor_pick
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Cell, Column, Pick, Picks, Table, checked, picked
@@ -112,7 +112,7 @@ def read_array_fields(
         for name in wanted
         if name in names and (width := table.lists.get(names.index(name)))
     }
-    time = Cell(names.index("time"))
+    time = table_clock(table, names.index("time"))
     return read_fields(table, fields, time, request, **more)
 
 

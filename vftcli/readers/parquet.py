@@ -44,6 +44,8 @@ class ParquetTable:
                 memory_map=isinstance(source, Path),
             )
             self._schema = self._file.schema_arrow
+            if self._file.metadata.num_rows == 0:
+                raise LogError(f"{path}: the table has no rows; nothing was recorded into it.")
         self.names: tuple[str, ...] | None = tuple(self._schema.names)
 
     @property

@@ -10,7 +10,7 @@ from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import Remark, warning
 from vftcli.signals.wrench import WrenchFrame
 
 
@@ -54,7 +54,7 @@ class LogFile:
         """What had to be left behind to open the file."""
         if self.wrapping is None or not self._unwrapped[1]:
             return ()
-        return (fact("file-cut", wrapping=self.wrapping),)
+        return (warning("file-cut", wrapping=self.wrapping),)
 
     @cached_property
     def _unwrapped(self) -> tuple[memoryview, bool]:

@@ -13,6 +13,9 @@ from vftcli.readers.joints import in_order, kinematic_order
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 
+LAYOUTS = 512
+"""Layouts that messages of one topic may have: joint names, and lengths of lists, hardly vary."""
+
 CHECKED_ROWS = 4
 """Random messages of some batches that are walked one by one to confirm their layout."""
 
@@ -118,6 +121,8 @@ class Decoder:
         while rows.size:
             layout = self._walked(batch, topic, int(rows[0]))
             known.append(layout)
+            if sum(map(len, topic.layouts.values())) > LAYOUTS:
+                raise LayoutError(f"its messages have more than {LAYOUTS} layouts")
             rows = self._matching(batch, topic, layout, rows)
 
     def _matching(

@@ -7,6 +7,7 @@ too, so that joint names hold for every message of a group.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,11 @@ from vftcli.signals.arrays import Mask
 
 MAX_DEPTH = 24
 MAX_LEAVES = 20_000
+SPARE_VISITS = 1000
+"""Fields that a walk may visit beyond one a byte: messages without fields take none."""
+
+MAX_DEFINITION = 64 * 1024
+"""The longest definition of an arm's state, Franka's with all its errors, takes some 10 KiB."""
 
 SIZES = {
     "bool": "u1", "byte": "u1", "octet": "u1", "char": "u1", "uint8": "u1", "int8": "i1",
@@ -119,6 +125,7 @@ class Walker:
         self.layout = MessageLayout()
         self.order = "<"
         self.position = 0
+        self.visits = 0
         if self.cdr:
             self._encapsulation()
 
@@ -147,6 +154,10 @@ class Walker:
         """Walk the fields of one message."""
         if depth > MAX_DEPTH:
             raise LayoutError("nested too deeply")
+        # Empty messages take no bytes: a few nested types of them would be visited without end.
+        self.visits += 1
+        if self.visits > len(self.message) + SPARE_VISITS:
+            raise LayoutError("more parts than bytes")
         if name not in self.types:
             raise LayoutError(f"no definition of {name}")
         for part in self.types[name]:
@@ -165,8 +176,6 @@ class Walker:
             self._message(path, part.type, depth + 1)
         else:
             for k in range(many):
-                if self.position >= len(self.message) and self.types.get(part.type):
-                    raise LayoutError("a sequence longer than the message")
                 self._message(f"{path}[{k}]", part.type, depth + 1)
 
     def _numbers(self, path: str, code: str, count: int) -> None:
@@ -192,8 +201,8 @@ class Walker:
         self.layout.fixed.append((start, self.position))
         count = int(self.message[start : self.position].view(f"{self.order}u4")[0])
         # An element takes a byte or more: a larger count is damage, not data.
-        if count > len(self.message):
-            raise LayoutError("a count larger than the message")
+        if count > len(self.message) - self.position:
+            raise LayoutError("a count larger than what is left of the message")
         return count
 
     def _texts(self, path: str, count: int) -> None:
@@ -210,6 +219,7 @@ class Walker:
         self.layout.texts[path] = tuple(texts)
 
 
+@lru_cache(maxsize=64)  # many channels may share one definition, and parsing takes its time
 def types_of(definition: str, name: str, *, idl: bool) -> dict[str, tuple[Field, ...]]:
     """Parse a message definition with rosbags' parsers. Type → fields.
 
@@ -218,8 +228,8 @@ def types_of(definition: str, name: str, *, idl: bool) -> dict[str, tuple[Field,
     """
     from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 
-    if len(definition) > 1 << 20:
-        raise LayoutError("a definition of more than a megabyte")
+    if len(definition) > MAX_DEFINITION:
+        raise LayoutError(f"a definition of more than {MAX_DEFINITION >> 10} KiB")
     try:
         parsed = get_types_from_idl(definition) if idl else get_types_from_msg(definition, name)
     except (TypesysError, ValueError, KeyError, TypeError, RecursionError, AssertionError) as error:

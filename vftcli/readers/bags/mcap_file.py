@@ -6,6 +6,7 @@ Format: https://mcap.dev/spec. A record is an opcode, a 64-bit length and the co
 import struct
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,9 +28,13 @@ from vftcli.readers.bags.container import (
     unpack_chunk,
 )
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import fact
+from vftcli.signals.remarks import caution, warning
 
-SCHEMA, CHANNEL, MESSAGE, CHUNK, STATISTICS, FOOTER, DATA_END = 3, 4, 5, 6, 11, 2, 15
+FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX = 2, 3, 4, 5, 6, 7
+CHUNK_INDEX, ATTACHMENT, STATISTICS, METADATA, DATA_END = 8, 9, 11, 12, 15
+DATA_RECORDS = {SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, ATTACHMENT, METADATA}
+DATA_END_BYTES = 13
+"""Length of the record that ends the data, its head included."""
 HEADER = 9
 """Bytes before a record's content: opcode and length."""
 MESSAGE_HEAD = 22
@@ -42,6 +47,31 @@ ENCODINGS: dict[str, Encoding] = {
 }  # fmt: skip
 
 
+@dataclass
+class End:
+    """What the records behind the messages say of them, and what was found.
+
+    Attributes:
+        messages: Messages found.
+        chunks: Chunks found.
+        counted: Messages that the statistics count, None without statistics.
+        indexed: Chunks that the summary lists.
+        data_end: Where the record that ends the data ends, None if there is none.
+        summary: Where the footer says that the summary begins; 0 if it has none.
+        data: Where the last record of the data ends.
+        closed: Whether there is a footer.
+    """
+
+    messages: int = 0
+    chunks: int = 0
+    counted: int | None = None
+    indexed: int = 0
+    data_end: int | None = None
+    summary: int = 0
+    data: int = 0
+    closed: bool = False
+
+
 class Catalogue:
     """Schemas and channels met so far."""
 
@@ -49,10 +79,8 @@ class Catalogue:
         self.ingest = ingest
         self.schemas: dict[int, tuple[str, str, bytes]] = {}
         self.channels: dict[int, Channel] = {}
-        self.messages = 0
-        self.counted: int | None = None
         self.loose: dict[int, list[MessageRun]] = {}
-        self.ended = self.closed = False
+        self.end = End()
 
     def take(self, opcode: int, content: memoryview) -> None:
         """Take up a schema or channel record."""
@@ -98,20 +126,23 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
     catalogue = Catalogue(ingest)
     position = len(MCAP)
     try:
-        while position + HEADER <= len(content) and not catalogue.closed:
+        while position + HEADER <= len(content) and not catalogue.end.closed:
             opcode, end = content[position], position + HEADER + u64(content, position + 1)
             if end > len(content):
                 break
             # Messages outside chunks are gathered and yielded at the end, all at once.
             if opcode == CHUNK:
+                catalogue.end.chunks += 1
                 yield from _chunk(content[position + HEADER : end], catalogue)
             else:
                 _record(catalogue, opcode, content, position, end)
+            if opcode in DATA_RECORDS and catalogue.end.data_end is None:
+                catalogue.end.data = end
             position = end
     except struct.error:
         raise LogError(f"{ingest.path}: a record is damaged at byte {position}.") from None
     yield from _yielded(catalogue.loose, np.frombuffer(content, dtype=np.uint8), catalogue)
-    _check_end(catalogue, len(content) - position)
+    _check_end(catalogue.end, ingest, len(content) - position)
 
 
 def _record(
@@ -122,32 +153,50 @@ def _record(
         _message(content, position, end, catalogue.loose)
     elif opcode in {SCHEMA, CHANNEL}:
         catalogue.take(opcode, content[position + HEADER : end])
-    elif opcode == STATISTICS:
-        catalogue.counted = u64(content, position + HEADER)
-    elif opcode in {DATA_END, FOOTER}:
-        catalogue.ended = True
-        catalogue.closed = opcode == FOOTER
+    end_of = catalogue.end
+    if opcode == STATISTICS:
+        end_of.counted = u64(content, position + HEADER)
+    elif opcode == CHUNK_INDEX:
+        end_of.indexed += 1
+    elif opcode == DATA_END:
+        end_of.data_end = end
+    elif opcode == FOOTER:
+        end_of.closed, end_of.summary = True, u64(content, position + HEADER)
 
 
-def _check_end(catalogue: Catalogue, left: int) -> None:
-    """Say so if the file is cut.
+def _check_end(end: End, ingest: Ingest, left: int) -> None:
+    """Say so if the file is cut, at its end or anywhere else, and how much of it was kept.
 
     Raises:
-        LogError: If its statistics count another number of messages.
+        LogError: If it holds more messages than it counts, or bytes behind its end.
     """
-    ingest = catalogue.ingest
-    if catalogue.counted is not None and catalogue.counted != catalogue.messages:
+    kept = end.messages
+    if end.counted is not None and end.counted < kept:
         raise LogError(
-            f"{ingest.path}: its statistics count {catalogue.counted} messages, the chunks hold "
-            f"{catalogue.messages}; the file is damaged."
+            f"{ingest.path}: its statistics count {end.counted} messages, the chunks hold {kept}; "
+            "the file is damaged."
         )
-    if catalogue.closed and left != len(MCAP):
+    if end.closed and left != len(MCAP):
         raise LogError(
             f"{ingest.path}: {left} bytes follow its end where {len(MCAP)} should; it is damaged."
         )
-    if not catalogue.ended:
-        is_cut = left > 0
-        ingest.note(fact("chunks-cut", rest_bytes=left) if is_cut else fact("recorder-stopped"))
+    data = end.data if end.data_end is None else end.data_end - DATA_END_BYTES
+    missing = end.summary - DATA_END_BYTES - data if end.summary else 0
+    if end.counted is not None:
+        if kept < end.counted:
+            ingest.note(
+                warning("messages-missing", kept=kept, counted=end.counted, by="its statistics")
+            )
+    elif end.chunks < end.indexed:
+        ingest.note(warning("chunks-missing", kept=kept, chunks=end.chunks, counted=end.indexed))
+    elif missing > 0:
+        ingest.note(
+            warning("bytes-missing", kept=kept, missing_bytes=missing, bytes=data + missing)
+        )
+    elif left > 0 and not end.closed:
+        ingest.note(warning("chunks-cut", kept=kept, rest_bytes=left))
+    elif end.data_end is None:
+        ingest.note(caution("recorder-stopped", kept=kept))
 
 
 def _message(
@@ -215,5 +264,5 @@ def _yielded(
     for number, runs in found.items():
         if (channel := catalogue.channels.get(number)) is None:
             raise LogError(f"{catalogue.ingest.path}: messages of an unknown channel; damaged.")
-        catalogue.messages += sum(run.messages for run in runs)
+        catalogue.end.messages += sum(run.messages for run in runs)
         yield batch_of(channel, buffer, runs, nanoseconds=True)

@@ -11,7 +11,7 @@ from vftcli.readers.bags.documents import Documents, read_documents
 from vftcli.readers.bags.topics import aligned
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, open_log
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Where, fact
+from vftcli.signals.remarks import Where, fact, warning
 
 METADATA_BYTES = 1024 * 1024
 
@@ -81,5 +81,9 @@ def _check_count(file: LogFile, messages: int, ingest: Ingest) -> None:
     with (file.path / "metadata.yaml").open("rb") as metadata:
         text = metadata.read(METADATA_BYTES)
     match = re.search(rb"^  message_count: (\d{1,15})\s*$", text, flags=re.MULTILINE)
-    if match is not None and int(match[1]) != messages:
-        ingest.note(fact("message-count-differs", counted=int(match[1]), found=messages))
+    if match is None or (counted := int(match[1])) == messages:
+        return
+    if messages < counted:
+        ingest.note(warning("messages-missing", kept=messages, counted=counted, by="metadata.yaml"))
+    else:
+        ingest.note(fact("message-count-differs", counted=counted, found=messages))

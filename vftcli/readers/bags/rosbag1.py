@@ -6,6 +6,7 @@ Format: http://wiki.ros.org/Bags/Format/2.0. A record is a header length, header
 
 import struct
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from vftcli.readers.bags.container import (
     unpack_chunk,
 )
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import fact
+from vftcli.signals.remarks import caution, fact, warning
 
 OP_MESSAGE, OP_BAG, OP_INDEX, OP_CHUNK, OP_CHUNK_INFO, OP_CONNECTION = 2, 3, 4, 5, 6, 7
 MAX_HEADER = 64 * 1024
@@ -99,6 +100,58 @@ def record_at(content: memoryview, start: int) -> Record:
     return Record(header, data, end)
 
 
+@dataclass
+class Census:
+    """What a bag's header and index say of its messages, and what was found.
+
+    Attributes:
+        messages: Messages found.
+        chunks: Chunks found.
+        counted_chunks: Chunks that the header counts, None where the recorder never closed the bag.
+        listed: Chunks that the index at the end lists.
+        counted: Messages that it counts.
+    """
+
+    messages: int = 0
+    chunks: int = 0
+    counted_chunks: int | None = None
+    listed: int = 0
+    counted: int = 0
+
+    def take_header(self, header: Header) -> None:
+        """Take up the header of the bag: a recorder fills it in when it closes the bag."""
+        place, chunks = header.get(b"index_pos", b""), header.get(b"chunk_count", b"")
+        if len(place) == 8 and place != bytes(8) and len(chunks) == 4:
+            self.counted_chunks = u32(chunks, 0)
+
+    def take_index(self, content: memoryview, record: Record) -> None:
+        """Take up what the index says of one chunk: connections and their messages."""
+        self.listed += 1
+        words = content[record.data : record.data + (record.end - record.data) // 8 * 8]
+        pairs = np.frombuffer(words, dtype="<u4")
+        self.counted += int(pairs[1::2].sum())
+
+    def tell(self, ingest: Ingest, left: int) -> None:
+        """Say so if the bag is cut, and how much of it was kept.
+
+        Args:
+            ingest: Where it is said.
+            left: Bytes behind the last whole record.
+        """
+        kept, counted = self.messages, self.counted_chunks
+        if counted is None:
+            unclosed = caution("recorder-stopped", kept=kept)
+            ingest.note(warning("chunks-cut", kept=kept, rest_bytes=left) if left else unclosed)
+        elif self.listed == counted and kept != self.counted:
+            ingest.note(
+                warning("messages-missing", kept=kept, counted=self.counted, by="its index")
+            )
+        elif self.chunks != counted:
+            ingest.note(warning("chunks-missing", kept=kept, chunks=self.chunks, counted=counted))
+        elif left:
+            ingest.note(fact("index-cut", kept=kept, chunks=counted))
+
+
 def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
     """Messages of a bag, chunk by chunk, up to the last whole chunk.
 
@@ -107,15 +160,15 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
     """
     connections: dict[int, Channel] = {}
     counts: dict[int, int] = {}
-    position, indexed = len(ROSBAG1), False
+    census = Census()
+    position = len(ROSBAG1)
     while position < len(content):
         try:
             record = record_at(content, position)
         except Cut:
-            ingest.note(fact("chunks-cut", rest_bytes=len(content) - position))
-            return
+            break
         if record.op == OP_BAG:
-            indexed = record.header.get(b"index_pos", bytes(8)) != bytes(8)
+            census.take_header(record.header)
             if record.header.get(b"encryptor"):
                 raise LogError(f"{ingest.path}: the bag is encrypted. Decrypt it first.")
         elif record.op == OP_CONNECTION:
@@ -123,13 +176,16 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
         elif record.op == OP_CHUNK:
             counts = {}
             yield from _chunk(content, record, connections, counts, ingest)
+            census.chunks += 1
+            census.messages += sum(counts.values())
         elif record.op == OP_INDEX:
             _compare(record, counts, ingest)
-        elif record.op != OP_CHUNK_INFO:
+        elif record.op == OP_CHUNK_INFO:
+            census.take_index(content, record)
+        else:
             raise LogError(f"{ingest.path}: an unknown record at byte {position}; damaged.")
         position = record.end
-    if not indexed:
-        ingest.note(fact("recorder-stopped"))
+    census.tell(ingest, len(content) - position)
 
 
 def _compare(record: Record, counts: dict[int, int], ingest: Ingest) -> None:

@@ -43,7 +43,7 @@ def aligned(
         LogError: If no topic has joint positions, or --columns names what is not there.
     """
     gathering = Gathering(leading(streams, path, others), request)
-    gathering.take_lead()
+    gathering.take_lead(path)
     for stream in streams:
         gathering.take(stream)
     frame = gathering.take_wrench(streams)
@@ -106,8 +106,12 @@ class Gathering:
         self.taken: set[str] = set()
         self.remarks: list[Remark] = []
 
-    def take_lead(self) -> None:
-        """Take the leading topic's signals, the vendor's signs turned into ours."""
+    def take_lead(self, path: Path) -> None:
+        """Take the leading topic's signals, the vendor's signs turned into ours.
+
+        Raises:
+            LogError: If the positions are NaN throughout.
+        """
         lead, width = self.lead, self.lead.signals["q"].shape[1]
         if lead.mixed:
             self.remarks.append(fact("joints-reordered", topic=lead.channel.topic))
@@ -117,6 +121,11 @@ class Gathering:
             elif value.shape[1] != width:
                 continue
             elif np.isnan(value[0]).all() and np.isnan(value).all():
+                if signal == "q":
+                    raise LogError(
+                        f"{path}: the positions in {lead.channel.topic} are NaN in all "
+                        f"{lead.messages} messages, so nothing was measured. Record another topic."
+                    )
                 # Drivers publish NaN for what they do not measure.
                 self.remarks.append(fact("signal-empty", signal=signal))
             else:
