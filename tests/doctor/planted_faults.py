@@ -155,6 +155,17 @@ def velocity_turned(table: Table, joints: tuple[int, ...] = (2,)) -> Table:
     return replace(table, dq=table.dq * turn)
 
 
+def position_turned(table: Table, joint: int = 2) -> Table:
+    return replace(table, q=edited(table.q, joint, -table.q[:, joint - 1]))
+
+
+def joint_turned(table: Table, joint: int = 2) -> Table:
+    """A joint that counts the other way: position and velocity, not effort."""
+    return replace(
+        position_turned(table, joint), dq=edited(table.dq, joint, -table.dq[:, joint - 1])
+    )
+
+
 def tau_ext_inverted(table: Table) -> Table:
     assert table.tau_ext is not None
     return replace(table, tau_ext=-table.tau_ext)
