@@ -101,7 +101,7 @@ def test_units_and_signs_of_velocity() -> None:
     log = moving("panda")
     assert log.dq is not None
     assert "velocity-unit" in names(altered(log, dq=np.rad2deg(log.dq)))
-    assert "velocity-mismatch" in names(altered(log, dq=-log.dq))
+    assert "velocity-sign" in names(altered(log, dq=-log.dq))
     assert not {"velocity-unit", "velocity-mismatch"} & names(examine(log))
 
 

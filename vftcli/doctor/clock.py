@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vftcli.doctor.velocity import VelocityFit, common_factor, is_clock, time_unit
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
 from vftcli.signals.remarks import Remark, fact, warning
 from vftcli.signals.series import gaps_of
@@ -20,15 +21,25 @@ MISSED = (1.6, 3.4)
 """Steps this many times the median are one or two samples that were missed."""
 SHORT = 2.0
 """A log shorter than this tells little of noise and nothing of repeated motion. [s]"""
-STALE = 0.01
+STALE = 0.003
 """Share of rows that repeat the one before, from which it is worth telling."""
 
 
-def clock_findings(recording: Recording) -> Iterator[Remark]:
-    """Findings about the clock, each check independent of the others."""
-    if recording.samples < 3:
-        yield warning("too-short", samples=recording.samples)
+def clock_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[Remark]:
+    """Findings about the clock, each check independent of the others.
+
+    Args:
+        recording: The log.
+        fit: Its velocities beside its positions: they tell the clock's rate and unit.
+    """
+    factor = common_factor(fit) if fit is not None else None
+    if factor is not None and (unit := time_unit(factor)):
+        # What else is odd about its steps is this.
+        yield warning("time-unit", gain=factor, unit=unit)
         return
+    if factor is not None and is_clock(factor):
+        pace = "fast" if factor > 1 else "slow"
+        yield warning("clock-rate", gain=factor, percent=100 * abs(factor - 1), pace=pace)
     if recording.duration < SHORT:
         yield fact("short", duration_s=recording.duration)
     rate = 1 / recording.median_step

@@ -8,7 +8,14 @@ import numpy as np
 from vftcli.doctor.clock import clock_findings
 from vftcli.doctor.fit import CLOSE, Evidence, RobotMatch, best_fit, measured, ranking
 from vftcli.doctor.load import load_findings
-from vftcli.doctor.signals import TRAVEL, inverted_joints, is_most, signal_findings
+from vftcli.doctor.signals import (
+    TRAVEL,
+    inverted_joints,
+    is_most,
+    signal_findings,
+    unusable_findings,
+)
+from vftcli.doctor.velocity import velocity_fit
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
@@ -76,15 +83,15 @@ def examine(recording: Recording, robot: Robot | None = None) -> Examination:
         recording: The log.
         robot: The arm it is from, its payload mounted; None to look for it among the profiles.
     """
-    if recording.samples < 3:
-        short = tuple(clock_findings(recording))
-        return Examination(recording=recording, findings=short, robots=())
+    if unusable := tuple(unusable_findings(recording)):
+        return Examination(recording=recording, findings=unusable, robots=())
     robots = profiles() if robot is None else {robot.name: robot}
     fits = ranking(recording, robots)
     best = robots[fits[0].robot] if fits and fits[0].fits else None
+    velocities = velocity_fit(recording)
     findings = [
-        *clock_findings(recording),
-        *signal_findings(recording),
+        *clock_findings(recording, velocities),
+        *signal_findings(recording, velocities),
         *load_findings(recording, best),
         *robot_findings(recording, fits, robots),
     ]

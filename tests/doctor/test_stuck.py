@@ -1,0 +1,253 @@
+"""Signals that stand still, are zero, clipped or coarse: each inside and outside of its limits."""
+
+import numpy as np
+import pytest
+
+from vftcli.doctor.stuck import is_clipped, stuck_findings
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark
+
+STEP = 0.01
+T = STEP * np.arange(4001)
+RATES = 2 * np.pi / 10 * np.array([1.0, 2, 3, 4, 5, 6])
+"""Whole turns in the 40 s of the log. [rad/s]"""
+Q = np.sin(np.outer(T, RATES))
+DQ = RATES * np.cos(np.outer(T, RATES))
+TORQUE = 20 * np.cos(Q) + np.random.default_rng(0).normal(0, 0.1, Q.shape)
+"""A torque that changes with the pose, with noise of 0.1 N·m. (T, 6) [N·m]"""
+
+
+def log_of(**changes: Array | None) -> Recording:
+    """Six joints that swing by 1 rad, with some signals changed."""
+    signals = {"t": T, "q": Q, "dq": DQ, "torque": TORQUE, **changes}
+    return Recording(**signals)  # type: ignore[arg-type]
+
+
+def found(**changes: Array | None) -> dict[str, Remark]:
+    return {finding.code: finding for finding in stuck_findings(log_of(**changes))}
+
+
+def scaled(x: Array, factor: float, *joints: int) -> Array:
+    """A signal with some of its columns, counted from 1, times a factor."""
+    scale = np.ones(x.shape[1])
+    scale[[j - 1 for j in joints]] = factor
+    return x * scale
+
+
+def standing(x: Array, joint: int, start: float, seconds: float) -> Array:
+    """A signal whose column, counted from 1, keeps one value for some time. [s]"""
+    still = np.array(x)
+    rows = (start - 1e-9 <= T) & (start + seconds + 1e-9 >= T)
+    still[rows, joint - 1] = still[np.argmax(rows), joint - 1]
+    return still
+
+
+def test_a_sound_log_has_no_finding() -> None:
+    assert found() == {}
+    assert found(torque=None, current=TORQUE) == {}
+    assert found(torque=None, dq=None) == {}
+
+
+@pytest.mark.parametrize(("seconds", "told"), [(0.45, False), (0.55, True), (20.0, True)])
+@pytest.mark.parametrize(
+    ("name", "code"),
+    [("q", "stuck-position"), ("dq", "stuck-velocity"), ("torque", "stuck-effort")],
+)
+def test_a_signal_that_stands_still_for_half_a_second(
+    name: str, code: str, seconds: float, told: bool
+) -> None:
+    signal = {"q": Q, "dq": DQ, "torque": TORQUE}[name]
+    findings = found(**{name: standing(signal, 4, 11.0, seconds)})
+    assert set(findings) == ({code} if told else set())
+    if told:
+        finding = findings[code]
+        assert (finding.where.joints, finding.level) == ((4,), "warning")
+        assert finding.values["longest_s"] == pytest.approx(seconds, abs=STEP)
+        assert finding.values["at_s"] == pytest.approx(11.0, abs=STEP)
+
+
+def test_a_current_that_stands_still_is_told_as_one() -> None:
+    still = standing(standing(TORQUE, 4, 11.0, 3.0), 2, 30.0, 5.0)
+    finding = found(torque=None, current=still)["stuck-effort"]
+    assert finding.where.joints == (2, 4)
+    assert finding.values["signal"] == "current"
+    assert finding.values["at_s"] == pytest.approx(30.0, abs=STEP)
+
+
+def test_a_joint_that_is_held_is_not_stuck() -> None:
+    """J4 rests in the second half, with one effort, and then an offset or noise on its velocity."""
+    rest = T > 19.99
+    q, dq = Q.copy(), DQ.copy()
+    q[rest, 3], dq[rest, 3] = q[1999, 3], 0.0
+    torque = TORQUE.copy()
+    torque[rest, 3] = 7.0  # the least of all: at an extreme
+    assert found(q=q, dq=dq, torque=torque) == {}
+    dq[rest, 3] = 5e-3  # ten times the offset of a real drive's velocity
+    assert found(q=q, dq=dq, torque=torque) == {}
+    dq[rest, 3] = np.random.default_rng(1).normal(0, 0.02, rest.sum())
+    assert found(q=q, dq=dq, torque=torque) == {}
+
+
+def test_a_constant_speed_and_a_constant_acceleration_take_a_constant_effort() -> None:
+    """A simulated arm without noise turns about the vertical by a trapezoid of speed."""
+    speed = np.clip(np.abs((T % 10) - 5) - 2.5, -1, 1)[:, None] * np.ones(6)
+    turned = np.cumsum(speed, axis=0) * STEP
+    slope = np.gradient(speed, STEP, axis=0)
+    torque = np.sign(speed) + 2 * np.round(slope)
+    assert "stuck-effort" not in found(q=turned, dq=speed, torque=torque)
+
+
+def test_a_packet_that_is_late_makes_nothing_stuck() -> None:
+    """A recorder that repeats whole rows for a second is another fault."""
+    rows = np.arange(4001)
+    rows[1500:1600] = 1500
+    assert not {"stuck-position", "stuck-velocity", "stuck-effort"} & set(
+        found(q=Q[rows], dq=DQ[rows], torque=TORQUE[rows])
+    )
+
+
+def test_coarse_efforts_repeat_and_are_not_stuck() -> None:
+    """Steps of 2 N·m of a torque that goes over 9 N·m: up to a second of one value at the turns."""
+    smooth = 20 * np.cos(Q)
+    assert "stuck-effort" not in found(torque=np.round(smooth / 2) * 2)
+
+
+def test_joints_that_never_move() -> None:
+    """A milliradian of travel is motion; the swing is 2 rad."""
+    small = {"dq": None}
+    assert "still-joint" not in found(q=scaled(Q, 0.55e-3, 2), **small)
+    still = found(q=scaled(Q, 0.45e-3, 2), **small)
+    assert still["still-joint"].where.joints == (2,)
+    two = found(q=scaled(Q, 0.45e-3, 2, 6), **small)
+    assert two["still-joints"].where.joints == (2, 6)
+    assert not {"still-joint", "at-rest"} & set(two)
+    rest = found(q=0.45e-3 * Q, **small)
+    assert rest["at-rest"].values["travel_mrad"] == pytest.approx(0.9, rel=1e-3)
+    assert {"still-joint", "still-joints"}.isdisjoint(rest)
+    assert rest["at-rest"].level == "fact"
+
+
+def wave(peak: float = 1.0, low: float = -1.0, run: int = 0) -> Array:
+    """A signal between two extremes each of which it takes once, the upper for a run at will."""
+    value = np.linspace(0.9 * low, 0.9 * peak, 200)
+    value[50] = low
+    value[100 : 100 + max(run, 1)] = peak
+    return value
+
+
+def clipped(value: Array, position: Array | None = None) -> bool:
+    """Whether an effort is clipped on a joint that goes 0.1 mrad a sample, or as told."""
+    moving = 1e-4 * np.arange(len(value))
+    return is_clipped(value, moving if position is None else position, least=10)
+
+
+@pytest.mark.parametrize(("run", "told"), [(1, False), (9, False), (10, True), (30, True)])
+def test_ten_samples_in_a_row_at_the_extreme_are_clipped(run: int, told: bool) -> None:
+    moving = 2e-4 * np.arange(200)  # 1.8 mrad in ten samples
+    assert clipped(wave(run=run), moving) == told
+    assert clipped(-wave(run=run), moving) == told
+
+
+def test_what_is_not_clipped() -> None:
+    assert not clipped(np.ones(200))
+    assert not clipped(wave(run=30), np.zeros(200))  # a joint that is held needs one effort
+    scattered = wave()
+    scattered[::10] = 1.0
+    assert not clipped(scattered)
+    # an effort that often reads the same small value rests: below half of its range
+    assert not clipped(wave(peak=0.9, low=-1.0, run=30))
+    assert clipped(wave(peak=1.1, low=-1.0, run=30))
+    # more than half of all samples at the extreme is a resting value too
+    assert clipped(wave(run=100))
+    assert not clipped(np.where(np.arange(200) < 101, 1.0, wave()))
+
+
+@pytest.mark.parametrize("step", [0.01, 0.1])
+def test_the_top_of_a_smooth_effort_of_coarse_resolution_is_not_clipped(step: float) -> None:
+    """It is wide on the level below too: (√2 − 1) times as wide, twice."""
+    smooth = np.round(np.sin(0.002 * np.arange(4000)) / step) * step
+    assert not clipped(smooth)
+    assert clipped(np.clip(smooth, -0.8, 0.8))
+
+
+def test_at_a_kilohertz_ten_samples_are_no_time() -> None:
+    """A tenth of a second at the extreme is: 99 samples are not, 101 are."""
+    t = 1e-3 * np.arange(4000)
+    q = np.sin(t)[:, None]
+    for samples, told in ((98, False), (101, True)):
+        torque = np.cos(3 * t)[:, None]
+        torque[1000 : 1000 + samples] = 2.0
+        log = Recording(t=t, q=q, dq=np.cos(t)[:, None], torque=torque)
+        assert ("saturation" in {f.code for f in stuck_findings(log)}) == told
+
+
+def test_clipped_joints_are_named_with_their_signal() -> None:
+    smooth = np.sin(np.outer(T, RATES))
+    clipped = smooth.copy()
+    clipped[:, 3] = np.clip(smooth[:, 3], -0.9, 0.9)
+    findings = [
+        finding
+        for finding in stuck_findings(log_of(current=clipped, torque=smooth))
+        if finding.code == "saturation"
+    ]
+    assert [(f.where.joints, f.values["signal"], f.level) for f in findings] == [
+        ((4,), "current", "warning")
+    ]
+
+
+@pytest.mark.parametrize("name", ["current", "torque"])
+def test_efforts_that_are_all_zero(name: str) -> None:
+    zeros = np.zeros_like(Q)
+    finding = found(**{"torque": None, name: zeros})["zero-effort"]
+    assert (finding.level, finding.where.joints) == ("warning", (1, 2, 3, 4, 5, 6))
+    assert finding.values["signal"] == name
+    zeros[-1] = 1e-9
+    assert "zero-effort" not in found(**{"torque": None, name: zeros})
+
+
+def test_an_effort_that_is_zero_on_one_joint() -> None:
+    """Zero, not also stuck; on a joint at rest only where the others' noise shows a sensor."""
+    assert set(found(torque=scaled(TORQUE, 0.0, 5))) == {"zero-effort"}
+    assert found(torque=scaled(TORQUE, 0.0, 5))["zero-effort"].where.joints == (5,)
+    rest = {"q": scaled(Q, 0.0, 5), "dq": scaled(DQ, 0.0, 5)}
+    assert "zero-effort" in found(torque=scaled(TORQUE, 0.0, 5), **rest)
+    assert "zero-effort" not in found(torque=scaled(20 * np.cos(Q), 0.0, 5), **rest)
+
+
+@pytest.mark.parametrize(
+    ("name", "level"), [("tau_ext", "warning"), ("target_torque", "fact"), ("dq", "fact")]
+)
+def test_signals_that_are_all_zero(name: str, level: str) -> None:
+    code = f"zero-{name.replace('_', '-')}"
+    zeros = np.zeros_like(Q)
+    assert found(**{name: zeros})[code].level == level
+    zeros[-1, 0] = 1e-9
+    assert code not in found(**{name: zeros})
+
+
+def test_a_zero_wrench_says_whether_the_torques_beside_it_are_zero() -> None:
+    zeros = np.zeros((len(T), 6))
+    assert found(wrench=zeros)["zero-wrench"].level == "warning"
+    assert "zero-wrench" in found(wrench=zeros, tau_ext=np.zeros_like(Q))
+    beside = found(wrench=zeros, tau_ext=TORQUE)
+    assert "zero-wrench-beside-tau-ext" in beside
+    assert "zero-wrench" not in beside
+
+
+@pytest.mark.parametrize(("step", "told"), [(1e-4, False), (1e-3, True)])
+def test_positions_in_coarse_steps_are_told(step: float, told: bool) -> None:
+    q = Q + 0.01 * T[:, None]  # no two swings alike
+    q[:, [1, 4]] = np.round(q[:, [1, 4]] / step) * step
+    findings = found(q=q)
+    assert set(findings) == ({"coarse-positions"} if told else set())
+    if told:
+        finding = findings["coarse-positions"]
+        assert (finding.where.joints, finding.level) == ((2, 5), "fact")
+        assert finding.values["steps_mrad"] == pytest.approx([1e3 * step] * 2)
+
+
+def test_fast_motion_of_few_samples_is_not_coarse() -> None:
+    """At 25 Hz every step is large, but none is a multiple of the smallest."""
+    rows = slice(None, None, 4)
+    assert "coarse-positions" not in found(t=T[rows], q=Q[rows], dq=DQ[rows], torque=TORQUE[rows])

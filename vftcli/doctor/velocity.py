@@ -1,0 +1,291 @@
+"""Findings from the logged velocity beside the change of position: unit, clock, order, lateness.
+
+Over short windows the logged velocity is fitted as q̇(t) ≈ a·v(t) − a·τ·v̇(t), where v is the
+derivative of the position: a is its gain and τ the time by which it runs behind. Both sides are
+weighed with a Hann window, and the derivatives fall on the window instead of on the data
+(∫φ v̇ dt = −∫φ' v dt), so that uneven steps need no resampling and noise is not amplified.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.doctor.findings import on_joints
+from vftcli.doctor.stuck import stuck_joints
+from vftcli.signals.arrays import Array, Mask, median
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, warning
+from vftcli.signals.series import runs_of
+
+WINDOW = 0.1
+"""Length of a window: short beside motion, long beside the noise of single samples. [s]"""
+LEAST_STEPS = 8
+"""Steps of a window of a slow log."""
+USUAL, UNUSUAL_STEPS = (2e-4, 0.05), 50
+"""Sample times beyond which the clock's unit may be another one than it was taken for [s], and the
+steps of a window then."""
+WINDOWS = 600
+"""Windows that are looked at, at most: spread evenly, they tell as much as all."""
+TRAVEL = 0.05
+"""Travel from which a joint's own data tell anything. [rad]"""
+GAIN = 0.02
+"""Deviation of the gain from 1 that is told; sound logs, real and simulated, stay within 0.004."""
+SURE = 4.0
+"""Standard errors by which a deviation has to exceed its limit as well."""
+LATE = 0.008
+"""Lag that is told, or a sample time where that is longer: a robot's own velocity filter takes
+2–3 ms, a host's stamps up to 6. [s]"""
+ANOTHER = 0.25
+"""What another joint's position may leave open, beside what the joint's own leaves."""
+OPEN = 0.1
+"""Share of a velocity that its own position may leave open for its gain to count."""
+DAMPED = 0.01
+"""Loss of a velocity's square by a filter that can be seen: sound logs lose up to 0.0065."""
+WIDE = 0.15
+"""Deviation from a factor between units by which it still is that factor."""
+DEGREES = 180 / np.pi
+"""Degrees in a radian."""
+UNITS = {1e3: "ms", 1e6: "us", 1e9: "ns"}
+"""Ticks a second → the unit of the stamps that were read as seconds."""
+HELD = 0.55
+"""Share of the moving steps in which a velocity repeats itself, from which it is held: one in two
+are those of half the rate, and sound logs repeat up to a third."""
+MOVES = 0.02
+"""Speed from which a velocity that repeats itself is held rather than small. [rad/s]"""
+CRUISE = 0.2
+"""A velocity that repeats itself for longer may be a constant one. [s]"""
+
+
+class VelocityFit(NamedTuple):
+    """The logged velocities as gain and lag of the positions' derivative; NaN where at rest.
+
+    Attributes:
+        gain: Logged velocity over the derivative of the position, a. (n,)
+        lag: How much later the logged velocity is, τ. (n,) [s]
+        gain_error: Standard error of the gain. (n,)
+        lag_error: Standard error of the lag. (n,) [s]
+        open: Share of the logged velocity that the fit leaves open, by its square. (n,)
+        amplitude: Size of the logged velocity over that of the derivative. (n,)
+        rate: Typical rate of change of the motion, rms v̇ over rms v. (n,) [1/s]
+        factor: Every logged velocity over every position's derivative: row i by column j. (n, n)
+        share: What is left open of the velocity then, by its square. (n, n)
+    """
+
+    gain: Array
+    lag: Array
+    gain_error: Array
+    lag_error: Array
+    open: Array
+    amplitude: Array
+    rate: Array
+    factor: Array
+    share: Array
+
+    @property
+    def known(self) -> Mask:
+        """Joints that moved enough to be judged. (n,)"""
+        return np.isfinite(self.gain)
+
+
+def velocity_fit(recording: Recording) -> VelocityFit | None:
+    """Fit the logged velocities to the positions; None where the log is too short or has none."""
+    if recording.dq is None or recording.samples < 2 * LEAST_STEPS + 4:
+        return None
+    by_position, by_velocity, slope = weighed_windows(recording)
+    n = recording.joints
+    moved = np.ptp(recording.q, axis=0) >= TRAVEL
+    moved &= np.any(by_position != 0, axis=0)
+    count = len(by_position)
+    if count < 4 or not moved.any():
+        return None
+    alone = {name: np.full(n, np.nan) for name in VelocityFit._fields[:-2]}
+    factor, share = crossed(by_velocity, by_position)
+    fit = VelocityFit(**alone, factor=factor, share=share)
+    for j in np.flatnonzero(moved):
+        v, w, logged = by_position[:, j], slope[:, j], by_velocity[:, j]
+        size, rate = rms(v), rms(w) / rms(v)
+        columns = np.column_stack([v, w]) / [size, max(rms(w), np.finfo(float).tiny)]
+        (a, b), *_ = np.linalg.lstsq(columns, logged, rcond=1e-10)
+        left = logged - columns @ [a, b]
+        # Two columns of unit size: the inverse of their products is known in closed form.
+        noise = float(left @ left) / (count - 2) / count
+        alike = float(columns[:, 0] @ columns[:, 1]) / count
+        error = np.sqrt(noise / max(1 - alike**2, 1e-9))
+        fit.gain[j], fit.gain_error[j] = a / size, error / size
+        scale = rms(w) * a / size
+        known = scale != 0
+        fit.lag[j] = b / scale if known else np.nan
+        fit.lag_error[j] = error / abs(scale) if known else np.nan
+        total = rms(logged)
+        fit.open[j] = (rms(left) / total) ** 2 if total > 0 else 1.0
+        fit.amplitude[j], fit.rate[j] = total / size, rate
+    return fit
+
+
+def weighed_windows(recording: Recording) -> tuple[Array, Array, Array]:
+    """Means over windows, by Hann's weights: v by position, q̇ as logged, and −v̇. (W, n) each
+
+    A window across a gap mixes motion that was not recorded, one of tiny steps hardly lasts: both
+    are left out.
+    """
+    t, dq = recording.t, recording.require("dq")
+    step = recording.median_step
+    usual = USUAL[0] < step < USUAL[1]
+    length = max(LEAST_STEPS, round(WINDOW / step)) if usual else UNUSUAL_STEPS
+    length = min(length, (len(t) - 1) // 4)
+    starts = np.arange(0, len(t) - length, length)
+    if len(starts) > WINDOWS:
+        starts = starts[np.linspace(0, len(starts) - 1, WINDOWS).astype(int)]
+    spans = (t[starts + length] - t[starts]) / (length * step)
+    starts = starts[(spans > 0.5) & (spans < 1.5)]
+    rows = starts[:, None] + np.arange(length + 1)
+    times, steps = t[rows], np.diff(t[rows], axis=1)
+    span = times[:, -1:] - times[:, :1]
+    phase = 2 * np.pi * ((times[:, 1:] + times[:, :-1]) / 2 - times[:, :1]) / span
+    hann, slope = 1 - np.cos(phase), 2 * np.pi / span * np.sin(phase)
+    turned = np.diff(recording.q[rows], axis=1)
+    logged = dq[rows]
+    way = (logged[:, 1:] + logged[:, :-1]) / 2 * steps[:, :, None]
+
+    def mean(weight: Array, of: Array) -> Array:
+        return np.asarray((weight[:, None, :] @ of)[:, 0] / span)
+
+    return mean(hann, turned), mean(hann, way), mean(slope, turned)
+
+
+def rms(x: Array) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def crossed(logged: Array, positions: Array) -> tuple[Array, Array]:
+    """Factor and open share of every logged velocity by every position's derivative. (n, n) each"""
+    product = logged.T @ positions
+    size, whole = np.sum(positions**2, axis=0), np.sum(logged**2, axis=0)[:, None]
+    factor = np.divide(product, size, out=np.zeros_like(product), where=size > 0)
+    explained = np.divide(factor * product, whole, out=np.zeros_like(product), where=whole > 0)
+    return factor, np.maximum(1 - explained, 0.0)
+
+
+def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[Remark]:
+    """What is odd about the logged velocity, the likeliest cause alone where one explains all."""
+    if fit is None:
+        return
+    factor = common_factor(fit)
+    if factor is not None and (time_unit(factor) or is_clock(factor)):
+        return
+    if factor is not None and any(abs(factor / u - 1) < WIDE for u in (DEGREES, 1 / DEGREES)):
+        yield warning("velocity-unit", slope=factor)
+        return
+    if swapped := exchanged(fit):
+        yield warning("velocity-order", on_joints(swapped))
+    held = held_joints(recording)
+    if held.size:
+        shares = 100 * held_shares(recording)[held]
+        yield warning("velocity-held", on_joints(held), shares_percent=shares.tolist())
+    explained = [*swapped, *held.tolist(), *stuck_joints(recording, "dq")]
+    yield from late_velocities(recording, fit, np.setdiff1d(np.flatnonzero(fit.known), explained))
+
+
+def late_velocities(recording: Recording, fit: VelocityFit, joints: Array) -> Iterator[Remark]:
+    """Joints whose velocity runs behind, or is of another size, each joint by itself."""
+    limit = max(LATE, recording.median_step)
+    told = np.isin(np.arange(recording.joints), joints)
+    late = told & (np.abs(fit.lag) - SURE * fit.lag_error > limit) & (fit.gain > 0.3)
+    if late.any():
+        code = "velocity-filtered" if is_damped(fit, late) else "velocity-lag"
+        lags = 1e3 * fit.lag[late]
+        yield warning(code, on_joints(np.flatnonzero(late)), lags_ms=lags.tolist())
+    wrong = told & ~late & (np.abs(fit.gain - 1) - SURE * fit.gain_error > GAIN)
+    turned = wrong & (np.abs(fit.gain + 1) < 0.3)
+    for code, found in (("velocity-sign", turned), ("velocity-mismatch", wrong & ~turned)):
+        if found.any():
+            slopes = fit.gain[found].tolist()
+            yield warning(code, on_joints(np.flatnonzero(found)), slopes=slopes)
+
+
+def is_damped(fit: VelocityFit, late: Mask) -> bool:
+    """Whether late velocities have lost the size that a filter takes, and a delay does not.
+
+    Of the square of a motion of rate ω a first-order filter of time constant τ leaves 1/(1 + ω²τ²).
+    """
+    taken = median(fit.rate[late] * fit.lag[late]) ** 2
+    lost = median(1 - fit.amplitude[late] ** 2)
+    return median(fit.lag[late]) > 0 and taken > DAMPED and lost > taken / 2
+
+
+def common_factor(fit: VelocityFit) -> float | None:
+    """The gain that all joints share; None where they differ or a velocity is another motion's."""
+    known = fit.known & (fit.open < OPEN)
+    if 2 * known.sum() <= fit.known.sum():
+        return None
+    gains, errors = fit.gain[known], fit.gain_error[known]
+    middle = median(gains)
+    alike = np.abs(gains - middle) < GAIN * abs(middle) / 2 + SURE * errors
+    if not np.all(alike):
+        return None
+    # What a lag takes from the gain, as a delay or as a filter, is no factor of the clock.
+    lost = float(np.max((fit.rate * fit.lag)[known] ** 2)) + SURE * median(errors)
+    return 1.0 if abs(middle - 1) < lost else middle
+
+
+def time_unit(factor: float) -> str:
+    """The unit that seconds were taken for by so large a gain, "" where it is none.
+
+    Stamps of milliseconds that are read as seconds make the derivative a thousand times too small.
+    """
+    for ticks, unit in UNITS.items():
+        if abs(factor / ticks - 1) < WIDE:
+            return unit
+        if abs(factor * ticks - 1) < WIDE:
+            return "s"
+    return ""
+
+
+def is_clock(factor: float) -> bool:
+    """Whether a gain that all joints share is that of a clock of another rate."""
+    in_degrees = any(abs(factor / unit - 1) < WIDE for unit in (DEGREES, 1 / DEGREES))
+    return factor > 0 and abs(factor - 1) > GAIN and not in_degrees
+
+
+def exchanged(fit: VelocityFit) -> list[int]:
+    """Joints whose logged velocity is that of another joint's position."""
+    own = np.where(np.abs(np.diag(fit.factor) - 1) < GAIN, np.diag(fit.share), 1.0)
+    fits = np.where(np.abs(fit.factor - 1) < 2 * GAIN, fit.share, 1.0)
+    fits[:, ~fit.known] = 1.0
+    np.fill_diagonal(fits, 1.0)
+    found = np.flatnonzero(fit.known & (fits.min(axis=1) < ANOTHER * own)).tolist()
+    return found if len(found) > 1 else []
+
+
+def held_shares(recording: Recording) -> Array:
+    """Share of a joint's moving steps in which its velocity repeats itself; NaN at rest. (n,)"""
+    dq, steps = recording.require("dq"), np.diff(recording.t)[:, None]
+    turned = np.abs(np.diff(recording.q, axis=0))
+    moves = turned > MOVES * steps
+    same = moves & (np.diff(dq, axis=0) == 0)
+    count = moves.sum(axis=0)
+    enough = (count >= 20) & (np.ptp(recording.q, axis=0) >= TRAVEL)
+    return np.where(enough, same.sum(axis=0) / np.maximum(count, 1), np.nan)
+
+
+def held_joints(recording: Recording) -> Array:
+    """Joints whose velocity stays for some samples and then jumps, while the position moves on.
+
+    A constant speed repeats for longer; one of coarse resolution mostly changes by a step of it.
+    """
+    shares = held_shares(recording)
+    longest = max(2, round(CRUISE / recording.median_step))
+    found = []
+    for j in np.flatnonzero(shares > HELD):
+        dq = recording.require("dq")[:, j]
+        change = np.diff(dq)
+        same = change == 0
+        short = sum(stop - start for start, stop in runs_of(same) if stop - start <= longest)
+        jumps = np.abs(change[~same])
+        if jumps.size < 4 or short < HELD * same.sum():
+            continue
+        if np.mean(jumps < 1.5 * np.quantile(jumps, 0.05)) < 0.5:
+            found.append(int(j))
+    return np.array(found, dtype=int)
