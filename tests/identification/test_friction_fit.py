@@ -15,8 +15,11 @@ from vftcli.identification.friction_fit import (
 from vftcli.identification.friction_shapes import FrictionColumns, Shape, term_values
 from vftcli.identification.least_squares import ColumnFit
 
+LIMIT = 1.2
+"""Speed up to which friction may not fall: 5 − 2·2 v = 0 lies above it, at 1.25. [rad/s]"""
 
-def equations(prepared, truth, noise=0.05, load=5.0, reverses=True):
+
+def equations(prepared, truth, noise=0.05, load=5.0, reverses=True, limit=LIMIT):
     """One joint's equations: a slow swing that reverses, friction by `truth` (term → value)."""
     t = np.arange(0, 40, 0.02)
     dq = 0.6 * np.sin(2 * np.pi * 0.2 * t) + 0.2 * np.sin(2 * np.pi * 0.05 * t)
@@ -25,7 +28,7 @@ def equations(prepared, truth, noise=0.05, load=5.0, reverses=True):
     loads = load * (1 + np.cos(2 * np.pi * 0.03 * t))
     motion = prepared(t, dq=dq[:, None])
     columns = FrictionColumns(motion, loads[:, None])
-    shape = Shape(tuple(truth), 0.03, 0.1)
+    shape = Shape(tuple(truth), 0.03, 0.1, 0.2)
     y = columns.joint(0, shape) @ np.array(list(truth.values()))
     y = y + noise * np.random.default_rng(0).standard_normal(len(t))
     return JointData(
@@ -35,6 +38,7 @@ def equations(prepared, truth, noise=0.05, load=5.0, reverses=True):
         sources=[columns],
         load_spread=float(np.std(loads)),
         reverses=reverses,
+        speed_limit=limit,
     )
 
 
@@ -44,6 +48,8 @@ def equations(prepared, truth, noise=0.05, load=5.0, reverses=True):
         {"coulomb": 3.0, "viscous": 5.0, "offset": 0.2},
         {"coulomb": 3.0, "viscous": 5.0, "offset": 0.2, "quadratic": -2.0},
         {"coulomb": 3.0, "viscous": 5.0, "offset": 0.2, "load_coulomb": 0.1},
+        {"coulomb": 3.0, "logarithmic": 4.0, "offset": 0.2},
+        {"coulomb": 3.0, "logarithmic": 4.0, "offset": 0.2, "load_coulomb": 0.1},
     ],
 )
 def test_the_planted_model_wins(prepared, truth):
@@ -55,6 +61,15 @@ def test_the_planted_model_wins(prepared, truth):
     assert chosen[0].joint == 1
     # the planted model leaves its noise of 0.05 on the stretches left out, to 2000 samples' 2 %
     assert chosen[0].error == pytest.approx(0.05, rel=0.1)
+
+
+def test_a_parabola_that_falls_in_the_joints_range_does_not_compete(prepared):
+    truth = {"coulomb": 3.0, "viscous": 5.0, "offset": 0.2, "quadratic": -2.0}
+    shape, choices = choose_shape(0, equations(prepared, truth, limit=3.0))  # it falls from 1.25 on
+    assert all("quadratic" not in c.shape.terms for c in choices)
+    assert "logarithmic" in shape.terms
+    # .2 N·m rms is what the fall at the log's .8 rad/s differs by from the best logarithm
+    assert next(c.error for c in choices if c.chosen) < 0.2
 
 
 def test_a_breakaway_peak_is_seen(prepared):
@@ -81,14 +96,16 @@ def test_a_joint_that_never_reverses_gets_no_offset(prepared):
 def test_growth_with_a_load_there_is_none_of_does_not_compete(prepared):
     light = equations(prepared, {"coulomb": 3.0, "viscous": 5.0}, load=0.1)
     assert light.load_spread < LIGHT
-    assert all("load_coulomb" not in shape.terms for shape in candidate_shapes(0.03, light))
+    assert all(
+        "load_coulomb" not in shape.terms for shape in candidate_shapes(Shape((), 0.03), light)
+    )
     heavy = equations(prepared, {"coulomb": 3.0, "viscous": 5.0}, load=5.0)
-    assert any("load_coulomb" in shape.terms for shape in candidate_shapes(0.03, heavy))
+    assert any("load_coulomb" in shape.terms for shape in candidate_shapes(Shape((), 0.03), heavy))
 
 
 def test_stribeck_velocities_stand_clear_of_the_smoothing(prepared):
     data = equations(prepared, {"coulomb": 3.0, "viscous": 5.0})
-    shapes = list(candidate_shapes(0.03, data))
+    shapes = list(candidate_shapes(Shape((), 0.03), data))
     assert len(shapes) == len(set(shapes))
     speeds = {s.stribeck_velocity for s in shapes if "stribeck" in s.terms}
     assert speeds == {0.1, 0.2}  # more than twice 0.03
@@ -97,7 +114,11 @@ def test_stribeck_velocities_stand_clear_of_the_smoothing(prepared):
 @pytest.mark.parametrize(
     ("terms", "values", "good"),
     [
-        (("coulomb", "viscous"), (0.0, -1.0), True),  # viscous may be: quadratic stands beside it
+        (("coulomb", "viscous"), (0.0, -1.0), False),
+        (("coulomb", "viscous", "quadratic"), (1.0, -1.0, 2.0), False),  # falls up to .25 rad/s
+        (("coulomb", "viscous", "quadratic"), (1.0, 3.0, -1.0), True),  # 1.5 rad/s is out of range
+        (("coulomb", "viscous", "quadratic"), (1.0, 2.0, -1.0), False),  # falls from 1 rad/s on
+        (("coulomb", "logarithmic"), (1.0, 2.0), True),
         (("coulomb", "viscous"), (-0.1, 1.0), False),
         (("coulomb", "stribeck"), (1.0, -0.1), False),
         (("coulomb", "load_coulomb"), (1.0, -0.1), False),
@@ -106,7 +127,7 @@ def test_stribeck_velocities_stand_clear_of_the_smoothing(prepared):
 )
 def test_dry_friction_must_not_push(terms, values, good):
     fit = ColumnFit(np.array(values), np.ones(2), np.zeros(3), np.ones(3))
-    assert is_dissipative(Shape(terms), fit) == good
+    assert is_dissipative(Shape(terms), fit, LIMIT) == good
 
 
 def test_fixed_columns_stand_behind_the_friction(prepared):

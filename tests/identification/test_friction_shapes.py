@@ -19,10 +19,11 @@ LOAD = np.linspace(0.0, 8.0, 41)
         ("coulomb", np.tanh(DQ / 0.03)),
         ("load_coulomb", np.tanh(DQ / 0.03) * LOAD),
         ("stribeck", np.tanh(DQ / 0.03) * np.exp(-((DQ / 0.1) ** 2))),
+        ("logarithmic", np.sign(DQ) * np.log(1 + np.abs(DQ) / 0.2)),
     ],
 )
 def test_terms_are_those_of_the_docs(term, expected):
-    values = term_values(term, Shape((term,), 0.03, 0.1), DQ, LOAD)
+    values = term_values(term, Shape((term,), 0.03, 0.1, 0.2), DQ, LOAD)
     np.testing.assert_allclose(values, expected, atol=1e-15)
 
 
@@ -34,10 +35,12 @@ def test_terms_are_those_of_the_docs(term, expected):
         (("coulomb", "viscous", "offset", "quadratic"), "coulomb-viscous-quadratic"),
         (("coulomb", "viscous", "quadratic", "load_coulomb"), "coulomb-viscous-load"),
         (("coulomb", "viscous", "stribeck", "load_coulomb"), "coulomb-viscous-stribeck"),
+        (("coulomb", "logarithmic", "offset"), "coulomb-logarithmic"),
+        (("coulomb", "logarithmic", "stribeck", "load_coulomb"), "coulomb-logarithmic"),
     ],
 )
 def test_columns_times_coefficients_are_the_robot_files_friction(terms, model):
-    shape = Shape(terms, 0.03, 0.1)
+    shape = Shape(terms, 0.03, 0.1, 0.2)
     assert shape.model == model
     values = 1.0 + 0.25 * np.arange(len(terms))
     columns = np.stack([term_values(term, shape, DQ, LOAD) for term in terms], axis=1)
@@ -51,6 +54,9 @@ def test_a_shape_says_its_nonlinear_numbers():
     assert shape.words == "coulomb + stribeck, smoothing 0.03 rad/s, Stribeck velocity 0.1 rad/s"
     assert "Stribeck" not in Shape(("coulomb",)).words
     assert shape.friction(np.array([1.0, 2.0])).parameters["stribeck_velocity"] == 0.1
+    bent = Shape(("coulomb", "logarithmic"), logarithmic_velocity=0.2)
+    assert bent.words == "coulomb + logarithmic, smoothing 0.01 rad/s, flattening from 0.2 rad/s"
+    assert bent.friction(np.array([1.0, 2.0])).parameters["logarithmic_velocity"] == 0.2
     assert "stribeck_velocity" not in Shape(("coulomb",)).friction(np.array([1.0])).parameters
 
 
@@ -65,6 +71,10 @@ def test_columns_are_filtered_and_made_once(prepared):
     # viscous friction has no smoothing: whatever the shape's, it is one column
     viscous = columns.column("viscous", 0, Shape(("viscous",), 0.01))
     assert columns.column("viscous", 0, Shape(("viscous",), 0.1)) is viscous
+    bent = columns.column("logarithmic", 0, Shape(("logarithmic",), 0.01))
+    assert columns.column("logarithmic", 0, Shape(("logarithmic",), 0.1)) is bent
+    steeper = Shape(("logarithmic",), logarithmic_velocity=0.1)
+    assert columns.column("logarithmic", 0, steeper) is not bent
     both = columns.joint(0, Shape(("coulomb", "viscous"), 0.01))
     np.testing.assert_array_equal(both[:, 1], viscous)
     np.testing.assert_array_equal(both[:, 0], motion.filtered(np.tanh(dq[:, :1] / 0.01))[:, 0])

@@ -110,7 +110,7 @@ def test_ur10e_targets_are_the_controllers_own(ur10e):
     for j, friction in enumerate(found.robot.friction):
         p, v = friction.parameters, np.linspace(0.2, 0.8, 7)
         expected = coulomb[j] + viscous[j] * v + quadratic[j] * v * v
-        ours = p["coulomb"] + p["viscous"] * v + p["quadratic"] * v * v
+        ours = p["coulomb"] + p["logarithmic"] * np.log1p(v / p["logarithmic_velocity"])
         np.testing.assert_allclose(ours, expected, rtol=0.10)
 
 

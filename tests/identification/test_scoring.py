@@ -54,8 +54,10 @@ def test_prediction_adds_rotors_and_filtered_friction(motion):
     values = UR5.friction[0].parameters
     dq = motion.dq[:, 0]
     law = values["coulomb"] * np.tanh(dq / values.get("smoothing", 0.01))
-    law = law + values["viscous"] * dq + values.get("quadratic", 0.0) * dq * np.abs(dq)
-    expected = motion.filtered((law + values.get("offset", 0.0))[:, None])[:, 0]
+    law += (
+        values["logarithmic"] * np.sign(dq) * np.log(1 + abs(dq) / values["logarithmic_velocity"])
+    )
+    expected = motion.filtered(law[:, None])[:, 0]
     np.testing.assert_allclose(friction[:, 0], expected, atol=1e-9)
 
 

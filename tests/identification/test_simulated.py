@@ -46,10 +46,10 @@ def truth() -> Robot:
 
     arm, _ = build(load_scenario("free-excitation"), SEED)
     profile, true = load_robot("ur5"), arm.true
-    names = ("coulomb", "viscous", "quadratic", "offset")
+    names = ("coulomb", "viscous", "logarithmic", "logarithmic_velocity", "offset")
     friction = tuple(
         JointFriction(
-            model="coulomb-viscous-stribeck",
+            model="coulomb-logarithmic",
             parameters={
                 **{name: float(getattr(true.friction, name)[j]) for name in names},
                 "stribeck": true.friction.stribeck * float(true.friction.coulomb[j]),

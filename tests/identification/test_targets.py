@@ -7,6 +7,7 @@ from vftcli.identification.friction_shapes import FrictionColumns
 from vftcli.identification.target_method import gravity_remarks, target_numbers, target_remarks
 from vftcli.identification.targets import (
     UNKNOWN,
+    WRITTEN,
     ControllerModel,
     Estimate,
     Targets,
@@ -66,8 +67,12 @@ def test_a_shift_in_time_is_no_inertia(targets):
 
 
 def test_friction_is_what_the_current_has_beyond_the_moment(targets):
-    values, sd = controller_friction(0, [targets], K)
-    np.testing.assert_allclose(values, [4.0, 6.0, -2.0], rtol=1e-6)
+    dq = targets.recording.require("dq")
+    law = 4.0 * np.tanh(dq / 0.01) + 6.0 * np.sign(dq) * np.log(1 + np.abs(dq) / 0.5)
+    bent = targets._replace(current=(targets.moment + targets.motion.filtered(law)) / K)
+    shape, values, sd = controller_friction(0, [bent], K)
+    assert shape.logarithmic_velocity == 0.5  # one of the bends that compete
+    np.testing.assert_allclose(values, [4.0, 6.0], rtol=1e-6)
     assert np.all(sd < 1e-3)
     slow = targets._replace(motion=slowed(targets, 0.04))
     assert controller_friction(0, [slow], K) is None
@@ -133,8 +138,8 @@ def test_a_robot_without_constants_has_no_targets():
 
 def model(constant=KNOWN, rotor=KNOWN, friction=True, gravity=UNKNOWN):
     """What a controller believes of a joint."""
-    values = (np.array([1.0, 2.0, 3.0]), np.full(3, 0.1)) if friction else (None, None)
-    return ControllerModel(constant, rotor, *values, gravity)
+    found = (WRITTEN[0], np.array([1.0, 2.0]), np.full(2, 0.1)) if friction else None
+    return ControllerModel(constant, rotor, found, gravity)
 
 
 @pytest.mark.parametrize(
@@ -159,7 +164,7 @@ def test_numbers_stand_beside_the_profiles():
     numbers = target_numbers(1, model(), UR5)
     assert [n.parameter for n in numbers] == [
         *("torque_constant", "rotor_inertia"),
-        *("coulomb", "viscous", "quadratic"),
+        *("coulomb", "logarithmic"),
     ]
     assert numbers[0].profile == UR5.torque_constant[1]
     assert numbers[1].profile == UR5.chain.rotor_inertia[1]

@@ -154,12 +154,12 @@ def test_strict_methods_refuse_what_others_remark_on(recording):
 
 
 def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_told(data):
-    fine = JointFriction(model="x", parameters={"coulomb": 1.0, "viscous": 1.0})
+    fine = JointFriction(model="coulomb-viscous", parameters={"coulomb": 1.0, "viscous": 1.0})
     assert check_friction(0, fine, data) == []
-    pushing = JointFriction(model="x", parameters={"coulomb": -5.0, "viscous": -5.0})
+    pushing = JointFriction(model="coulomb-viscous", parameters={"coulomb": -5.0, "viscous": -5.0})
     with pytest.raises(IdentificationError, match="it would push"):
         check_friction(0, pushing, data)
-    crossing = JointFriction(model="x", parameters={"coulomb": -2.0, "viscous": 5.0})
+    crossing = JointFriction(model="coulomb-viscous", parameters={"coulomb": -2.0, "viscous": 5.0})
     (remark,) = check_friction(2, crossing, data)
     speed = np.max(np.abs(data.motions[0].dq[:, 2]))
     assert remark.where.joints == (3,)

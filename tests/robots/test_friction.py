@@ -2,12 +2,17 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from vftcli.robots import JointFriction
+from vftcli.robots import PROFILES, JointFriction, load_robot
 from vftcli.robots.friction import (
+    coulomb_logarithmic,
     coulomb_viscous,
     dry_friction,
     dry_torque,
+    falling_friction,
+    falling_speed,
     friction_torque,
     sigmoid,
 )
@@ -81,3 +86,100 @@ def test_dry_friction_of_every_model() -> None:
 def test_dry_friction_grows_with_the_load_either_way() -> None:
     values = {"coulomb": 3.0, "load_coulomb": 0.1}
     np.testing.assert_allclose(dry_torque(values, np.array([-20.0, 0.0, 20.0])), [5.0, 3.0, 5.0])
+
+
+SIZE = st.floats(0.01, 50.0)
+"""Of a friction parameter; the UR's are .4 to 17. [N·m, rad/s]"""
+
+SPEED = st.floats(0.0, 7.0)
+"""Up to what the fastest UR joint does, 6.48 rad/s. [rad/s]"""
+
+
+@given(SIZE, SIZE, SIZE, SPEED, SPEED)
+def test_the_logarithmic_friction_takes_energy_and_never_falls(c, a, b, one, other) -> None:
+    slow, fast = sorted((one, other))
+    dq = np.array([-fast, -slow, 0.0, slow, fast])
+    torque = coulomb_logarithmic(dq, a, b, coulomb=c)
+    assert np.all(torque * dq >= 0.0)
+    assert np.all(np.diff(torque) >= -1e-13 * (1.0 + torque[-1]))  # rounding of equal speeds
+    np.testing.assert_array_equal(torque, -torque[::-1])
+    assert torque[2] == 0.0
+
+
+@given(SIZE, SIZE, st.floats(0.2, 7.0))
+def test_the_logarithmic_friction_rises_as_its_derivative_says(a, b, speed) -> None:
+    h = 1e-5
+    ends = coulomb_logarithmic(np.array([speed - h, speed + h]), a, b, coulomb=1.0)
+    # central differences: h²/3 of the third derivative, 2a/(b + v)³, and rounding of the torque
+    error = h**2 * a / (b + speed) ** 3 + 1e-15 * ends[1] / h
+    assert (ends[1] - ends[0]) / (2 * h) == pytest.approx(a / (b + speed), abs=error, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "points", "scale", "rms"),
+    [
+        # joint test of a UR5e at 44.6 and 43.8 °C [N·m]; the profiles stand at 35 °C
+        *((name, 0, (5.73, 9.32, 13.58, 18.72), 1.128, 0.13) for name in ("ur5", "ur5e")),
+        *((name, 5, (1.25, 1.95, 2.74, 3.71), 1.193, 0.03) for name in ("ur5", "ur5e")),
+    ],
+)
+def test_profiles_rub_as_the_joint_test_says(name, joint, points, scale, rms) -> None:
+    """The stated rms of the curve through the four points, to its last digit."""
+    values = load_robot(name).friction[joint].parameters
+    curve = coulomb_logarithmic(
+        np.array([0.01, 0.5, 1.5, 3.2]), **{**values, "smoothing": 1e-4}
+    )  # the sign is there at 0.01 rad/s already, as it is in the test
+    assert np.sqrt(np.mean((curve / scale - points) ** 2)) == pytest.approx(rms, abs=0.01)
+
+
+def test_the_ur10e_profile_rubs_as_its_controller_does() -> None:
+    """Points of the feed-forward read off real logs, and the largest misfit of each curve."""
+    speeds = (0.01, 0.5, 1.5, 1.9)
+    points = [(17.66, 29.59, 40.47, 44.2), (16.82, 28.75, 38.74), (6.61, 12.57, 20.06)]
+    points += [(3.09, 5.17, 7.12, 8.0), (3.42, 4.81, 6.62), (3.09, 5.13, 7.64)]
+    for joint, expected, most in zip(
+        load_robot("ur10e").friction, points, (0.43, 0.01, 0.01, 0.2, 0.06, 0.01), strict=True
+    ):
+        values = {**joint.parameters, "smoothing": 1e-4}
+        curve = coulomb_logarithmic(np.array(speeds[: len(expected)]), **values)
+        assert np.max(np.abs(curve - expected)) < most
+
+
+def test_a_parabola_turns_down_where_its_slope_is_zero() -> None:
+    # wrist 1 of the UR10e as it was: 5.246 − 2·2.15 v = 0 at 1.22 rad/s
+    values = {"coulomb": 2.95, "viscous": 5.246, "quadratic": -2.15}
+    joint = JointFriction(model="coulomb-viscous-quadratic", parameters=values)
+    step = np.pi / 500  # of the speeds looked at
+    assert falling_speed(joint, np.pi) == pytest.approx(5.246 / 4.3, abs=2 * step)
+    assert np.isnan(falling_speed(joint, 1.2))
+    assert np.isnan(falling_speed(joint, np.nan))
+    (remark,) = falling_friction((joint, joint), np.array([1.2, np.pi]))
+    assert (remark.code, remark.level) == ("falling-friction", "warning")
+    assert remark.where.joints == (2,)
+    assert "1.2 rad/s" in str(remark)
+
+
+@pytest.mark.parametrize(
+    ("model", "values", "falls"),
+    [
+        ("coulomb-viscous", {"coulomb": -1.0, "viscous": 5.0}, True),
+        ("coulomb-viscous", {"coulomb": 0.0, "viscous": -1.0}, True),
+        ("coulomb-viscous-offset", {"coulomb": 1.0, "viscous": 0.0, "offset": -3.0}, False),
+        (
+            "coulomb-viscous-stribeck",
+            {"coulomb": 3.0, "viscous": 1.0, "stribeck": 2.0, "stribeck_velocity": 0.1},
+            False,
+        ),
+        ("sigmoid", {"amplitude": 1.0, "slope": 9.0, "shift": 0.1}, False),
+        ("sigmoid", {"amplitude": 1.0, "slope": -9.0, "shift": 0.1}, True),
+        ("none", {}, False),
+    ],
+)
+def test_what_falls_and_what_does_not(model, values, falls) -> None:
+    assert np.isfinite(falling_speed(JointFriction(model=model, parameters=values), 2.0)) == falls
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_no_profile_has_friction_that_falls(name: str) -> None:
+    robot = load_robot(name)
+    assert falling_friction(robot.friction, robot.limits.qd_max) == []

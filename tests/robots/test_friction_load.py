@@ -69,9 +69,9 @@ def test_a_file_needs_the_models_keys(tmp_path):
 
     text = PROFILES["ur5"].read_text(encoding="utf-8")
     path = tmp_path / "arm.toml"
-    model = 'model = "coulomb-viscous-quadratic"'
+    model = 'model = "coulomb-logarithmic"'
     path.write_text(text.replace(model, 'model = "coulomb-viscous-load"', 1), encoding="utf-8")
-    with pytest.raises(RobotError, match="load_coulomb is missing"):
+    with pytest.raises(RobotError, match="viscous is missing"):
         load_robot(path)
     with_velocity = 'model = "coulomb-viscous-stribeck"\nstribeck = 1.0\nstribeck_velocity = 0.0'
     path.write_text(text.replace(model, with_velocity, 1), encoding="utf-8")

@@ -1,5 +1,7 @@
 """The true friction against the profile's curve and its own derivative."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -49,10 +51,12 @@ def test_a_share_of_the_sigmoid_can_stick():
     assert whole.has_sigmoid
 
 
-def test_warmth_thins_the_viscous_part_alone():
+def test_warmth_thins_the_rise_alone():
     friction = true_friction(load_robot("ur5"), FrictionSpec())
-    warm = friction.with_viscous_factor(0.7)
-    np.testing.assert_allclose(warm.viscous, 0.7 * friction.viscous)
+    warm = replace(friction, viscous=np.ones(6)).with_viscous_factor(0.7)
+    np.testing.assert_allclose(warm.viscous, np.full(6, 0.7))
+    np.testing.assert_allclose(warm.logarithmic, 0.7 * friction.logarithmic)
+    assert friction.logarithmic.all()
     np.testing.assert_array_equal(warm.coulomb, friction.coulomb)
 
 

@@ -6,15 +6,18 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.identification.friction_shapes import (
+    LOGARITHMIC_VELOCITIES,
     SMOOTHINGS,
     STRIBECK_VELOCITIES,
     FrictionColumns,
     Shape,
 )
 from vftcli.identification.least_squares import ColumnFit, cross_validated, fit_column
+from vftcli.robots.friction import falling_speed
 from vftcli.signals.arrays import Array
 
 PLAIN = ("coulomb", "viscous", "offset")
+CURVED = ("coulomb", "logarithmic", "offset")
 RICHEST = (*PLAIN, "quadratic", "load_coulomb")
 CANDIDATES: tuple[tuple[str, ...], ...] = (
     PLAIN,
@@ -22,8 +25,10 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
     (*PLAIN, "load_coulomb"),
     (*PLAIN, "quadratic", "load_coulomb"),
     (*PLAIN, "stribeck"),
-    (*PLAIN, "stribeck", "quadratic"),
-    (*PLAIN, "stribeck", "quadratic", "load_coulomb"),
+    CURVED,
+    (*CURVED, "load_coulomb"),
+    (*CURVED, "stribeck"),
+    (*CURVED, "stribeck", "load_coulomb"),
 )
 """Sets of friction terms that compete, simplest first."""
 
@@ -64,6 +69,7 @@ class JointData(NamedTuple):
         sources: Friction columns of each log.
         load_spread: Spread of the gravity torque. [N·m]
         reverses: Whether the joint moves both ways.
+        speed_limit: Speed up to which its friction may not fall. [rad/s]
     """
 
     y: Array
@@ -72,6 +78,7 @@ class JointData(NamedTuple):
     sources: Sequence[FrictionColumns]
     load_spread: float
     reverses: bool
+    speed_limit: float
 
     @property
     def lengths(self) -> tuple[int, ...]:
@@ -87,7 +94,8 @@ class JointData(NamedTuple):
 def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
     """Choose a joint's friction model by cross-validation, simplest of the nearly best.
 
-    First the smoothing is chosen with the richest plain model, then the terms.
+    First the smoothing is chosen with the richest plain model, then the bend of the logarithm,
+    then the terms. A parabola is in the race only where it rises up to the joint's own speed.
 
     Args:
         j: Joint, from 0.
@@ -97,18 +105,18 @@ def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
     start = fit_column(data.columns(j, Shape(rich)), data.y, data.weights)
 
     # Weights of outliers are held: candidates must answer for the same samples.
-    def error(smoothing: float) -> float:
-        A = data.columns(j, Shape(rich, smoothing))
-        return cross_validated(A, data.y, start.weights, data.lengths)
+    def error(shape: Shape) -> float:
+        return cross_validated(data.columns(j, shape), data.y, start.weights, data.lengths)
 
-    smoothing = min(SMOOTHINGS, key=error)
+    smoothing = min((Shape(rich, s) for s in SMOOTHINGS), key=error).smoothing
+    curved = Shape(tellable_terms((*CURVED, "load_coulomb"), data), smoothing)
+    bends = (curved._replace(logarithmic_velocity=v) for v in LOGARITHMIC_VELOCITIES)
+    best = min(bends, key=error)
     choices = []
-    for shape in candidate_shapes(smoothing, data):
-        A = data.columns(j, shape)
-        fit = fit_column(A, data.y, data.weights)
-        if is_dissipative(shape, fit):
-            missed = cross_validated(A, data.y, start.weights, data.lengths)
-            choices.append(ShapeChoice(j + 1, shape, missed))
+    for shape in candidate_shapes(best, data):
+        fit = fit_column(data.columns(j, shape), data.y, data.weights)
+        if is_dissipative(shape, fit, data.speed_limit):
+            choices.append(ShapeChoice(j + 1, shape, error(shape)))
     if not choices:
         return Shape(tellable_terms(PLAIN, data), smoothing), []
     limit = MARGIN * min(c.error for c in choices)
@@ -117,17 +125,17 @@ def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
     return chosen.shape, [c._replace(chosen=c is chosen) for c in choices]
 
 
-def candidate_shapes(smoothing: float, data: JointData) -> Iterator[Shape]:
-    """The friction shapes that compete for a joint at one smoothing [rad/s], each once."""
+def candidate_shapes(best: Shape, data: JointData) -> Iterator[Shape]:
+    """The friction shapes that compete for a joint, with the smoothing and bend of `best`."""
     shapes: dict[Shape, None] = {}
     for terms in CANDIDATES:
-        kept = tellable_terms(terms, data)
-        if "stribeck" not in kept:
-            shapes[Shape(kept, smoothing)] = None
+        shape = best._replace(terms=tellable_terms(terms, data))
+        if "stribeck" not in terms:
+            shapes[shape] = None
             continue
         for velocity in STRIBECK_VELOCITIES:
-            if velocity > 2 * smoothing:  # else the sign's own rounding hides it
-                shapes[Shape(kept, smoothing, velocity)] = None
+            if velocity > 2 * best.smoothing:  # else the sign's own rounding hides it
+                shapes[shape._replace(stribeck_velocity=velocity)] = None
     yield from shapes
 
 
@@ -137,10 +145,9 @@ def tellable_terms(terms: tuple[str, ...], data: JointData) -> tuple[str, ...]:
     return out if data.reverses else tuple(t for t in out if t != "offset")
 
 
-def is_dissipative(shape: Shape, fit: ColumnFit) -> bool:
-    """Whether no dry-friction term came out negative."""
-    return all(
-        value >= 0.0
-        for term, value in zip(shape.terms, fit.values, strict=False)
-        if term in NEVER_NEGATIVE
-    )
+def is_dissipative(shape: Shape, fit: ColumnFit, speed_limit: float) -> bool:
+    """Whether no dry term is negative and the friction rises all the way to `speed_limit`."""
+    values = dict(zip(shape.terms, fit.values, strict=False))
+    pushes = any(values.get(term, 0.0) < 0.0 for term in NEVER_NEGATIVE)
+    friction = shape.friction(fit.values[: len(shape.terms)])
+    return not pushes and bool(np.isnan(falling_speed(friction, speed_limit)))

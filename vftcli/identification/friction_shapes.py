@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.identification.processing import PreparedLog
-from vftcli.robots.friction import SMOOTHING, coulomb_viscous
+from vftcli.robots.friction import SMOOTHING, coulomb_logarithmic
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
 
@@ -20,22 +20,30 @@ STRIBECK_VELOCITIES = (0.02, 0.05, 0.1, 0.2)
 """Velocities over which a Stribeck term may fade. [rad/s]"""
 
 
+LOGARITHMIC_VELOCITIES = (0.1, 0.2, 0.5, 1.0, 2.0)
+"""Velocities from which a logarithmic rise may flatten; UR's gears have .28 to 2.1. [rad/s]"""
+
+
 class Shape(NamedTuple):
-    """The structure of one joint's friction: which terms, and its two nonlinear numbers.
+    """The structure of one joint's friction: which terms, and its three nonlinear numbers.
 
     Attributes:
         terms: Keys of the robot file whose values are coefficients, in order.
         smoothing: Velocity over which the sign is smoothed. [rad/s]
         stribeck_velocity: Velocity over which the Stribeck term fades. [rad/s]
+        logarithmic_velocity: Velocity from which the logarithmic term flattens. [rad/s]
     """
 
     terms: tuple[str, ...]
     smoothing: float = SMOOTHING
     stribeck_velocity: float = 0.05
+    logarithmic_velocity: float = 1.0
 
     @property
     def model(self) -> str:
         """Name of the friction model that the robot file gets: the simplest that has all terms."""
+        if "logarithmic" in self.terms:
+            return "coulomb-logarithmic"
         if "stribeck" in self.terms:
             return "coulomb-viscous-stribeck"
         if "load_coulomb" in self.terms:
@@ -50,6 +58,8 @@ class Shape(NamedTuple):
         text = f"{' + '.join(self.terms)}, smoothing {self.smoothing:g} rad/s"
         if "stribeck" in self.terms:
             text += f", Stribeck velocity {self.stribeck_velocity:g} rad/s"
+        if "logarithmic" in self.terms:
+            text += f", flattening from {self.logarithmic_velocity:g} rad/s"
         return text
 
     def friction(self, values: Array, confidence: str = "") -> JointFriction:
@@ -58,6 +68,8 @@ class Shape(NamedTuple):
         parameters["smoothing"] = self.smoothing
         if "stribeck" in self.terms:
             parameters["stribeck_velocity"] = self.stribeck_velocity
+        if "logarithmic" in self.terms:
+            parameters["logarithmic_velocity"] = self.logarithmic_velocity
         return JointFriction(model=self.model, parameters=parameters, confidence=confidence)
 
 
@@ -75,13 +87,9 @@ def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
         dq: Velocities as recorded. [rad/s]
         load: Absolute gravity torque. [N·m]
     """
-    coefficients = {"coulomb": 0.0, "viscous": 0.0, term: 1.0}
-    return coulomb_viscous(
-        dq,
-        **coefficients,
-        smoothing=shape.smoothing,
-        stribeck_velocity=shape.stribeck_velocity,
-        load=load,
+    numbers = {k: v for k, v in shape._asdict().items() if k != "terms"}
+    return coulomb_logarithmic(
+        dq, **{"coulomb": 0.0, "logarithmic": 0.0, term: 1.0}, **numbers, load=load
     )
 
 
@@ -96,14 +104,17 @@ class FrictionColumns:
     def __init__(self, motion: PreparedLog, load: Array) -> None:
         self.motion = motion
         self.load = load
-        self.cache: dict[tuple[str, int, float, float], Array] = {}
+        self.cache: dict[tuple[str, int, tuple[float, ...]], Array] = {}
 
     def column(self, term: str, j: int, shape: Shape) -> Array:
         """One term of joint j (from 0), filtered like the torque and kept for later calls. (M,)"""
         # The key holds only what the term depends on, so that shapes share their columns.
-        steep = shape.smoothing if term in {"coulomb", "load_coulomb", "stribeck"} else 0.0
-        fades = shape.stribeck_velocity if term == "stribeck" else 0.0
-        key = (term, j, steep, fades)
+        numbers = {
+            **dict.fromkeys(("coulomb", "load_coulomb"), (shape.smoothing,)),
+            "stribeck": (shape.smoothing, shape.stribeck_velocity),
+            "logarithmic": (shape.logarithmic_velocity,),
+        }
+        key = (term, j, numbers.get(term, ()))
         if key not in self.cache:
             dq = self.motion.recording.require("dq")[:, j]
             values = term_values(term, shape, dq, self.load[:, j])

@@ -10,10 +10,11 @@ from vftcli.identification.friction_shapes import Shape
 from vftcli.identification.least_squares import robust_sd
 from vftcli.identification.result import Number, number
 from vftcli.identification.training import Training
+from vftcli.robots.friction import falling_speed, steady_torque
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 
 DETERMINED = 0.3
 """Standard deviation over value up to which a number counts as determined by the logs."""
@@ -51,15 +52,13 @@ def friction_numbers(
 
 
 def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
-    """A remark if the friction found would push joint j (from 0) at some speed of the log.
+    """A remark if the friction found would push joint j (from 0) at some speed, or falls.
 
     Raises:
         IdentificationError: If it pushes at all speeds: sign or unit are wrong.
     """
-    values = friction.parameters
     speed = max(float(np.max(np.abs(m.dq[:, j]))) for m in data.motions)
-    v = np.linspace(0.1 * speed, speed, 10)
-    torque = values["coulomb"] + values["viscous"] * v + values.get("quadratic", 0.0) * v**2
+    torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
     noise = max(robust_sd(m.tau[:, j]) for m in data.motions)
     # A hundredth of the torque's spread: friction of nothing comes out on either side of zero.
     if np.all(torque < -0.01 * noise):
@@ -70,6 +69,10 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> list[Rema
         )
     if np.any(torque < 0):
         return [caution("negative-friction", Where(joints=(j + 1,)), least_Nm=float(torque.min()))]
+    limit = data.top_speed(j)
+    if np.isfinite(falls := falling_speed(friction, limit)):
+        values = {"speed_radps": falls, "limit_radps": limit}
+        return [warning("falling-friction", Where(joints=(j + 1,)), **values)]
     return []
 
 

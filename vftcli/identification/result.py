@@ -56,6 +56,7 @@ UNITS = {
     "viscous": "N·m·s/rad",
     "offset": "N·m",
     "quadratic": "N·m·s²/rad²",
+    "logarithmic": "N·m",
     "load_coulomb": "1",
     "stribeck": "N·m",
     "mass": "kg",

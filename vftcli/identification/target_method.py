@@ -13,7 +13,7 @@ from vftcli.identification.method_result import (
     profile_friction,
 )
 from vftcli.identification.result import Number, number
-from vftcli.identification.targets import SHAPES, ControllerModel, controller_models
+from vftcli.identification.targets import ControllerModel, controller_models
 from vftcli.identification.training import Training
 from vftcli.robots.robot import Robot
 from vftcli.signals.remarks import Remark, Where, caution, fact
@@ -37,9 +37,9 @@ def targets_method(data: Training) -> MethodResult:
             constants[j] = round_digits(model.constant.value)
         if model.rotor.known:
             rotor[j] = round_digits(model.rotor.value)
-        if model.friction is not None and model.friction_sd is not None:
-            words = friction_source(data, "targets", model.friction_sd)
-            frictions[j] = SHAPES[0].friction(model.friction, words)
+        if model.friction is not None:
+            shape, values, sd = model.friction
+            frictions[j] = shape.friction(values, friction_source(data, "targets", sd))
     remarks += gravity_remarks(models)
     chain = replace(robot.chain, rotor_inertia=rotor)
     new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
@@ -58,9 +58,8 @@ def target_numbers(j: int, model: ControllerModel, robot: Robot) -> list[Number]
         number(j, "torque_constant", *model.constant[:2], K, model.constant.known),
         number(j, "rotor_inertia", *model.rotor[:2], J, model.rotor.known),
     ]
-    if model.friction is not None and model.friction_sd is not None:
-        before = profile_friction(robot)[j]
-        numbers += friction_numbers(j, SHAPES[0], model.friction, model.friction_sd, before)
+    if model.friction is not None:
+        numbers += friction_numbers(j, *model.friction, profile_friction(robot)[j])
     return numbers
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.friction_shapes import FrictionColumns, Shape
+from vftcli.identification.friction_shapes import LOGARITHMIC_VELOCITIES, FrictionColumns, Shape
 from vftcli.identification.least_squares import fit_column, solve
 from vftcli.identification.processing import (
     PreparedLog,
@@ -41,7 +41,12 @@ SHAPES = (
     Shape(("coulomb", "viscous", "quadratic")),
     Shape(("coulomb", "viscous", "quadratic", "offset")),
 )
-"""Friction shapes whose drive constants must agree; the first is what is written."""
+"""Friction shapes beside which the drive constants must agree."""
+
+WRITTEN = tuple(
+    Shape(("coulomb", "logarithmic"), logarithmic_velocity=bend) for bend in LOGARITHMIC_VELOCITIES
+)
+"""Friction shapes of which the best is written: none of them falls beyond the log's speeds."""
 
 SPEEDS = (0.0, 0.05, 0.1, 0.2)
 """Lowest speeds of the samples used, which must agree too. [rad/s]"""
@@ -70,15 +75,14 @@ class ControllerModel(NamedTuple):
     Attributes:
         constant: Drive constant K. [N·m/A]
         rotor: Reflected rotor inertia. [kg·m²]
-        friction: Coefficients of `SHAPES[0]`, None where the joint does not move.
-        friction_sd: Their standard deviations.
+        friction: The best of `WRITTEN`, its coefficients and their standard deviations, None where
+            the joint does not move.
         gravity: Its gravity torque over the profile's.
     """
 
     constant: Estimate
     rotor: Estimate
-    friction: Array | None
-    friction_sd: Array | None
+    friction: tuple[Shape, Array, Array] | None
     gravity: Estimate
 
 
@@ -155,9 +159,7 @@ def joint_model(j: int, logs: Sequence[Targets], before: float) -> ControllerMod
     constant = min((still, moving), key=relative_sd)
     K = constant.value if constant.known else before
     rotor, gravity = rotor_inertia(j, logs)
-    friction = controller_friction(j, logs, K)
-    values, sd = friction if friction is not None else (None, None)
-    return ControllerModel(constant, rotor, values, sd, gravity)
+    return ControllerModel(constant, rotor, controller_friction(j, logs, K), gravity)
 
 
 def relative_sd(estimate: Estimate) -> float:
@@ -253,12 +255,22 @@ def rotor_inertia(j: int, logs: Sequence[Targets]) -> tuple[Estimate, Estimate]:
 
 def controller_friction(
     j: int, logs: Sequence[Targets], constant: float
-) -> tuple[Array, Array] | None:
-    """Coefficients of K·target_current − target_moment, or None where the joint does not move."""
+) -> tuple[Shape, Array, Array] | None:
+    """The shape that K·target_current − target_moment fits best, its coefficients and their sd.
+
+    The controller's own law is a bent line through four points; None where the joint does not move.
+    """
     speed = np.abs(np.concatenate([log.motion.dq[:, j] for log in logs]))
     if np.quantile(speed, 0.9) < 0.05:
         return None
     y = np.concatenate([constant * log.current[:, j] - log.moment[:, j] for log in logs])
-    A = np.concatenate([log.columns.joint(j, SHAPES[0]) for log in logs])
-    fit = fit_column(A, y, np.ones(len(y)))
-    return fit.values, fit.sd
+    fits = {}
+    for shape in WRITTEN:
+        A = np.concatenate([log.columns.joint(j, shape) for log in logs])
+        fits[shape] = fit_column(A, y, np.ones(len(y)))
+
+    def misfit(shape: Shape) -> float:
+        return float(fits[shape].weights @ fits[shape].residual ** 2)
+
+    best = min(WRITTEN, key=misfit)
+    return best, fits[best].values, fits[best].sd

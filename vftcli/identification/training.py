@@ -70,6 +70,11 @@ class Training:
         """Whether the torque is measured before the gear, so that it accelerates the rotor too."""
         return self.robot.torque_source != "link_torque"
 
+    def top_speed(self, j: int) -> float:
+        """Speed limit of joint j (from 0), its fastest motion where the robot has none. [rad/s]"""
+        fastest = max(float(np.max(np.abs(m.dq[:, j]), initial=0.0)) for m in self.motions)
+        return float(np.fmax(self.robot.limits.qd_max[j], fastest))
+
 
 def prepare_training(
     recordings: Sequence[Recording], robot: Robot, processing: Processing, fit_constants: bool
@@ -166,6 +171,7 @@ def data_of_joint(data: Training, j: int, weights: Sequence[Array], constant: bo
         sources=data.columns,
         load_spread=float(np.std(load)),
         reverses=bool(data.excited.reverses[j]),
+        speed_limit=data.top_speed(j),
     )
 
 

@@ -80,9 +80,11 @@ BOUNDS: dict[str, Bound] = {
     "offset": TORQUE,
     "amplitude": TORQUE,
     "stribeck": TORQUE,
+    "logarithmic": TORQUE,
     "load_coulomb": either_way(10.0, ""),  # a share of the torque that the gear carries
     "smoothing": Bound(TINY, 1e3, "rad/s"),
     "stribeck_velocity": Bound(TINY, 1e3, "rad/s"),
+    "logarithmic_velocity": Bound(TINY, 1e3, "rad/s"),
     "slope": either_way(1e6, "s/rad"),
     "shift": either_way(1e3, "rad/s"),
 }

@@ -10,6 +10,7 @@ import numpy as np
 from vftcli.robots.bounds import weightless
 from vftcli.robots.chain import Chain, Payload, symmetric, unphysical
 from vftcli.robots.conventions import CONVENTIONS, Kinematics
+from vftcli.robots.friction import falling_friction
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import RobotFile, Section, is_finite
 from vftcli.signals.arrays import Array
@@ -32,6 +33,10 @@ FRICTION_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "coulomb-viscous-stribeck": (
         ("coulomb", "viscous", "stribeck", "stribeck_velocity"),
         ("load_coulomb", "quadratic", "offset", "smoothing"),
+    ),
+    "coulomb-logarithmic": (
+        ("coulomb", "logarithmic", "logarithmic_velocity"),
+        ("viscous", "load_coulomb", "stribeck", "stribeck_velocity", "offset", "smoothing"),
     ),
     "sigmoid": (("amplitude", "slope", "shift"), ()),
 }
@@ -61,14 +66,16 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
         for name, section in root.section("payload").named_sections("mass").items()
     }
     noise = {name: column(joints, f"noise_{name}") for name in SensorNoise.__dataclass_fields__}
+    friction, limits = checked_friction(joints), checked_limits(joints)
+    notes = [fact("robot-file-note", text=text) for text in root.texts("notes")]
     return Robot(
         name=(name := root.text("name", root.file.path.stem)),
         title=root.text("title", name),
         chain=chain,
         torque_source=source,
         torque_constant=checked_torque_constant(joints, source),
-        friction=checked_friction(joints),
-        limits=checked_limits(joints),
+        friction=friction,
+        limits=limits,
         noise=SensorNoise(**noise),
         sample_rate_hz=root.number("sample_rate_hz", math.nan),
         ros_state=root.text("ros_state"),
@@ -81,7 +88,7 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
         sources=root.tables("sources"),
         published=root.section("published").values,
         document=root.values,
-        remarks=tuple(fact("robot-file-note", text=text) for text in root.texts("notes")),
+        remarks=(*notes, *falling_friction(friction, limits.qd_max)),
         path=root.file.path,
     )
 

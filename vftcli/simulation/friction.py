@@ -1,7 +1,7 @@
 """The true friction of the joints: dry friction that can stick, and a smooth part.
 
 τ_f = λ + smooth(q̇), with λ ∈ F_c(q̇)·Sgn(q̇) set-valued at rest (Coulomb and Stribeck) and
-smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + sigmoid(q̇).
+smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + a ln(1 + |q̇|/b) sign(q̇) + sigmoid(q̇).
 """
 
 from dataclasses import dataclass, replace
@@ -12,7 +12,10 @@ from vftcli.robots import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.simulation.scenario import FrictionSpec
 
-SHAPES = ("coulomb", "viscous", "quadratic", "offset", "amplitude", "slope", "shift")
+SHAPES = (
+    *("coulomb", "viscous", "quadratic", "offset", "logarithmic", "logarithmic_velocity"),
+    *("amplitude", "slope", "shift"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +27,8 @@ class TrueFriction:
         viscous: Viscous coefficient. [N·m·s/rad]
         quadratic: Signed quadratic coefficient. [N·m·s²/rad²]
         offset: Torque independent of motion. [N·m]
+        logarithmic: Logarithmic rise a. [N·m]
+        logarithmic_velocity: Velocity b from which it flattens. [rad/s]
         amplitude: Amplitude of the sigmoid. [N·m]
         slope: Slope of the sigmoid. [s/rad]
         shift: Shift of the sigmoid. [rad/s]
@@ -35,6 +40,8 @@ class TrueFriction:
     viscous: Array
     quadratic: Array
     offset: Array
+    logarithmic: Array
+    logarithmic_velocity: Array
     amplitude: Array
     slope: Array
     shift: Array
@@ -57,6 +64,10 @@ class TrueFriction:
         speed = np.abs(dq)
         torque = self.offset + (self.viscous + self.quadratic * speed) * dq
         slope = self.viscous + 2.0 * self.quadratic * speed
+        if self.logarithmic.any():
+            bend = self.logarithmic_velocity
+            torque = torque + self.logarithmic * np.log1p(speed / bend) * np.sign(dq)
+            slope = slope + self.logarithmic / (bend + speed)
         if self.has_sigmoid:
             bell = 1.0 / (1.0 + np.exp(-self.slope * (dq + self.shift)))
             rest = 1.0 / (1.0 + np.exp(-self.slope * self.shift))
@@ -71,8 +82,8 @@ class TrueFriction:
         return bool(self.amplitude.any())
 
     def with_viscous_factor(self, factor: float) -> "TrueFriction":
-        """The friction with its viscous part multiplied by `factor`; warm oil is thinner."""
-        return replace(self, viscous=self.viscous * factor)
+        """The friction with its rise multiplied by `factor`; warm oil is thinner."""
+        return replace(self, viscous=self.viscous * factor, logarithmic=self.logarithmic * factor)
 
 
 def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
@@ -83,6 +94,7 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
     """
     n = robot.joints
     table = {name: np.zeros(n) for name in SHAPES}
+    table["logarithmic_velocity"] += 1.0  # where there is no rise, any velocity will do
     joints = robot.friction or (JointFriction(),) * n
     if spec.enabled:
         for j, joint in enumerate(joints):

@@ -103,4 +103,5 @@ def perturbed_friction(
         amplitude=friction.amplitude * dry,
         viscous=friction.viscous * wet,
         quadratic=friction.quadratic * wet,
+        logarithmic=friction.logarithmic * wet,
     )
