@@ -78,9 +78,11 @@ def test_the_band_covers_the_truth_on_moving_joints(worked_up: Analysis) -> None
     for observer in ("kfo-auto", "rts-auto"):
         share = rows.filter(pl.col("observer") == observer)["coverage_95"].mean()
         assert 0.93 <= share <= 0.99
-    # the joint that rests has no coverage to be told
+    # Pushes slide the resting joint in 16 of 2501 samples, for which a band measured at rest says
+    # nothing: that is the remark band-of-a-standing-joint.
     rest = worked_up.errors.filter((pl.col("joint") == 5) & (pl.col("observer") == "rts-auto"))
-    assert rest["coverage_95"].to_list() == [None]
+    assert rest["coverage_95"].item() < 0.5
+    assert np.count_nonzero(worked_up.estimates[-1].moving[:, 4]) == 16
 
 
 def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
@@ -115,11 +117,11 @@ def test_removing_the_bias_subtracts_the_free_cycle_at_the_same_phase(
 def test_what_is_left_without_the_bias_is_tuned_on(
     worked_up: Analysis, without_bias: Analysis
 ) -> None:
-    """Joints that friction and model limit gain; where noise does (J1), there is twice as much."""
+    """Joints that friction and model limit gain, J2 and J4 here; where noise does, nothing does."""
     assert worked_up.refinement is not None
     assert without_bias.refinement is not None
     plain, left = (a.refinement.curves["kfo-auto"] for a in (worked_up, without_bias))
-    limited = [1, 2, 3]
+    limited = [1, 3]
     assert np.all(left.least[limited] < 0.7 * plain.least[limited])
 
 

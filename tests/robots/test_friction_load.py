@@ -73,7 +73,7 @@ def test_a_file_needs_the_models_keys(tmp_path):
     path.write_text(text.replace(model, 'model = "coulomb-viscous-load"', 1), encoding="utf-8")
     with pytest.raises(RobotError, match="viscous is missing"):
         load_robot(path)
-    with_velocity = 'model = "coulomb-viscous-stribeck"\nstribeck = 1.0\nstribeck_velocity = 0.0'
+    with_velocity = 'model = "coulomb-logarithmic"\nstribeck = 1.0\nstribeck_velocity = 0.0'
     path.write_text(text.replace(model, with_velocity, 1), encoding="utf-8")
     with pytest.raises(
         RobotError, match=r"stribeck_velocity is 0 rad/s; on a robot it lies within"
