@@ -59,8 +59,13 @@ def test_a_fixture_goes_all_the_way_to_a_table() -> None:
 
 
 def test_the_log_must_settle_its_robot_or_be_told() -> None:
+    """The controller's own torques tell a UR5; currents alone settle nothing."""
+    told = analyse_log(FIXTURE, AnalysisChoice())
+    assert told.robot.name == "ur5"
+    assert "robot-guessed" in [remark.code for remark in told.robot.remarks]
+    measured = ReadChoice(signals=frozenset({"dq", "current"}))
     with pytest.raises(RobotError, match="choose one with --robot: ur5, ur5e, ur10e"):
-        analyse_log(FIXTURE, AnalysisChoice())
+        analyse_log(FIXTURE, AnalysisChoice(read=measured))
 
 
 def test_an_interval_keeps_the_logs_own_time() -> None:

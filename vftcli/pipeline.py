@@ -79,7 +79,17 @@ def analyse_logs(logs: Iterable[Path], choice: AnalysisChoice) -> Iterator["Anal
     """
     models = Models()
     for recording in choice.library.open_logs(list(logs), choice.read):
-        yield analyse(recording, models.robot(choice.robot, recording), choice, models)
+        yield analyse(*prepared(recording, choice), choice, models)
+
+
+def prepared(recording: Recording, choice: AnalysisChoice) -> tuple[Recording, Robot]:
+    """A log with its robot, its effort taken for what it is where the robot's model shall say.
+
+    Raises:
+        RobotError: If no robot is chosen and the log does not settle it.
+    """
+    robot = choice.examiner.robot(recording, choice.robot)
+    return choice.examiner.taken(recording, robot, choice.read), robot
 
 
 def analyse_log(path: Path, choice: AnalysisChoice) -> "Analysis":
@@ -116,6 +126,7 @@ def read(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Mod
     for path in {*choice.free.logs, choice.zero_log}:
         if path is not None:
             free = choice.library.open(path, choice.read.whole)
+            free = choice.examiner.taken(free, robot, choice.read)
             runs[path] = FreeRun(run=models.of(free, robot, literal=literal), log=log)
     given = tuple(runs[path] for path in choice.free.logs)
     return FreeMotion(log=log, choice=choice.free, runs=given, zero=runs.get(choice.zero_log))

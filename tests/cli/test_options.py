@@ -34,6 +34,7 @@ BAD = {
     "--interval": ("8:4", "is not A:B with A < B"),
     "--format": ("excel", "known formats"),
     "--columns": ("nonsense", "--columns"),
+    "--effort": ("volts", "there is auto, current, torque, torque-without-gravity"),
     "--robot": ("ur9", "no robot 'ur9'"),
     "--friction": ("some", "there is profile, none"),
     "--payload": ("bucket", "no payload 'bucket'"),

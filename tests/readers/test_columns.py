@@ -159,3 +159,25 @@ def test_a_headed_table_that_is_described_wrongly(tmp_path: Path, columns: str, 
 
 def test_every_row_is_kept(tmp_path: Path) -> None:
     assert read(table_csv(tmp_path / "x")).samples == ROWS
+
+
+def test_a_torque_without_gravity_is_no_torque(tmp_path: Path) -> None:
+    """By its name in --columns, and by UR's own name in a recording of its client."""
+    rows = "\n".join(f"{0.1 * k},{','.join(str(k + j) for j in range(12))}" for k in range(4))
+    log = tmp_path / "log.csv"
+    log.write_text(f"t,{','.join(f'q{j}' for j in range(6))},{EFFORTS}\n{rows}\n")
+    found = read(log, columns="t=t,q=q{i},-tau+g[mNm]=e{i}")
+    assert found.torque is None
+    assert found.torque_without_gravity is not None
+    assert found.torque_without_gravity[2].tolist() == pytest.approx(
+        [-1e-3 * (2 + j) for j in range(6, 12)]
+    )
+    rtde = tmp_path / "rtde.csv"
+    names = [f"actual_q_{j}" for j in range(6)] + [
+        f"actual_current_as_torque_{j}" for j in range(6)
+    ]
+    rtde.write_text(f"timestamp,{','.join(names)}\n{rows}\n")
+    assert read(rtde).signals == ("q", "torque_without_gravity")
+
+
+EFFORTS = ",".join(f"e{j}" for j in range(6))

@@ -1,5 +1,7 @@
 """RobotChoice: the arm that is named, or the one the log settles."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -43,3 +45,12 @@ def test_another_friction_is_refused_before_a_log_is_read() -> None:
 def test_a_payload_that_the_file_has_not_is_refused() -> None:
     with pytest.raises(RobotError, match="no payload 'bucket'"):
         RobotChoice(name="ur5", payload="bucket").load(log())
+
+
+def test_the_payload_that_the_log_declares_is_mounted() -> None:
+    told = replace(log(6), payload_mass=1.2, payload_com=(0.0, 0.01, 0.1))
+    payload = RobotChoice(name="ur5e", payload="log").load(told).payload
+    assert payload is not None
+    assert (payload.mass, payload.com.tolist()) == (1.2, [0.0, 0.01, 0.1])
+    with pytest.raises(RobotError, match="does not say which payload"):
+        RobotChoice(name="ur5e", payload="log").load(log(6))

@@ -196,6 +196,7 @@ def replayed(
 ) -> "tuple[Replay, Recording, tuple[Examination, ...]]":
     """A log's force through every controller."""
     from vftcli.admittance.replay import replay
+    from vftcli.pipeline import prepared
     from vftcli.readers.estimates import estimates_columns
 
     stored, observers = None, analysis.observers
@@ -207,8 +208,7 @@ def replayed(
             reading = analysis.reading.changed(columns=columns)
             analysis = analysis.changed(reading=reading, observers=observers)
     choice = chosen(analysis, log)
-    recording = choice.library.open(log, choice.read)
-    arm = choice.robot.load(recording)
+    recording, arm = prepared(choice.library.open(log, choice.read), choice)
     if stored is None:  # estimates of an earlier run were examined in it
         choice.examiner.examine(recording, arm)
     settings = control.parameters(arm)

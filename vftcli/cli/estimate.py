@@ -28,22 +28,22 @@ def estimate(
     """
     from vftcli.cli.background import Background
     from vftcli.readers.library import Library
+    from vftcli.signals.recording import EFFORTS
 
     extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
     # Of a large log only the columns that are computed with are read; outputs show the others too.
-    signals = None if analysis.wrench.asks or extras else frozenset(("dq", "current", "torque"))
+    signals = None if analysis.wrench.asks or extras else frozenset(("dq", *EFFORTS))
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
     reading = Background(lambda: library.open(log, chosen))
 
     from vftcli.cli.console import command_line, say, say_analysis
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
-    from vftcli.pipeline import analyse
+    from vftcli.pipeline import analyse, prepared
 
     OutputFolder(output, force, estimate_files(extras)).check()
     choice = analysis.choice(library)
-    recording = reading.result()
-    made = analyse(recording, choice.robot.load(recording), choice)
+    made = analyse(*prepared(reading.result(), choice), choice)
     record = write_estimate_folder(output, made, command=command_line(), extras=extras, force=force)
     say_analysis(made, briefly=json)
     if json:

@@ -10,6 +10,8 @@ from vftcli.cli.bundles import Bundle, flag, option, taken_apart
 
 if TYPE_CHECKING:
     from vftcli.identification import Task
+    from vftcli.readers.reader import ReadChoice
+    from vftcli.signals.recording import Recording
 
 
 class TaskOptions(Bundle):
@@ -115,16 +117,18 @@ def identify_robot(
     held_out_choice = reading.changed(interval=validation.interval).choice()
     validated, without_load = validation.validate or [], free.logs(asked.find_payload)
     library = Library([*logs, *validated, *without_load])
-    train = [library.open(log, choice) for log in logs]
-    held_out = [library.open(log, held_out_choice) for log in validated]
-    unloaded = [library.open(log, choice) for log in without_load]
-    read = [*train, *held_out, *unloaded]
-    profile = chosen.load(train[0])
     # That the profile is not the arm's is what this command is there to change.
     examiner = Examiner(anyway=anyway, fitting=False)
-    for recording in read:
+    profile = examiner.robot(library.open(logs[0], choice), chosen)
+
+    def opened(paths: list[Path] | tuple[Path, ...], how: "ReadChoice") -> list["Recording"]:
+        return [examiner.taken(library.open(path, how), profile, how) for path in paths]
+
+    train = opened(logs, choice)
+    held_out, unloaded = opened(validated, held_out_choice), opened(without_load, choice)
+    for recording in (*train, *held_out, *unloaded):
         say_recording(recording)
-        say_health([examiner.examine(recording, profile)], named=len(read) > 1)
+        say_health([examiner.examine(recording, profile)], named=len(library) > 1)
     found = identify(train, profile, task, held_out, unloaded[0] if unloaded else None)
     record = write_identification(output, found, examiner.examinations, command_line(), force)
     for remark in found.remarks:

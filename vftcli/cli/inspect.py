@@ -23,15 +23,20 @@ def inspect_log(
     Example: vftcli inspect fixtures/ur5_circle.csv
     """
     from vftcli.cli.console import say_json
-    from vftcli.doctor import examine
+    from vftcli.doctor import Examiner, examine
     from vftcli.outputs.examination import examination_record, examination_text
     from vftcli.readers import read_first_recording
 
     choice = reading.choice()
     recording = read_first_recording(log, format=choice.format, columns=choice.columns)
-    recording = choice.within(recording)
+    recording = choice.within(choice.taken(recording))
     chosen = robot.choice()
-    examination = examine(recording, chosen.load(recording) if chosen.name else None)
+    arm = chosen.load(recording) if chosen.name else None
+    if choice.effort == "auto":
+        examiner = Examiner()
+        arm = examiner.robot(recording, chosen)
+        recording = examiner.taken(recording, arm, choice)
+    examination = examine(recording, arm)
     if json:
         say_json(examination_record(examination))
     else:

@@ -77,6 +77,12 @@ class ReadOptions(ChoiceBundle["ReadChoice"]):
     interval: str | None = option(
         "--interval", "A:B", "Use only this time span, in seconds from the first sample."
     )
+    effort: str | None = option(
+        "--effort",
+        "auto|current|torque|torque-without-gravity",
+        "What the log's effort is, whatever it is called; auto takes what the robot's model "
+        "explains best, and says so.",
+    )
 
 
 class RobotOptions(ChoiceBundle["RobotChoice"]):
@@ -88,7 +94,11 @@ class RobotOptions(ChoiceBundle["RobotChoice"]):
     friction: str | None = option(
         "--friction", "profile|none", "The robot's friction model (default), or none."
     )
-    payload: str | None = option("--payload", "NAME", "Mount a [payload.NAME] of the robot file.")
+    payload: str | None = option(
+        "--payload",
+        "NAME",
+        "Mount a [payload.NAME] of the robot file; log: the one that the log declares.",
+    )
 
 
 class ObserverOptions(ChoiceBundle["ObserverChoice"]):

@@ -53,7 +53,7 @@ def tune_gains(
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
     from vftcli.outputs.log.run_record import jsonable
-    from vftcli.pipeline import AnalysisChoice, examine, model, read
+    from vftcli.pipeline import AnalysisChoice, examine, model, prepared, read
     from vftcli.refinement.tuning import parse_goal, tune_all
     from vftcli.repetition.free_run import Models
     from vftcli.robots.writing import lines_of
@@ -68,8 +68,7 @@ def tune_gains(
         refinement=replace(bias.choice(), bands=True),
         examiner=Examiner(anyway=anyway),
     )
-    recording = choice.library.open(log, choice.read)
-    arm = choice.robot.load(recording)
+    recording, arm = prepared(choice.library.open(log, choice.read), choice)
     motion = read(recording, arm, choice, Models())
     examinations = examine(motion, choice)
     found = model(motion, choice)

@@ -1,17 +1,44 @@
 """Examiner: who examines the logs of a command, each once, and turns the meaningless ones away."""
 
 from collections.abc import Iterable
+from dataclasses import replace
+from typing import NamedTuple
 
-from vftcli.doctor.examination import Examination, examine
+from vftcli.doctor.examination import Examination, examine, guess_robot
 from vftcli.doctor.findings import in_words
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots.choice import RobotChoice, choices_for
+from vftcli.robots.drive import effort_name
 from vftcli.robots.robot import Robot
-from vftcli.signals.errors import ExaminationError
+from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import Remark, fact
+
+
+class Correction(NamedTuple):
+    """What puts an effort right that is not what it is called.
+
+    Attributes:
+        kind: What it is, one of `vftcli.signals.recording.EFFORTS`; "" for what it is called.
+        factor: What its values are multiplied with.
+    """
+
+    kind: str
+    factor: float = 1.0
+
+
+CORRECTIONS = {
+    "current-as-torque": Correction("torque"),
+    "torque-as-current": Correction("current"),
+    "torque-without-gravity": Correction("torque_without_gravity"),
+    "milliamperes": Correction("current", 1e-3),
+    "effort-sign": Correction("", -1.0),
+}
+"""Finding that an effort is something else → what puts it right."""
 
 
 class Examiner:
-    """Examines the logs of one command.
+    """Loads the robots of a command and examines its logs, each once.
 
     Args:
         anyway: Whether results are wanted even where a finding makes them meaningless.
@@ -21,6 +48,35 @@ class Examiner:
     def __init__(self, *, anyway: bool = False, fitting: bool = True) -> None:
         self._anyway, self._fitting = anyway, fitting
         self._made: list[tuple[Recording, Robot, Examination]] = []
+        self._robots: dict[tuple[str, float | None, bool], Robot] = {}
+
+    def robot(self, recording: Recording, choice: RobotChoice) -> Robot:
+        """The robot that is chosen, that the log says, or that its maker's own model tells.
+
+        Raises:
+            RobotError: If none of these names one; with what each profile leaves unexplained.
+        """
+        name, remarks = choice.name or recording.robot_hint, tuple[Remark, ...]()
+        if name is None:
+            name, remarks = guessed(recording)
+        # The log may be what says which load is mounted.
+        key = (name, recording.payload_mass, bool(remarks))
+        if key not in self._robots:
+            robot = choice.load(recording, name)
+            self._robots[key] = replace(robot, remarks=(*robot.remarks, *remarks))
+        return self._robots[key]
+
+    def taken(self, recording: Recording, robot: Robot, choice: ReadChoice) -> Recording:
+        """A log with its effort taken for what the robot's model explains best, if it is open."""
+        if choice.effort != "auto":
+            return recording
+        for finding in examine(recording, robot).findings:
+            if (right := CORRECTIONS.get(finding.code)) is not None:
+                called = effort_name(recording, robot)
+                return recording.with_effort(
+                    right.kind or called, source=called, factor=right.factor
+                )
+        return recording
 
     def examine(self, recording: Recording, robot: Robot) -> Examination:
         """The examination of a log as this arm's, made once.
@@ -42,6 +98,24 @@ class Examiner:
     def examinations(self) -> tuple[Examination, ...]:
         """All that were made, in their order."""
         return tuple(made for _, _, made in self._made)
+
+
+def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
+    """The profile that the maker's own model in a log tells, and on what grounds.
+
+    Raises:
+        RobotError: If the log does not settle it.
+    """
+    found, fits = guess_robot(recording)
+    if found is None:
+        ranked = f": {'; '.join(map(str, fits))}" if fits else ""
+        raise RobotError(
+            f"{recording.name} does not say which arm it is, and no profile settles it{ranked}; "
+            f"{choices_for(recording)}"
+        )
+    others = [str(fit) for fit in fits if fit is not found]
+    remark = fact("robot-guessed", robot=found.robot, fit=str(found), others=others or ["none"])
+    return found.robot, (remark,)
 
 
 def refuse(name: str, findings: Iterable[Remark]) -> None:

@@ -10,6 +10,7 @@ SIGNALS: dict[str, str] = {
     "dq": "dq",
     "current": "current",
     "tau": "torque",
+    "tau+g": "torque_without_gravity",
     "target_q": "target_q",
     "target_dq": "target_dq",
     "target_current": "target_current",
@@ -38,13 +39,14 @@ KINDS = {
     "target_q": "q",
     "target_dq": "dq",
     "target_current": "current",
+    "tau+g": "tau",
     "target_torque": "tau",
     "tau_ext": "tau",
 }
 """Signals that share another signal's units."""
 
 ITEM = re.compile(
-    r"(?P<minus>-)?(?P<name>[A-Za-z_]+)(?:\[(?P<unit>[^\]]*)\])?"
+    r"(?P<minus>-)?(?P<name>tau\+g|[A-Za-z_]+)(?:\[(?P<unit>[^\]]*)\])?"
     r"(?:@(?P<rate>[0-9.eE+]+)(?:Hz)?|:(?P<count>\d+)|=(?P<pattern>.+))?"
 )
 

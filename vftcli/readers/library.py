@@ -21,6 +21,10 @@ class Library:
         self._labels = labelled(absolute(path) for path in paths)
         self._recordings: dict[tuple[Path, ReadChoice], Recording] = {}
 
+    def __len__(self) -> int:
+        """How many logs it knows of."""
+        return len(self._labels)
+
     def open(self, path: str | Path, choice: ReadChoice | None = None) -> Recording:
         """Read a log as it is chosen, unless that has been done, and take the part of it that is.
 
@@ -31,13 +35,14 @@ class Library:
 
         choice, at, label = choice or ReadChoice(), absolute(path), self.label(path)
         if (at, choice.whole) not in self._recordings:
-            self._recordings[at, choice.whole] = read(
+            found = read(
                 path,
                 format=choice.format,
                 columns=choice.columns,
                 signals=choice.signals,
                 label=label,
             )
+            self._recordings[at, choice.whole] = choice.taken(found)
         return choice.within(self._recordings[at, choice.whole])
 
     def label(self, path: str | Path) -> str:

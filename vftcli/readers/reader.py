@@ -114,6 +114,15 @@ class RawLog:
     payload_com: tuple[float, ...] | None = None
 
 
+EFFORT = {
+    "auto": None,
+    "current": "current",
+    "torque": "torque",
+    "torque-without-gravity": "torque_without_gravity",
+}
+"""Value of ``--effort`` → field of Recording; None where the robot's model has to decide."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class ReadChoice:
     """How a log is read, and which part of it is used.
@@ -123,29 +132,53 @@ class ReadChoice:
         columns: The text of ``--columns``, or None.
         signals: The signals that are wanted; None for all. Others may be left unread.
         interval: The span that is used, from the first sample, None for all of it. [s]
+        effort: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the
+            robot; None to take what it is called.
+
+    Raises:
+        ParameterError: If the effort is none of these.
     """
 
     format: str | None = None
     columns: str | None = None
     signals: frozenset[str] | None = None
     interval: tuple[float, float] | None = None
+    effort: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.effort is not None:
+            parsing.check_known(self.effort, tuple(EFFORT), f"--effort {self.effort!r}")
 
     @classmethod
     def parsed(
-        cls, *, format: str | None = None, columns: str | None = None, interval: str | None = None
+        cls,
+        *,
+        format: str | None = None,
+        columns: str | None = None,
+        interval: str | None = None,
+        effort: str | None = None,
     ) -> "ReadChoice":
-        """The choice that ``--format``, ``--columns`` and ``--interval A:B`` state.
+        """The choice that ``--format``, ``--columns``, ``--interval A:B`` and ``--effort`` state.
 
         Raises:
             ParameterError: If the interval is malformed.
         """
         span = parsing.interval(interval) if interval is not None else None
-        return cls(format=format, columns=columns, interval=span)
+        return cls(format=format, columns=columns, interval=span, effort=effort)
 
     @property
     def whole(self) -> "ReadChoice":
         """The same without its interval: a free run is read whole."""
         return replace(self, interval=None)
+
+    def taken(self, recording: Recording) -> Recording:
+        """A recording with its effort taken for what it is said to be.
+
+        Raises:
+            MissingSignalError: If the log has no such effort.
+        """
+        kind = EFFORT[self.effort] if self.effort is not None else None
+        return recording if kind is None else recording.with_effort(kind)
 
     def within(self, recording: Recording) -> Recording:
         """The part of a recording that lies in the interval.

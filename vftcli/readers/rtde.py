@@ -17,6 +17,7 @@ JOINT_COLUMNS = {
     "q": "actual_q",
     "dq": "actual_qd",
     "current": "actual_current",
+    "torque_without_gravity": "actual_current_as_torque",
     "target_q": "target_q",
     "target_dq": "target_qd",
     "target_current": "target_current",

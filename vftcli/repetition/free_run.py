@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vftcli.robots.choice import RobotChoice
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.errors import ReferenceTorqueError
@@ -47,22 +46,10 @@ class ModelledRun:
 
 
 class Models:
-    """The robots that a command loads and the recordings that it models with them, each once."""
+    """The recordings that a command models with its robots, each once."""
 
     def __init__(self) -> None:
         self._runs: list[ModelledRun] = []
-        self._robots: dict[str | None, Robot] = {}
-
-    def robot(self, choice: RobotChoice, recording: Recording) -> Robot:
-        """The robot that is chosen for a recording, or that the recording settles.
-
-        Raises:
-            RobotError: If none is chosen and the recording does not settle it.
-        """
-        name = choice.name or recording.robot_hint
-        if name not in self._robots:
-            self._robots[name] = choice.load(recording)
-        return self._robots[name]
 
     def of(self, recording: Recording, robot: Robot, *, literal: bool = False) -> ModelledRun:
         """The recording with this robot's model, the one that is there if there is one."""

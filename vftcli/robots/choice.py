@@ -2,13 +2,17 @@
 
 from dataclasses import dataclass
 
-from vftcli.robots import PROFILES, Robot, load_robot
+import numpy as np
+
+from vftcli.robots import PROFILES, Payload, Robot, load_robot
 from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import check_known
 from vftcli.signals.recording import Recording
 
 FRICTION = ("profile", "none")
 """Values of ``--friction``: the model of the robot file, or none at all."""
+DECLARED = "log"
+"""Value of ``--payload``: what the log says that the controller was told of."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,7 +22,8 @@ class RobotChoice:
     Attributes:
         name: Profile name, TOML or URDF file, None to take what the log settles.
         friction: "profile" or "none".
-        payload: Name of a ``[payload.NAME]`` of the robot file to mount, or None.
+        payload: Name of a ``[payload.NAME]`` of the robot file to mount, "log" for the payload that
+            the log says the controller was told of, or None.
 
     Raises:
         ParameterError: If friction is neither of the two.
@@ -38,21 +43,49 @@ class RobotChoice:
         """The choice that ``--robot``, ``--friction`` and ``--payload`` state."""
         return cls(name=robot, friction=friction or "profile", payload=payload)
 
-    def load(self, recording: Recording) -> Robot:
-        """Load the robot that is chosen, or the one that the log settles.
+    def load(self, recording: Recording, otherwise: str | None = None) -> Robot:
+        """Load the robot that is chosen, or the one that the log says.
+
+        Args:
+            recording: The log.
+            otherwise: The robot's name where neither is so.
 
         Raises:
-            RobotError: If none is chosen and the log does not settle it, or there is no such robot.
+            RobotError: If none of these names one, or there is no such robot.
         """
-        name = self.name or recording.robot_hint
+        name = self.name or recording.robot_hint or otherwise
         if name is None:
-            fitting = [p for p in PROFILES if load_robot(p).joints == recording.joints]
             raise RobotError(
-                f"{recording.name} does not say which arm it is; choose one with --robot: "
-                f"{', '.join(fitting) or ', '.join(PROFILES)}, or a FILE.toml or FILE.urdf of "
-                f"{recording.joints} joints"
+                f"{recording.name} does not say which arm it is; {choices_for(recording)}"
             )
         robot = load_robot(name)
-        if self.payload is not None:
+        if self.payload == DECLARED:
+            robot = robot.with_payload(declared_payload(recording))
+        elif self.payload is not None:
             robot = robot.with_payload(self.payload)
         return robot.without_friction() if self.friction == "none" else robot
+
+
+def choices_for(recording: Recording) -> str:
+    """What may be given with ``--robot`` for a log, in words."""
+    fitting = [p for p in PROFILES if load_robot(p).joints == recording.joints]
+    return (
+        f"choose one with --robot: {', '.join(fitting) or ', '.join(PROFILES)}, or a FILE.toml or "
+        f"FILE.urdf of {recording.joints} joints"
+    )
+
+
+def declared_payload(recording: Recording) -> Payload:
+    """The payload that the controller was told of; nobody tells it an inertia.
+
+    Raises:
+        RobotError: If the log does not say one.
+    """
+    mass, com = recording.payload_mass, recording.payload_com
+    if mass is None:
+        raise RobotError(
+            f"{recording.name}: the log does not say which payload the controller was told of; "
+            "describe it in a [payload.NAME] section of the robot file and give --payload NAME"
+        )
+    centre = np.zeros(3) if com is None else np.asarray(com, dtype=np.float64)
+    return Payload(mass=mass, com=centre, inertia=np.zeros((3, 3)))

@@ -1,5 +1,8 @@
 """From what the drives measure to torque at the joints."""
 
+import numpy as np
+
+from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, RobotError
@@ -18,8 +21,20 @@ def check_joints(recording: Recording, robot: Robot) -> None:
 def uses_current(recording: Recording, robot: Robot) -> bool:
     """Whether the drive torque comes from motor current rather than from a torque signal."""
     if robot.torque_source == "current":
-        return recording.current is not None or recording.torque is None
-    return recording.torque is None and recording.current is not None
+        return recording.current is not None or not has_torque(recording)
+    return not has_torque(recording) and recording.current is not None
+
+
+def effort_name(recording: Recording, robot: Robot) -> str:
+    """The signal that the drive torque comes from, one of `vftcli.signals.recording.EFFORTS`."""
+    if uses_current(recording, robot):
+        return "current"
+    return "torque" if recording.torque is not None else "torque_without_gravity"
+
+
+def has_torque(recording: Recording) -> bool:
+    """Whether the log has a torque signal, with gravity in it or without."""
+    return recording.torque is not None or recording.torque_without_gravity is not None
 
 
 def drive_torque(recording: Recording, robot: Robot) -> Array:
@@ -27,14 +42,20 @@ def drive_torque(recording: Recording, robot: Robot) -> Array:
 
     τ = K i where the robot's torque source is current, else the measured torque. A robot described
     by currents whose log has only torques uses the torques, and the other way round if its file
-    has torque constants.
+    has torque constants. Torques without gravity get the gravity torque g(q) of the arm with its
+    payload: τ = e + g(q).
 
     Raises:
         MissingSignalError: If the log has neither, or currents without drive constants.
         RobotError: If the number of joints differs.
     """
     check_joints(recording, robot)
-    if not uses_current(recording, robot):
+    name = effort_name(recording, robot)
+    if name == "torque_without_gravity" and recording.torque_without_gravity is not None:
+        still = np.zeros_like(recording.q)
+        gravity = momentum_terms(robot.loaded_chain, recording.q, still).gravity
+        return np.asarray(recording.torque_without_gravity + gravity)
+    if name != "current":
         return recording.require("torque")
     current = recording.require("current")
     if robot.torque_constant is None:

@@ -3,12 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import WrenchFrame
 
@@ -17,6 +18,7 @@ MEANINGS = {
     "dq": "joint velocities",
     "current": "motor currents",
     "torque": "joint torques",
+    "torque_without_gravity": "joint torques without gravity's",
     "target_q": "target positions",
     "target_dq": "target velocities",
     "target_current": "target currents",
@@ -29,6 +31,10 @@ MEANINGS = {
 
 JOINT_SIGNALS = tuple(name for name in MEANINGS if name != "wrench")
 """Those of them that hold one column a joint."""
+
+
+EFFORTS = ("current", "torque", "torque_without_gravity")
+"""Those that say what the drives do; a log has one of them or several."""
 
 
 class Awaited:
@@ -109,6 +115,8 @@ class Recording:
         dq: Joint velocities. (T, n) [rad/s]
         current: Motor currents. (T, n) [A]
         torque: Measured drive torques, gravity included. (T, n) [N·m]
+        torque_without_gravity: Drive torques less what holds the arm and its payload against
+            gravity, as newer UR drivers publish them. (T, n) [N·m]
         target_q: Commanded positions. (T, n) [rad]
         target_dq: Commanded velocities. (T, n) [rad/s]
         target_current: The controller's expected currents. (T, n) [A]
@@ -129,6 +137,7 @@ class Recording:
     dq: Array | None = None
     current: Array | None = None
     torque: Array | None = None
+    torque_without_gravity: Array | None = None
     target_q: Array | None = None
     target_dq: Array | None = None
     target_current: Array | None = None
@@ -204,6 +213,35 @@ class Recording:
                 f"{', '.join(self.signals)}. Record them, or name their columns with --columns."
             )
         return value
+
+    def with_effort(
+        self, kind: str, *, source: str | None = None, factor: float = 1.0
+    ) -> "Recording":
+        """Return the recording with its effort taken for what it really is, and with no other.
+
+        Args:
+            kind: One of `EFFORTS`.
+            source: Which of the log's efforts it is; None for the one that is called so, or the
+                only one there is.
+            factor: What its values are multiplied with.
+
+        Raises:
+            MissingSignalError: If the log has no effort, or several and none of this kind.
+        """
+        there = [name for name in EFFORTS if getattr(self, name) is not None]
+        source = source or (kind if kind in there else None)
+        if not there or (len(there) > 1 and source is None):
+            raise MissingSignalError(
+                f"{self.name}: the log has {' and '.join(there) or 'no effort'}, so none of it can "
+                f"be taken for {kind}; name the column with --columns"
+            )
+        source = source or there[0]
+        value: Array = getattr(self, source)
+        taken = fact("effort-taken", effort=MEANINGS[source], kind=MEANINGS[kind], factor=factor)
+        where = replace(self.source, remarks=(*self.source.remarks, taken))
+        # 0 + x: no zero of the other sign.
+        changed: dict[str, Any] = {**dict.fromkeys(there), kind: 0.0 + factor * value}
+        return replace(self, source=where, **changed)
 
     def between(self, start: float, stop: float) -> "Recording":
         """Return the samples with start ≤ t ≤ stop; their times stay those of the whole log. [s]

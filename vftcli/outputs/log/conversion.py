@@ -93,11 +93,12 @@ def write_mcap(recording: Recording, path: Path) -> None:
 def topics(recording: Recording) -> Iterator[OutputTopic]:
     """The topics of a log.
 
-    The effort of /joint_states is the torque, or the motor current of a log that has no torque, as
-    UR's driver publishes it.
+    The effort of /joint_states is the torque, or of a log that has no torque the motor current or
+    the torque without gravity, as UR's driver publishes them.
     """
     names = recording.joint_names or tuple(f"joint_{j + 1}" for j in range(recording.joints))
-    effort = recording.torque if recording.torque is not None else recording.current
+    efforts = (getattr(recording, name) for name in ("torque", "current", "torque_without_gravity"))
+    effort = next((value for value in efforts if value is not None), None)
     yield joint_topic("/joint_states", names, recording.q, recording.dq, effort)
     # JointState has no field for these: each gets a topic whose effort it is.
     for name in JOINT_SIGNALS:

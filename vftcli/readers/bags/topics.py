@@ -15,6 +15,7 @@ from vftcli.readers.joints import UR_NAMES, robot_of
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
+from vftcli.signals.recording import EFFORTS
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import median_step, resample_columns
 from vftcli.signals.wrench import WrenchFrame
@@ -178,11 +179,11 @@ class Gathering:
         same = stream.messages == lead.messages and np.array_equal(
             host_times(stream)[0], self.clock.host
         )
-        if value is None or not same or (name != "wrench" and name not in SIGNALS):
+        if value is None or not same or name not in {*SIGNALS, *SIGNALS.values()}:
             return
         field_name = SIGNALS.get(name, name)
-        if field_name in {"current", "torque"} and lead.kind.names:
-            for other in {"current", "torque"} & set(self.signals):
+        if field_name in EFFORTS and lead.kind.names:
+            for other in set(EFFORTS) & set(self.signals):
                 if np.array_equal(self.signals[other], value):
                     del self.signals[other]  # /joint_states' effort said the same without its kind
         self.signals[field_name] = value

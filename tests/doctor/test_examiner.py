@@ -1,0 +1,97 @@
+"""Who examines the logs of a command: each once, refusals with their remedy, robots and efforts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vftcli.doctor import Examiner, in_words
+from vftcli.doctor.examiner import refuse
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots import load_robot
+from vftcli.robots.choice import RobotChoice
+from vftcli.robots.kernels import momentum_terms
+from vftcli.signals.errors import ExaminationError, RobotError
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import warning
+
+UR5E = load_robot("ur5e")
+ORDER = warning("no-effort")
+
+
+def excited(seconds: float = 12.0) -> Recording:
+    """A UR5e on a slow excitation, its torques the model's and dry friction's of 6 N·m. 100 Hz"""
+    t = np.arange(0.0, seconds, 0.01)
+    rates = 0.4 + 0.07 * np.arange(6)
+    phase = np.outer(t, rates) + np.arange(6)
+    q, dq = 0.6 * np.sin(phase), 0.6 * rates * np.cos(phase)
+    terms = momentum_terms(UR5E.loaded_chain, q, dq)
+    torque = np.gradient(terms.p, t, axis=0) - terms.coriolis_transpose_dq + terms.gravity
+    return Recording(t=t, q=q, dq=dq, torque=torque + 6.0 * np.tanh(dq / 0.01))
+
+
+def turned(log: Recording) -> Recording:
+    return replace(log, torque=-log.require("torque"))
+
+
+def test_a_log_is_examined_once_for_an_arm() -> None:
+    examiner, log = Examiner(), excited()
+    first = examiner.examine(log, UR5E)
+    assert examiner.examine(log, UR5E) is first
+    assert examiner.examine(log, load_robot("ur5e")) is not first
+    assert examiner.examinations[0] is first
+
+
+def test_a_turned_sign_is_refused_with_its_remedy_unless_it_is_wanted_anyway() -> None:
+    log = turned(excited())
+    with pytest.raises(ExaminationError, match="effort-sign") as error:
+        Examiner().examine(log, UR5E)
+    assert "-tau" in str(error.value)
+    assert "--anyway" in str(error.value)
+    found = Examiner(anyway=True).examine(log, UR5E)
+    assert "effort-sign" in {finding.code for finding in found.refusals()}
+
+
+def test_several_refusals_are_one_line() -> None:
+    refuse("log", [])
+    others = [warning("too-short", samples=1), warning("no-velocity"), warning("no-velocity")]
+    with pytest.raises(ExaminationError) as error:
+        refuse("a.csv", [ORDER, *others])
+    assert str(error.value) == (
+        f"a.csv: {in_words(ORDER)} Also: too-short, no-velocity. "
+        "With --anyway it goes on all the same."
+    )
+
+
+def test_a_robot_is_loaded_once_and_guessed_where_the_makers_model_tells_it() -> None:
+    """No other profile comes near a log whose target torques are one's own."""
+    examiner, log = Examiner(), excited()
+    told = RobotChoice(name="ur5e")
+    assert examiner.robot(log, told) is examiner.robot(log, told)
+    known = replace(log, target_torque=log.require("torque") - 6.0 * np.tanh(log.dq / 0.01))
+    guessed = examiner.robot(known, RobotChoice())
+    assert guessed.name == "ur5e"
+    assert "robot-guessed" in [remark.code for remark in guessed.remarks]
+    with pytest.raises(RobotError, match="no profile settles it"):
+        examiner.robot(log, RobotChoice())
+
+
+def test_the_payload_of_one_log_is_not_that_of_another() -> None:
+    examiner, log = Examiner(), replace(excited(), payload_mass=1.5, payload_com=(0.0, 0.0, 0.1))
+    choice = RobotChoice(name="ur5e", payload="log")
+    first, second = (examiner.robot(replace(log, payload_mass=m), choice) for m in (1.5, 2.0))
+    assert first.payload is not None
+    assert second.payload is not None
+    assert (first.payload.mass, second.payload.mass) == (1.5, 2.0)
+
+
+def test_an_open_effort_is_taken_for_what_the_model_explains() -> None:
+    """The sign that was turned is turned back; a log that says the truth stays as it is."""
+    examiner, log = Examiner(), excited()
+    auto = ReadChoice(effort="auto")
+    assert examiner.taken(log, UR5E, auto) is log
+    healed = examiner.taken(turned(log), UR5E, auto)
+    assert healed.torque == pytest.approx(log.torque)
+    assert [remark.code for remark in healed.source.remarks] == ["effort-taken"]
+    assert examiner.taken(turned(log), UR5E, ReadChoice()).source.remarks == ()
+    assert not Examiner().examine(healed, UR5E).refusals()
