@@ -1,11 +1,10 @@
 """Pickles: opened only if they rebuild nothing but NumPy arrays. They are never executed."""
 
-import codecs
 import io
 import pickle
 import pickletools
+import re
 import warnings
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -19,6 +18,14 @@ from vftcli.signals.errors import LogError
 
 PICKLE_LIMIT = 512 * 1024 * 1024
 """Larger pickles are refused: they have to be held in memory twice."""
+
+BUILT_LIMIT = 1 << 20
+"""Numbers that a pickle of any size may build; a larger one as many as it has bytes."""
+
+TOO_MUCH = "more numbers than a file of its size can hold"
+
+DEPTH = 32
+"""Lists inside lists: a log has four, an array of states four or five."""
 
 
 class Refused(pickle.UnpicklingError):
@@ -37,50 +44,92 @@ class Marker:
         raise Refused("an array of its own making")
 
 
-def _dtype(code: Any, *_: Any) -> Any:  # noqa: ANN401
-    """A dtype of plain numbers, letters or booleans; object dtypes are refused."""
-    dtype = np.dtype(code)
-    if dtype.hasobject or dtype.itemsize > 1024:
-        raise Refused("an array of objects")
-    return dtype
+class PickledType:
+    """The type of an array's numbers as a pickle tells it; NumPy's own never meets a pickle.
+
+    Attributes:
+        dtype: The type of plain numbers, letters or booleans; None for any other.
+    """
+
+    def __init__(self, code: Any = None, *_: Any) -> None:  # noqa: ANN401 - whatever is pickled
+        if isinstance(code, str) and re.search(r"O|object", code):
+            raise Refused("an array of objects")
+        plain = isinstance(code, str) and re.fullmatch(
+            r"[<>=|]?([biufc?]\d{0,2}|[SU]\d{1,3})", code
+        )
+        self.dtype: np.dtype[Any] | None = np.dtype(code) if plain else None
+
+    def __setstate__(self, state: Any) -> None:  # noqa: ANN401
+        """Take up the byte order, the second of what NumPy pickles of a type."""
+        _version, order, subarray, names = state[:4]
+        if subarray is not None or names is not None or order not in {"<", ">", "=", "|"}:
+            self.dtype = None
+        elif self.dtype is not None and order in {"<", ">"}:
+            self.dtype = self.dtype.newbyteorder(order)
 
 
-def _empty(_kind: Any, _shape: Any, _code: Any) -> Any:  # noqa: ANN401
-    """The empty array that a pickled array's state then fills."""
-    return np.ndarray.__new__(np.ndarray, (0,), "b")
+class PickledArray:
+    """An array as a pickle tells it, laid over the pickle's own bytes.
+
+    Attributes:
+        array: The array; empty where it holds no plain numbers.
+    """
+
+    __slots__ = ("array",)
+
+    def __init__(self, kind: Any = Marker, *_: Any) -> None:  # noqa: ANN401
+        if kind is not Marker:
+            raise Refused("an array of a kind of its own")
+        self.array = NOTHING
+
+    def __setstate__(self, state: Any) -> None:  # noqa: ANN401
+        """Take up shape, type, order and bytes, as NumPy pickles them."""
+        shape, kind, fortran, content = state[-4:]
+        self.fill(content, kind, shape, "F" if fortran else "C")
+
+    def fill(self, content: Any, kind: Any, shape: Any, order: str) -> None:  # noqa: ANN401
+        """Lay the array over some bytes.
+
+        Raises:
+            Refused: If what is given is not of the kinds that NumPy pickles.
+            ValueError: If the bytes do not fill the shape.
+        """
+        if not isinstance(kind, PickledType) or not isinstance(content, bytes | bytearray):
+            raise Refused("an array of objects")
+        if kind.dtype is not None:
+            numbers = np.frombuffer(content, dtype=kind.dtype)
+            self.array = numbers.reshape(shape, order="F" if order == "F" else "C")
 
 
-def _scalar(dtype: Any, content: Any = None) -> Any:  # noqa: ANN401
+Built = tuple[Any, int]
+"""What was built of a part of a pickle, and how many numbers it holds."""
+
+NOTHING = np.empty(0, dtype="V1")
+"""What stands for an array that holds no numbers."""
+
+
+def _from_buffer(buffer: Any, kind: Any, shape: Any, order: Any = "C") -> PickledArray:  # noqa: ANN401
+    """An array over a buffer of the pickle, as newer protocols hold it."""
+    array = PickledArray()
+    array.fill(buffer, kind, shape, order)
+    return array
+
+
+def _scalar(kind: Any, content: Any = None) -> Any:  # noqa: ANN401
     """One number of its bytes."""
-    if not isinstance(dtype, np.dtype) or dtype.hasobject or not isinstance(content, bytes):
+    if not isinstance(kind, PickledType) or kind.dtype is None or not isinstance(content, bytes):
         raise Refused("a scalar that is no number")
-    return np.frombuffer(content, dtype=dtype, count=1)[0]
-
-
-def _encode(text: Any, encoding: Any = "latin1") -> Any:  # noqa: ANN401
-    """Text that old pickles hold the bytes of an array as."""
-    if not isinstance(text, str) or encoding not in {"latin1", "latin-1"}:
-        raise Refused("an odd encoding")
-    return codecs.encode(text, "latin1")
-
-
-def _from_buffer(buffer: Any, dtype: Any, shape: Any, order: Any = "C") -> Any:  # noqa: ANN401
-    """An array of plain numbers over a buffer of the pickle."""
-    if not isinstance(dtype, np.dtype) or dtype.hasobject:
-        raise Refused("an array of objects")
-    return np.frombuffer(buffer, dtype=dtype).reshape(shape, order=order).copy()
+    return np.frombuffer(content, dtype=kind.dtype, count=1)[0].item()
 
 
 ALLOWED: dict[tuple[str, str], Callable[..., Any] | type] = {
     ("numpy", "ndarray"): Marker,
-    ("numpy", "dtype"): _dtype,
-    ("collections", "OrderedDict"): OrderedDict,
-    ("_codecs", "encode"): _encode,
+    ("numpy", "dtype"): PickledType,
     **{
         (f"numpy.{package}.{module}", name): function
         for package in ("core", "_core")
         for module, name, function in (
-            ("multiarray", "_reconstruct", _empty),
+            ("multiarray", "_reconstruct", PickledArray),
             ("multiarray", "scalar", _scalar),
             ("numeric", "_frombuffer", _from_buffer),
         )
@@ -90,7 +139,15 @@ ALLOWED: dict[tuple[str, str], Callable[..., Any] | type] = {
 
 
 class ArrayUnpickler(pickle.Unpickler):
-    """An unpickler that rebuilds arrays and refuses everything else."""
+    """An unpickler that rebuilds arrays and refuses everything else.
+
+    What it builds is bounded by the size of the pickle: a part may be named again and again in two
+    bytes each.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        super().__init__(io.BytesIO(content))
+        self._left = max(BUILT_LIMIT, len(content))
 
     def find_class(self, module: str, name: str) -> Any:  # noqa: ANN401
         """Return what a name may stand for.
@@ -98,10 +155,73 @@ class ArrayUnpickler(pickle.Unpickler):
         Raises:
             Refused: If the name is not one of the few that arrays are made of.
         """
+        if (module, name) == ("_codecs", "encode"):
+            return self._encoded
+        if (module, name) == ("collections", "OrderedDict"):
+            return self._ordered
         try:
             return ALLOWED[module, name]
         except KeyError:
             raise Refused(f"{module}.{name}"[:80]) from None
+
+    def _encoded(self, text: Any, encoding: Any = "latin1") -> bytes:  # noqa: ANN401
+        """Text that old pickles hold the bytes of an array as."""
+        if not isinstance(text, str) or encoding not in {"latin1", "latin-1"}:
+            raise Refused("an odd encoding")
+        self._claim(len(text))
+        return text.encode("latin1")
+
+    def _ordered(self, items: Any = ()) -> dict[Any, Any]:  # noqa: ANN401
+        """A dictionary that keeps its order, as every dictionary does today."""
+        self._claim(len(items))
+        return dict(items)
+
+    def _claim(self, size: int) -> None:
+        """Count what is about to be built.
+
+        Raises:
+            Refused: If it is more than a pickle of this size holds.
+        """
+        self._left -= size
+        if self._left < 0:
+            raise Refused(TOO_MUCH)
+
+    def built(self, value: Any) -> Any:  # noqa: ANN401 - whatever the pickle holds
+        """What was loaded, with arrays for pickled arrays, once its size is known to be bounded.
+
+        Raises:
+            Refused: If it holds more numbers than a pickle of this size, or itself.
+        """
+        built, size = self._settled(value, {}, 0)
+        self._claim(size)
+        return built
+
+    def _settled(self, value: Any, known: dict[int, Built | None], depth: int) -> Built:  # noqa: ANN401
+        """A value with arrays for pickled arrays, and how many numbers it takes laid out in full.
+
+        A part that is named again is not walked again: a few lists that hold one another a few
+        times over are more than any memory takes.
+        """
+        if isinstance(value, PickledArray):
+            return value.array, value.array.size
+        if not isinstance(value, list | tuple | dict):
+            return value, 1
+        if id(value) in known:
+            if (before := known[id(value)]) is None:
+                raise Refused("a list that holds itself")
+            return before
+        if depth > DEPTH:
+            raise Refused(f"lists nested more than {DEPTH} deep")
+        known[id(value)] = None
+        parts = [
+            self._settled(part, known, depth + 1)
+            for part in (value.values() if isinstance(value, dict) else value)
+        ]
+        inner = [part for part, _ in parts]
+        whole = dict(zip(value, inner, strict=True)) if isinstance(value, dict) else inner
+        built = whole, 1 + sum(size for _, size in parts)
+        known[id(value)] = built
+        return built
 
 
 def load_arrays_only(file: LogFile) -> Any:  # noqa: ANN401 - whatever the pickle holds
@@ -119,7 +239,8 @@ def load_arrays_only(file: LogFile) -> Any:  # noqa: ANN401 - whatever the pickl
             warnings.simplefilter("ignore")  # old opcodes' escapes: refused or read, never told
             # Looked over as a whole first: loading builds objects on the way to what it refuses.
             _check_opcodes(content)
-            return ArrayUnpickler(io.BytesIO(content)).load()
+            unpickler = ArrayUnpickler(content)
+            return unpickler.built(unpickler.load())
     except Refused as refusal:
         raise LogError(f"{file.path}: refused, the pickle asks for {refusal}. {remedy}") from None
     except RecursionError:
