@@ -53,6 +53,31 @@ def test_ur_rtde_is_told_by_its_commas(tmp_path: Path) -> None:
     assert read(ur_csv(tmp_path / "x", separator=",", end="\n")).source.format == "ur-rtde"
 
 
+@pytest.mark.parametrize(
+    ("field", "shift", "point"),
+    [
+        ("ft_raw_wrench_0", 0.0, "flange"),  # only e-Series has it
+        ("joint_mode_0", 0.0, "tool"),  # CB3 counts cycles of 8 ms
+        ("joint_mode_0", 0.002, "flange"),
+    ],
+)
+def test_the_point_of_the_controllers_moment(
+    tmp_path: Path, field: str, shift: float, point: str
+) -> None:
+    """Of actual_TCP_force: the flange on e-Series, the TCP on CB3, told by fields or clock."""
+    path = ur_csv(tmp_path / "x", separator=",", end="\n")
+    lines = path.read_text().splitlines()
+    clock = lines[0].split(",").index("timestamp")
+    wrench = ",".join(f"actual_TCP_force_{k}" for k in range(6))
+    out = [f"{lines[0]},{wrench},{field}"]
+    for k, line in enumerate(lines[1:]):
+        cells = line.split(",")
+        cells[clock] = f"{1000.0 + 0.008 * k + shift:.6f}"
+        out.append(",".join([*cells, "1,2,3,.1,.2,.3", "0"]))
+    path.write_text("\n".join(out) + "\n")
+    assert read(path).wrench_frame == WrenchFrame("base", point)
+
+
 def test_payload_that_the_controller_was_told_of(tmp_path: Path) -> None:
     path = ur_csv(tmp_path / "x", separator=",", end="\n")
     lines = path.read_text().splitlines()

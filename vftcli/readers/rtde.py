@@ -1,5 +1,6 @@
 """UR's real-time data exchange: the official client's text and binary files, and ur_rtde's CSV."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +10,7 @@ from vftcli.readers.aliases import vector_picks
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Cell, Pick, Picks, Table, checked, picked
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import WrenchFrame
@@ -28,8 +30,11 @@ JOINT_COLUMNS = {
 """Field of Recording → RTDE's name; all have six elements, name_0 to name_5."""
 
 CLOCK = "controller clock (timestamp, seconds since power-on)"
-WRENCH_FRAME = WrenchFrame("base", "tool")
-"""Of actual_TCP_force: estimated from currents on CB3, measured on e-Series."""
+CB3_CYCLE = 8e-3
+"""Cycle of a CB3 controller, which its time stamps count; an e-Series has 2 ms. [s]"""
+
+E_SERIES_FIELD = "ft_raw_wrench_0"
+"""What only a controller with a sensor on the flange sends."""
 
 PAYLOAD = ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2")
 """The payload that the controller was told of; its last value counts."""
@@ -68,10 +73,28 @@ def read_rtde(table: Table, request: ReadChoice) -> RawLog:
             f"{table.path}: no actual_q_0 … actual_q_5 among its {len(names)} columns. Add "
             "actual_q to the recipe and record again."
         )
-    raw = picked(table, checked(table, picks), request, clock_name=CLOCK, wrench_frame=WRENCH_FRAME)
+    raw = picked(table, checked(table, picks), request, clock_name=CLOCK)
+    raw = replace(raw, wrench_frame=force_frame(names, raw.stamps * raw.tick))
     if len(raw.constants) != len(PAYLOAD) or not np.all(np.isfinite(raw.constants)):
         return raw
     return replace(raw, payload_mass=raw.constants[0], payload_com=raw.constants[1:])
+
+
+def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:
+    """Frame of actual_TCP_force: base axes, about the flange on e-Series, about the TCP on CB3.
+
+    Measured on three e-Series logs: about the TCP its moment misses the joints' torque by four
+    times as much. An e-Series log that has no such field and whose stamps all happen to be
+    multiples of 8 ms cannot be told from a CB3's.
+
+    Args:
+        names: Columns of the log.
+        stamps: Controller clock. (T,) [s]
+    """
+    steps = stamps[np.isfinite(stamps)] / CB3_CYCLE
+    # Half a millisecond: stamps may be written with three decimals.
+    cb3 = bool(np.all(np.abs(steps - np.round(steps)) < 5e-4 / CB3_CYCLE))
+    return WrenchFrame("base", "tool" if cb3 and E_SERIES_FIELD not in names else "flange")
 
 
 class BinaryTable:
