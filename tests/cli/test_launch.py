@@ -1,5 +1,6 @@
 """The program as the shell calls it: it leaves at once, all written, with the right code."""
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -46,3 +47,49 @@ def test_files_are_complete_when_it_has_left(tmp_path: Path) -> None:
     done = launched("estimate", FIXTURE, "--robot", "ur5", "-o", tmp_path / "out")
     assert done.returncode == 0
     assert pl.read_parquet(tmp_path / "out" / "estimates.parquet").height == 2501
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("--help",), 1, "error: standard output is closed\n"),
+        (("robots",), 1, "error: standard output is closed\n"),
+        (("estimate",), 2, "Missing argument"),
+    ],
+)
+def test_a_closed_output_is_one_line(words: tuple[str, ...], code: int, said: str) -> None:
+    shell = ["sh", "-c", 'exec "$@" >&-', "sh", sys.executable, "-c", PROGRAM, *words]
+    done = subprocess.run(shell, capture_output=True, text=True, check=False)
+    assert done.returncode == code
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_without_streams_the_files_are_written(tmp_path: Path) -> None:
+    """What takes the place of a closed stream is no output file, into which words would go."""
+    words = ["convert", FIXTURE, "-o", tmp_path / "x.csv"]
+    shell = ["sh", "-c", 'exec "$@" <&- >&- 2>&-', "sh", sys.executable, "-c", PROGRAM]
+    done = subprocess.run([*shell, *map(str, words)], check=False)
+    assert done.returncode == 0
+    assert (tmp_path / "x.csv").read_text(encoding="utf-8").startswith("t,")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stopped_command_says_so_and_leaves_nothing(tmp_path: Path, number: int) -> None:
+    """The signal comes while half of the files are written, and again while they are removed."""
+    script = (
+        "import os, shutil, vftcli.outputs.log.estimates as e\n"
+        f"e.write_csv = lambda *_: os.kill(os.getpid(), {int(number)})\n"
+        "remove = shutil.rmtree\n"
+        f"shutil.rmtree = lambda *a, **k: (os.kill(os.getpid(), {int(number)}), remove(*a, **k))\n"
+    )
+    words = ["estimate", FIXTURE, "--robot", "ur5", "--csv", "--anyway", "-o", tmp_path / "out"]
+    done = subprocess.run(
+        [sys.executable, "-c", script + PROGRAM, *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 128 + number
+    assert done.stderr == "error: interrupted; run the command again\n"
+    assert list(tmp_path.iterdir()) == []

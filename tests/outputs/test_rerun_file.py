@@ -1,4 +1,5 @@
 from pathlib import Path
+from uuid import UUID
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from vftcli.outputs.plots import Lines, PlotLine, Tab
 from vftcli.outputs.rerun_file import (
     drawable,
     finish,
+    recording_id,
     rerun_file,
     send_force,
     turn_from_z,
@@ -91,3 +93,16 @@ def test_a_recording_without_its_footer_is_no_recording(tmp_path: Path) -> None:
     (tmp_path / "cut.rrd").write_bytes(b"RRF2" + bytes(1000))
     with pytest.raises(OutputError, match=r"cut\.rrd cannot be written whole"):
         finish(Stream(), tmp_path / "cut.rrd")
+
+
+def test_a_recording_is_known_by_what_it_holds() -> None:
+    """Equal data and words are one recording; another value, line or word is another."""
+    t, ramp = np.arange(3.0), np.arange(3.0)
+
+    def identity(values: np.ndarray = ramp, name: str = "gmo", text: str = "sha256 12") -> UUID:
+        lines = Lines("/tau_ext/J1", "J1", [PlotLine(name, values, "#000000")])
+        return recording_id("log", [Tab("Torque", t, [lines])], {"Summary": text})
+
+    assert identity() == identity(ramp.copy())
+    others = [identity(2 * ramp), identity(name="fdo"), identity(text="sha256 13")]
+    assert len({identity(), *others}) == 4

@@ -1,17 +1,22 @@
 """The command line: one file a command; parse, call, print. Nothing else prints or exits."""
 
 import atexit
+import errno
 import gc
+import io
 import os
+import signal
 import sys
 from collections.abc import Collection
 from contextlib import suppress
 from importlib import import_module
+from types import FrameType
 from typing import Annotated, Any, NamedTuple
 
 import typer
 
 from vftcli.signals.errors import VftError
+from vftcli.signals.letters import printable
 
 
 class ListedCommand(NamedTuple):
@@ -145,7 +150,6 @@ def main() -> None:
         fail("out of memory; use --interval to take a part of the log")
     except OSError as error:
         if isinstance(error, BrokenPipeError):
-            sys.stderr.close()
             raise SystemExit(1) from None
         where = f": {error.filename}" if error.filename else ""
         fail(f"{error.strerror or error}{where}")
@@ -158,18 +162,68 @@ def launch() -> None:
     that has to be written is written, and whoever asked to be called at exit is called, before.
     """
     try:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            # What the caller had switched off, as nohup does, stays so.
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, stop)
+        open_streams()
         main()
         code: object = 0
     except SystemExit as end:
         code = end.code
-    atexit._run_exitfuncs()
-    with suppress(OSError, ValueError):
-        sys.stdout.flush()
-        sys.stderr.flush()
+    except Stopped as stopped:
+        typer.echo("error: interrupted; run the command again", err=True)
+        code = 128 + stopped.number
+    with suppress(Stopped):
+        atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError, AttributeError):
+            stream.flush()
     os._exit(code if isinstance(code, int) else int(code is not None))
+
+
+class Stopped(BaseException):
+    """The user or the system ends the command; what is half written goes.
+
+    Attributes:
+        number: The signal's.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+def stop(number: int, _frame: FrameType | None) -> None:
+    """Unwind what the command is doing, once: a second signal must not stop the cleaning up."""
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, signal.SIG_IGN)
+    raise Stopped(number)
+
+
+class ClosedOutput(io.TextIOBase):
+    """Standard output that the caller closed: who writes hears of it, as on a full disk."""
+
+    def write(self, _text: str) -> int:
+        """Raise, whatever is written."""
+        raise OSError(errno.EBADF, "standard output is closed")
+
+
+def open_streams() -> None:
+    """Make standard streams that the caller closed, or whose letters are too few, harmless."""
+    for number in (0, 1, 2):
+        try:
+            os.fstat(number)
+        except OSError:
+            # Else the next file that is opened gets its number, and a library's words.
+            os.open(os.devnull, os.O_RDWR)
+    if sys.stdout is None:
+        sys.stdout = ClosedOutput()
+    elif isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def fail(message: str) -> None:
     """Print one line to stderr and exit with code 1."""
-    typer.echo(f"error: {' '.join(message.split())}", err=True)
+    typer.echo(f"error: {printable(' '.join(message.split()))}", err=True)
     raise SystemExit(1)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from vftcli.signals.letters import printable, printable_lines
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -18,12 +20,12 @@ if TYPE_CHECKING:
 
 def command_line() -> str:
     """The command as the user typed it, for `run.json` and the report."""
-    return shlex.join(["vftcli", *sys.argv[1:]])
+    return printable(shlex.join(["vftcli", *sys.argv[1:]]))
 
 
 def say(text: str) -> None:
     """Print words to stderr; tables go to stdout."""
-    typer.echo(text, err=True)
+    typer.echo(printable_lines(text), err=True)
 
 
 def say_json(value: object) -> None:

@@ -1,7 +1,6 @@
 """The paper's guidelines for choosing an observer (Sec. IV-A), as facts computed on a log."""
 
 from collections.abc import Mapping, Sequence
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -21,9 +20,6 @@ REACHED = 0.9
 FAST = 5.0
 """Contacts by a person's deliberate action lie below this frequency, the rest is noise. [Hz]"""
 
-REPEATS = 3
-"""Runs of which the shortest computation time counts."""
-
 
 class Facts(NamedTuple):
     """What one observer does on one log.
@@ -36,7 +32,6 @@ class Facts(NamedTuple):
             observer's own response. [N·m]
         passed: Share of the drive torque's noise above `FAST` that comes through, mean of joints.
         rmse: Root-mean-square error against the reference, mean of joints, NaN without. [N·m]
-        time: Computation time a sample. [s]
         parameter_count: Numbers to tune.
     """
 
@@ -46,7 +41,6 @@ class Facts(NamedTuple):
     noise: float
     passed: float
     rmse: float
-    time: float
     parameter_count: int
 
 
@@ -107,7 +101,6 @@ def facts_of(
         noise=float(np.mean(noise * np.sqrt(gain.mean(axis=0)))),
         passed=float(np.mean(np.sqrt(gain[frequency > FAST].mean(axis=0)))),
         rmse=mean_rmse(observer.name, errors),
-        time=computation_time(observer, terms),
         parameter_count=tuning.parameter_count,
     )
 
@@ -131,16 +124,6 @@ def step_response(observer: Observer, step: float, joints: int) -> Array:
     seen = observer.estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))).tau >= REACHED
     times: Array = np.where(seen.any(axis=0), t[seen.argmax(axis=0)], np.nan)
     return times
-
-
-def computation_time(observer: Observer, terms: DynamicsTerms) -> float:
-    """Shortest time a sample of a few runs over the log. [s]"""
-    spent = []
-    for _ in range(REPEATS):
-        start = perf_counter()
-        observer.estimate(terms)
-        spent.append(perf_counter() - start)
-    return min(spent) / terms.samples
 
 
 def mean_rmse(name: str, errors: pl.DataFrame | None) -> float:

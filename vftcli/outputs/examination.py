@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.doctor import Examination, finding_record, in_words
+from vftcli.signals.letters import printable
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
 
@@ -142,8 +143,3 @@ def overridden_lines(examinations: Sequence[Examination]) -> list[str]:
         for one in examinations
         for words in map(in_words, one.refusals())
     ]
-
-
-def printable(line: str) -> str:
-    """A line without control characters that a log's names may carry."""
-    return "".join(c if c.isprintable() else "?" for c in line)

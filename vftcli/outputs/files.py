@@ -76,6 +76,23 @@ def check_file(path: Path, force: bool = False) -> None:
         raise unwritable(path, error) from None
 
 
+@contextmanager
+def table_file(path: Path) -> Iterator[Path]:
+    """Yield a path at which Polars writes a table.
+
+    Raises:
+        OutputError: If the disk is full, which Polars calls an error of computation.
+    """
+    from polars.exceptions import ComputeError
+
+    try:
+        yield path
+    except ComputeError as error:
+        raise OutputError(
+            f"{path.name} cannot be written ({one_line(error)[:200]}): is the disk full?"
+        ) from None
+
+
 def write_text(path: Path, text: str, force: bool = False) -> None:
     """Write UTF-8 text, whole or not at all.
 

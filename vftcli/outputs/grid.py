@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.signals.letters import printable
+
 DASH = "–"
 """What stands where nothing is known."""
 
@@ -145,12 +147,14 @@ class Grid:
     def caption(self) -> str:
         """The title with what all of its numbers are, "" where there is neither."""
         quantity = f"{self.quantity} in {self.unit}" if self.unit else self.quantity
-        return ", ".join(text for text in (self.title, quantity) if text)
+        return printable(", ".join(text for text in (self.title, quantity) if text))
 
     @property
     def cells(self) -> list[list[GridCell]]:
         """Every entry as text, row by row."""
-        return [[c.cell(x) for c, x in zip(self.columns, row, strict=True)] for row in self.rows]
+        rows = [[c.cell(x) for c, x in zip(self.columns, row, strict=True)] for row in self.rows]
+        # A name from a file may hold an end of line, or what a terminal would obey.
+        return [[cell._replace(text=printable(cell.text)) for cell in row] for row in rows]
 
 
 def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ...]:  # noqa: ANN401
@@ -205,7 +209,7 @@ def latex(grid: Grid) -> str:
     spec = "".join("l" if column.words else "r" for column in grid.columns)
     heads = [column.symbol or escape_latex(column.head) for column in grid.columns]
     heads[0] = heads[0][:1].upper() + heads[0][1:]
-    parts = [f"% {text}".replace("\n", " ") for text in comments if text]
+    parts = [printable(f"% {text}") for text in comments if text]
     parts += [rf"\begin{{tabular}}{{{spec}}}", r"\toprule"]
     if grid.unit:
         unit = escape_latex(grid.unit)
@@ -275,15 +279,17 @@ def words_class(column: Column) -> str:
 
 def escape_markdown(text: str) -> str:
     """Text that Markdown shows as it is."""
+    text = printable(text)
     for mark in "\\|*_`<>[]":
         text = text.replace(mark, f"\\{mark}")
-    return text.replace("\n", " ")
+    return text
 
 
 def escape_latex(text: str) -> str:
     """Text that LaTeX prints as it is."""
     # A blank behind the sign of a bound is a thin one: "< 6" is one number.
-    return "".join(LATEX_LETTERS.get(letter, letter) for letter in text).replace("$<$ ", r"$<$\,")
+    text = "".join(LATEX_LETTERS.get(letter, letter) for letter in printable(text))
+    return text.replace("$<$ ", r"$<$\,")
 
 
 def json_rows(rows: Sequence[Mapping[str, Any]]) -> str:

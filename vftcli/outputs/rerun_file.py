@@ -4,12 +4,14 @@ Every plot is one entity holding one scalar a line, on the timeline `t` in secon
 first sample; words are Markdown documents.
 """
 
+import hashlib
 import os
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
+from uuid import UUID
 
 import numpy as np
 
@@ -89,7 +91,9 @@ def rerun_file(
     """
     import rerun as rr
 
-    stream = rr.RecordingStream("vftcli")
+    # The same data make the same recording: no random id, and no time at which it was made.
+    identity = recording_id(title, tabs, words)
+    stream = rr.RecordingStream("vftcli", recording_id=identity, send_properties=False)
     stream.save(str(path), default_blueprint=blueprint(tabs, list(words), view))
     stream.send_recording_name(drawable(title))
     for tab in tabs:
@@ -102,6 +106,19 @@ def rerun_file(
         stream.log("/robot", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     yield stream
     finish(stream, path)
+
+
+def recording_id(title: str, tabs: Sequence[Tab], words: Mapping[str, str]) -> UUID:
+    """The identity of a recording: equal for equal data and words, which hold the logs' sha256.
+
+    A viewer puts recordings of one identity into one; other gains on the same log make another.
+    """
+    found = hashlib.sha256("\0".join([title, *words, *words.values()]).encode("utf-8", "replace"))
+    for tab in tabs:
+        for lines in tab.plots:
+            found.update("\0".join([lines.path, *(line.name for line in lines.lines)]).encode())
+            found.update(lines.values.tobytes())
+    return UUID(bytes=found.digest()[:16])
 
 
 def finish(stream: Stream, path: Path) -> None:

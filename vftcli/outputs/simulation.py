@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.log.run_record import seal, versions
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.errors import OutputError
@@ -90,8 +90,10 @@ def write_run(folder: OutputFolder, path: Path, run: Simulation, format: str, co
     from vftcli.simulation.writers.parquet import write_truth
 
     truth, scenario, record = (file.name for file in companions(path))
-    WRITERS[format](folder / path.name, run)
-    write_truth(folder / truth, run.truth, run.scenario.sensing.start)
+    with table_file(folder / path.name) as file:
+        WRITERS[format](file, run)
+    with table_file(folder / truth) as file:
+        write_truth(file, run.truth, run.scenario.sensing.start)
     folder.write(scenario, to_toml(replace(run.scenario, format=format), run.seed))
     own = {truth, scenario, path.name}
     files = {n: sha for n, sha in folder.digests().items() if n.partition("/")[0] in own}

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from vftcli.readers.reader import ReadChoice
 from vftcli.signals.identity import refuse_repeated_logs
+from vftcli.signals.letters import printable
 from vftcli.signals.recording import Recording
 
 
@@ -69,12 +70,13 @@ def labelled(paths: Iterable[str | Path]) -> dict[Path, str]:
     every other path: `a/log.csv` and `b/log.csv`. Spellings of one path have one label.
 
     Returns:
-        Path as it was given → label.
+        Path as it was given → label, all of it letters that can be shown.
     """
     given = [Path(path) for path in paths]
     # Spellings of one path count once, or no tail of it would be unique.
     parts = {path: absolute(path).parts for path in given}
-    return {path: _shortest_tail(parts[path], set(parts.values())) for path in given}
+    every = set(parts.values())
+    return {path: printable(_shortest_tail(parts[path], every)) for path in given}
 
 
 def absolute(path: str | Path) -> Path:

@@ -13,6 +13,7 @@ from vftcli.readers.columns import SIGNALS, ColumnSpec, Item
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
+from vftcli.signals.letters import printable
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import WrenchFrame
@@ -331,7 +332,7 @@ def missing_column(table: Table, signal: str, name: str) -> LogError:
 
 def listed(names: Sequence[str], most: int = 24) -> str:
     """Names for a message; a long list is cut."""
-    clean = ["".join(c if c.isprintable() else "?" for c in name[:41]) for name in names[:most]]
+    clean = [printable(name[:41]) for name in names[:most]]
     shown = ", ".join(name if len(name) <= 40 else name[:37] + "…" for name in clean)
     return shown + (f" and {len(names) - most} more" if len(names) > most else "")
 

@@ -10,13 +10,19 @@ from vftcli.analysis import Analysis
 from vftcli.outputs.log import report
 from vftcli.outputs.log.estimates import write_estimate_folder
 from vftcli.outputs.log.report import FILES, write_report, write_reports
+from vftcli.outputs.seals import digests
 from vftcli.signals.errors import OutputError
 
 
 def test_a_report_holds_its_files(analysis: Analysis, tmp_path: Path) -> None:
     text = write_report(tmp_path / "out", analysis, command="vftcli report x")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted(FILES)
-    assert (tmp_path / "out/run.json").read_text(encoding="utf-8") == text
+    written = json.loads((tmp_path / "out/run.json").read_text(encoding="utf-8"))
+    files = written.pop("files")
+    assert written == json.loads(text)
+    found = digests(tmp_path / "out")
+    found.pop("run.json")
+    assert files == found
     assert json.loads(text)["command"] == "vftcli report x"
     assert "vftcli report x" in (tmp_path / "out/index.html").read_text(encoding="utf-8")
 

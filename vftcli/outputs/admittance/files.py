@@ -16,7 +16,7 @@ from vftcli.outputs.admittance.page import render_admittance
 from vftcli.outputs.admittance.recording import padded, write_ghosts
 from vftcli.outputs.admittance.tables import comparison_csv, latency_rows
 from vftcli.outputs.examination import health_record
-from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.grid import json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
 from vftcli.outputs.seals import SEAL
@@ -151,6 +151,7 @@ def write_admittance(
     with OutputFolder(path, force, FILES) as folder:
         for name, text in texts.items():
             folder.write(name, text)
-        motion_table(replay).write_parquet(folder / "motion.parquet", compression="zstd")
+        with table_file(folder / "motion.parquet") as file:
+            motion_table(replay).write_parquet(file, compression="zstd")
         write_ghosts(folder / "recording.rrd", replay, title)
         seal(folder, SEAL, record)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from vftcli.outputs.files import atomic, check_file
+from vftcli.outputs.files import atomic, check_file, table_file
 from vftcli.outputs.log.estimates import per_axis, per_joint
 from vftcli.outputs.log.mcap_output import (
     OutputTopic,
@@ -75,14 +75,16 @@ def write_parquet(recording: Recording, path: Path) -> None:
         "robot": recording.robot_hint,
         "repairs": [str(repair) for repair in recording.source.repairs],
     }
-    table.write_parquet(path, compression="zstd", metadata={"vftcli": json.dumps(metadata)})
+    with table_file(path) as file:
+        table.write_parquet(file, compression="zstd", metadata={"vftcli": json.dumps(metadata)})
 
 
 def write_csv(recording: Recording, path: Path) -> None:
     """Write flat columns as CSV, every number with the digits that restore it exactly."""
     import polars as pl
 
-    pl.DataFrame(dict(columns_of(recording))).write_csv(path)
+    with table_file(path) as file:
+        pl.DataFrame(dict(columns_of(recording))).write_csv(file)
 
 
 def write_mcap(recording: Recording, path: Path) -> None:

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.files import OutputFolder, one_line
+from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.log.run_record import run_record, seal
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
-from vftcli.signals.errors import OutputError
 from vftcli.signals.wrench import AXES
 
 if TYPE_CHECKING:
@@ -94,18 +93,16 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
     Raises:
         OutputError: If the disk is full.
     """
-    from polars.exceptions import ComputeError
-
     table = estimates_table(analysis)
-    try:
-        table.write_parquet(path, compression="zstd", compression_level=1, statistics=False)
-    except ComputeError as error:  # how polars reports a full disk
-        raise OutputError(f"{path.name} cannot be written: {one_line(error)}") from None
+    with table_file(path) as file:
+        table.write_parquet(file, compression="zstd", compression_level=1, statistics=False)
 
 
 def write_csv(path: Path, analysis: Analysis) -> None:
     """Write the table as CSV with nine digits after the point; unknown is empty."""
-    estimates_table(analysis).write_csv(path, float_precision=9)
+    table = estimates_table(analysis)
+    with table_file(path) as file:
+        table.write_csv(file, float_precision=9)
 
 
 EXTRAS = {"csv": "estimates.csv", "mcap": "estimates.mcap", "rrd": "recording.rrd"}

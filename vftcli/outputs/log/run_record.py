@@ -19,6 +19,7 @@ from vftcli.observers.observer import Observer, Tuning
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.files import OutputFolder
 from vftcli.robots.robot import Robot
+from vftcli.signals.letters import whole
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
 
@@ -91,12 +92,13 @@ def seal(
         files: Name → sha256, where they are not all that are there.
 
     Returns:
-        The text of the file.
+        The text of the record alone: digests of recordings differ from run to run, since Rerun
+        numbers what it writes by the clock.
     """
     place = name.rpartition("/")[0]
-    text = to_json({**record, "files": folder.digests(place) if files is None else files})
-    folder.write(name, text)
-    return text
+    files = folder.digests(place) if files is None else files
+    folder.write(name, to_json({**record, "files": files}))
+    return to_json(record)
 
 
 def to_json(record: Mapping[str, Any]) -> str:
@@ -113,19 +115,19 @@ def jsonable(value: Any) -> Any:  # noqa: ANN401 - whatever JSON can hold
     match value:
         case Remark():
             return jsonable(as_record(value))
-        case None | bool() | int() | str():
+        case None | bool() | int():
             return value
         case float() | np.floating():
             return float(value) if np.isfinite(value) else None
         case np.ndarray() | np.generic():
             return jsonable(value.tolist())
         case Mapping():
-            return {str(key): jsonable(item) for key, item in value.items()}
+            return {whole(str(key)): jsonable(item) for key, item in value.items()}
         case list() | tuple() | set() | frozenset():
             return [jsonable(item) for item in value]
         case _ if is_dataclass(value) and not isinstance(value, type):
             return {field.name: jsonable(getattr(value, field.name)) for field in fields(value)}
-    return str(value)
+    return whole(str(value))
 
 
 def versions() -> dict[str, str]:

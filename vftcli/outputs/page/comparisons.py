@@ -14,7 +14,6 @@ HEADS = (
     "noise [N·m]",
     "noise > 5 Hz passed",
     "mean RMSE [N·m]",
-    "time a sample [µs]",
     "to tune",
 )
 """Headings of the table of what was computed on the log."""
@@ -22,7 +21,6 @@ HEADS = (
 
 def selection_guide(analysis: Analysis) -> str:
     """Which observer for what, by what was computed on this log."""
-    # Measured here and now: the time a sample takes is that of this machine.
     terms = analysis.motion.log.terms
     found = facts(analysis.observers, analysis.tunings, terms, analysis.errors)
     if not found:
@@ -50,7 +48,7 @@ def selection_guide(analysis: Analysis) -> str:
 def facts_row(found: Facts) -> tuple[str | float, ...]:
     """One observer's facts in the order and the units of the headings."""
     times = (1e3 * found.response, 1e3 * found.delay)
-    rest = (found.noise, found.passed, found.rmse, 1e6 * found.time)
+    rest = (found.noise, found.passed, found.rmse)
     return (found.name, *map(float, (*times, *rest)), found.parameter_count)
 
 

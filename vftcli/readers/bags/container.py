@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
 from vftcli.readers.reader import LogFile
+from vftcli.signals import letters
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark
 
@@ -165,7 +166,7 @@ def _numbers_in(name: str) -> tuple[list[int], str]:
 
 def printable(name: str) -> str:
     """A name of a bag for messages: one line, no control characters, not too long."""
-    return "".join(c if c.isprintable() else "?" for c in name[:120])
+    return letters.printable(name[:120])
 
 
 def type_name(name: str) -> str:
