@@ -82,4 +82,4 @@ def compare(
         if a.reference is not None
     ]
     together = pl.concat([*errors, evaluate_pooled(members)], how="diagonal")
-    typer.echo(show(together, paper_bounds(analyses)))
+    typer.echo(show(tables.marked(together, analyses), paper_bounds(analyses)))

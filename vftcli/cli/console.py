@@ -52,11 +52,12 @@ def say_health(examinations: "Iterable[Examination]", *, named: bool = False) ->
         examinations: The log's, then those of its free runs, which are told by their names.
         named: Whether the log is told by its name too, for a command that has several.
     """
-    from vftcli.outputs.examination import health_line, overridden_lines
+    from vftcli.outputs.examination import health_line
 
     made = list(examinations)
-    for line in overridden_lines(made):
-        say(line)
+    codes = dict.fromkeys(finding.code for one in made for finding in one.refusals())
+    if codes:
+        say(f"MEANINGLESS unless this is wrong, and made with --anyway: {', '.join(codes)}")
     for k, examination in enumerate(made):
         say(health_line(examination, named=named or k > 0))
 

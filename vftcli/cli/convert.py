@@ -24,8 +24,9 @@ def convert_log(
 
     Example: vftcli convert fixtures/ur5_circle.csv -o ur5_circle.mcap
     """
-    from vftcli.cli.console import say, say_health, say_json
+    from vftcli.cli.console import say, say_json
     from vftcli.doctor import examine
+    from vftcli.outputs.examination import health_line
     from vftcli.outputs.log.conversion import check_conversion, convert
     from vftcli.readers.library import Library
 
@@ -33,7 +34,7 @@ def convert_log(
     recording = Library().open(log, reading.choice())
     convert(recording, output, force=force)
     # A table may be made of any log, also of one that no estimate should be made of.
-    say_health([examine(recording)])
+    say(health_line(examine(recording)))
     if json:
         summary = {
             "output": str(output),

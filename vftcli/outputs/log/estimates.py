@@ -1,5 +1,6 @@
 """What `vftcli estimate` writes: the estimates as flat columns, `run.json`, extras on demand."""
 
+import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -7,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vftcli.analysis import Analysis
+from vftcli.outputs.examination import overridden_lines
 from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.log.run_record import run_record, seal
 from vftcli.outputs.seals import SEAL
@@ -94,8 +96,13 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
         OutputError: If the disk is full.
     """
     table = estimates_table(analysis)
+    # For who finds the table alone, without the record beside it.
+    doubts = overridden_lines(analysis.examinations)
+    metadata = {"vftcli": json.dumps({"overridden": doubts})} if doubts else None
     with table_file(path) as file:
-        table.write_parquet(file, compression="zstd", compression_level=1, statistics=False)
+        table.write_parquet(
+            file, compression="zstd", compression_level=1, statistics=False, metadata=metadata
+        )
 
 
 def write_csv(path: Path, analysis: Analysis) -> None:

@@ -79,7 +79,7 @@ def write_reports(
         folder.write("index.html", render_index(list(zip(places, analyses, strict=True))))
         found = [a.errors for a in analyses if a.errors is not None]
         together = pl.concat(found, how="diagonal") if found else None
-        put_errors(folder, "", together, paper_bounds(analyses))
+        put_errors(folder, "", together, analyses)
         logs = dict(zip(places, labels, strict=True))
         seal(folder, SEAL, {"command": command, "versions": versions(), "logs": logs})
         return "[\n" + ",\n".join(record.rstrip("\n") for record in records) + "\n]\n"
@@ -93,15 +93,19 @@ def fill(folder: OutputFolder, place: str, analysis: Analysis, command: str) -> 
     folder.write(f"{place}index.html", render(analysis))
     write_rrd(folder / f"{place}recording.rrd", analysis)
     write_estimates(folder / f"{place}estimates.parquet", analysis)
-    put_errors(folder, place, analysis.errors, paper_bounds([analysis]))
+    put_errors(folder, place, analysis.errors, [analysis])
     return seal(folder, f"{place}{SEAL}", record)
 
 
 def put_errors(
-    folder: OutputFolder, place: str, errors: "pl.DataFrame | None", bounds: PaperBounds
+    folder: OutputFolder,
+    place: str,
+    errors: "pl.DataFrame | None",
+    analyses: Sequence[Analysis],
 ) -> None:
     """Write the error tables, if there are errors."""
     if errors is None:
         return
+    errors, bounds = tables.marked(errors, analyses), paper_bounds(analyses)
     for name, text_of in ERROR_TABLES.items():
         folder.write(f"{place}{name}", text_of(errors, bounds))

@@ -4,10 +4,12 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
+from vftcli.evaluation.pooling import POOLED
 from vftcli.outputs.grid import (
     Column,
     Grid,
     csv_rows,
+    escape_markdown,
     joint_columns,
     json_rows,
     latex,
@@ -24,12 +26,49 @@ from vftcli.outputs.log.rmse_tables import (
     rmse_grid,
 )
 from vftcli.outputs.log.wrench_tables import PaperBounds, axis_grids, contact_grids
+from vftcli.signals.letters import printable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from vftcli.analysis import Analysis
     from vftcli.evaluation.print_table import Comparison
+
+OVERRIDDEN = "overridden"
+"""Column of the codes with which results were wanted anyway."""
 
 SURE = 0.05
 """Below this p a difference between two observers is called sure."""
+
+
+def marked(errors: pl.DataFrame, analyses: "Sequence[Analysis]") -> pl.DataFrame:
+    """The errors with a column `overridden` where results were wanted though they mean nothing.
+
+    It holds the codes of the findings, of all logs together in pooled rows; without any such
+    finding the table is as it was.
+    """
+    codes: dict[str, str] = {}
+    for analysis in analyses:
+        found = [f.code for one in analysis.examinations for f in one.refusals()]
+        if found:
+            codes[analysis.recording.name] = ", ".join(dict.fromkeys(found))
+    if not codes:
+        return errors
+    every = {POOLED: "; ".join(f"{name}: {text}" for name, text in codes.items()), **codes}
+    column = pl.col("recording").replace_strict(every, default=None, return_dtype=pl.String)
+    return errors.with_columns(overridden=column)
+
+
+def doubts_of(errors: pl.DataFrame) -> list[str]:
+    """What stands above tables of errors that mean nothing: one line a log."""
+    if OVERRIDDEN not in errors.columns:
+        return []
+    rows = errors.select("recording", OVERRIDDEN).unique(maintain_order=True).drop_nulls()
+    return [
+        f"MEANINGLESS unless these findings are wrong (--anyway): {name}: {codes}"
+        for name, codes in rows.iter_rows()
+        if name != POOLED
+    ]
 
 
 def to_terminal(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
@@ -39,7 +78,8 @@ def to_terminal(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
         return "no errors to show: the estimates and the reference have no sample in common\n"
     joints = "\n".join(terminal(rmse_grid(table)) for table in found) + marks_in_words(found)
     below = [*detail_grids(errors), *axis_grids(errors, bounds), *contact_grids(errors)]
-    return "\n".join([joints, *map(terminal, below)])
+    above = "".join(f"{printable(line)}\n" for line in doubts_of(errors))
+    return above + "\n".join([joints, *map(terminal, below)])
 
 
 def to_markdown(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
@@ -48,12 +88,15 @@ def to_markdown(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
     marks = [f"{DAGGER} {RESTS}\n"] if any(table.untrusted for table in found) else []
     below = [*detail_grids(errors), *axis_grids(errors, bounds)]
     above = [markdown(rmse_grid(table)) for table in found]
-    return "\n".join([*above, *marks, *map(markdown, below)])
+    doubts = [f"> **{escape_markdown(line)}**\n" for line in doubts_of(errors)]
+    return "\n".join([*doubts, *above, *marks, *map(markdown, below)])
 
 
 def to_latex(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
     """The RMSE tables as LaTeX tabulars (needs ``booktabs``), best value of each joint bold."""
-    return "\n".join(map(latex, [*map(rmse_grid, blocks(errors)), *axis_grids(errors, bounds)]))
+    doubts = "".join(f"% {printable(line)}\n" for line in doubts_of(errors))
+    grids = [*map(rmse_grid, blocks(errors)), *axis_grids(errors, bounds)]
+    return doubts + "\n".join(map(latex, grids))
 
 
 def to_json(errors: pl.DataFrame, _bounds: PaperBounds | None = None) -> str:

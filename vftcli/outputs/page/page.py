@@ -54,7 +54,8 @@ def render_index(analyses: Sequence[tuple[str, Analysis]]) -> str:
     )
     title = f"External joint torques from {len(analyses)} logs"
     top = f"<header><h1>{escape(title)}</h1></header>"
-    return document(title, f"{top}{html(overview)}{tables}")
+    found = [one for _, analysis in analyses for one in analysis.examinations]
+    return document(title, f"{top}{html(overview)}{health(found)}{tables}")
 
 
 def index_row(folder: str, analysis: Analysis) -> tuple[GridCell | str | float | None, ...]:

@@ -1,0 +1,125 @@
+"""The examination in every command: a health line, refusal, --anyway, and what outputs carry.
+
+The log is the UR5 fixture (its truth is known, so it is sound); the fault is its currents turned.
+"""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+Run = Callable[..., tuple[int, str, str]]
+
+FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
+UR5 = ("--robot", "ur5")
+
+COMMANDS: dict[str, tuple[str, ...]] = {
+    "estimate": (*UR5, "--observer", "gmo", "-o", "out"),
+    "compare": (*UR5, "--observer", "gmo", "--reference", f"file:{FIXTURE}.truth.parquet"),
+    "report": (*UR5, "--observer", "gmo", "-o", "out"),
+    "tune": (*UR5, "--free-part", "0:4", "-o", "gains.toml"),
+    "admit": UR5,
+    "identify": (*UR5, "-o", "mine.toml"),
+}
+"""Command that a fault refuses → what else it is given."""
+
+
+@pytest.fixture
+def turned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The fixture with its currents turned, in the folder that the commands run in."""
+    table = pl.read_csv(FIXTURE, separator=" ")
+    names = [f"actual_current_{j}" for j in range(6)]
+    table.with_columns(-pl.col(names)).write_csv(tmp_path / "turned.csv", separator=" ")
+    monkeypatch.chdir(tmp_path)
+    return "turned.csv"
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, "convert"])
+def test_a_sound_log_is_said_to_be_sound(
+    command: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = COMMANDS.get(command, ("-o", "other.csv"))
+    code, out, err = run(command, FIXTURE, *words, "--json")
+    assert code == 0, err
+    assert "log health: sound" in err.splitlines()
+    json.loads(out)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_meaningless_log_is_refused_in_one_line_and_nothing_is_written(
+    command: str, turned: str, run: Run, tmp_path: Path
+) -> None:
+    code, out, err = run(command, turned, *COMMANDS[command])
+    assert (code, out) == (1, "")
+    (line,) = [line for line in err.splitlines() if line.startswith("error: ")]
+    assert "effort-sign" in line
+    assert "--anyway" in line
+    assert [file.name for file in tmp_path.iterdir()] == [turned]
+
+
+# identify has a guard of its own: links that explain nothing make no robot.
+@pytest.mark.parametrize("command", sorted(COMMANDS.keys() - {"identify"}))
+def test_anyway_goes_on_and_says_so_first(command: str, turned: str, run: Run) -> None:
+    code, _, err = run(command, turned, *COMMANDS[command], "--anyway")
+    assert code == 0, err
+    lines = err.splitlines()
+    (doubt,) = [line for line in lines if line.startswith("MEANINGLESS")]
+    assert "effort-sign" in doubt
+    assert any("log health: " in line and "effort-sign" in line for line in lines)
+
+
+def test_every_output_of_a_report_carries_what_was_overridden(
+    turned: str, run: Run, tmp_path: Path
+) -> None:
+    words = ("--reference", "zero", "--observer", "gmo", "-o", "out", "--anyway")
+    code, _, err = run("report", turned, *UR5, *words)
+    assert code == 0, err
+    out = tmp_path / "out"
+    record = json.loads((out / "run.json").read_text("utf-8"))
+    (examined,) = record["examination"]
+    assert examined["overridden"] == ["effort-sign"]
+    assert not examined["sound"]
+    finding = next(f for f in examined["findings"] if f["code"] == "effort-sign")
+    assert finding["level"] == "warning"
+    assert finding["values"]
+    page = (out / "index.html").read_text("utf-8")
+    assert page.index("MEANINGLESS") < page.index("<h2>Errors")
+    assert (out / "errors.md").read_text("utf-8").startswith("> **MEANINGLESS")
+    assert (out / "errors.tex").read_text("utf-8").startswith("% MEANINGLESS")
+    rows = json.loads((out / "errors.json").read_text("utf-8"))
+    assert {row["overridden"] for row in rows} == {"effort-sign"}
+    assert set(pl.read_csv(out / "errors.csv")["overridden"]) == {"effort-sign"}
+    assert "effort-sign" in pl.read_parquet_metadata(out / "estimates.parquet")["vftcli"]
+
+
+def test_an_open_effort_heals_the_log(turned: str, run: Run, tmp_path: Path) -> None:
+    words = ("--observer", "gmo", "--effort", "auto", "-o", "out", "--json")
+    code, out, err = run("estimate", turned, *UR5, *words)
+    assert code == 0, err
+    record = json.loads(out)
+    assert record["examination"][0]["overridden"] == []
+    assert "effort-taken" in [repair["code"] for repair in record["repairs"]]
+    healed = pl.read_parquet(tmp_path / "out" / "estimates.parquet")
+    run("estimate", FIXTURE, *UR5, "--observer", "gmo", "-o", "plain")
+    plain = pl.read_parquet(tmp_path / "plain" / "estimates.parquet")
+    assert healed.equals(plain)
+
+
+def test_free_runs_are_examined_too_and_told_by_name(turned: str, run: Run) -> None:
+    words = ("--observer", "gmo", "--free", turned, "-o", "out")
+    code, _, err = run("estimate", FIXTURE, *UR5, *words)
+    assert code == 1
+    assert "turned.csv: effort-sign" in err
+
+
+def test_inspect_examines_the_users_own_arm(turned: str, run: Run) -> None:
+    code, out, _ = run("inspect", turned, *UR5, "--json")
+    assert code == 0
+    record = json.loads(out)
+    assert "effort-sign" in [finding["code"] for finding in record["findings"]]
+    keys = {"format", "joints", "samples", "duration_s", "rate_hz", "max_gap_s", "duplicates",
+            "repairs", "warnings", "findings"}  # fmt: skip
+    assert keys <= set(record)
