@@ -7,6 +7,7 @@ import numpy as np
 
 from vftcli.doctor.clock import clock_findings
 from vftcli.doctor.fit import CLOSE, Evidence, RobotMatch, best_fit, measured, ranking
+from vftcli.doctor.lateness import MISTIMED, effort_lag
 from vftcli.doctor.load import load_findings
 from vftcli.doctor.signals import (
     TRAVEL,
@@ -89,9 +90,15 @@ def examine(recording: Recording, robot: Robot | None = None) -> Examination:
     fits = ranking(recording, robots)
     best = robots[fits[0].robot] if fits and fits[0].fits else None
     velocities = velocity_fit(recording)
-    findings = [
+    timed = [
         *clock_findings(recording, velocities),
         *signal_findings(recording, velocities),
+    ]
+    arm = best if robot is None else robot
+    if arm is not None and not MISTIMED & {finding.code for finding in timed}:
+        timed.extend(effort_lag(recording, arm))
+    findings = [
+        *timed,
         *load_findings(recording, best),
         *robot_findings(recording, fits, robots),
     ]

@@ -1,0 +1,139 @@
+"""An effort that is late by a known time is told by it, and by nothing else that may be odd."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vftcli.doctor import examine
+from vftcli.doctor.lateness import effort_lag, window_starts
+from vftcli.robots import load_robot
+from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark
+
+ARM = load_robot("ur5e")
+STEP = 0.01
+T = STEP * np.arange(2000)
+RATES = 0.9 + 0.3 * np.arange(6)
+"""Every joint turns round every one to three seconds. [rad/s]"""
+
+
+def log_of(late: float = 0.0, push: float = 0.0, scale: float = 1.0) -> Recording:
+    """20 s of motion under the arm's own torque, friction and noise of 0.3 N·m.
+
+    Args:
+        late: By how much the torque is logged later. [s]
+        push: Height of a push of 0.8 s every 4 s on each joint. [N·m]
+        scale: Factor of the torque.
+    """
+    angle = np.outer(T, RATES) + np.arange(6)
+    q, dq = 0.6 * np.sin(angle), 0.6 * RATES * np.cos(angle)
+    t = T - late
+    angle = np.outer(t, RATES) + np.arange(6)
+    x, dx, ddx = np.sin(angle), RATES * np.cos(angle), -(RATES**2) * np.sin(angle)
+    torque = torque_regressor(ARM.chain, 0.6 * x, 0.6 * dx, 0.6 * ddx) @ chain_parameters(ARM.chain)
+    torque += 4 * np.tanh(60 * dx) + 3 * dx
+    torque += push * np.clip(np.sin(2 * np.pi * t / 4) - 0.6, 0, None)[:, None] / 0.4
+    torque += np.random.default_rng(0).normal(0, 0.3, torque.shape)
+    return Recording(t=T, q=q, dq=dq, torque=scale * torque)
+
+
+def told(log: Recording) -> Remark | None:
+    """The finding, None without one."""
+    found = list(effort_lag(log, ARM))
+    assert len(found) <= 1
+    return found[0] if found else None
+
+
+@pytest.mark.parametrize("late", [0.05, 0.1, 0.2, -0.06])
+def test_the_lag_is_told(late: float) -> None:
+    """To a hundredth of a second: lags are tried that far apart."""
+    finding = told(log_of(late))
+    assert finding is not None
+    assert (finding.code, finding.level) == ("effort-lag", "warning")
+    assert finding.values["lag_ms"] == pytest.approx(1e3 * abs(late), abs=10.1)
+    assert finding.values["order"] == ("later" if late > 0 else "earlier")
+    assert finding.values["ratio"] > 1.45
+    assert set(finding.where.joints) <= {1, 2, 3, 4, 5, 6}
+
+
+@pytest.mark.parametrize("late", [0.0, 0.01, 0.03, -0.03])
+def test_a_lag_as_real_friction_and_drivers_have_it_is_not_told(late: float) -> None:
+    assert told(log_of(late)) is None
+
+
+def test_pushes_hide_no_lag_and_are_none() -> None:
+    """5 N·m on every joint for a fifth of the time, the wrists move by as much."""
+    assert told(log_of(push=5.0)) is None
+    finding = told(log_of(0.06, push=5.0))
+    assert finding is not None
+    assert finding.values["lag_ms"] == pytest.approx(60.0, abs=10.1)
+
+
+def test_a_wrong_unit_sign_offset_or_load_is_no_lag() -> None:
+    for scale in (-1.0, 0.1, 100.0):
+        assert told(log_of(scale=scale)) is None
+    offset = log_of()
+    offset = replace(offset, torque=offset.require("torque") + 10.0)
+    assert told(offset) is None
+
+
+def test_a_current_is_judged_as_a_torque_is() -> None:
+    log = log_of(0.06, scale=0.1)
+    assert told(replace(log, torque=None, current=log.torque)) is not None
+    assert told(replace(log, torque=None)) is None
+
+
+def test_one_joint_alone_tells_no_lag() -> None:
+    """Two joints have to agree; noise on one may look like a lag."""
+    log = log_of(0.06)
+    still = np.zeros(6)
+    still[1] = 1.0
+    assert told(replace(log, q=log.q * still, dq=log.require("dq") * still)) is None
+
+
+@pytest.mark.parametrize(("thinned", "told_by"), [(3, True), (4, False)])
+def test_below_thirty_samples_a_second_no_lag_is_told(thinned: int, told_by: bool) -> None:
+    log = log_of(0.12)
+    rows = slice(None, None, thinned)
+    signals = {name: getattr(log, name)[rows] for name in ("t", *log.signals)}
+    assert (told(replace(log, **signals)) is not None) == told_by
+
+
+def test_an_arm_of_other_joints_tells_nothing() -> None:
+    assert not list(effort_lag(log_of(0.06), load_robot("panda")))
+
+
+def test_windows_lie_on_an_even_clock_at_every_lag() -> None:
+    """Steps of 10 ms and a gap of a second in the middle: no window reaches across it."""
+    late = T + (np.arange(2000) >= 1000)
+    starts = window_starts(late, 15, -10, 25)
+    ends = starts + 15 + 25
+    assert starts[0] == 10
+    assert ends[-1] < 2000
+    assert not np.any((starts - 10 < 1000) & (ends >= 1000))
+    assert np.all(np.diff(starts[starts > 1000]) == 7)
+
+
+def test_an_effort_beside_late_velocities_is_not_called_early() -> None:
+    """Whichever is late, it is told once: by the velocity, which the position judges."""
+    log = log_of()
+    late = log.require("dq")[np.maximum(np.arange(2000) - 6, 0)]
+    codes = {finding.code for finding in examine(replace(log, dq=late), ARM).findings}
+    assert "velocity-lag" in codes
+    assert "effort-lag" not in codes
+    codes = {finding.code for finding in examine(log_of(0.06), ARM).findings}
+    assert "effort-lag" in codes
+    assert "velocity-lag" not in codes
+
+
+def columns(width: int) -> Array:
+    return np.zeros((30, width))
+
+
+def test_a_short_log_tells_nothing() -> None:
+    t = STEP * np.arange(30)
+    log = Recording(t=t, q=columns(6), dq=columns(6), torque=columns(6))
+    assert told(log) is None
