@@ -120,19 +120,28 @@ def _pick_of(table: Table, signal: str, groups: dict[str, Group]) -> Pick | None
             f"--columns, as in q=…,{signal if signal != 'torque' else 'tau'}={found[0]}_{{i}}."
         )
     name = found[0]
-    group = groups[name]
-    if not group.cells:
-        raise LogError(
-            f"{table.path}: {name} holds no number in its first row, so its width cannot be told. "
-            "Cut the rows with empty lists out, or leave the column out with --columns."
-        )
+    group, cells = groups[name], filled_cells(table, name, groups[name])
     first = group.indices[0]
     if group.indices != tuple(range(first, first + len(group.indices))):
         raise LogError(
             f"{table.path}: the columns of {name} are numbered "
             f"{', '.join(map(str, group.indices[:12]))}, with holes. Name them with --columns."
         )
-    return vendor_pick(signal, name, group.cells)
+    return vendor_pick(signal, name, cells)
+
+
+def filled_cells(table: Table, name: str, group: Group) -> tuple[Cell, ...]:
+    """The cells of a group.
+
+    Raises:
+        LogError: If there are none: a column of lists whose first one is empty.
+    """
+    if not group.cells:
+        raise LogError(
+            f"{table.path}: {name} holds no number in its first row, so its width cannot be told. "
+            "Cut the rows with empty lists out, or leave the column out with --columns."
+        )
+    return group.cells
 
 
 def vendor_pick(signal: str, name: str, cells: tuple[Cell, ...]) -> Pick:

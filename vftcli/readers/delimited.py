@@ -187,8 +187,8 @@ class TextTable:
         if self._needs_mending(head):
             return self._mended()
         end = self._end()
-        if self.file.wrapping is None and end is None:
-            return self.path
+        if self.file.direct is not None and end is None:
+            return self.file.direct
         text = bytes(self.file.content[:end])
         for _ in range(self._lines_before_rows):
             text = text.partition(b"\n")[2]

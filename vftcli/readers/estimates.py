@@ -27,7 +27,8 @@ def estimates_columns(path: Path, observer: str) -> str | None:
             return None
     import polars as pl
 
-    names = pl.read_parquet_schema(path)
+    with path.open("rb") as file:  # polars cannot open a name that is not UTF-8
+        names = pl.read_parquet_schema(file)
     held = sorted({n.split("/")[1] for n in names if n.startswith(PREFIX) and n.count("/") == 2})
     if not held or "t" not in names or "q/1" not in names:
         return None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.parquet import ParquetTable
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
 from vftcli.readers.tables import from_table
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import caution
@@ -26,12 +26,13 @@ def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
     files = sorted((file.path / "data").rglob("*.parquet"))
     if not files:
         raise LogError(f"{file.path}: a LeRobot dataset without data/**/*.parquet.")
-    table = ParquetTable(files[0], files[0])
+    first_file = open_log(files[0])
+    table = ParquetTable(first_file)
     rows, first = None, 0
     if (numbers := table.episodes()).size:
         first = int(numbers[0])
         rows = np.flatnonzero(numbers == numbers[0])
-    table = ParquetTable(files[0], files[0], rows)
+    table = ParquetTable(first_file, rows)
     remark = caution(
         "episode-taken",
         episode=first,

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Column
 from vftcli.readers.tables import from_table
@@ -33,15 +34,15 @@ class ParquetTable:
 
     remarks: tuple[Remark, ...] = ()
 
-    def __init__(self, path: Path, source: Any, rows: Any = None) -> None:  # noqa: ANN401
+    def __init__(self, file: LogFile, rows: Any = None) -> None:  # noqa: ANN401 - numbers of rows
         import pyarrow.parquet as pq
 
-        self.path = path
+        self.path = path = file.path
         self._rows = rows
+        self._size = path.stat().st_size
         with guarded(self.path):
             self._file = pq.ParquetFile(
-                source if isinstance(source, Path) else BytesIO(source),
-                memory_map=isinstance(source, Path),
+                file.direct or BytesIO(file.content), memory_map=file.direct is not None
             )
             self._schema = self._file.schema_arrow
             if self._file.metadata.num_rows == 0:
@@ -71,6 +72,7 @@ class ParquetTable:
 
     def _first_length(self, column: int) -> int:
         """Length of the list in the first row of a column, 0 for an empty one."""
+        self._check_size({self._schema.names[column]})
         with guarded(self.path):
             batches = self._file.iter_batches(
                 batch_size=1, columns=[self._schema.names[column]], use_threads=False
@@ -91,18 +93,38 @@ class ParquetTable:
         # pyarrow would hand over both under one name.
         if any(names.count(names[c]) > 1 for c in columns):
             raise LogError(f"{self.path}: two columns have one name; rename one of them.")
+        self._check_size({names[c] for c in columns})
         with guarded(self.path):
             table = self._file.read(columns=[names[c] for c in columns], use_threads=False)
             if self._rows is not None:
                 table = table.take(self._rows)
             return {c: self._numbers(table.column(names[c]), c, clock) for c in columns}
 
+    def _check_size(self, wanted: set[str]) -> None:
+        """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
+
+        Raises:
+            LogError: If they hold more numbers than a log of this size can.
+        """
+        told, limit = self._file.metadata, max(UNPACKED_LIMIT, UNPACKED_RATIO * self._size)
+        groups = [told.row_group(k) for k in range(told.num_row_groups)]
+        pages = (group.column(k) for group in groups for k in range(group.num_columns))
+        counts = (p.num_values for p in pages if p.path_in_schema.split(".")[0] in wanted)
+        if 8 * max(sum(counts), told.num_rows * len(wanted)) > limit:
+            raise LogError(
+                f"{self.path}: its columns unpack to more than {limit >> 20} MiB, more than a log "
+                "of this size can hold. It is damaged or made to fill memory."
+            )
+
     def episodes(self) -> Column:
         """The episode of each row, as datasets of LeRobot number them; none elsewhere. (T,)"""
         if self.names is None or EPISODE not in self.names:
             return np.empty(0)
         column = self.names.index(EPISODE)
-        return self.load([column], None)[column]
+        numbers = self.load([column], None)[column]
+        if numbers.ndim != 1 or not np.isfinite(numbers).all():
+            raise LogError(f"{self.path}: {EPISODE} is not a number in every row.")
+        return numbers
 
     def _numbers(self, values: Any, column: int, clock: int | None) -> Column:  # noqa: ANN401
         """A column as numbers; whole stamps stay whole, times become nanoseconds."""
@@ -169,8 +191,7 @@ def guarded(path: Path) -> Iterator[None]:
 
 def read_parquet(file: LogFile, request: ReadChoice) -> RawLog:
     """Read a Parquet file: ours, a user's, or one file of a LeRobot dataset."""
-    source = file.path if file.wrapping is None else file.content
-    table = ParquetTable(file.path, source)
+    table = ParquetTable(file)
     refuse_episodes(table)
     raw = from_table(table, request)
     told = table.told()

@@ -36,6 +36,15 @@ class LogFile:
         return self.path.is_dir()
 
     @property
+    def direct(self) -> Path | None:
+        """The path, where other libraries can open it: a plain file with a name in UTF-8."""
+        try:
+            str(self.path).encode("utf-8")
+        except UnicodeEncodeError:
+            return None
+        return self.path if self.wrapping is None else None
+
+    @property
     def is_whole(self) -> bool:
         """Whether `head` is the whole content."""
         return len(self.content) == len(self.head)

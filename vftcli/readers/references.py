@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.readers.aliases import _clock, _wrench, grouped
+from vftcli.readers.aliases import _clock, _wrench, filled_cells, grouped
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.parquet import ParquetTable
@@ -73,7 +73,7 @@ def opened(file: LogFile) -> Table:
         LogError: If it is none.
     """
     if file.head.startswith(b"PAR1"):
-        return ParquetTable(file.path, file.path)
+        return ParquetTable(file)
     if not file.lines:
         raise LogError(
             f"{file.path}: not a text table or Parquet file; a reference is one of them."
@@ -112,7 +112,10 @@ def found(table: Table) -> Picks:
             f"{table.path}: the reference torques cannot be told: {there}. Name them with "
             "--reference-columns, as in t=time,tau_ext=true_tau_{i}."
         )
-    picks = [Pick(signal=TORQUE, cells=group.cells) for group in groups.values()]
+    picks = [
+        Pick(signal=TORQUE, cells=filled_cells(table, name, group))
+        for name, group in groups.items()
+    ]
     if wrench is not None:
         picks.append(wrench)
     return Picks(signals=tuple(picks), clock=_clock(table))
