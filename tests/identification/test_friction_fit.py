@@ -13,7 +13,6 @@ from vftcli.identification.friction_fit import (
     tellable_terms,
 )
 from vftcli.identification.friction_shapes import FrictionColumns, Shape, term_values
-from vftcli.identification.least_squares import ColumnFit
 
 LIMIT = 1.2
 """Speed up to which friction may not fall: 5 − 2·2 v = 0 lies above it, at 1.25. [rad/s]"""
@@ -126,8 +125,7 @@ def test_stribeck_velocities_stand_clear_of_the_smoothing(prepared):
     ],
 )
 def test_dry_friction_must_not_push(terms, values, good):
-    fit = ColumnFit(np.array(values), np.ones(2), np.zeros(3), np.ones(3))
-    assert is_dissipative(Shape(terms), fit, LIMIT) == good
+    assert is_dissipative(Shape(terms), np.array([*values, -9.0]), LIMIT) == good
 
 
 def test_fixed_columns_stand_behind_the_friction(prepared):

@@ -91,6 +91,21 @@ def test_a_plain_model_is_chosen_where_nothing_more_is_there():
     assert len(chosen) == 6
 
 
+def test_a_fall_beside_the_links_is_replaced_by_the_joints_own_fit(monkeypatch):
+    from vftcli.identification import whole_arm
+
+    recording = log(rubbed(UR5, "coulomb-viscous-offset"))
+    together = identify([recording], UR5, Task(method="base")).robot.friction
+    monkeypatch.setattr(whole_arm, "is_dissipative", lambda *_: False)
+    alone = identify([recording], UR5, Task(method="base")).robot.friction
+    for one, other in zip(alone, together, strict=True):
+        assert one.model == other.model
+        assert one.parameters != other.parameters
+        # both of noise that moves 5 and 8 by 1 or 2 %
+        for key in ("coulomb", "viscous"):
+            assert one.parameters[key] == pytest.approx(other.parameters[key], rel=0.05)
+
+
 def test_a_stribeck_effect_is_seen():
     true = rubbed(UR5, "coulomb-viscous-stribeck", stribeck=4.0, stribeck_velocity=0.1)
     found = identify([log(true, noise=0.05)], UR5, Task()).robot

@@ -12,7 +12,7 @@ from vftcli.identification.friction_shapes import (
     FrictionColumns,
     Shape,
 )
-from vftcli.identification.least_squares import ColumnFit, cross_validated, fit_column
+from vftcli.identification.least_squares import cross_validated, fit_column
 from vftcli.robots.friction import falling_speed
 from vftcli.signals.arrays import Array
 
@@ -115,7 +115,7 @@ def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
     choices = []
     for shape in candidate_shapes(best, data):
         fit = fit_column(data.columns(j, shape), data.y, data.weights)
-        if is_dissipative(shape, fit, data.speed_limit):
+        if is_dissipative(shape, fit.values, data.speed_limit):
             choices.append(ShapeChoice(j + 1, shape, error(shape)))
     if not choices:
         return Shape(tellable_terms(PLAIN, data), smoothing), []
@@ -145,9 +145,15 @@ def tellable_terms(terms: tuple[str, ...], data: JointData) -> tuple[str, ...]:
     return out if data.reverses else tuple(t for t in out if t != "offset")
 
 
-def is_dissipative(shape: Shape, fit: ColumnFit, speed_limit: float) -> bool:
-    """Whether no dry term is negative and the friction rises all the way to `speed_limit`."""
-    values = dict(zip(shape.terms, fit.values, strict=False))
-    pushes = any(values.get(term, 0.0) < 0.0 for term in NEVER_NEGATIVE)
-    friction = shape.friction(fit.values[: len(shape.terms)])
+def is_dissipative(shape: Shape, values: Array, speed_limit: float) -> bool:
+    """Whether no dry term is negative and the friction rises all the way to `speed_limit`.
+
+    Args:
+        shape: The structure.
+        values: Its coefficients, others may follow. (k,)
+        speed_limit: Speed up to which it may not fall. [rad/s]
+    """
+    own = dict(zip(shape.terms, values, strict=False))
+    pushes = any(own.get(term, 0.0) < 0.0 for term in NEVER_NEGATIVE)
+    friction = shape.friction(values[: len(shape.terms)])
     return not pushes and bool(np.isnan(falling_speed(friction, speed_limit)))

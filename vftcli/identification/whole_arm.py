@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.identification.base_parameters import BaseParameters, base_parameters
 from vftcli.identification.consistent import fit_consistent, nearest_physical
-from vftcli.identification.friction_fit import PLAIN
+from vftcli.identification.friction_fit import PLAIN, is_dissipative
 from vftcli.identification.friction_shapes import FrictionColumns, Shape, round_digits
 from vftcli.identification.method_result import (
     MethodResult,
@@ -62,10 +62,14 @@ def whole_arm(data: Training, method: str) -> MethodResult:
     numbers = []
     frictions = list(profile_friction(data.robot))
     for j, (shape, place) in enumerate(zip(layout.shapes, layout.frictions, strict=True)):
-        if data.excited.moves[j]:
+        if (found := fits[j]) is not None:
             sd = base.sd[-(layout.size - place.start) :][: place.stop - place.start]
-            frictions[j] = shape.friction(x[place], friction_source(data, method, sd))
-            numbers += friction_numbers(j, shape, x[place], sd, profile_friction(data.robot)[j])
+            values = x[place]
+            # Beside the links' errors a rise may turn into a fall; the joint's own fit does not.
+            if not is_dissipative(shape, values, data.top_speed(j)):
+                values = found.fit.values[: len(shape.terms)]
+            frictions[j] = shape.friction(values, friction_source(data, method, sd))
+            numbers += friction_numbers(j, shape, values, sd, profile_friction(data.robot)[j])
             remarks += check_friction(j, frictions[j], data)
     robot = with_vector(data.robot, layout, x, tuple(frictions))
     choices = [c for f in fits if f is not None for c in f.choices]
