@@ -158,9 +158,7 @@ def test_what_is_not_clipped() -> None:
     # an effort that often reads the same small value rests: below half of its range
     assert not clipped(wave(peak=0.9, low=-1.0, run=30))
     assert clipped(wave(peak=1.1, low=-1.0, run=30))
-    # more than half of all samples at the extreme is a resting value too
-    assert clipped(wave(run=100))
-    assert not clipped(np.where(np.arange(200) < 101, 1.0, wave()))
+    assert clipped(np.where(np.arange(200) < 150, 1.0, wave()))  # most of the time, and it moves
 
 
 @pytest.mark.parametrize("step", [0.01, 0.1])

@@ -70,9 +70,9 @@ def test_gains_are_the_factor_of_the_velocity() -> None:
 
 @pytest.mark.parametrize("lag", [-0.02, 0.003, 0.05])
 def test_lags_are_the_delay_of_the_velocity(lag: float) -> None:
-    """Windows of ten steps weigh a slope (π/10)²/6 = 1.6 % too high; (ωτ)²/6 is up to 0.6 %."""
+    """Windows of 20 steps weigh a slope (π/20)²/6 = 0.4 % too high; (ωτ)²/6 is up to 0.6 %."""
     fit = fit_of(dq=speed_at(T - lag))
-    np.testing.assert_allclose(fit.lag, lag, rtol=0.022)
+    np.testing.assert_allclose(fit.lag, lag, rtol=0.01)
 
 
 def test_uneven_steps_shift_nothing() -> None:
@@ -91,11 +91,11 @@ def test_joints_that_hardly_move_are_not_judged() -> None:
     assert fit.known.tolist() == [False, True, True, True, True, False]
 
 
-def test_a_fit_needs_twenty_samples_and_velocities() -> None:
+def test_a_fit_needs_eight_windows_and_velocities() -> None:
     assert velocity_fit(replace(log_of(), dq=None)) is None
-    fast = Recording(t=T[:20], q=20 * Q[:20], dq=20 * DQ[:20])
-    assert velocity_fit(fast) is not None
-    assert velocity_fit(fast.between(0, T[18])) is None
+    short = Recording(t=T[:65], q=Q[:65], dq=DQ[:65])  # eight windows of eight steps
+    assert velocity_fit(short) is not None
+    assert velocity_fit(short.between(0, T[63])) is None
 
 
 def test_motion_in_a_gap_is_not_held_against_the_velocity() -> None:
@@ -177,7 +177,7 @@ def test_a_velocity_that_is_late_by_more_than_a_sample_is_told(samples: float, t
     if told:
         assert findings["velocity-lag"].where.joints == (1, 4)
         lags = findings["velocity-lag"].values["lags_ms"]
-        assert lags == pytest.approx([10 * samples] * 2, rel=0.022)
+        assert lags == pytest.approx([10 * samples] * 2, rel=0.01)
 
 
 @pytest.mark.parametrize(("late_ms", "told"), [(7.0, False), (9.0, True)])
@@ -257,3 +257,30 @@ def test_rows_that_repeat_whole_hold_no_velocity() -> None:
         np.where(np.random.default_rng(0).random(4001) < 0.6, 0, np.arange(4001))
     )
     assert "velocity-held" not in found(q=Q[rows], dq=DQ[rows])
+
+
+def test_noise_of_the_positions_hides_no_lag() -> None:
+    """Noise of 1 mrad makes the derivative of the slope ten times as large as the motion's own."""
+    q = Q + np.random.default_rng(0).normal(0, 1e-3, Q.shape)
+    fit = fit_of(q=q, dq=speed_at(T - 0.03))
+    np.testing.assert_allclose(fit.lag, 0.03, atol=4 * np.max(fit.lag_error))
+    assert np.max(fit.lag_error) < 2e-3
+
+
+def test_a_velocity_that_was_written_for_a_joint_at_rest() -> None:
+    """J6 stands; J5's velocity is its own, J6's that of J5: both are told, neither as a size."""
+    still = np.array([1.0, 1, 1, 1, 1, 0])
+    findings = found(q=Q * still, dq=(DQ * still)[:, [0, 1, 2, 3, 5, 4]])
+    assert set(findings) == {"velocity-order"}
+    assert findings["velocity-order"].where.joints == (5, 6)
+
+
+def test_filtered_velocities_are_no_other_joint_s() -> None:
+    """Two joints of one rate, a quarter turn apart: a filter brings one closer to the other."""
+    q, dq = Q.copy(), DQ.copy()
+    q[:, 5], dq[:, 5] = np.sin(RATES[0] * T - 0.3), RATES[0] * np.cos(RATES[0] * T - 0.3)
+    keep = np.exp(-2 * np.pi * 0.5 * STEP)
+    start = keep * dq[:1]
+    assert set(found(q=q, dq=lfilter([1 - keep], [1, -keep], dq, axis=0, zi=start)[0])) == {
+        "velocity-filtered"
+    }

@@ -196,10 +196,9 @@ def resolution(position: Array) -> float:
 
 
 def is_extreme(value: Array, stretch: Stretch) -> bool:
-    """Whether a stretch is at the extreme of a signal that also has other values to a good part."""
-    at = value[stretch.first]
-    part = (stretch.last - stretch.first) / len(value)
-    return part < 0.3 and abs(at) == float(np.max(np.abs(value)))
+    """Whether a stretch is at the extreme of an effort that varies: that is saturation."""
+    at, low, high = value[stretch.first], value.min(), value.max()
+    return bool(low < high and at in (low, high) and abs(at) >= 0.5 * (high - low))
 
 
 def zero_signals(recording: Recording) -> Iterator[Remark]:
@@ -261,7 +260,7 @@ def is_clipped(value: Array, position: Array, least: int = 10) -> bool:
         at = value == extreme
         count = int(at.sum())
         # A drive saturates far from zero; one that often reads the same small value rests.
-        if abs(extreme) < 0.5 * (highest - lowest) or not least <= count <= 0.5 * len(value):
+        if highest == lowest or abs(extreme) < 0.5 * (highest - lowest) or count < least:
             continue
         # The rounded top of a smooth effort of coarse resolution is wide on the next level too.
         below = float(np.max(sign * value[~at]))

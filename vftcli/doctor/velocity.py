@@ -18,17 +18,21 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
 from vftcli.signals.series import runs_of
 
-WINDOW = 0.1
-"""Length of a window: short beside motion, long beside the noise of single samples. [s]"""
+WINDOW = 0.2
+"""Length of a window: short beside motion, long beside the noise of single samples and an arm's
+vibration. [s]"""
 LEAST_STEPS = 8
 """Steps of a window of a slow log."""
 USUAL, UNUSUAL_STEPS = (2e-4, 0.05), 50
 """Sample times beyond which the clock's unit may be another one than it was taken for [s], and the
 steps of a window then."""
-WINDOWS = 600
-"""Windows that are looked at, at most: spread evenly, they tell as much as all."""
+WINDOWS, WANTED, LEAST = 600, 12, 8
+"""Windows that are looked at, at most: spread evenly, they tell as much as all; how many a short
+log is cut into, and how many tell anything."""
 TRAVEL = 0.05
 """Travel from which a joint's own data tell anything. [rad]"""
+TELLING = 0.1
+"""Share of the turns of a position that the logged velocity has to show to tell its lag by them."""
 GAIN = 0.02
 """Deviation of the gain from 1 that is told; sound logs, real and simulated, stay within 0.004."""
 SURE = 4.0
@@ -36,10 +40,13 @@ SURE = 4.0
 LATE = 0.008
 """Lag that is told, or a sample time where that is longer: a robot's own velocity filter takes
 2–3 ms, a host's stamps up to 6. [s]"""
-ANOTHER = 0.25
-"""What another joint's position may leave open, beside what the joint's own leaves."""
+ANOTHER, ALIKE = 0.25, 0.3
+"""What another joint's position may leave open beside what the joint's own leaves with a lag, and
+how far the gain of the joint's own may be off for that to count."""
 OPEN = 0.1
 """Share of a velocity that its own position may leave open for its gain to count."""
+DAMPED_MOST = 0.15
+"""Gain below which a velocity is no late one but of another size."""
 DAMPED = 0.01
 """Loss of a velocity's square by a filter that can be seen: sound logs lose up to 0.0065."""
 WIDE = 0.15
@@ -90,41 +97,65 @@ class VelocityFit(NamedTuple):
 
 def velocity_fit(recording: Recording) -> VelocityFit | None:
     """Fit the logged velocities to the positions; None where the log is too short or has none."""
-    if recording.dq is None or recording.samples < 2 * LEAST_STEPS + 4:
+    if recording.dq is None or recording.samples <= LEAST * LEAST_STEPS:
         return None
-    by_position, by_velocity, slope = weighed_windows(recording)
+    windows = weighed_windows(recording)
+    by_position, by_velocity = windows.by_position, windows.by_velocity
     n = recording.joints
     moved = np.ptp(recording.q, axis=0) >= TRAVEL
     moved &= np.any(by_position != 0, axis=0)
-    count = len(by_position)
-    if count < 4 or not moved.any():
+    if len(by_position) < LEAST or not moved.any():
         return None
     alone = {name: np.full(n, np.nan) for name in VelocityFit._fields[:-2]}
     factor, share = crossed(by_velocity, by_position)
     fit = VelocityFit(**alone, factor=factor, share=share)
     for j in np.flatnonzero(moved):
-        v, w, logged = by_position[:, j], slope[:, j], by_velocity[:, j]
-        size, rate = rms(v), rms(w) / rms(v)
-        columns = np.column_stack([v, w]) / [size, max(rms(w), np.finfo(float).tiny)]
-        (a, b), *_ = np.linalg.lstsq(columns, logged, rcond=1e-10)
-        left = logged - columns @ [a, b]
-        # Two columns of unit size: the inverse of their products is known in closed form.
-        noise = float(left @ left) / (count - 2) / count
-        alike = float(columns[:, 0] @ columns[:, 1]) / count
-        error = np.sqrt(noise / max(1 - alike**2, 1e-9))
-        fit.gain[j], fit.gain_error[j] = a / size, error / size
-        scale = rms(w) * a / size
-        known = scale != 0
-        fit.lag[j] = b / scale if known else np.nan
-        fit.lag_error[j] = error / abs(scale) if known else np.nan
-        total = rms(logged)
-        fit.open[j] = (rms(left) / total) ** 2 if total > 0 else 1.0
-        fit.amplitude[j], fit.rate[j] = total / size, rate
+        v, logged, w = by_position[:, j], by_velocity[:, j], windows.slope[:, j]
+        size = float(v @ v)
+
+        def without(x: Array, v: Array = v, size: float = size) -> Array:
+            return np.asarray(x - v * float(v @ x) / size)
+
+        rest, turn = without(logged), without(w)
+        # Noise of the positions would hide a lag; that of the logged velocities is another one.
+        tool = without(windows.logged_slope[:, j])
+        if float(tool @ turn) ** 2 < TELLING * float(tool @ tool) * float(turn @ turn):
+            tool = turn
+        common = float(tool @ turn)
+        delay = float(tool @ rest) / common if common != 0 else 0.0
+        gain = float(v @ (logged - delay * w)) / size
+        left = logged - gain * v - delay * w
+        noise = float(left @ left) / (len(v) - 2)
+        # What v and v̇ have in common, in a short log, both may explain.
+        apart = float(turn @ turn) / (float(w @ w) or 1.0)
+        fit.gain[j], fit.gain_error[j] = gain, np.sqrt(noise / size / max(apart, 1e-6))
+        error = np.sqrt(noise * float(tool @ tool)) / abs(common) if common != 0 else 0.0
+        fit.lag[j], fit.lag_error[j] = (delay / gain, error / abs(gain)) if gain else (0.0, 0.0)
+        total = float(logged @ logged)
+        fit.open[j] = float(left @ left) / total if total > 0 else 1.0
+        fit.amplitude[j] = np.sqrt(total / size)
+        fit.rate[j] = np.sqrt(abs(float(windows.logged_slope[:, j] @ w)) / abs(gain or 1) / size)
     return fit
 
 
-def weighed_windows(recording: Recording) -> tuple[Array, Array, Array]:
-    """Means over windows, by Hann's weights: v by position, q̇ as logged, and −v̇. (W, n) each
+class WeighedWindows(NamedTuple):
+    """Means over windows by Hann's weights, joint by joint.
+
+    Attributes:
+        by_position: v, the derivative of the position. (W, n) [rad/s]
+        by_velocity: The logged velocity. (W, n) [rad/s]
+        slope: −v̇ by the position. (W, n) [rad/s²]
+        logged_slope: −q̈ by the logged velocity. (W, n) [rad/s²]
+    """
+
+    by_position: Array
+    by_velocity: Array
+    slope: Array
+    logged_slope: Array
+
+
+def weighed_windows(recording: Recording) -> WeighedWindows:
+    """What position and logged velocity say over windows, spread over the log.
 
     A window across a gap mixes motion that was not recorded, one of tiny steps hardly lasts: both
     are left out.
@@ -132,8 +163,8 @@ def weighed_windows(recording: Recording) -> tuple[Array, Array, Array]:
     t, dq = recording.t, recording.require("dq")
     step = recording.median_step
     usual = USUAL[0] < step < USUAL[1]
-    length = max(LEAST_STEPS, round(WINDOW / step)) if usual else UNUSUAL_STEPS
-    length = min(length, (len(t) - 1) // 4)
+    length = round(WINDOW / step) if usual else UNUSUAL_STEPS
+    length = max(LEAST_STEPS, min(length, (len(t) - 1) // WANTED))
     starts = np.arange(0, len(t) - length, length)
     if len(starts) > WINDOWS:
         starts = starts[np.linspace(0, len(starts) - 1, WINDOWS).astype(int)]
@@ -151,12 +182,9 @@ def weighed_windows(recording: Recording) -> tuple[Array, Array, Array]:
     def mean(weight: Array, of: Array) -> Array:
         return np.asarray((weight[:, None, :] @ of)[:, 0] / span)
 
-    return mean(hann, turned), mean(hann, way), mean(slope, turned)
-
-
-def rms(x: Array) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(x**2)))
+    return WeighedWindows(
+        mean(hann, turned), mean(hann, way), mean(slope, turned), mean(slope, way)
+    )
 
 
 def crossed(logged: Array, positions: Array) -> tuple[Array, Array]:
@@ -192,7 +220,7 @@ def late_velocities(recording: Recording, fit: VelocityFit, joints: Array) -> It
     """Joints whose velocity runs behind, or is of another size, each joint by itself."""
     limit = max(LATE, recording.median_step)
     told = np.isin(np.arange(recording.joints), joints)
-    late = told & (np.abs(fit.lag) - SURE * fit.lag_error > limit) & (fit.gain > 0.3)
+    late = told & (np.abs(fit.lag) - SURE * fit.lag_error > limit) & (fit.gain > DAMPED_MOST)
     if late.any():
         code = "velocity-filtered" if is_damped(fit, late) else "velocity-lag"
         lags = 1e3 * fit.lag[late]
@@ -250,12 +278,16 @@ def is_clock(factor: float) -> bool:
 
 
 def exchanged(fit: VelocityFit) -> list[int]:
-    """Joints whose logged velocity is that of another joint's position."""
-    own = np.where(np.abs(np.diag(fit.factor) - 1) < GAIN, np.diag(fit.share), 1.0)
+    """Joints whose logged velocity is that of another joint's position, and those others."""
+    close = np.abs(fit.gain - 1) < ALIKE
+    own = np.where(close, fit.open, 1.0)
     fits = np.where(np.abs(fit.factor - 1) < 2 * GAIN, fit.share, 1.0)
     fits[:, ~fit.known] = 1.0
     np.fill_diagonal(fits, 1.0)
-    found = np.flatnonzero(fit.known & (fits.min(axis=1) < ANOTHER * own)).tolist()
+    taken = np.flatnonzero(fits.min(axis=1) < np.minimum(ANOTHER * own, OPEN))
+    # A joint that stands has no velocity to be recognised by where it was written instead.
+    emptied = [j for j in np.argmin(fits[taken], axis=1) if not close[j]]
+    found = sorted({*taken.tolist(), *map(int, emptied)})
     return found if len(found) > 1 else []
 
 
