@@ -1,4 +1,5 @@
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -6,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from vftcli.outputs.files import OutputFolder, atomic, numbered, write_text
-from vftcli.outputs.seals import digest
+from vftcli.outputs.seals import digest, digests
 from vftcli.signals.errors import OutputError
 
 
@@ -254,3 +255,43 @@ def test_a_failed_run_clears_nothing(tmp_path: Path) -> None:
 def test_half_a_letter_in_a_name_does_not_stop_a_text(tmp_path: Path) -> None:
     write_text(tmp_path / "a.txt", "bad\udcff.csv")
     assert (tmp_path / "a.txt").read_text() == "bad\\udcff.csv"
+
+
+def test_a_kill_before_any_rename_leaves_no_two_runs_under_one_seal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder with sub-folders, each sealed, above them a seal for all; the new run has others."""
+    out, copies = tmp_path / "out", []
+    move = Path.replace
+
+    def copied(self: Path, target: Path) -> Path:
+        copies.append(shutil.copytree(out, tmp_path / f"copy-{len(copies)}"))
+        return move(self, target)
+
+    def report(places: str, text: str) -> dict[str, str]:
+        with OutputFolder(out, force=True, names=["run.json", "index.html"]) as folder:
+            for place in places:
+                folder.write(f"{place}/page.html", text + place)
+                folder.write(f"{place}/run.json", json.dumps({"files": folder.digests(place)}))
+            folder.write("index.html", text)
+            folder.write("run.json", json.dumps({"files": folder.digests()}))
+        return digests(out)
+
+    old = report("ab", "old")
+    monkeypatch.setattr(Path, "replace", copied)
+    new = report("bc", "new")
+    assert new.keys() == {"index.html", "run.json", *(f"{p}/{f}" for p in "bc" for f in
+                                                      ("page.html", "run.json"))}  # fmt: skip
+    for copy in copies:
+        shutil.rmtree(next(copy.glob(".vftcli-*.partial")))
+        found = digests(copy)
+        for seal in [name for name in found if name.endswith("run.json")]:
+            place = seal.removesuffix("run.json")
+            listed = json.loads((copy / seal).read_text())["files"]
+            beside = {n.removeprefix(place): d for n, d in found.items() if n.startswith(place)}
+            beside.pop("run.json")
+            assert listed == beside
+        assert "run.json" not in found or found == old
+    # Six files go and six come; the first change leaves the old one as it is.
+    assert len(copies) == 12
+    assert sum(digests(copy) == old for copy in copies) == 1
