@@ -87,6 +87,15 @@ def test_every_observer_and_robot_is_documented() -> None:
     assert not [name for name in PROFILES if f"`{name}`" not in robots]
 
 
+def test_every_finding_is_documented() -> None:
+    import tomllib
+
+    text = (ROOT / "docs" / "trust.md").read_text("utf-8")
+    for path in (ROOT / "vftcli" / "signals" / "words").glob("doctor*.toml"):
+        for code, entry in tomllib.loads(path.read_text("utf-8")).items():
+            assert f"`{entry.get('name', code)}`" in text, code
+
+
 def test_the_readme_names_every_dependency() -> None:
     import tomllib
 

@@ -82,9 +82,10 @@ def coulomb_logarithmic(
     rise = np.abs(dq)
     rise /= logarithmic_velocity
     np.log1p(rise, out=rise)
+    np.copysign(rise, dq, out=rise)
     rise *= logarithmic
-    rise *= np.sign(dq)
-    return coulomb_viscous(dq, **others) + rise
+    rise += coulomb_viscous(dq, **others)
+    return rise
 
 
 def sigmoid(
