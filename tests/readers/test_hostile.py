@@ -154,6 +154,30 @@ def test_tables_that_are_no_log_are_refused_by_what_is_wrong(
     assert "\n" not in str(refusal.value)
 
 
+def test_a_name_of_many_digits_is_a_name(tmp_path: Path) -> None:
+    """A number was tried from each of its digits on, and one of 5000 digits is none of Python's."""
+    path = table(tmp_path / "x", lambda k: 0.008 * k)
+    head, _, rows = path.read_text().partition("\n")
+    path.write_text(head.replace("dq5", "1" * 40_000 + "x").replace("dq4", "dq" + "4" * 5000))
+    with path.open("a") as file:
+        file.write("\n" + rows)
+    assert read(path).signals == ("q",)
+
+
+def test_a_document_longer_than_any_message_of_joints_is_refused(tmp_path: Path) -> None:
+    from mcap.writer import Writer
+
+    with (tmp_path / "x").open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="", library="test")
+        channel = writer.register_channel("/j", "json", 0)
+        for k, numbers in enumerate((6, 5000)):
+            writer.add_message(channel, k, b'{"q": [' + b"1," * numbers + b"1]}", k, k)
+        writer.finish()
+    with pytest.raises(LogError, match=r"message 2 of /j is damaged \(nested or long"):
+        read(tmp_path / "x")
+
+
 def test_a_clock_may_be_a_list_of_one_number(tmp_path: Path) -> None:
     clock = [[float(t)] for t in motion(7)["t"]]
     np.testing.assert_array_equal(read(parquet(tmp_path / "x", t=clock)).t, motion(7)["t"])

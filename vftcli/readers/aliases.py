@@ -37,8 +37,9 @@ WRENCHES = (
 """Names of the six columns of a wrench."""
 
 INDEXED = re.compile(
-    r"(?P<stem>.*?)[_./ ]?(?:(?:joint|j)_?(?P<a>\d+)|\[(?P<b>\d+)\]|(?P<c>\d+))", re.IGNORECASE
-)
+    r"(?P<stem>.*?)[_./ ]?(?:(?:joint|j)_?(?P<a>\d{1,9})|\[(?P<b>\d{1,9})\]|(?P<c>\d{1,9}))",
+    re.IGNORECASE,
+)  # a number of any length would be tried from each of its digits on
 JOINT_FIRST = re.compile(
     r"(?:.*/)?(?P<joint>[A-Za-z][\w ]*)[/.](?P<stem>position|velocity|effort)(?:\[\])?"
 )

@@ -47,7 +47,7 @@ KINDS = {
 
 ITEM = re.compile(
     r"(?P<minus>-)?(?P<name>tau\+g|[A-Za-z_]+)(?:\[(?P<unit>[^\]]*)\])?"
-    r"(?:@(?P<rate>[0-9.eE+]+)(?:Hz)?|:(?P<count>\d+)|=(?P<pattern>.+))?"
+    r"(?:@(?P<rate>[0-9.eE+]+)(?:Hz)?|:(?P<count>\d{1,9})|=(?P<pattern>.+))?"
 )
 
 

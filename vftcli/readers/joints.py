@@ -19,7 +19,7 @@ UR_WORDS = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
 """The names on UR's teach pendant, base to tip."""
 
 FRANKA = re.compile(r"(?:.*_)?(panda|fr3|fer|fp3)_joint([1-7])")
-NUMBERED = re.compile(r".*?joint[_ ]?(\d+)", re.IGNORECASE)
+NUMBERED = re.compile(r".*?joint[_ ]?(\d{1,9})", re.IGNORECASE)
 
 HINTS = {"panda": "panda", "fer": "panda", "fr3": "fr3"}
 """Stem of Franka's joint names → profile."""

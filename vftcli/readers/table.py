@@ -273,7 +273,7 @@ def _named(table: Table, item: Item) -> tuple[Cell, ...]:
     if "{i}" not in pattern:
         return _exact(table, item, pattern)
     template = re.compile(
-        re.escape(pattern).replace(r"\{i\}", r"(\d+)", 1).replace(r"\{i\}", r"\1")
+        re.escape(pattern).replace(r"\{i\}", r"(\d{1,9})", 1).replace(r"\{i\}", r"\1")
     )
     found = {
         int(match[1]): column
@@ -297,10 +297,10 @@ def _exact(table: Table, item: Item, name: str) -> tuple[Cell, ...]:
     """The cells of one column by its name, or of some elements of its lists: name[0:7]."""
     names = table.names or ()
     bare, elements = name, slice(None)
-    if name not in names and (match := re.fullmatch(r"(.+)\[(\d*):(\d*)\]", name)):
+    if name not in names and (match := re.fullmatch(r"(.+)\[(\d{0,9}):(\d{0,9})\]", name)):
         bare = match[1]
         elements = slice(*(int(text) if text else None for text in match.group(2, 3)))
-    elif name not in names and (match := re.fullmatch(r"(.+)\[(\d+)\]", name)):
+    elif name not in names and (match := re.fullmatch(r"(.+)\[(\d{1,9})\]", name)):
         bare, elements = match[1], slice(int(match[2]), int(match[2]) + 1)
     if names.count(bare) != 1:
         if bare in names:

@@ -161,7 +161,7 @@ def _numbers_in(name: str) -> tuple[list[int], str]:
     """What sorts bag_10.mcap behind bag_9.mcap."""
     stem = name.split(".", maxsplit=1)[0]
     tail = stem.rpartition("_")[2]
-    return ([int(tail)] if tail.isdigit() else [], name)
+    return ([int(tail)] if tail.isdecimal() else [], name)
 
 
 def printable(name: str) -> str:

@@ -16,6 +16,7 @@ from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.errors import LogError
 
 FOXGLOVE = "foxglove.JointStates"
+MAX_BYTES = 1 << 20
 MAX_DEPTH = 8
 MAX_VALUES = 4096
 
@@ -47,7 +48,7 @@ class Documents:
         for offset, length, time in zip(batch.offsets, batch.lengths, batch.times, strict=True):
             message = batch.buffer[offset : offset + length].tobytes()
             try:
-                rows.append(flattened(_json(message) if json_like else joint_states(message)))
+                rows.append(flattened(_document(message, json_like=json_like)))
             except DocumentError as error:
                 raise LogError(
                     f"{self.ingest.path}: message {len(rows) + 1} of {channel.topic} is damaged "
@@ -55,6 +56,17 @@ class Documents:
                 ) from None
             times.append(int(time))
         return True
+
+
+def _document(message: bytes, *, json_like: bool) -> Any:  # noqa: ANN401
+    """A message in JSON, or of JointStates.
+
+    Raises:
+        DocumentError: If it is damaged, or longer than any that tells of joints.
+    """
+    if len(message) > MAX_BYTES:
+        raise DocumentError("longer than any message of joints")
+    return _json(message) if json_like else joint_states(message)
 
 
 def _json(message: bytes) -> Any:  # noqa: ANN401
@@ -151,6 +163,8 @@ def _flatten(value: Any, path: str, flat: dict[str, Any], depth: int) -> None:  
             found = [v[key] for v in value if key in v]
             if len(found) == len(value):
                 flat[key] = found
+    elif isinstance(value, list) and len(value) > MAX_VALUES:
+        raise DocumentError("nested or long beyond any message of joints")
     elif isinstance(value, list | int | float | str | bool):
         flat[path] = value
 
