@@ -1,0 +1,189 @@
+"""One input: a file with one thing changed, and a command on it, in a process of its own."""
+
+import json
+import os
+import resource
+import shutil
+import signal
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from array_mutants import archive_mutant, parquet_mutant, record_mutant
+from message_mutants import bag_mutant, folder_mutant, mcap_mutant
+from option_mutants import option_words
+from robot_mutants import toml_mutant, urdf_mutant
+from text_mutants import lines_mutant, table_mutant
+from tokens import Mutant, Rng, Seed, pick
+
+CPU_SECONDS = 5
+WALL_SECONDS = 60
+"""A process that waits takes no processor time, and the machine may be busy."""
+
+MEMORY = 1 << 30
+"""Most resident memory, and what an input may map beyond what the parent has. [B]"""
+
+BROKEN = 70
+"""Exit code of a command that ended in an exception."""
+
+MUTATORS: dict[str, Callable[[Seed, Rng, Path], Mutant]] = {
+    "table": table_mutant,
+    "lines": lines_mutant,
+    "parquet": parquet_mutant,
+    "npz": archive_mutant,
+    "npy": archive_mutant,
+    "pickle": archive_mutant,
+    "records": record_mutant,
+    "mcap": mcap_mutant,
+    "bag": bag_mutant,
+    "folder": folder_mutant,
+    "robot": toml_mutant,
+    "gains": toml_mutant,
+    "scenario": toml_mutant,
+    "urdf": urdf_mutant,
+}
+WEIGHTS = {
+    "table": 22, "lines": 6, "parquet": 10, "npz": 8, "npy": 2, "pickle": 7, "records": 5,
+    "mcap": 13,
+    "bag": 7, "folder": 7, "robot": 6, "urdf": 3, "gains": 1, "scenario": 1, "options": 2,
+}  # fmt: skip
+"""Family → inputs of a hundred."""
+
+ENDINGS = {"robot": ".toml", "gains": ".toml", "scenario": ".toml", "urdf": ".urdf"}
+LARGEST_TORQUE = 1e9
+"""An external torque beyond it, from a sound log and a robot file, is none that a robot has."""
+
+
+class Attempt(NamedTuple):
+    """One input.
+
+    Attributes:
+        family: Of the file, or "options".
+        seed: What it started from.
+        how: What was changed.
+        words: The command line.
+        rows: Rows of the file, None where they are not known.
+    """
+
+    family: str
+    seed: str
+    how: str
+    words: tuple[str, ...]
+    rows: int | None
+
+
+def attempt(number: int, index: int, seeds: dict[str, list[Seed]], folder: Path) -> Attempt:
+    """Write the input of an index, and say how it is tried; the same for the same two numbers."""
+    rng = np.random.default_rng([number, index])
+    wheel = [family for family, weight in WEIGHTS.items() for _ in range(weight)]
+    family = pick(rng, wheel)
+    command = pick(rng, ("inspect", "inspect", "inspect", "convert", "convert", "estimate"))
+    if family == "options":
+        seed = pick(rng, seeds["table"])
+        words = [command, str(seed.path), *option_words(rng, command)]
+        how = " ".join(words[2:])
+        rows = None
+    else:
+        seed = pick(rng, seeds[family])
+        place = folder / f"in{ENDINGS.get(family, '')}"
+        mutant = MUTATORS[family](seed, rng, place)
+        place, how, rows = mutant.path or place, mutant.how, mutant.rows
+        if family in ENDINGS:
+            words = on_robot(family, seed, place, seeds)
+        else:
+            options = ["--columns", seed.columns] if seed.columns else []
+            robot = ["--robot", "ur5" if seed.joints == 6 else "panda"]
+            words = [command, str(place), *options, *(robot if command == "estimate" else [])]
+    words += {
+        "inspect": ["--json"],
+        "convert": ["-o", str(folder / "out.parquet"), "--json"],
+        "estimate": ["-o", str(folder / "out"), "--anyway"],
+        "simulate": ["-o", str(folder / "out.csv"), "--json"],
+    }[words[0]]
+    return Attempt(family, seed.name, how, tuple(words), rows)
+
+
+def on_robot(family: str, seed: Seed, place: Path, seeds: dict[str, list[Seed]]) -> list[str]:
+    """The command that takes a robot file, gains or a scenario."""
+    if family == "scenario":
+        return ["simulate", str(place), "--set", "duration=0.2"]
+    joints = 7 if "panda" in seed.name else 6
+    sound = {s.name: s for s in seeds["table"]}["libfranka-csv" if joints == 7 else "table"]
+    if family == "gains":
+        return ["estimate", str(sound.path), "--robot", "ur5", "--set-file", str(place)]
+    return ["estimate", str(sound.path), "--robot", str(place)]
+
+
+def tried(number: int, index: int, seeds: dict[str, list[Seed]], folder: Path) -> int:
+    """Make the input of an index and run its command, what it says kept in the folder; its code."""
+    clear(folder)
+    (folder / "TMP").mkdir()
+    made = attempt(number, index, seeds, folder)
+    (folder / "attempt.json").write_text(json.dumps(made._asdict()), encoding="utf-8")
+    limit()
+    try:
+        code = command(made.words, folder)
+    except BaseException:  # noqa: BLE001 - whatever it is, it is what is looked for
+        (folder / "trace").write_text(traceback.format_exc(), encoding="utf-8", errors="replace")
+        return BROKEN
+    if code == 0 and made.words[0] in {"estimate", "convert"}:
+        (folder / "numbers").write_text(odd_numbers(made, folder), encoding="utf-8")
+    return code
+
+
+def limit() -> None:
+    """Bound what the next command may take."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    spent = resource.getrusage(resource.RUSAGE_SELF)
+    used = int(spent.ru_utime + spent.ru_stime)
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CPU, (used + CPU_SECONDS, hard))
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    most = pages * os.sysconf("SC_PAGE_SIZE") + 2 * MEMORY
+    resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    signal.alarm(WALL_SECONDS)
+
+
+def command(words: tuple[str, ...], folder: Path) -> int:
+    """Run a command of vftcli, what it says kept in the folder; its exit code."""
+    import vftcli.cli
+
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        file = os.open(folder / name, os.O_WRONLY | os.O_CREAT, 0o644)
+        os.dup2(file, number)
+        os.close(file)
+    os.environ["TMPDIR"] = str(folder / "TMP")
+    sys.argv = ["vftcli", *words]
+    code: Any = 0
+    try:
+        vftcli.cli.main()
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) or end.code is None else 1
+    sys.stdout.flush()
+    sys.stderr.flush()
+    return code or 0
+
+
+def odd_numbers(made: Attempt, folder: Path) -> str:
+    """What is wrong with the numbers that were written, "" where nothing is."""
+    import pyarrow.parquet as pq
+
+    path = folder / ("out/estimates.parquet" if made.words[0] == "estimate" else "out.parquet")
+    table = pq.read_table(path, use_threads=False)
+    for name in table.column_names:
+        values = np.asarray(table.column(name).to_numpy(), dtype=float)
+        if np.isinf(values).any() or (name.startswith("tau_ext/") and np.isnan(values).any()):
+            return f"not finite: {name}"
+        beyond = bool(np.any(np.abs(values) > LARGEST_TORQUE)) and name.startswith("tau_ext/")
+        if beyond and made.family in {"robot", "urdf", "gains"}:
+            return f"beyond any robot: {name} {np.nanmax(np.abs(values)):.3g}"
+    return ""
+
+
+def clear(folder: Path) -> None:
+    """Empty the folder of one input."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)

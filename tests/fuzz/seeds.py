@@ -1,0 +1,151 @@
+"""The seeds: a small sound file of every kind, made in code, and the heads of sample files."""
+
+import os
+import pickle
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from message_mutants import mcap_messages, shrunk_archive, shrunk_database, shrunk_mcap
+from tokens import Seed
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "readers"))
+import seed_logs
+
+MOST = 60
+"""Rows or messages of a seed: an input should cost some tens of milliseconds."""
+
+FAMILIES = {
+    "ur-csv": "table", "ur-rtde": "table", "libfranka-csv": "table", "libfranka-csv-old": "table",
+    "table": "table", "table-gz": "table", "headerless": "table", "libfranka-json": "lines",
+    "ur-binary": "records", "npy": "npy", "npz": "npz", "pickle": "pickle", "parquet": "parquet",
+    "rosbag1": "bag", "rosbag1-lz4": "bag", "db3": "folder", "mcap": "mcap", "mcap-json": "mcap",
+}  # fmt: skip
+"""Seed of the reader tests → the mutator that knows its structure."""
+
+TENSOR = 'ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"'
+GAINS = """[observers.gmo]
+gain = [10.0, 10.0, 10.0, 10.0, 10.0, 10.0]
+[observers.fdo]
+omega = 10.0
+[observers.kfo]
+r_diag = 0.1
+q_p_diag = 0.01
+q_tau_diag = [10.0, 10.0, 10.0, 10.0, 10.0, 10.0]
+noise_convention = "density"
+"""
+
+
+def urdf(joints: int = 6) -> str:
+    """A serial arm of revolute joints."""
+    parts = ['<robot name="arm"><link name="l0"/>']
+    parts += [
+        f'<link name="l{k}"><inertial><origin xyz="0 0 0.1" rpy="0 0 0"/>'
+        f'<mass value="{8 - k}.5"/><inertia {TENSOR}/></inertial></link>'
+        f'<joint name="j{k}" type="revolute"><parent link="l{k - 1}"/><child link="l{k}"/>'
+        f'<origin xyz="0 0 0.3" rpy="0.1 0 0"/><axis xyz="0 {k % 2} {1 - k % 2}"/>'
+        '<limit lower="-6" upper="6" velocity="3" effort="150"/></joint>'
+        for k in range(1, joints + 1)
+    ]
+    return "\n".join([*parts, "</robot>"])
+
+
+def make_seeds(folder: Path) -> list[Seed]:
+    """Write every seed into a folder; polars runs here, so call it in a process of its own."""
+    seeds = [*seeds_in_code(folder), *robot_seeds(folder)]
+    logs = os.environ.get("VFT_LOGS")
+    samples = Path(logs).parent / "samples" if logs else None
+    if samples is not None and samples.is_dir():
+        seeds += sample_seeds(samples, folder)
+    return [s._replace(model=mcap_messages(s.path)) if s.family == "mcap" else s for s in seeds]
+
+
+def seeds_in_code(folder: Path) -> Iterator[Seed]:
+    for name, family in FAMILIES.items():
+        make, columns = seed_logs.SEEDS[name]
+        path = folder / name
+        made = make(path)
+        yield Seed(name, family, made, columns)
+    for storage in ("sqlite3", "mcap"):
+        path = seed_logs.rosbag2(folder / f"rosbag2-{storage}", storage=storage)
+        yield Seed(f"rosbag2-{storage}", "folder", path)
+
+
+def robot_seeds(folder: Path) -> Iterator[Seed]:
+    """Robot files, gains and scenarios."""
+    import vftcli.robots
+    import vftcli.simulation.load
+
+    for name in ("ur5", "panda"):
+        path = folder / f"{name}.toml"
+        shutil.copyfile(vftcli.robots.PROFILES[name], path)
+        yield Seed(f"robot-{name}", "robot", path)
+    (folder / "arm.urdf").write_text(urdf(), encoding="utf-8")
+    yield Seed("urdf", "urdf", folder / "arm.urdf")
+    (folder / "gains.toml").write_text(GAINS, encoding="utf-8")
+    yield Seed("gains", "gains", folder / "gains.toml")
+    for name in ("ur5-circle", "panda-bearing", "ur5-sensor"):
+        path = folder / f"{name}.scenario.toml"
+        text = (vftcli.simulation.load.FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
+        yield Seed(f"scenario-{name}", "scenario", path)
+
+
+def sample_seeds(samples: Path, folder: Path) -> Iterator[Seed]:
+    """The heads of the sample files, whatever kinds there are."""
+    for path in sorted(samples.rglob("*")):
+        name = "-".join(path.relative_to(samples).parts)
+        target = folder / f"sample-{name}"
+        if path.suffix == ".csv":
+            lines = path.read_bytes().splitlines(keepends=True)
+            target.write_bytes(b"".join(lines[: MOST + 1]))
+            yield Seed(name, "table", target)
+        elif path.suffix == ".jsonl":
+            lines = path.read_bytes().splitlines(keepends=True)
+            target.write_bytes(b"".join(lines[: MOST // 2]))
+            yield Seed(name, "lines", target)
+        elif path.suffix == ".npz":
+            target.write_bytes(shrunk_archive(path.read_bytes(), MOST))
+            yield Seed(name, "npz", target)
+        elif path.suffix == ".pkl":
+            log = pickle.loads(path.read_bytes())
+            log = (
+                {k: v[:MOST] if isinstance(v, list) else v for k, v in log.items()}
+                if isinstance(log, dict)
+                else log
+            )
+            target.write_bytes(pickle.dumps(log))
+            yield Seed(name, "pickle", target)
+        elif path.suffix == ".parquet" and "truth" not in name and "meta" not in name:
+            import pyarrow.parquet as pq
+
+            pq.write_table(pq.read_table(path).slice(0, MOST), target)
+            yield Seed(name, "parquet", target)
+        elif path.suffix == ".bin":
+            head = path.read_bytes()
+            target.write_bytes(head[: head.index(b"\n", head.index(b"\n") + 1) + 40_000])
+            yield Seed(name, "records", target)
+        else:
+            yield from bag_seeds(path, name, target)
+
+
+def bag_seeds(path: Path, name: str, target: Path) -> Iterator[Seed]:
+    """A sample that holds messages."""
+    if path.suffix in {".mcap", ".db3"} and (path.parent / "metadata.yaml").is_file():
+        shutil.copytree(path.parent, target)
+        for file in [target, *target.iterdir()]:
+            file.chmod(0o755)
+        if path.suffix == ".db3":
+            shrunk_database(path, target / path.name, MOST)
+        yield Seed(name, "folder", target)
+    elif path.suffix == ".mcap":
+        try:
+            shrunk_mcap(path, target, MOST)
+        except Exception:  # noqa: BLE001 - one cut on purpose is none to start from
+            return
+        yield Seed(name, "mcap", target)
+    elif path.suffix in {".bag", ".active"} and "trunc" not in name:
+        shutil.copyfile(path, target)
+        target.chmod(0o644)
+        yield Seed(name, "bag", target)

@@ -1,0 +1,77 @@
+"""The fuzzer: that it runs, that its inputs can be made again, and that it sees a failure."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import run as fuzz
+from child import BROKEN, MUTATORS, Attempt
+from seed_logs import SEEDS
+from tokens import Seed
+
+INPUTS = 40
+
+
+def test_a_short_run_finds_nothing() -> None:
+    """The long ones are documented in docs/contributing.md."""
+    words = [sys.executable, fuzz.__file__, "--seed", "7", "--inputs", str(INPUTS)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f"{INPUTS} inputs of seed 7" in done.stdout
+    read = next(line for line in done.stdout.splitlines() if line.split()[:1] == ["all"])
+    assert int(read.split()[2]) > 0  # some are read: it does not only meet refusals
+
+
+@pytest.mark.parametrize(("name", "family"), [("table", "table"), ("npz", "npz"), ("mcap", "mcap")])
+def test_the_same_seed_makes_the_same_input(tmp_path: Path, name: str, family: str) -> None:
+    from message_mutants import mcap_messages
+
+    seed = Seed(name, family, SEEDS[name][0](tmp_path / "sound"))
+    if family == "mcap":
+        seed = seed._replace(model=mcap_messages(seed.path))
+    made = []
+    for k in (1, 1, 2):
+        path = tmp_path / "mutant"
+        how = MUTATORS[family](seed, np.random.default_rng([5, k]), path).how
+        made.append((how, path.read_bytes()))
+    assert made[0] == made[1] != made[2]
+
+
+def attempt(*words: str, family: str = "table", rows: int | None = None) -> Attempt:
+    return Attempt(family, "seed", "how", words, rows)
+
+
+@pytest.mark.parametrize(
+    ("status", "made", "files", "kind"),
+    [
+        (1, attempt("inspect"), {"stderr": "error: no log"}, "refused"),
+        (0, attempt("estimate"), {}, "read"),
+        (0, attempt("inspect", "--json", rows=9), {"stdout": '{"samples": 9}'}, "read"),
+        (0, attempt("inspect", "--json", rows=9), {"stdout": '{"samples": 8}'}, "rows lost"),
+        (
+            0,
+            attempt("inspect", "--json", rows=9),
+            {"stdout": '{"samples": 8, "repairs": ["one dropped"]}'},
+            "read with drops said",
+        ),
+        (0, attempt("inspect", "--json"), {"stdout": '{"misfit": Infinity}'}, "json"),
+        (0, attempt("estimate"), {"numbers": "not finite: tau_ext/gmo/1"}, "numbers"),
+        (BROKEN, attempt("inspect"), {"trace": "ValueError"}, "traceback"),
+        (-24, attempt("inspect"), {}, "hang"),
+        (-11, attempt("inspect"), {}, "signal"),
+        (1, attempt("inspect"), {"stderr": "error: out of memory"}, "memory"),
+        (1, attempt("inspect"), {"stderr": "Error: C++\nerror: no robot"}, "several lines"),
+        (1, attempt("estimate"), {"stderr": "error: no", "out": ""}, "left behind"),
+        (2, attempt("inspect"), {"stderr": "Usage"}, "exit code 2"),
+        (2, attempt("inspect", family="options"), {"stderr": "Usage"}, "usage"),
+    ],
+)
+def test_each_kind_of_failure_is_seen(
+    tmp_path: Path, status: int, made: Attempt, files: dict[str, str], kind: str
+) -> None:
+    for name, text in {**files, "attempt.json": json.dumps(made._asdict())}.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    assert fuzz.judged(status, 3, tmp_path).kind == kind
