@@ -41,7 +41,7 @@ from vftcli.signals.errors import VftError  # noqa: E402
 PURE = {"mcap", "bag", "folder", "npz", "npy", "pickle", "records"}
 """Families whose readers start no threads: their caches are filled before the fork."""
 
-READ = ("read", "read with drops said", "refused", "usage")
+READ = ("read", "read with a word", "refused", "usage")
 """Verdicts that are no failure; the last is of typer's own, in several lines."""
 
 
@@ -214,10 +214,11 @@ def of_result(made: Attempt, folder: Path) -> tuple[str, str]:
         return "json", f"{error}: {out[:200]}"
     if numbers := text(folder / "numbers"):
         return "numbers", numbers
-    repairs = report.get("repairs", [])
-    if made.rows is not None and report.get("samples", made.rows) < made.rows and not repairs:
+    health = "log health: sound" not in text(folder / "stderr") and made.words[0] == "convert"
+    said = bool(report.get("repairs") or report.get("warnings") or health)
+    if made.rows is not None and report.get("samples", made.rows) < made.rows and not said:
         return "rows lost", f"{report['samples']} of {made.rows}"
-    return READ[bool(repairs)], ""
+    return READ[said], ""
 
 
 def refuse(word: str) -> None:

@@ -55,7 +55,7 @@ def attempt(*words: str, family: str = "table", rows: int | None = None) -> Atte
             0,
             attempt("inspect", "--json", rows=9),
             {"stdout": '{"samples": 8, "repairs": ["one dropped"]}'},
-            "read with drops said",
+            "read with a word",
         ),
         (0, attempt("inspect", "--json"), {"stdout": '{"misfit": Infinity}'}, "json"),
         (0, attempt("estimate"), {"numbers": "not finite: tau_ext/gmo/1"}, "numbers"),

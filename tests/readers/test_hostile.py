@@ -134,6 +134,7 @@ def test_bombs_are_refused_in_one_line_and_little_memory(tmp_path: Path) -> None
         (lambda path: table(path, lambda k: k // 40), "clock is coarser than the samples: 117 of"),
         (lambda path: table(path, lambda k: k * 5e-324), "which no robot's log is"),
         (lambda path: table(path, lambda k: k * 1e300), "which no robot's log is"),
+        (lambda path: table(path, lambda k: 1e10 + k / 64), "starts at 1e+10 s, which no clock"),
         (lambda path: table(path, lambda k: k % 100), "the clock starts anew"),
     ],
 )

@@ -30,6 +30,9 @@ ABSURD = 1e9
 SHORTEST_STEP, LONGEST_LOG = 1e-7, 1e11
 """No robot is sampled ten million times a second, nor for three thousand years. [s]"""
 
+FARTHEST_START = 9e9
+"""A clock starts within 285 years of 1970: nanoseconds in 64 bits count no farther. [s]"""
+
 ONE_TURN, TWO_TURNS = 2 * np.pi + 0.1, 13.0
 """How far a joint goes from its zero, with a little to spare: of seven-joint arms, of any. [rad]"""
 
@@ -220,13 +223,19 @@ def refuse_backward_steps(raw: RawLog, path: Path) -> None:
 
 
 def refuse_standing_clock(raw: RawLog, path: Path) -> None:
-    """Raise a ClockError if the clock does not run, or not at a pace that a robot's log can have.
+    """Raise a ClockError if the clock does not run, or as the clock of no robot's log can.
 
     Raises:
-        ClockError: If all stamps are one, or lie nearer or farther apart than any robot's.
+        ClockError: If all stamps are one, lie nearer or farther apart than any robot's, or begin
+            farther from zero than nanoseconds can be counted.
     """
-    t = seconds(raw)
+    t, start = seconds(raw), float(raw.stamps[0]) * raw.tick + raw.origin
     rows, span, steps = len(t), float(t[-1]), np.diff(t)
+    if not abs(start) <= FARTHEST_START:
+        raise ClockError(
+            f"{path}: the clock starts at {start:.3g} s, which no clock shows. Say its unit with "
+            "--columns, as in t[ns]=…, or name another column."
+        )
     if rows < 2:
         return
     if span == 0:
