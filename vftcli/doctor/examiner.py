@@ -48,7 +48,7 @@ class Examiner:
     def __init__(self, *, anyway: bool = False, fitting: bool = True) -> None:
         self._anyway, self._fitting = anyway, fitting
         self._made: list[tuple[Recording, Robot, Examination]] = []
-        self._robots: dict[tuple[str, float | None, bool], Robot] = {}
+        self._robots: dict[tuple[str, RobotChoice, float | None, bool], Robot] = {}
 
     def robot(self, recording: Recording, choice: RobotChoice) -> Robot:
         """The robot that is chosen, that the log says, or that its maker's own model tells.
@@ -60,7 +60,7 @@ class Examiner:
         if name is None:
             name, remarks = guessed(recording)
         # The log may be what says which load is mounted.
-        key = (name, recording.payload_mass, bool(remarks))
+        key = (name, choice, recording.payload_mass, bool(remarks))
         if key not in self._robots:
             robot = choice.load(recording, name)
             self._robots[key] = replace(robot, remarks=(*robot.remarks, *remarks))
