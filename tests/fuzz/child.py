@@ -46,11 +46,15 @@ MUTATORS: dict[str, Callable[[Seed, Rng, Path], Mutant]] = {
     "urdf": urdf_mutant,
 }
 WEIGHTS = {
-    "table": 22, "lines": 6, "parquet": 10, "npz": 8, "npy": 2, "pickle": 7, "records": 5,
+    "table": 20, "lines": 6, "parquet": 10, "npz": 8, "npy": 2, "pickle": 7, "records": 5,
     "mcap": 13,
-    "bag": 7, "folder": 7, "robot": 6, "urdf": 3, "gains": 1, "scenario": 1, "options": 2,
+    "bag": 7, "folder": 7, "robot": 6, "urdf": 3, "gains": 1, "scenario": 1, "options": 4,
 }  # fmt: skip
 """Family → inputs of a hundred."""
+
+COMMANDS = (*["inspect"] * 9, *["convert"] * 7, *["estimate"] * 3, "compare")
+ANALYSES = {"estimate", "compare"}
+REFERENCES = ("zero", "vendor", "two-cycle", "sensor", "zero", "x")
 
 ENDINGS = {"robot": ".toml", "gains": ".toml", "scenario": ".toml", "urdf": ".urdf"}
 LARGEST_TORQUE = 1e9
@@ -80,7 +84,7 @@ def attempt(number: int, index: int, seeds: dict[str, list[Seed]], folder: Path)
     rng = np.random.default_rng([number, index])
     wheel = [family for family, weight in WEIGHTS.items() for _ in range(weight)]
     family = pick(rng, wheel)
-    command = pick(rng, ("inspect", "inspect", "inspect", "convert", "convert", "estimate"))
+    command = pick(rng, COMMANDS)
     if family == "options":
         seed = pick(rng, seeds["table"])
         words = [command, str(seed.path), *option_words(rng, command)]
@@ -96,11 +100,12 @@ def attempt(number: int, index: int, seeds: dict[str, list[Seed]], folder: Path)
         else:
             options = ["--columns", seed.columns] if seed.columns else []
             robot = ["--robot", "ur5" if seed.joints == 6 else "panda"]
-            words = [command, str(place), *options, *(robot if command == "estimate" else [])]
+            words = [command, str(place), *options, *(robot if command in ANALYSES else [])]
     words += {
         "inspect": ["--json"],
         "convert": ["-o", str(folder / "out.parquet"), "--json"],
         "estimate": ["-o", str(folder / "out"), "--anyway"],
+        "compare": ["--reference", pick(rng, REFERENCES), "--anyway", "--json"],
         "simulate": ["-o", str(folder / "out.csv"), "--json"],
     }[words[0]]
     return Attempt(family, seed.name, how, tuple(words), rows)

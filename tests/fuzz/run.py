@@ -2,8 +2,8 @@
 
 Seeds are small sound files of every kind that a user may give (made in code, and where VFT_LOGS is
 set the heads of the samples beside it). An input is one of them taken apart, one thing changed, and
-put together again, with inspect, convert, estimate or simulate on it; or words that an option does
-not take. They run in forked children of a parent that has everything imported and has run nothing.
+put together again, with inspect, convert, estimate, compare or simulate on it; or words that an
+option does not take. They run in forked children of a parent that has everything imported.
 
 An input fails if the command ends in a traceback or by a signal, takes more than 5 s of processor
 time or 1 GiB, prints JSON that is none, writes numbers that are not finite or that no robot has,
@@ -116,6 +116,7 @@ def import_all(folder: Path, seeds: list[Seed]) -> None:
         ("estimate", table, "--robot", str(next(s.path for s in seeds if s.family == "urdf")),
          "-o", str(folder / "warm/o"), "--anyway"),
         ("convert", table, "-o", str(folder / "warm/o.parquet")),
+        ("compare", table, "--robot", "ur5", "--reference", "zero", "--anyway", "--json"),
         ("simulate", scenario, "-o", str(folder / "warm/o.csv"), "--set", "duration=0.1"),
     ]  # fmt: skip
     for words in tried:
@@ -214,6 +215,8 @@ def of_result(made: Attempt, folder: Path) -> tuple[str, str]:
         return "json", f"{error}: {out[:200]}"
     if numbers := text(folder / "numbers"):
         return "numbers", numbers
+    if not isinstance(report, dict):
+        return READ[0], ""
     health = "log health: sound" not in text(folder / "stderr") and made.words[0] == "convert"
     said = bool(report.get("repairs") or report.get("warnings") or health)
     if made.rows is not None and report.get("samples", made.rows) < made.rows and not said:
