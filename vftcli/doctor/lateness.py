@@ -27,7 +27,7 @@ WINDOW = 0.15
 """Length of a window; each begins in the middle of the one before. [s]"""
 WINDOWS, BLOCK, LEAST = 320, 16, 40
 """Windows that are looked at, at most, in blocks of neighbours; and how many a joint needs."""
-INSIDE = 16
+INSIDE = 12
 """Instants of a window at which the model is computed."""
 EARLIEST, LATEST, STEP = -0.1, 0.25, 0.01
 """Lags that are tried, and how far apart they are. [s]"""
@@ -44,8 +44,8 @@ LATE = 0.035
 simulation whose torque belongs to the step before like 30. [s]"""
 BETTER = 1.45
 """How much better a lag explains the joints, in the mean."""
-AGREE, NEAR = 0.65, 0.35
-"""Share of the joints, two at least, whose own best lag is as near as this share of it."""
+AGREE, ENOUGH, NEAR = 0.65, 3, 0.35
+"""Share and number of the joints whose own best lag is nearer to it than this share of it."""
 MISTIMED = frozenset(
     {"time-unit", "clock-rate", "velocity-unit", "velocity-sign", "velocity-mismatch"}
     | {"velocity-order", "velocity-lag", "velocity-filtered", "velocity-held", "stuck-velocity"}
@@ -65,14 +65,15 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
         return
     lags, rest = left
     known = np.flatnonzero(np.isfinite(rest[:, 0]) & (rest.min(axis=1) > 0))
-    if known.size < 2:
+    if known.size < ENOUGH:
         return
     together = np.log(rest[known]).mean(axis=0)
     best, none = int(np.argmin(together)), int(np.argmin(np.abs(lags)))
     lag, better = float(lags[best]), float(np.exp(together[none] - together[best]))
     own = lags[np.argmin(rest[known], axis=1)]
     alike = np.abs(own - lag) < max(NEAR * abs(lag), 1.5 * STEP)
-    if abs(lag) > LATE and better > BETTER and np.mean(alike) >= AGREE:
+    agreed = alike.sum() >= ENOUGH and np.mean(alike) >= AGREE
+    if abs(lag) > LATE and better > BETTER and agreed:
         order = "later" if lag > 0 else "earlier"
         joints = on_joints(known[alike])
         yield warning("effort-lag", joints, lag_ms=1e3 * abs(lag), order=order, ratio=better)
@@ -93,9 +94,7 @@ def unexplained(recording: Recording, robot: Robot) -> tuple[Array, Array] | Non
         return None
     rows = starts[:, None] + np.linspace(0, length, min(length, INSIDE) + 1).round().astype(int)
     model, speed = model_columns(recording, robot, rows)
-    hann = (1 - np.cos(2 * np.pi * np.arange(1, length) / length)) / length
-    smooth = np.stack([np.convolve(x, hann, "valid") for x in effort.T], axis=1)
-    late = smooth[starts[:, None] + 1 + lags]
+    late = by_hann(effort, length)[starts[:, None] + lags]
     neighbours = np.diff(starts) <= length // 2
     rest = np.full((recording.joints, len(lags)), np.nan)
     for j in range(recording.joints):
@@ -104,6 +103,18 @@ def unexplained(recording: Recording, robot: Robot) -> tuple[Array, Array] | Non
             change = np.diff(late[:, :, j], axis=0)[moves]
             rest[j] = rest_of(np.diff(model[:, j], axis=0)[moves], change)
     return lags * step, rest
+
+
+def by_hann(x: Array, length: int) -> Array:
+    """Means of columns over every window of so many steps, by Hann's weights. (T - length, n)
+
+    By Fourier transform: a window of a fast log has a hundred samples and more.
+    """
+    weight = (1 - np.cos(2 * np.pi * np.arange(length + 1) / length)) / length
+    size = 1 << (len(x) + length).bit_length()
+    product = np.fft.rfft(np.ascontiguousarray(x.T), size) * np.fft.rfft(weight, size)
+    mean: Array = np.fft.irfft(product, size)[:, length : len(x)].T
+    return mean
 
 
 def window_starts(t: Array, length: int, earliest: int, latest: int) -> NDArray[np.intp]:
@@ -170,7 +181,7 @@ def rest_of(model: Array, effort: Array) -> Array:
     columns = model / np.where(size > 0, size, 1.0)
     keep = np.ones(len(columns), dtype=bool)
     rest = np.zeros_like(effort)
-    for _ in range(3):
+    for _ in range(2):
         solution = np.linalg.lstsq(columns[keep], effort[keep], rcond=1e-8)[0]
         rest = (effort - columns @ solution) ** 2
         # A sample that no lag explains is contact; one that some lag explains is what tells it.

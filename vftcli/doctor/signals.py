@@ -26,6 +26,8 @@ ABSURD, FARTHEST = 1e9, 1e18
 """No measurement is this large, in whatever unit, and no time. [-, s]"""
 STEPS = (1e-13, 1e10)
 """Sample times between which every recorder's lies, read in whatever unit. [s]"""
+SOME = 5000
+"""Samples that tell how large a signal usually is."""
 LARGE_ANGLE = 13.0
 """Two turns and a little: no joint of these arms goes further from its zero. [rad]"""
 LARGE_CURRENT = 60.0
@@ -71,7 +73,8 @@ def odd_units(recording: Recording) -> Iterator[Remark]:
     if largest > LARGE_ANGLE:
         yield warning("degrees", largest_rad=largest)
     if recording.current is not None:
-        typical = float(np.quantile(np.abs(recording.current), 0.99))
+        thinned = recording.current[:: max(1, recording.samples // SOME)]
+        typical = float(np.quantile(np.abs(thinned), 0.99))
         if typical > LARGE_CURRENT:
             yield warning("milliamperes", typical_A=typical)
 
@@ -83,13 +86,14 @@ def work_shares(recording: Recording, effort: Array) -> Array:
     """
     if recording.dq is None:
         return np.full(recording.joints, np.nan)
-    steps = np.gradient(recording.t)[:, None]
-    power = effort * recording.dq * steps
+    rows = slice(None, None, max(1, recording.samples // SOME))
+    speed = recording.dq[rows]
+    power = effort[rows] * speed * np.gradient(recording.t[rows])[:, None]
     gross = np.sum(np.abs(power), axis=0)
     share = np.sum(power, axis=0) / np.where(gross > 0, gross, 1.0)
-    travel = np.sum(np.abs(np.diff(recording.q, axis=0)), axis=0)
+    travel = np.sum(np.abs(np.diff(recording.q[rows], axis=0)), axis=0)
     # One way only, gravity alone can take or give work.
-    reversing = (recording.dq.max(axis=0) > MOVING) & (recording.dq.min(axis=0) < -MOVING)
+    reversing = (speed.max(axis=0) > MOVING) & (speed.min(axis=0) < -MOVING)
     share[(travel < 0.3) | ~reversing | (gross == 0)] = np.nan
     return np.asarray(share)
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.doctor.findings import on_joints
-from vftcli.doctor.stuck import stuck_joints
+from vftcli.doctor.stuck import stuck_joints, travel_of
 from vftcli.signals.arrays import Array, Mask, median
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
@@ -21,8 +21,8 @@ from vftcli.signals.series import runs_of
 WINDOW = 0.2
 """Length of a window: short beside motion, long beside the noise of single samples and an arm's
 vibration. [s]"""
-LEAST_STEPS = 8
-"""Steps of a window of a slow log."""
+LEAST_STEPS, MOST_STEPS = 8, 40
+"""Steps of a window of a slow log, and of a fast one, which is thinned."""
 USUAL, UNUSUAL_STEPS = (2e-4, 0.05), 50
 """Sample times beyond which the clock's unit may be another one than it was taken for [s], and the
 steps of a window then."""
@@ -58,6 +58,8 @@ UNITS = {1e3: "ms", 1e6: "us", 1e9: "ns"}
 HELD = 0.55
 """Share of the moving steps in which a velocity repeats itself, from which it is held: one in two
 are those of half the rate, and sound logs repeat up to a third."""
+STEPS, BLOCK = 8000, 500
+"""Steps that are looked at, at most, in blocks."""
 MOVES = 0.02
 """Speed from which a velocity that repeats itself is held rather than small. [rad/s]"""
 CRUISE = 0.2
@@ -102,7 +104,7 @@ def velocity_fit(recording: Recording) -> VelocityFit | None:
     windows = weighed_windows(recording)
     by_position, by_velocity = windows.by_position, windows.by_velocity
     n = recording.joints
-    moved = np.ptp(recording.q, axis=0) >= TRAVEL
+    moved = travel_of(recording) >= TRAVEL
     moved &= np.any(by_position != 0, axis=0)
     if len(by_position) < LEAST or not moved.any():
         return None
@@ -170,7 +172,7 @@ def weighed_windows(recording: Recording) -> WeighedWindows:
         starts = starts[np.linspace(0, len(starts) - 1, WINDOWS).astype(int)]
     spans = (t[starts + length] - t[starts]) / (length * step)
     starts = starts[(spans > 0.5) & (spans < 1.5)]
-    rows = starts[:, None] + np.arange(length + 1)
+    rows = starts[:, None] + np.arange(0, length + 1, max(1, length // MOST_STEPS))
     times, steps = t[rows], np.diff(t[rows], axis=1)
     span = times[:, -1:] - times[:, :1]
     phase = 2 * np.pi * ((times[:, 1:] + times[:, :-1]) / 2 - times[:, :1]) / span
@@ -208,10 +210,11 @@ def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator
         return
     if swapped := exchanged(fit):
         yield warning("velocity-order", on_joints(swapped))
-    held = held_joints(recording)
+    shares = held_shares(recording)
+    held = held_joints(recording, shares)
     if held.size:
-        shares = 100 * held_shares(recording)[held]
-        yield warning("velocity-held", on_joints(held), shares_percent=shares.tolist())
+        percent = 100 * shares[held]
+        yield warning("velocity-held", on_joints(held), shares_percent=percent.tolist())
     explained = [*swapped, *held.tolist(), *stuck_joints(recording, "dq")]
     yield from late_velocities(recording, fit, np.setdiff1d(np.flatnonzero(fit.known), explained))
 
@@ -293,21 +296,27 @@ def exchanged(fit: VelocityFit) -> list[int]:
 
 def held_shares(recording: Recording) -> Array:
     """Share of a joint's moving steps in which its velocity repeats itself; NaN at rest. (n,)"""
-    dq, steps = recording.require("dq"), np.diff(recording.t)[:, None]
-    turned = np.abs(np.diff(recording.q, axis=0))
-    moves = turned > MOVES * steps
-    same = moves & (np.diff(dq, axis=0) == 0)
+    first = np.arange(recording.samples - 1)
+    if len(first) > STEPS:
+        blocks = np.linspace(0, len(first) - BLOCK, STEPS // BLOCK).astype(int)
+        first = (blocks[:, None] + np.arange(BLOCK)).ravel()
+    t, q, dq = recording.t, recording.q, recording.require("dq")
+    moves = np.abs(q[first + 1] - q[first]) > MOVES * (t[first + 1] - t[first])[:, None]
+    same = moves & (dq[first + 1] == dq[first])
     count = moves.sum(axis=0)
-    enough = (count >= 20) & (np.ptp(recording.q, axis=0) >= TRAVEL)
+    enough = (count >= 20) & (travel_of(recording) >= TRAVEL)
     return np.where(enough, same.sum(axis=0) / np.maximum(count, 1), np.nan)
 
 
-def held_joints(recording: Recording) -> Array:
+def held_joints(recording: Recording, shares: Array) -> Array:
     """Joints whose velocity stays for some samples and then jumps, while the position moves on.
 
     A constant speed repeats for longer; one of coarse resolution mostly changes by a step of it.
+
+    Args:
+        recording: The log.
+        shares: Share of each joint's moving steps in which its velocity repeats itself. (n,)
     """
-    shares = held_shares(recording)
     longest = max(2, round(CRUISE / recording.median_step))
     found = []
     for j in np.flatnonzero(shares > HELD):
