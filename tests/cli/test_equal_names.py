@@ -16,6 +16,7 @@ from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 RUNNER = CliRunner()
+TRUTH = f"file:{FIXTURE}.truth.parquet"
 ROWS = {"a": 1501, "b": 1001}
 """Lines kept of the fixture, header included: two different runs."""
 
@@ -38,7 +39,7 @@ def invoke(*words):
 
 def compared(logs, *options):
     both = [logs / name / "log.csv" for name in ROWS]
-    result = invoke("compare", *both, "--robot", "ur5", "--reference", "zero", *options)
+    result = invoke("compare", *both, "--robot", "ur5", "--reference", TRUTH, *options)
     assert result.exit_code == 0, result.output
     return result.stdout
 
@@ -59,7 +60,10 @@ def test_csv_has_the_rows_of_both_logs(logs):
 def test_every_table_shows_both_logs(logs, option):
     text = compared(logs, *([option] if option else []))
     for name, rows in ROWS.items():
-        assert f"{name}/log.csv against zero, {rows - 1} samples" in text.replace("\\_", "_")
+        assert (
+            f"{name}/log.csv against file:{FIXTURE.name}.truth.parquet, {rows - 1} samples"
+            in text.replace("\\_", "_")
+        )
 
 
 def test_significance_names_both_logs(logs):
@@ -70,9 +74,7 @@ def test_significance_names_both_logs(logs):
 
 def test_a_report_of_both_has_both_in_its_table(logs, tmp_path):
     both = [logs / name / "log.csv" for name in ROWS]
-    result = invoke(
-        "report", *both, "--robot", "ur5", "--reference", "zero", "-o", tmp_path / "out"
-    )
+    result = invoke("report", *both, "--robot", "ur5", "--reference", TRUTH, "-o", tmp_path / "out")
     assert result.exit_code == 0, result.output
     rows = json.loads((tmp_path / "out" / "errors.json").read_text(encoding="utf-8"))
     assert {row["recording"] for row in rows} == {"a/log.csv", "b/log.csv"}

@@ -74,7 +74,8 @@ def test_anyway_goes_on_and_says_so_first(command: str, turned: str, run: Run) -
 def test_every_output_of_a_report_carries_what_was_overridden(
     turned: str, run: Run, tmp_path: Path
 ) -> None:
-    words = ("--reference", "zero", "--observer", "gmo", "-o", "out", "--anyway")
+    truth = f"file:{FIXTURE}.truth.parquet"
+    words = ("--reference", truth, "--observer", "gmo", "-o", "out", "--anyway")
     code, _, err = run("report", turned, *UR5, *words)
     assert code == 0, err
     out = tmp_path / "out"

@@ -112,7 +112,7 @@ def admit(
     Example: vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9
     """
     from vftcli.admittance.choice import ControlChoice, split_settings
-    from vftcli.cli.console import command_line, say, say_health
+    from vftcli.cli.console import command_line, say
     from vftcli.outputs.admittance.files import FILES, write_admittance
     from vftcli.outputs.files import OutputFolder
 
@@ -132,7 +132,6 @@ def admit(
         result = released(release, analysis, control)
     else:
         result, recording, examinations = replayed(log, source, analysis, control)
-        say_health(examinations)
     show(result, run, json)
     if output is not None:
         write_admittance(

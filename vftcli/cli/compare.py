@@ -64,8 +64,8 @@ def compare(
     choice = analysis.choice(Library(logs), reference)
     analyses = []
     for made in analyse_logs(logs, choice):
-        # Rows alone are its JSON: what is wrong with the log is told beside them.
-        say_analysis(made, named=len(logs) > 1, briefly=table.json)
+        if not table.json:
+            say_analysis(made)
         analyses.append(made)
     if significance:
         pairs = [

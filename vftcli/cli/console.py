@@ -10,10 +10,9 @@ import typer
 from vftcli.signals.letters import printable, printable_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from vftcli.analysis import Analysis
-    from vftcli.doctor import Examination
+    from vftcli.doctor import Examination, Examiner
+    from vftcli.readers.library import Library
     from vftcli.signals.recording import Recording
     from vftcli.virtual_sensor.sensor_reading import SensorReading
 
@@ -29,8 +28,10 @@ def say(text: str) -> None:
 
 
 def say_json(value: object) -> None:
-    """Print what a command makes to stdout, for machines."""
-    typer.echo(json.dumps(value, indent=2, ensure_ascii=False))
+    """Print what a command makes to stdout, for machines; what is no finite number is null."""
+    from vftcli.outputs.log.run_record import jsonable
+
+    typer.echo(json.dumps(jsonable(value), indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def say_recording(recording: "Recording") -> None:
@@ -45,36 +46,28 @@ def say_recording(recording: "Recording") -> None:
         say(f"  note: {remark}")
 
 
-def say_health(examinations: "Iterable[Examination]", *, named: bool = False) -> None:
-    """One line a log on what is wrong with it, and what is meaningless though it was wanted.
+def health_of(library: "Library", *, anyway: bool, fitting: bool = True) -> "Examiner":
+    """Who examines a command's logs, and says one line on the health of each as soon as it is told.
 
     Args:
-        examinations: The log's, then those of its free runs, which are told by their names.
-        named: Whether the log is told by its name too, for a command that has several.
+        library: Where the logs are read; of several each is told by its name.
+        anyway: Whether results are wanted even where a finding makes them meaningless.
+        fitting: Whether the robot must be the log's.
     """
+    from vftcli.doctor.examiner import Examiner
     from vftcli.outputs.examination import health_line
 
-    made = list(examinations)
-    codes = dict.fromkeys(finding.code for one in made for finding in one.refusals())
-    if codes:
-        say(f"MEANINGLESS unless this is wrong, and made with --anyway: {', '.join(codes)}")
-    for k, examination in enumerate(made):
-        say(health_line(examination, named=named or k > 0))
+    def tell(examination: "Examination") -> None:
+        if codes := dict.fromkeys(f.code for f in examination.refusals(fitting=fitting)):
+            say(f"MEANINGLESS unless this is wrong, and made with --anyway: {', '.join(codes)}")
+        say(health_line(examination, named=len(library) > 1))
+
+    return Examiner(anyway=anyway, fitting=fitting, tell=tell)
 
 
-def say_analysis(analysis: "Analysis", *, named: bool = False, briefly: bool = False) -> None:
-    """What was read, what is wrong with it, and what the reader of the numbers should know.
-
-    Args:
-        analysis: The log's.
-        named: Whether the command has several logs.
-        briefly: Whether only what is wrong is told, beside JSON that says the rest.
-    """
-    if briefly:
-        say_health(analysis.examinations, named=named)
-        return
+def say_analysis(analysis: "Analysis") -> None:
+    """What was read, and what the reader of the numbers should know."""
     say_recording(analysis.recording)
-    say_health(analysis.examinations, named=named)
     reference = analysis.reference.remarks if analysis.reference is not None else ()
     own = [f"{e.name}: {note}" for e in analysis.estimates for note in e.remarks]
     for note in (*analysis.robot.remarks, *analysis.remarks, *own, *reference):

@@ -45,8 +45,8 @@ def estimate(
     choice = analysis.choice(library)
     made = analyse(*prepared(reading.result(), choice), choice)
     record = write_estimate_folder(output, made, command=command_line(), extras=extras, force=force)
-    say_analysis(made, briefly=json)
     if json:
         typer.echo(record)
         return
+    say_analysis(made)
     say(f"wrote {output}")

@@ -103,8 +103,7 @@ def identify_robot(
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
-    from vftcli.cli.console import command_line, say, say_health, say_recording
-    from vftcli.doctor.examiner import Examiner
+    from vftcli.cli.console import command_line, health_of, say, say_recording
     from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.identification.files import beside, write_identification
@@ -118,7 +117,7 @@ def identify_robot(
     validated, without_load = validation.validate or [], free.logs(asked.find_payload)
     library = Library([*logs, *validated, *without_load])
     # That the profile is not the arm's is what this command is there to change.
-    examiner = Examiner(anyway=anyway, fitting=False)
+    examiner = health_of(library, anyway=anyway, fitting=False)
     profile = examiner.robot(library.open(logs[0], choice), chosen)
 
     def opened(paths: list[Path] | tuple[Path, ...], how: "ReadChoice") -> list["Recording"]:
@@ -128,7 +127,7 @@ def identify_robot(
     held_out, unloaded = opened(validated, held_out_choice), opened(without_load, choice)
     for recording in (*train, *held_out, *unloaded):
         say_recording(recording)
-        say_health([examiner.examine(recording, profile)], named=len(library) > 1)
+        examiner.examine(recording, profile)
     found = identify(train, profile, task, held_out, unloaded[0] if unloaded else None)
     record = write_identification(output, found, examiner.examinations, command_line(), force)
     for remark in found.remarks:

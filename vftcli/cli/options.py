@@ -281,7 +281,7 @@ class AnalysisOptions(Bundle):
         Raises:
             VftError: If a word is not what its room takes.
         """
-        from vftcli.doctor.examiner import Examiner
+        from vftcli.cli.console import health_of
         from vftcli.pipeline import AnalysisChoice
 
         return AnalysisChoice(
@@ -293,5 +293,5 @@ class AnalysisOptions(Bundle):
             wrench=self.wrench.choice(),
             reference=reference.choice() if reference is not None else None,
             library=library,
-            examiner=Examiner(anyway=self.anyway),
+            examiner=health_of(library, anyway=self.anyway),
         )

@@ -51,7 +51,8 @@ def report(
         if published is not None and made.errors is not None:
             beside = compare_with(published, made.errors, made.observers, made.tunings)
         analyses.append(replace(made, published=beside))
-        say_analysis(made, named=len(logs) > 1, briefly=json)
+        if not json:
+            say_analysis(made)
     command = command_line()
     if len(analyses) == 1:
         record = write_report(output, analyses[0], command=command, force=force)

@@ -46,14 +46,14 @@ def tune_gains(
 
     Example: vftcli tune fixtures/ur5_circle.csv --robot ur5 -o gains.toml
     """
-    from vftcli.cli.console import command_line, say, say_health, say_json, say_recording
-    from vftcli.doctor.examiner import Examiner
+    from vftcli.cli.console import command_line, health_of, say, say_json, say_recording
     from vftcli.outputs.examination import health_record, overridden_lines
     from vftcli.outputs.files import check_file, write_text
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
     from vftcli.outputs.log.run_record import jsonable
     from vftcli.pipeline import AnalysisChoice, examine, model, prepared, read
+    from vftcli.readers.library import Library
     from vftcli.refinement.tuning import parse_goal, tune_all
     from vftcli.repetition.free_run import Models
     from vftcli.robots.writing import lines_of
@@ -61,12 +61,14 @@ def tune_gains(
 
     wanted = parse_goal(goal, threshold)
     check_file(output, force)
+    library = Library([log])
     choice = AnalysisChoice(
         read=reading.choice(),
         robot=robot.choice(),
         free=free.choice(),
         refinement=replace(bias.choice(), bands=True),
-        examiner=Examiner(anyway=anyway),
+        library=library,
+        examiner=health_of(library, anyway=anyway),
     )
     recording, arm = prepared(choice.library.open(log, choice.read), choice)
     motion = read(recording, arm, choice, Models())
@@ -82,13 +84,11 @@ def tune_gains(
     gains = {"observers": {line.section: dict(line.gains) for line in tuned}}
     write_text(output, comments + "".join(lines_of(gains)), force)
     if json:
-        say_health(examinations)
         rows = [jsonable({**line._asdict()}) for line in tuned]
         health = jsonable(health_record(examinations))
         say_json({"goal": goal, "examination": health, "notes": notes, "observers": rows})
         return
     say_recording(recording)
-    say_health(examinations)
     for note in notes:
         say(f"note: {note}")
     typer.echo(terminal(tuned_grid(tuned, wanted.threshold is not None)).rstrip("\n"))

@@ -1,6 +1,6 @@
 """Examiner: who examines the logs of a command, each once, and turns the meaningless ones away."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -43,10 +43,18 @@ class Examiner:
     Args:
         anyway: Whether results are wanted even where a finding makes them meaningless.
         fitting: Whether the robot must be the log's; identification makes it so.
+        tell: What is done with every examination that refuses nothing, as soon as it is made: what
+            is wrong with a log is said even if nothing comes of it.
     """
 
-    def __init__(self, *, anyway: bool = False, fitting: bool = True) -> None:
-        self._anyway, self._fitting = anyway, fitting
+    def __init__(
+        self,
+        *,
+        anyway: bool = False,
+        fitting: bool = True,
+        tell: Callable[[Examination], None] | None = None,
+    ) -> None:
+        self._anyway, self._fitting, self._tell = anyway, fitting, tell
         self._made: list[tuple[Recording, Robot, Examination]] = []
         self._robots: dict[tuple[str, RobotChoice, float | None, bool], Robot] = {}
 
@@ -92,6 +100,8 @@ class Examiner:
         if not self._anyway:
             refuse(recording.name, found.refusals(fitting=self._fitting))
         self._made.append((recording, robot, found))
+        if self._tell is not None:
+            self._tell(found)
         return found
 
     @property

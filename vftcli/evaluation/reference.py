@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vftcli.evaluation.touches import check_untouched
+from vftcli.repetition.free_run import ModelledRun
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution
@@ -24,15 +26,21 @@ class ReferenceLoad:
     wrench: Wrench | None = None
 
 
-def zero_reference(recording: Recording) -> ReferenceLoad:
-    """No contact at all: the reference of a free motion, exact if the motion really was free."""
-    shape = recording.q.shape
+def zero_reference(log: ModelledRun) -> ReferenceLoad:
+    """No contact at all: the reference of a free motion.
+
+    How free it was cannot be known from the log alone, so neither can its error.
+
+    Raises:
+        ReferenceTorqueError: If the log shows contact.
+    """
+    check_untouched(log)
+    recording = log.recording
     return ReferenceLoad(
         torque=ExternalTorque(
             name="zero",
             t=recording.t,
-            tau=np.zeros(shape),
-            floor=np.zeros(shape[1]),
+            tau=np.zeros(recording.q.shape),
             remarks=(caution("reference-zero"),),
         )
     )

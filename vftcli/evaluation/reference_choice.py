@@ -68,7 +68,7 @@ class ReferenceSource:
 
 
 REFERENCES: dict[str, Callable[[ReferenceSource], ReferenceLoad]] = {
-    "zero": lambda source: zero_reference(source.motion.log.recording),
+    "zero": lambda source: zero_reference(source.motion.log),
     "vendor": lambda source: vendor_reference(source.motion.log.recording),
     "two-cycle": lambda source: ReferenceLoad(torque=two_cycle_reference(source.motion)),
     "sensor": lambda source: sensor_reference(

@@ -116,16 +116,19 @@ def health_line(examination: Examination, *, named: bool = False) -> str:
     )
 
 
-def health_record(examinations: Iterable[Examination]) -> list[dict[str, Any]]:
+def health_record(
+    examinations: Iterable[Examination], *, fitting: bool = True
+) -> list[dict[str, Any]]:
     """What was found in the logs of a run, as `run.json` holds it: the log's first, then others'.
 
-    `overridden` are the codes with which results mean little, though they were wanted anyway.
+    `overridden` are the codes with which results mean little, though they were wanted anyway;
+    `fitting` is whether the robot had to be the log's.
     """
     return [
         {
             "log": one.recording.name,
             "sound": not warnings_of(one),
-            "overridden": [finding.code for finding in one.refusals()],
+            "overridden": [finding.code for finding in one.refusals(fitting=fitting)],
             "read": [as_record(remark) for remark in one.recording.source.remarks],
             "findings": [finding_record(finding) for finding in one.findings],
         }
@@ -133,7 +136,7 @@ def health_record(examinations: Iterable[Examination]) -> list[dict[str, Any]]:
     ]
 
 
-def overridden_lines(examinations: Sequence[Examination]) -> list[str]:
+def overridden_lines(examinations: Sequence[Examination], *, fitting: bool = True) -> list[str]:
     """What stands at the top of outputs that were wanted though a finding makes them meaningless.
 
     One line a finding; none where there is no such finding.
@@ -141,5 +144,5 @@ def overridden_lines(examinations: Sequence[Examination]) -> list[str]:
     return [
         f"MEANINGLESS unless this finding is wrong (--anyway): {one.recording.name}: {words}"
         for one in examinations
-        for words in map(in_words, one.refusals())
+        for words in map(in_words, one.refusals(fitting=fitting))
     ]

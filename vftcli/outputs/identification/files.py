@@ -57,7 +57,7 @@ def write_identification(
     names = {kind: file.name for kind, file in beside(path).items()}
     record = identification_record(found, logs, command)
     heading = [
-        *overridden_lines(logs),
+        *overridden_lines(logs, fitting=False),
         f"{found.robot.title}; written by vftcli identify, keys: docs/robots.md.",
         command,
     ]
@@ -80,7 +80,7 @@ def identification_record(
     return {
         "command": command,
         "versions": versions(),
-        "examination": health_record(logs),
+        "examination": health_record(logs, fitting=False),
         "method": found.method,
         "inputs": [input_record(log) for log in recordings],
         "profile": robot_record(found.profile),

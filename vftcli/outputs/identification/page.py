@@ -50,7 +50,7 @@ def render_identification(
         residuals = f"<h2>Residuals</h2>{html(residual_grid(found))}{soft(words)}"
     parts = (
         headline(found.robot.name, text),
-        health(examinations),
+        health(examinations, fitting=False),
         remarks(found.remarks),
         residuals,
         velocity_section(found),

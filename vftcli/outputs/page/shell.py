@@ -93,14 +93,16 @@ def remarks(lines: Sequence[Remark]) -> str:
     return f'<section class="remarks"><h2>Read this first</h2>{bullets(lines)}</section>'
 
 
-def health(examinations: Sequence[Examination]) -> str:
+def health(examinations: Sequence[Examination], *, fitting: bool = True) -> str:
     """What is wrong with the logs: evidence, consequence and remedy of every finding.
 
     Where there are warnings they stand open, above everything that they may make wrong.
     """
     if not examinations:
         return ""
-    alarms = "".join(f'<p class="alarm">{escape(x)}</p>' for x in overridden_lines(examinations))
+    alarms = "".join(
+        f'<p class="alarm">{escape(x)}</p>' for x in overridden_lines(examinations, fitting=fitting)
+    )
     lines = "".join(f"<li>{escape(health_line(one, named=True))}</li>" for one in examinations)
     parts = []
     for one in examinations:

@@ -1,0 +1,65 @@
+"""Where a log shows contact by itself: planted pushes, free logs, and what cannot be told."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli import readers
+from vftcli.evaluation.touches import check_untouched, touches
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots import load_robot
+from vftcli.signals.errors import ReferenceTorqueError
+
+ROOT = Path(__file__).parent.parent.parent
+FIXTURE = readers.read(ROOT / "fixtures" / "ur5_circle.csv")
+UR5 = load_robot("ur5")
+REAL = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+
+
+def test_a_simulated_push_is_found_where_it_was() -> None:
+    """The scenario holds 30 N and more from 4 s on; its first cycle of 4 s is free."""
+    found = touches(ModelledRun(recording=FIXTURE, robot=UR5))
+    assert found
+    assert min(touch.start for touch in found) > 4.0
+    with pytest.raises(ReferenceTorqueError) as error:
+        check_untouched(ModelledRun(recording=FIXTURE, robot=UR5))
+    assert "--interval 0.0:" in str(error.value)
+    free = ModelledRun(recording=FIXTURE.between(0.0, 4.0), robot=UR5)
+    assert touches(free) == ()
+    check_untouched(free)
+
+
+def test_the_span_that_is_offered_is_free() -> None:
+    found = touches(ModelledRun(recording=FIXTURE, robot=UR5))
+    first = min(touch.start for touch in found)
+    assert touches(ModelledRun(recording=FIXTURE.between(0.0, first - 0.1), robot=UR5)) == ()
+
+
+def test_without_friction_a_current_tells_no_contact() -> None:
+    bare = ModelledRun(recording=FIXTURE, robot=UR5.without_friction())
+    assert touches(bare) == ()
+
+
+def test_a_log_without_a_quiet_level_is_not_judged() -> None:
+    assert touches(ModelledRun(recording=FIXTURE.between(5.0, 6.9), robot=UR5)) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "columns", "touched"),
+    [
+        ("ur10e/free_14harm.csv", REAL, False),
+        ("ur10e/free_12harm.csv", REAL, False),
+        ("ur10e/free_repeat_b.csv", REAL, False),
+        ("ur10e/jointwise_2.csv", REAL, False),
+        ("ur10e/load_14harm.csv", REAL, False),  # a load is no contact
+        ("ur10e/push_pose.csv", REAL, True),  # four pushes by hand
+    ],
+)
+def test_hands_are_found_in_real_logs_and_in_those_alone(
+    name: str, columns: str, touched: bool, logs: Path
+) -> None:
+    recording = readers.read(logs / name, columns=columns)
+    found = touches(ModelledRun(recording=recording, robot=load_robot("ur10e")))
+    assert bool(found) == touched
+    assert np.all([touch.torque > touch.quiet for touch in found])

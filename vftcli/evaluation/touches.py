@@ -1,0 +1,97 @@
+"""Touches: where a log shows contact by itself, so that nobody calls its motion free.
+
+The torque that the model leaves open is low-passed and compared with its own quiet level: friction
+that is missed spreads over a log, a contact stands out of it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.filters import low_pass
+from vftcli.signals.series import runs_of
+
+CUTOFF = 2.0
+"""Where the open torque is low-passed: a hand's push lasts longer, reversals do not. [Hz]"""
+STANDING_OUT = 8.0
+"""Multiple of a joint's median open torque from which it stands out.
+
+Free UR10e logs reach more on joints whose friction is missed for a moment (13.8), but below their
+dry friction; logs of hands, and simulated pushes, reach 17–100.
+"""
+OF_FRICTION = 1.5
+"""Multiple of a joint's dry friction up to which friction may be what is open; free UR10e logs
+reach 1.15, logs of hands 1.8–7."""
+LEAST = 2.0
+"""Torque below which nothing is called a contact: an arm of link torques leaves 1.8 open. [N·m]"""
+SHORTEST = 2.0
+"""Shorter logs have no quiet level. [s]"""
+
+
+class Touch(NamedTuple):
+    """A contact that a log shows.
+
+    Attributes:
+        joint: The joint that shows it most, from zero.
+        start: When it begins. [s]
+        stop: When it ends. [s]
+        torque: The largest torque that is open. [N·m]
+        quiet: The joint's quiet level. [N·m]
+    """
+
+    joint: int
+    start: float
+    stop: float
+    torque: float
+    quiet: float
+
+
+def touches(run: ModelledRun) -> tuple[Touch, ...]:
+    """The contacts that a log shows, in the order of time; what it does not show may still be."""
+    recording, robot = run.recording, run.robot
+    # Motor friction that nobody models hides contact and looks like one.
+    unknown = robot.torque_source == "current" and not robot.friction
+    if unknown or recording.dq is None or recording.duration < SHORTEST:
+        return ()
+    drive = run.drive
+    cutoff = min(CUTOFF, 0.2 / recording.median_step)
+    open_torque = low_pass(drive.t, drive.model - drive.torque, cutoff)
+    level = np.abs(open_torque - np.median(open_torque, axis=0))
+    quiet = np.median(level, axis=0)
+    limit = np.maximum(np.maximum(STANDING_OUT * quiet, OF_FRICTION * drive.coulomb), LEAST)
+    return tuple(
+        touch_in(drive.t, level, limit, quiet, start, stop)
+        for start, stop in runs_of(np.asarray((level > limit).any(axis=1)))
+    )
+
+
+def touch_in(t: Array, level: Array, limit: Array, quiet: Array, start: int, stop: int) -> Touch:
+    """The contact of a run of samples, told by the joint that exceeds its limit most."""
+    joint = int(np.argmax((level[start:stop] / limit).max(axis=0)))
+    torque = float(level[start:stop, joint].max())
+    return Touch(joint, float(t[start]), float(t[stop - 1]), torque, float(quiet[joint]))
+
+
+def check_untouched(run: ModelledRun) -> None:
+    """Raise an error if a log that is to be free shows contact.
+
+    Raises:
+        ReferenceTorqueError: With when and where, and the longest span without.
+    """
+    found = touches(run)
+    if not found:
+        return
+    worst = max(found, key=lambda touch: touch.torque / max(touch.quiet, LEAST))
+    t = run.recording.t
+    edges = [float(t[0]), *(x for touch in found for x in (touch.start, touch.stop)), float(t[-1])]
+    spans = list(zip(edges[::2], edges[1::2], strict=True))
+    begin, end = max(spans, key=lambda span: span[1] - span[0])
+    raise ReferenceTorqueError(
+        f"{run.recording.name}: --reference zero needs motion that nobody touches, but from "
+        f"{worst.start:.1f} to {worst.stop:.1f} s J{worst.joint + 1} shows {worst.torque:.3g} N·m "
+        f"where {worst.quiet:.2g} is usual ({len(found)} contact{'s' * (len(found) > 1)}). Leave "
+        f"them out, as with --interval {begin:.1f}:{end:.1f}, or take another --reference"
+    )
