@@ -31,7 +31,7 @@ SHORTEST = 2.0
 """Shorter logs have no quiet level. [s]"""
 
 
-class Touch(NamedTuple):
+class ShownContact(NamedTuple):
     """A contact that a log shows.
 
     Attributes:
@@ -49,7 +49,7 @@ class Touch(NamedTuple):
     quiet: float
 
 
-def touches(run: ModelledRun) -> tuple[Touch, ...]:
+def touches(run: ModelledRun) -> tuple[ShownContact, ...]:
     """The contacts that a log shows, in the order of time; what it does not show may still be."""
     recording, robot = run.recording, run.robot
     # Motor friction that nobody models hides contact and looks like one.
@@ -68,11 +68,13 @@ def touches(run: ModelledRun) -> tuple[Touch, ...]:
     )
 
 
-def touch_in(t: Array, level: Array, limit: Array, quiet: Array, start: int, stop: int) -> Touch:
+def touch_in(
+    t: Array, level: Array, limit: Array, quiet: Array, start: int, stop: int
+) -> ShownContact:
     """The contact of a run of samples, told by the joint that exceeds its limit most."""
     joint = int(np.argmax((level[start:stop] / limit).max(axis=0)))
     torque = float(level[start:stop, joint].max())
-    return Touch(joint, float(t[start]), float(t[stop - 1]), torque, float(quiet[joint]))
+    return ShownContact(joint, float(t[start]), float(t[stop - 1]), torque, float(quiet[joint]))
 
 
 def check_untouched(run: ModelledRun) -> None:
