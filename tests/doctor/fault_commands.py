@@ -23,9 +23,8 @@ from typing import NamedTuple
 from unittest.mock import patch
 
 import numpy as np
-import polars as pl
 from fault_matrix import base_logs
-from planted_faults import FAULTS, HARMLESS, READER, Fault, Table, fits_log
+from planted_faults import FAULTS, HARMLESS, READER, Fault, Table, fits_log, truth_path
 
 from vftcli.cli import main as vftcli
 
@@ -66,14 +65,8 @@ def reference_words(log: str, folder: Path) -> list[str]:
     """What a log is compared with: zero, the truth of the simulation, or the vendor's estimate."""
     if log == "ur10e":
         return ["--reference", "zero"]
-    return ["--reference", f"file:{folder / 'ur5.truth.csv'}" if log == "ur5" else "vendor"]
-
-
-def write_truth(folder: Path) -> None:
-    """The true torque of the simulated UR5 as a table of t and six columns."""
-    truth = pl.read_parquet(folder / "ur5.parquet.truth.parquet")
-    columns = ["t", *(f"tau_ext/{j}" for j in range(1, 7))]
-    truth.select(columns).write_csv(folder / "ur5.truth.csv")
+    truth = f"file:{truth_path('ur5', folder)}"
+    return ["--reference", truth if log == "ur5" else "vendor"]
 
 
 def said_by(command: str, log: str, path: Path, given: str, folder: Path) -> Said:
@@ -130,7 +123,6 @@ def matrix(
     tables: Mapping[str, Table], faults: Sequence[str], commands: Sequence[str], folder: Path
 ) -> Iterator[tuple[str, str, str, str]]:
     """Every fault in every log through every command: log, fault, command, mark."""
-    write_truth(folder)
     for log, table in tables.items():
         path = table.write(folder / "planted.csv")
         sound = {c: said_by(c, log, path, table.given, folder) for c in commands}

@@ -443,26 +443,6 @@ def fits_log(fault: Fault, table: Table) -> bool:
     return fault.signal in {"", table.signal}
 
 
-def table_of(path: Path, robot: str, signal: str) -> Table:
-    """The table of a log that the simulation wrote as flat Parquet."""
-    frame = pl.read_parquet(path)
-    joints = range(1, robot_named(robot).joints + 1)
-
-    def columns(name: str) -> Array:
-        return frame.select([f"{name}/{j}" for j in joints]).to_numpy()
-
-    return Table(
-        t=frame["t"].to_numpy(),
-        q=columns("q"),
-        dq=columns("dq"),
-        effort=columns(signal),
-        signal=signal,
-        tau_ext=columns("tau_ext") if signal == "tau" else None,
-        robot=robot,
-        given=robot,
-    )
-
-
 SCENARIOS: Mapping[str, tuple[str, float, str]] = {
     "ur5": ("ur5-circle", 16.0, "current"),
     "panda": ("panda-bearing", 14.0, "tau"),
@@ -473,17 +453,30 @@ SEED = 3
 
 
 def simulated(log: str, folder: Path) -> Table:
-    """A simulated log; made in `folder` unless it is there, its truth and scenario beside it."""
-    from vftcli.outputs.simulation import save
+    """A simulated log, made in `folder` unless it is there; `truth_path` of it is beside it."""
     from vftcli.simulation import load_scenario
     from vftcli.simulation.experiment import simulate
 
     scenario, seconds, signal = SCENARIOS[log]
-    path = folder / f"{log}.parquet"
+    path = folder / f"{log}.npz"
     if not path.exists():
-        setup = load_scenario(scenario, [f"duration={seconds:g}"])
-        save(simulate(setup, SEED), path, "parquet")
-    return table_of(path, log, signal)
+        made = simulate(load_scenario(scenario, [f"duration={seconds:g}"]), SEED)
+        seen = made.recording
+        effort = seen.current if signal == "current" else seen.torque
+        assert effort is not None
+        signals = {"t": seen.t, "q": seen.q, "dq": seen.require("dq"), "effort": effort}
+        if signal == "tau":
+            signals["tau_ext"] = seen.require("tau_ext")
+        true = {f"tau_ext{j + 1}": column for j, column in enumerate(made.truth.tau_ext.T)}
+        pl.DataFrame({"t": made.truth.t, **true}).write_csv(truth_path(log, folder))
+        np.savez(path, **signals)
+    with np.load(path) as arrays:
+        return Table(**dict(arrays), signal=signal, robot=log, given=log)
+
+
+def truth_path(log: str, folder: Path) -> Path:
+    """The true external torque of a simulated log, as a table."""
+    return folder / f"{log}.truth.csv"
 
 
 def ur10e_log(path: Path, start: float = 2.0, stop: float = 24.0) -> Table:

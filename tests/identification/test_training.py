@@ -164,6 +164,14 @@ def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_told(data):
     speed = np.max(np.abs(data.motions[0].dq[:, 2]))
     assert remark.where.joints == (3,)
     assert remark.values["least_Nm"] == pytest.approx(-2.0 + 0.5 * speed)
+    bent = {"coulomb": 1.0, "viscous": 5.0, "quadratic": -1.0}
+    falling = JointFriction(model="coulomb-viscous-quadratic", parameters=bent)
+    (remark,) = check_friction(2, falling, data)
+    assert remark.code == "falling-friction"
+    # 5 − 2 v = 0, seen in 500 steps up to the joint's limit
+    limit = UR5.limits.qd_max[2]
+    assert remark.values["speed_radps"] == pytest.approx(2.5, abs=2 * limit / 500)
+    assert remark.values["limit_radps"] == limit
 
 
 def test_joints_that_are_held_are_told(data):

@@ -181,3 +181,29 @@ def test_a_torque_without_gravity_is_no_torque(tmp_path: Path) -> None:
 
 
 EFFORTS = ",".join(f"e{j}" for j in range(6))
+
+
+@pytest.mark.parametrize(
+    ("columns", "signal", "value"),
+    [
+        ("-tau=effort", "torque", -5.0),
+        ("-tau=effort_{i}", "torque", -5.0),
+        ("current[mA]=EFFORT", "current", 5e-3),
+        ("t[ms]=time", "torque", 5.0),
+    ],
+)
+def test_a_text_without_positions_says_something_of_its_signals_alone(
+    tmp_path: Path, columns: str, signal: str, value: float
+) -> None:
+    rows = "\n".join(f"{k / 10},0.1,0.2,0.3,0.4,5,6" for k in range(5))
+    path = write(tmp_path / "x", "time,q_0,q_1,dq_0,dq_1,effort_0,effort_1\n" + rows + "\n")
+    recording = read(path, columns=columns)
+    assert recording.signals == tuple(sorted({"q", "dq", signal}, key=["q", "dq", signal].index))
+    assert getattr(recording, signal)[0, 0] == pytest.approx(value)
+    assert recording.median_step == pytest.approx(1e-4 if columns.startswith("t") else 0.1)
+
+
+def test_a_name_that_stands_for_no_columns_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "x", "t,q1,tau1\n" + "\n".join(f"{k},0.1,0.2" for k in range(5)))
+    with pytest.raises(LogError, match=r"no column 'effort' for tau; the table has t, q1, tau1"):
+        read(path, columns="-tau=effort")

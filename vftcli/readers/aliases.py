@@ -2,12 +2,22 @@
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from vftcli.readers.columns import Item
 from vftcli.readers.joints import kinematic_order
-from vftcli.readers.table import Cell, Pick, Picks, Table, checked, listed
+from vftcli.readers.table import (
+    Cell,
+    Pick,
+    Picks,
+    Table,
+    checked,
+    listed,
+    named_cells,
+    pick_of,
+)
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
@@ -57,25 +67,44 @@ class Group(NamedTuple):
     joints: tuple[str, ...] = ()
 
 
-def picks_by_alias(table: Table) -> tuple[Picks, tuple[str, ...]]:
+def picks_by_alias(table: Table, stated: Sequence[Item] = ()) -> tuple[Picks, tuple[str, ...]]:
     """Find the signals of a headed table by the names of its columns, and the joints' names.
+
+    Args:
+        table: The table.
+        stated: What a --columns text says of some signals; their columns are no other signal's.
 
     Raises:
         LogError: If two groups of columns could be the same signal, or none is the positions.
     """
     groups = grouped(table)
-    signals = [pick for signal in ALIASES if (pick := _pick_of(table, signal, groups)) is not None]
-    if (wrench := _wrench(table)) is not None:
+    told = {item.signal: pick_of(item, stated_cells(table, item, groups)) for item in stated}
+    clock = told.pop("t", None) or _clock(table)
+    signals = list(told.values())
+    known, taken = {pick.signal for pick in signals}, {c for pick in signals for c in pick.cells}
+    for signal in ALIASES:
+        if signal not in known and (pick := _pick_of(table, signal, groups)) is not None:
+            signals += [pick] if taken.isdisjoint(pick.cells) else []
+    if "wrench" not in known and (wrench := _wrench(table)) is not None:
         signals.append(wrench)
     joints = next((len(p.cells) for p in signals if p.signal == "q"), 0)
     # A group of another width is about something else: a gripper, a base.
-    signals = [p for p in signals if len(p.cells) == joints or p.signal in {"q", "wrench"}]
+    also = {"q", "wrench", *known}
+    signals = [p for p in signals if len(p.cells) == joints or p.signal in also]
     names_there = table.names or ()
     origin = names_there.index(OWN_STAMPS) if names_there.count(OWN_STAMPS) == 1 else None
     origin = None if origin in table.lists else origin
-    picks = checked(table, Picks(signals=tuple(signals), clock=_clock(table), origin=origin))
+    picks = checked(table, Picks(signals=tuple(signals), clock=clock, origin=origin))
     names = next((g.joints for g in groups.values() if g.joints), ())
     return picks, names
+
+
+def stated_cells(table: Table, item: Item, groups: Mapping[str, Group]) -> tuple[Cell, ...]:
+    """The cells of an item: columns by pattern, or a group by its name without index."""
+    group = groups.get((item.pattern or "").lower())
+    if group is not None and item.pattern not in (table.names or ()):
+        return group.cells
+    return named_cells(table, item)
 
 
 def grouped(table: Table) -> dict[str, Group]:

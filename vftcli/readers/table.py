@@ -215,7 +215,7 @@ def picks_of(
                 f"{table.path}: the table has no header, so --columns must count its "
                 f"{table.width} columns in file order, as in t,q:6,dq:6,current:6."
             )
-        found = [_pick(item, _named(table, item)) for item in spec.items if item.pattern]
+        found = [pick_of(item, named_cells(table, item)) for item in spec.items if item.pattern]
     else:
         found = list(_counted(table, spec))
     signals = tuple(pick for pick in found if pick.signal not in {"t", "_"})
@@ -246,12 +246,12 @@ def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
     for item in spec.items:
         if item.rate is not None:
             continue
-        picks.append(_pick(item, tuple(cells[start : start + item.count])))
+        picks.append(pick_of(item, tuple(cells[start : start + item.count])))
         start += item.count
     return picks
 
 
-def _pick(item: Item, cells: tuple[Cell, ...]) -> Pick:
+def pick_of(item: Item, cells: tuple[Cell, ...]) -> Pick:
     """The cells of an item, with its factor to SI units."""
     wrench = item.signal == "wrench"
     return Pick(
@@ -264,7 +264,7 @@ def _pick(item: Item, cells: tuple[Cell, ...]) -> Pick:
     )
 
 
-def _named(table: Table, item: Item) -> tuple[Cell, ...]:
+def named_cells(table: Table, item: Item) -> tuple[Cell, ...]:
     """The cells that a pattern names, in the order of its indices."""
     pattern = item.pattern or ""
     names = table.names or ()

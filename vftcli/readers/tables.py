@@ -28,13 +28,17 @@ NOT_AN_ARRAY = (
 def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
     """Read a table by its --columns text, else by the aliases of its column names.
 
+    A text that names other signals but no positions says something of these alone.
+
     Raises:
         LogError: If the columns cannot be told.
     """
     spec = parse_columns(request.columns) if request.columns is not None else None
     if spec is not None:
         more["segment"] = spec.segment
-    if spec is not None and spec.items:
+    items = spec.items if spec is not None else ()
+    partial = table.names is not None and all(item.pattern and item.signal != "q" for item in items)
+    if spec is not None and items and not partial:
         stated = (item := spec.item("q")) is not None and item.unit is not None
         return picked(table, picks_of(table, spec), request, degrees_possible=not stated, **more)
     if table.names is None and table.width == 1:
@@ -47,7 +51,7 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
             f"{table.path}: a table of {table.width} columns without a header. Say what they are "
             "with --columns, in file order, as in t,q:6,dq:6,current:6 (_:13 skips 13 columns)."
         )
-    picks, joints = picks_by_alias(table)
+    picks, joints = picks_by_alias(table, items)
     return picked(
         table,
         picks,
