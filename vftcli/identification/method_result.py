@@ -71,7 +71,7 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> list[Rema
         return [caution("negative-friction", Where(joints=(j + 1,)), least_Nm=float(torque.min()))]
     limit = data.top_speed(j)
     if np.isfinite(falls := falling_speed(friction, limit)):
-        values = {"speed_radps": falls, "limit_radps": limit}
+        values = {"speeds_rad_s": [falls], "limits_rad_s": [limit]}
         return [warning("falling-friction", Where(joints=(j + 1,)), **values)]
     return []
 

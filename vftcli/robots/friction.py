@@ -193,18 +193,19 @@ def falling_speed(friction: JointFriction, limit: float) -> float:
 
 
 def falling_friction(friction: Sequence[JointFriction], limits: Array) -> list[Remark]:
-    """A warning for each joint whose friction falls or pushes within its speed range.
+    """A warning on the joints whose friction falls or pushes within their speed range, if any.
 
     Args:
         friction: One model a joint; empty for a frictionless arm.
         limits: Speed limits, NaN where unknown. (n,) [rad/s]
     """
-    remarks = []
-    for j, (joint, limit) in enumerate(zip(friction, limits, strict=False), start=1):
-        if np.isfinite(speed := falling_speed(joint, float(limit))):
-            values = {"speed_radps": speed, "limit_radps": float(limit)}
-            remarks.append(warning("falling-friction", Where(joints=(j,)), **values))
-    return remarks
+    speeds = [falling_speed(joint, limit) for joint, limit in zip(friction, limits, strict=False)]
+    falls = np.flatnonzero(np.isfinite(speeds))
+    if not falls.size:
+        return []
+    where = Where(joints=tuple(int(j) + 1 for j in falls))
+    values = {"speeds_rad_s": [speeds[j] for j in falls], "limits_rad_s": limits[falls].tolist()}
+    return [warning("falling-friction", where, **values)]
 
 
 def dry_friction(friction: Sequence[JointFriction], joints: int) -> Array:
