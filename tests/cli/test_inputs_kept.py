@@ -69,9 +69,10 @@ def test_what_an_option_names_is_an_input_unless_it_is_one_of_ours() -> None:
         "log": Path("log.csv"),
         "output": Path("out"),
         "analysis_robot_robot": "ur5",
-        "analysis_free_free": ["free.csv", "1:2"],
+        "analysis_observers_observer": ["gmo", "fdo"],
+        "analysis_free_free": ["bag", "1:2"],
         "reference_reference": "file:truth.parquet",
         "seed": 3,
     }
     names = {str(path) for path in bundles.inputs_of(values)}
-    assert names == {"log.csv", "free.csv", "1:2", "truth.parquet"}
+    assert names == {"log.csv", "bag", "1:2", "truth.parquet"}

@@ -151,9 +151,9 @@ def inputs_of(values: Mapping[str, Any]) -> list[Path]:
     for name, value in values.items():
         for word in value if isinstance(value, list | tuple) else (value,):
             path = Path(word.removeprefix("file:")) if isinstance(word, str) else word
-            # A robot or scenario without an ending is one of ours, not a file of that name.
-            is_name = name.endswith(("robot", "scenario")) and isinstance(word, str)
-            if name != "output" and isinstance(path, Path) and (path.suffix or not is_name):
+            # A word without an ending is a name of ours, as of a robot, where no log is asked for.
+            is_path = path is word or name.endswith(("free", "zero")) or getattr(path, "suffix", "")
+            if name != "output" and isinstance(path, Path) and is_path:
                 found.append(path)
     return found
 
