@@ -252,6 +252,13 @@ def test_a_failed_run_clears_nothing(tmp_path: Path) -> None:
     assert len(names(tmp_path)) == 1
 
 
+def test_a_name_that_no_library_writes_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="no name in UTF-8"):
+        write_text(tmp_path / "bad\udcff.csv", "text")
+    with pytest.raises(OutputError, match="no name in UTF-8"):
+        OutputFolder(tmp_path, names=["bad\udcff.toml"]).check()
+
+
 def test_half_a_letter_in_a_name_does_not_stop_a_text(tmp_path: Path) -> None:
     write_text(tmp_path / "a.txt", "bad\udcff.csv")
     assert (tmp_path / "a.txt").read_text() == "bad\\udcff.csv"

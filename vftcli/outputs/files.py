@@ -16,6 +16,7 @@ from typing import Self
 from vftcli.outputs.partial import check_writable, held, partial_folder, to_disk
 from vftcli.outputs.seals import SEAL, digests, is_seal, sealed_files
 from vftcli.signals.errors import OutputError
+from vftcli.signals.letters import whole
 
 _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
 
@@ -70,6 +71,7 @@ def check_file(path: Path, force: bool = False) -> None:
         OutputError: As `atomic` does.
     """
     try:
+        check_letters(path)
         refuse_existing(path, force)
         check_writable((path.resolve() if path.is_symlink() else path).parent)
     except OSError as error:
@@ -152,6 +154,7 @@ class OutputFolder:
             if self.path.exists() and not self.path.is_dir():
                 raise OutputError(f"{self.path} is a file; -o needs the name of a folder")
             for name in self.names:
+                check_letters(self.path / name)
                 refuse_existing(self.path / name, self.force)
             for path in self._earlier():
                 refuse_input(path)
@@ -304,6 +307,12 @@ def is_read(path: Path, given: Path) -> bool:
                 # A report may stand in the folder of its own log.
                 return not is_seal(path) and path not in sealed_files(path.with_name(SEAL))
     return False
+
+
+def check_letters(path: Path) -> None:
+    """Raise an OutputError for a name with bytes that are no letters: libraries refuse it."""
+    if whole(str(path)) != str(path):
+        raise OutputError(f"{path} is no name in UTF-8; give another -o")
 
 
 def numbered(names: Iterable[str]) -> list[str]:

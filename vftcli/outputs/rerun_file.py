@@ -93,7 +93,11 @@ def rerun_file(
 
     # The same data make the same recording: no random id, and no time at which it was made.
     identity = recording_id(title, tabs, words)
-    stream = rr.RecordingStream("vftcli", recording_id=identity, send_properties=False)
+    # Nor rows put together by how much time has gone by.
+    untimed = rr.ChunkBatcherConfig.NEVER()
+    stream = rr.RecordingStream(
+        "vftcli", recording_id=identity, send_properties=False, batcher_config=untimed
+    )
     stream.save(str(path), default_blueprint=blueprint(tabs, list(words), view))
     stream.send_recording_name(drawable(title))
     for tab in tabs:
