@@ -151,9 +151,10 @@ def inputs_of(values: Mapping[str, Any]) -> list[Path]:
     for name, value in values.items():
         for word in value if isinstance(value, list | tuple) else (value,):
             path = Path(word.removeprefix("file:")) if isinstance(word, str) else word
+            if name == "output" or not isinstance(path, Path):
+                continue
             # A word without an ending is a name of ours, as of a robot, where no log is asked for.
-            is_path = path is word or name.endswith(("free", "zero")) or getattr(path, "suffix", "")
-            if name != "output" and isinstance(path, Path) and is_path:
+            if path is word or path.suffix or name.endswith(("free", "zero")):
                 found.append(path)
     return found
 
