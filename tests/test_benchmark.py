@@ -1,6 +1,9 @@
 """The benchmark: its yardsticks compute what the observers do, else no ratio says anything."""
 
+from pathlib import Path
+
 import numpy as np
+import polars as pl
 import pytest
 
 from vftcli.benchmark import (
@@ -8,9 +11,11 @@ from vftcli.benchmark import (
     benchmark,
     circle,
     dense_kalman_loop,
+    examination_costs,
     first_order_loops,
     held_matrices,
     taylor_exponential,
+    wide_table,
 )
 from vftcli.observers import KalmanObserver, MomentumObserver
 from vftcli.robots import load_robot
@@ -73,3 +78,16 @@ def test_the_keys_that_scripts_read() -> None:
     ratios = {"core_over_rnea_loop", "analytic_script_over_core", "literal_script_over_core"}
     assert ratios <= set(found["ratios"])
     assert all(value > 0 for value in found["ratios"].values())
+
+
+def test_the_examination_is_measured_on_a_log_that_reads_back(tmp_path: Path) -> None:
+    """The wide table is a log of UR's client: 200 columns, of which an estimate reads its own."""
+    log = tmp_path / "long.csv"
+    table = wide_table(UR5, samples=300)
+    assert len(table) == 200
+    pl.DataFrame(table).write_csv(log)
+    costs = examination_costs("ur5", log, rounds=1)
+    assert costs["over_estimate"] == pytest.approx(
+        (costs["examination_s"] + costs["columns_s"]) / costs["estimate_s"]
+    )
+    assert costs["examination_minute_s"] > 0.0

@@ -10,20 +10,24 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from vftcli.doctor import Examiner, examine
+from vftcli.doctor.examiner import EXAMINED
 from vftcli.observers import DEFAULT, KalmanObserver
 from vftcli.observers.auto_tuning import KINDS, tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Part, Spectra, spectra_of
+from vftcli.readers import read
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.literal import literal_momentum_terms
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 
 SAMPLES = 30_060
 """Samples of the paper's Table II."""
@@ -287,6 +291,70 @@ def run_rounds(timings: Timings, robot: Robot, recording: Recording, rounds: int
             timings.measure(name, partial(observer.estimate, terms))
         timings.measure("analytic script", lambda: analytic_script(model, short, kalman), scale)
         timings.measure("literal script", lambda: literal_script(model, short, kalman), scale)
+
+
+def wide_table(robot: Robot, samples: int = SAMPLES, columns: int = 200) -> dict[str, Array]:
+    """A long log as UR's client records it with everything it can: RTDE's columns, and many more.
+
+    Returns:
+        Name of a column → its values. (T,)
+    """
+    log = circle(robot, samples)
+    named = {"actual_q": log.q, "actual_qd": log.require("dq")}
+    effort = log.require("current")
+    named |= dict.fromkeys(("actual_current", "target_current", "target_moment"), effort)
+    table = {"timestamp": log.t}
+    for name, values in named.items():
+        table |= {f"{name}_{j}": column for j, column in enumerate(values.T)}
+    rng = np.random.default_rng(1)
+    for k in range(columns - len(table)):
+        table[f"output_double_register_{k}"] = rng.normal(size=samples)
+    return table
+
+
+def examination_costs(robot_name: str, log: Path, rounds: int) -> dict[str, float]:
+    """What the examination takes of an estimate, of a minute and of a long log.
+
+    Args:
+        robot_name: The arm.
+        log: The long log, as `wide_table` has it.
+        rounds: Interleaved repetitions.
+
+    Returns:
+        ``examination_minute_s``, of 60 s at 100 Hz; ``examination_s``, ``columns_s`` and
+        ``estimate_s`` of the long log: the examination, reading the columns that it alone looks
+        at, and everything: reading, examination, dynamics and observers. ``over_estimate`` is the
+        first two over the last. Loading the code is in none of them.
+    """
+    from vftcli.pipeline import AnalysisChoice, analyse
+
+    robot, timings = load_robot(robot_name), Timings()
+    minute = circle(robot, 6_000, rate=100.0)
+    computed = frozenset(("dq", *EFFORTS))
+    # Random currents are no sound log; how long it takes does not depend on what is found.
+    choice = AnalysisChoice(examiner=Examiner(anyway=True))
+
+    def whole() -> None:
+        recording = read(log, signals=EXAMINED)
+        analyse(recording, robot, choice)
+
+    recording = read(log, signals=EXAMINED)
+    whole()
+    for _ in range(rounds):
+        timings.measure("minute", lambda: examine(minute, robot))
+        timings.measure("examination", lambda: examine(recording, robot))
+        timings.measure("all columns", lambda: read(log, signals=EXAMINED))
+        timings.measure("columns", lambda: read(log, signals=computed))
+        timings.measure("estimate", whole)
+    examination, estimate = timings.median("examination"), timings.median("estimate")
+    columns = timings.median("all columns") - timings.median("columns")
+    return {
+        "examination_minute_s": timings.median("minute"),
+        "examination_s": examination,
+        "columns_s": columns,
+        "estimate_s": estimate,
+        "over_estimate": (examination + columns) / estimate,
+    }
 
 
 def memory_per_sample(robot_name: str = "panda", samples: int = 1_000_000) -> float:

@@ -1,5 +1,8 @@
 """`vftcli bench`: Table II on this machine."""
 
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
 import typer
 
 from vftcli.cli import options as opt
@@ -12,6 +15,9 @@ class BenchOptions(Bundle):
     robot: str = option(*opt.ROBOT, "ur5")
     samples: int = option("--samples", "N", "Length of the log.", 30_060, min=100)
     rounds: int = option("--rounds", "N", "Interleaved repetitions.", 7, min=1)
+    examination: bool = flag(
+        "--examination", "Measure the examination too, on a minute and on a log of 118 MB."
+    )
     memory: bool = flag("--memory", "Measure memory too, on a million samples of a Panda.")
 
 
@@ -27,6 +33,9 @@ def bench(measured: BenchOptions, json: opt.Json = False) -> None:
     from vftcli.outputs.listings import bench_grid
 
     result = benchmark(measured.robot, measured.samples, measured.rounds)
+    if measured.examination:
+        result["examination"] = examined(measured)
+        result["ratios"]["examination_over_estimate"] = result["examination"]["over_estimate"]
     if measured.memory:
         result["memory_bytes_per_sample"] = memory_per_sample()
     if json:
@@ -44,8 +53,29 @@ def bench(measured: BenchOptions, json: opt.Json = False) -> None:
         "all of these with dynamics, smoother and tuning included / the four causal ones: "
         f"{ratios['complete_over_core']:.2f}"
     )
+    if measured.examination:
+        cost = result["examination"]
+        typer.echo(
+            f"examination of 60 s at 100 Hz: {1e3 * cost['examination_minute_s']:.0f} ms; of "
+            f"{measured.samples} samples in 200 columns {1e3 * cost['examination_s']:.0f} ms and "
+            f"{1e3 * cost['columns_s']:.0f} ms for its columns, "
+            f"{100 * cost['over_estimate']:.0f} % of the {cost['estimate_s']:.2f} s of an estimate"
+        )
     if measured.memory:
         typer.echo(
             f"memory beyond the log's own, 1 000 000 samples of a Panda: "
             f"{result['memory_bytes_per_sample']:.0f} B per sample"
         )
+
+
+def examined(measured: BenchOptions) -> dict[str, float]:
+    """What the examination costs, the long log written into a folder that is removed again."""
+    import polars as pl
+
+    from vftcli.benchmark import examination_costs, wide_table
+    from vftcli.robots import load_robot
+
+    with TemporaryDirectory() as folder:
+        log = Path(folder) / "long.csv"
+        pl.DataFrame(wide_table(load_robot(measured.robot), measured.samples)).write_csv(log)
+        return examination_costs(measured.robot, log, measured.rounds)

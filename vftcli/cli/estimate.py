@@ -27,12 +27,12 @@ def estimate(
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5 -o out
     """
     from vftcli.cli.background import Background
+    from vftcli.doctor.examiner import EXAMINED
     from vftcli.readers.library import Library
-    from vftcli.signals.recording import EFFORTS
 
     extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
-    # Of a large log only the columns that are computed with are read; outputs show the others too.
-    signals = None if analysis.wrench.asks or extras else frozenset(("dq", *EFFORTS))
+    # Of a large log only the columns that are looked at are read; outputs show the others too.
+    signals = None if analysis.wrench.asks or extras else EXAMINED
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
     reading = Background(lambda: library.open(log, chosen))
 

@@ -11,8 +11,11 @@ from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.drive import effort_name
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ExaminationError, RobotError
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, fact
+
+EXAMINED = frozenset(("dq", *EFFORTS, "target_dq", "target_current", "target_torque", "tau_ext"))
+"""Signals that an examination looks at beside time and positions."""
 
 
 class Correction(NamedTuple):
