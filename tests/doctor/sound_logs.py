@@ -62,7 +62,7 @@ LOGS: tuple[SoundLog, ...] = (
     ur10e("free_repeat_c.csv"),
     ur10e("jointwise_2.csv"),
     ur10e("jointwise_4.csv"),
-    ur10e("load_14harm.csv", "unmodelled-load"),
+    ur10e("load_14harm.csv", "unmodelled-load", "payload-mismatch"),
     ur10e("push_pose.csv"),
     SoundLog("ur10_link4/link4.csv.gz", "t,q:6,dq:6,current:6,_:6", "ur10e"),
     SoundLog("fr3/run_a.npy", FR3, "fr3", ("gaps",)),
@@ -80,7 +80,13 @@ LOGS: tuple[SoundLog, ...] = (
     ),
     SoundLog("rtde/static_cb3.csv", None, "", ("payload-mismatch", "no-robot-fits")),
     SoundLog("rtde/ur3e_25hz_cr_line_ends.csv", None, "", ("slow-rate", "no-robot-fits")),
-    SoundLog("rtde/ur3e_25hz_cr_line_ends.csv", None, "../robots/ur3e.toml", ("slow-rate",)),
+    # It declares a payload that the robot file does not mount.
+    SoundLog(
+        "rtde/ur3e_25hz_cr_line_ends.csv",
+        None,
+        "../robots/ur3e.toml",
+        ("slow-rate", "payload-not-mounted"),
+    ),
     SoundLog("rtde/blank_lines.csv", None, "", ("no-robot-fits",)),  # ten samples at rest
     SoundLog("mujoco_ur5e/circle.csv", None, "mujoco_ur5e/robot.toml"),
     SoundLog("libfranka_sim/pushes.csv.gz", None, "libfranka_sim/robot.toml"),

@@ -188,6 +188,8 @@ EFFORTS = ",".join(f"e{j}" for j in range(6))
     [
         ("-tau=effort", "torque", -5.0),
         ("-tau=effort_{i}", "torque", -5.0),
+        ("-tau", "torque", -5.0),
+        ("t[ms],tau[mNm]", "torque", 5e-3),
         ("current[mA]=EFFORT", "current", 5e-3),
         ("t[ms]=time", "torque", 5.0),
     ],

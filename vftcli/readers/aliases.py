@@ -2,11 +2,12 @@
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from vftcli.readers.columns import Item
+from vftcli.readers.columns import SIGNALS, Item
 from vftcli.readers.joints import kinematic_order
 from vftcli.readers.table import (
     Cell,
@@ -15,6 +16,7 @@ from vftcli.readers.table import (
     Table,
     checked,
     listed,
+    missing_column,
     named_cells,
     pick_of,
 )
@@ -35,7 +37,7 @@ ALIASES: dict[str, tuple[str, ...]] = {
 }
 """Field of Recording → names its columns go by, in lower case and without their index."""
 
-TURNED = {"tau_ext_hat_filtered", "motor_torques_external"}
+TURNED = {"tau_ext_hat_filtered", "state.tau_ext_hat_filtered", "motor_torques_external"}
 """Names of libfranka's residual, measured torque minus model: its sign has to be turned."""
 
 WRENCHES = (
@@ -78,7 +80,7 @@ def picks_by_alias(table: Table, stated: Sequence[Item] = ()) -> tuple[Picks, tu
         LogError: If two groups of columns could be the same signal, or none is the positions.
     """
     groups = grouped(table)
-    told = {item.signal: pick_of(item, stated_cells(table, item, groups)) for item in stated}
+    told = {item.signal: stated_pick(table, item, groups) for item in stated}
     clock = told.pop("t", None) or _clock(table)
     signals = list(told.values())
     known, taken = {pick.signal for pick in signals}, {c for pick in signals for c in pick.cells}
@@ -99,12 +101,24 @@ def picks_by_alias(table: Table, stated: Sequence[Item] = ()) -> tuple[Picks, tu
     return picks, names
 
 
-def stated_cells(table: Table, item: Item, groups: Mapping[str, Group]) -> tuple[Cell, ...]:
-    """The cells of an item: columns by pattern, or a group by its name without index."""
-    group = groups.get((item.pattern or "").lower())
+def stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
+    """The columns of an item: by pattern, by a name without index, or those found without it.
+
+    Raises:
+        LogError: If there are none.
+    """
+    if item.pattern is None:
+        signal = SIGNALS.get(item.signal, item.signal)
+        found = _clock(table) if signal == "t" else _wrench(table) if signal == "wrench" else None
+        found = _pick_of(table, signal, groups) if signal in ALIASES else found
+        if found is None:
+            raise missing_column(table, item.signal, item.signal)
+        pick = pick_of(item, found.cells)
+        return replace(pick, factor=pick.factor * found.factor)
+    group = groups.get(item.pattern.lower())
     if group is not None and item.pattern not in (table.names or ()):
-        return group.cells
-    return named_cells(table, item)
+        return pick_of(item, group.cells)
+    return pick_of(item, named_cells(table, item))
 
 
 def grouped(table: Table) -> dict[str, Group]:

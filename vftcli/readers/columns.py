@@ -60,7 +60,7 @@ class Item:
         factor: What a value is multiplied with to be in SI units and in our sign.
         unit: The unit as written, or None.
         count: Columns in a row that it covers, in a headerless table.
-        pattern: The column names it means, in a headed table.
+        pattern: The column names it means, in a headed table; None for those found without it.
         rate: Sampling rate of a table that has no clock. [Hz]
     """
 
@@ -88,6 +88,11 @@ class ColumnSpec:
         return next((item for item in self.items if item.signal == signal), None)
 
     @property
+    def partial(self) -> bool:
+        """Whether it says something of some signals and leaves the others to their names."""
+        return self.named and self.item("q") is None
+
+    @property
     def width(self) -> int:
         """Number of columns that a counting text describes."""
         return sum(item.count for item in self.items if item.rate is None)
@@ -103,9 +108,15 @@ def parse_columns(text: str) -> ColumnSpec:
         raise LogError("--columns is empty. Say which column is which, as in t,q:6,dq:6,current:6.")
     parts, segment = _without_segment(_split(text))
     items = tuple(_parse_item(part) for part in parts)
-    named = any(item.pattern is not None for item in items)
+    signals = {item.signal for item in items}
+    # Nothing can be counted without positions: what is left says a unit or a sign.
+    alone = all(item.count == 1 and item.rate is None for item in items) and not signals & {
+        "q",
+        "_",
+    }
+    named = alone or any(item.pattern is not None for item in items)
     for item in items:
-        if named and item.pattern is None and item.rate is None:
+        if named and not alone and item.pattern is None and item.rate is None:
             raise LogError(
                 f"--columns: {item.signal} has no column name while others have one. Name every "
                 "signal (q=joint_{i}), or count columns in file order (t,q:6), not both."

@@ -37,7 +37,7 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
     if spec is not None:
         more["segment"] = spec.segment
     items = spec.items if spec is not None else ()
-    partial = table.names is not None and all(item.pattern and item.signal != "q" for item in items)
+    partial = table.names is not None and spec is not None and spec.partial
     if spec is not None and items and not partial:
         stated = (item := spec.item("q")) is not None and item.unit is not None
         return picked(table, picks_of(table, spec), request, degrees_possible=not stated, **more)

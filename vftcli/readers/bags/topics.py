@@ -139,7 +139,8 @@ class Gathering:
         """Decide what effort is: what --columns says, else current for UR joints, else torque."""
         there, lead = dict(self.signals), self.lead
         for signal, (pattern, factor) in self.chosen.items():
-            last = pattern.rpartition(".")[2]
+            own = "effort" if signal in EFFORTS and "effort" in there else signal
+            last = pattern.rpartition(".")[2] or own
             source = FIELDS.get(last, last)
             if source not in there:
                 fields = [next((f for f, s in FIELDS.items() if s == name), name) for name in there]
@@ -266,7 +267,7 @@ FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}
 
 
 def chosen_fields(request: ReadChoice) -> dict[str, tuple[str, float]]:
-    """Signal → message field and factor, as --columns says: -tau=effort, current[mA]=effort."""
+    """Signal → message field, "" for its own, and factor: -tau=effort, current[mA]=effort, -tau."""
     items = parse_columns(request.columns).items if request.columns is not None else ()
     return {
         SIGNALS[item.signal]: (item.pattern or "", item.factor)
