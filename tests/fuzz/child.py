@@ -7,7 +7,7 @@ import shutil
 import signal
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -79,11 +79,20 @@ class Attempt(NamedTuple):
     rows: int | None
 
 
-def attempt(number: int, index: int, seeds: dict[str, list[Seed]], folder: Path) -> Attempt:
-    """Write the input of an index, and say how it is tried; the same for the same two numbers."""
+def attempt(
+    number: int, index: int, families: Sequence[str], seeds: dict[str, list[Seed]], folder: Path
+) -> Attempt:
+    """Write the input of an index, and say how it is tried; the same for the same numbers.
+
+    Args:
+        number: The seed of the run.
+        index: Which input.
+        families: Those to draw from.
+        seeds: The sound files.
+        folder: Where it is written.
+    """
     rng = np.random.default_rng([number, index])
-    wheel = [family for family, weight in WEIGHTS.items() for _ in range(weight)]
-    family = pick(rng, wheel)
+    family = pick(rng, [family for family in families for _ in range(WEIGHTS[family])])
     command = pick(rng, COMMANDS)
     if family == "options":
         seed = pick(rng, seeds["table"])
@@ -122,11 +131,8 @@ def on_robot(family: str, seed: Seed, place: Path, seeds: dict[str, list[Seed]])
     return ["estimate", str(sound.path), "--robot", str(place)]
 
 
-def tried(number: int, index: int, seeds: dict[str, list[Seed]], folder: Path) -> int:
-    """Make the input of an index and run its command, what it says kept in the folder; its code."""
-    clear(folder)
-    (folder / "TMP").mkdir()
-    made = attempt(number, index, seeds, folder)
+def tried(made: Attempt, folder: Path) -> int:
+    """Run the command of an input, what it says kept in the folder; its code."""
     (folder / "attempt.json").write_text(json.dumps(made._asdict()), encoding="utf-8")
     limit()
     try:

@@ -32,7 +32,7 @@ from typing import Any, NamedTuple
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
 
-from child import BROKEN, MEMORY, Attempt, clear, command, tried  # noqa: E402
+from child import BROKEN, MEMORY, WEIGHTS, Attempt, attempt, clear, command, tried  # noqa: E402
 from seeds import make_seeds  # noqa: E402
 from tokens import Seed  # noqa: E402
 
@@ -238,7 +238,10 @@ def text(path: Path) -> str:
 def batch(pipe: int, indices: range, asked: argparse.Namespace, seeds: Seeds, folder: Path) -> None:
     """Be the child of a batch: try one input after the other, a line through the pipe for each."""
     for index in indices:
-        status = tried(asked.seed, index, seeds, folder)
+        clear(folder)
+        (folder / "TMP").mkdir()
+        made = attempt(asked.seed, index, asked.family or list(WEIGHTS), seeds, folder)
+        status = tried(made, folder)
         verdict = judged(status, index, folder)
         keep(verdict, asked, folder)
         os.write(pipe, (json.dumps(verdict) + "\n").encode())
@@ -342,6 +345,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--inputs", type=int, default=5000)
     parser.add_argument("--first", type=int, default=0, help="index of the first input")
+    parser.add_argument("--family", action="append", choices=WEIGHTS, help="of these only")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--keep", type=Path, help="folder for the inputs that failed")
     parser.add_argument("--progress", type=Path, help="file for the counts so far")

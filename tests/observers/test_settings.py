@@ -115,7 +115,11 @@ def test_sections_are_read_as_a_robot_file_s(tmp_path: Path) -> None:
         ("[observers.gmo]\ngain = true", "gmo.gain holds True; give a number or one a joint"),
         ('[observers.gmo]\ngain = [1, "2"]', "gmo.gain holds '2'; give a number"),
         ("[observers.gmo]\ngain = [nan]", "gmo.gain: nan is out of range"),
-        ("[observers.fdo]\nomega = 1e20", r"fdo.omega: 1e\+20 is out of range; .* at most 1e\+06"),
+        (
+            "[observers.fdo]\nomega = 1e20",
+            r"fdo.omega: 1e\+20 is out of range; .* to 1e\+06 in size",
+        ),
+        ("[observers.kfo]\nr_diag = 5e-324", "kfo.r_diag: 5e-324 is out of range"),
         ("[observers.kfo]\nr_diag = 1e300", r"kfo.r_diag: 1e\+300 is out of range"),
         ("[observers.kfo]\nnoise_convention = 3", "must be a word in quotes"),
         (f"x = {'[' * 5000}", "not a TOML file of gains: .*nested too deep"),

@@ -36,6 +36,9 @@ LARGEST = {"omega": 1e6, "gain": 1e6, "decay": 1e6}
 LARGEST_VARIANCE = 1e15
 """Every other number is a variance: 3·10⁷ N·m, or of its momentum, or gained in a second."""
 
+SMALLEST = 1e-15
+"""Smallest size of a number that is not zero: the ratio of two must stay a number."""
+
 
 def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[str]]) -> Settings:
     """Read ``observer.parameter=VALUE`` assignments; a value is a number or one a joint.
@@ -96,10 +99,11 @@ def check_numbers(parameter: str, values: Iterable[Any], where: str) -> None:
     for value in values:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ParameterError(f"{where} holds {shown(value)}; give a number or one a joint")
-        if not abs(value) <= largest:  # neither is what is not a number
+        # What is not a number is neither zero nor between the two.
+        if value != 0 and not SMALLEST <= abs(value) <= largest:
             raise ParameterError(
                 f"{where}: {shown(value)} is out of range; every number must be finite, "
-                f"at most {largest:g}"
+                f"{SMALLEST:g} to {largest:g} in size"
             )
 
 

@@ -109,6 +109,10 @@ class FreeChoice:
         )
 
 
+DIGITS = 5
+"""Most digits of a cycle's number: at a second each, a log of 99 999 cycles takes a day."""
+
+
 def cycle_numbers(text: str) -> tuple[int, ...]:
     """Cycle numbers, counted from 1, of ``1`` or ``1,2`` or ``1-3``.
 
@@ -118,7 +122,8 @@ def cycle_numbers(text: str) -> tuple[int, ...]:
     found: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
-        if not first.isdecimal() or (dash and not last.isdecimal()):
+        short = max(len(first), len(last)) <= DIGITS
+        if not short or not first.isdecimal() or (dash and not last.isdecimal()):
             raise ReferenceTorqueError(
                 f"--free-cycles {text!r} is not a list of cycle numbers such as 1 or 1,2 or 1-3"
             )

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vftcli.robots import Payload, Robot
+from vftcli.robots.bounds import out_of_bounds
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
@@ -31,6 +32,13 @@ class TrueArm:
     nominal: Robot
 
 
+LARGEST_SHARE = 0.45
+"""Largest relative deviation: drawn twice as large, it leaves nothing negative."""
+
+ABSOLUTE = {"com": 1.0, "torque_offset": 1e4}
+"""Deviations that are not relative, and their largest. [m, N·m]"""
+
+
 def deviate(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> Array:
     """Normal deviates of standard deviation `size`, cut at two standard deviations."""
     draw: Array = size * np.clip(rng.standard_normal(shape), -2.0, 2.0)
@@ -38,7 +46,15 @@ def deviate(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> Ar
 
 
 def as_payload(spec: PayloadSpec, scale: float = 1.0) -> Payload:
-    """Return a payload section as a load on the flange, its mass and tensor scaled."""
+    """Return a payload section as a load on the flange, its mass and tensor scaled.
+
+    Raises:
+        ParameterError: If it is beyond what robots carry.
+    """
+    values = {"mass": (spec.mass,), "com": spec.com, "inertia": spec.inertia}
+    for key, numbers in values.items():
+        if why := out_of_bounds(key, numbers):
+            raise ParameterError(f"payload.{why}")
     inertia = np.diag(scale * np.array(spec.inertia))
     return Payload(mass=scale * spec.mass, com=np.array(spec.com), inertia=inertia)
 
@@ -50,12 +66,13 @@ def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> Tru
     others as they were.
 
     Raises:
-        ParameterError: If a size is negative.
+        ParameterError: If a size is negative, or so large that no arm could be drawn.
     """
     sizes, n = scenario.mismatch, robot.joints
     for name, size in vars(sizes).items():
-        if size < 0:
-            raise ParameterError(f"mismatch.{name} is {size:g}; it must not be negative")
+        most = ABSOLUTE.get(name, LARGEST_SHARE)
+        if not 0 <= size <= most:
+            raise ParameterError(f"mismatch.{name} is {size:g}; it lies within 0 to {most:g}")
     chain = perturbed_chain(robot.loaded_chain, sizes, rng)
     friction = perturbed_friction(true_friction(robot, scenario.friction), sizes, rng)
     gain = 1.0 + deviate(rng, sizes.torque_constant, (n,))
@@ -68,6 +85,8 @@ def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> Tru
         if scenario.payload.known:
             nominal = nominal.with_payload(as_payload(scenario.payload))
     if (sensor := scenario.force_sensor) is not None:
+        if why := out_of_bounds("mass", (sensor.mass, sensor.tool_mass)):
+            raise ParameterError(f"force_sensor.{why}")
         body = Payload(mass=sensor.mass, com=np.array(sensor.com), inertia=np.zeros((3, 3)))
         chain = chain.with_payload(body)
         if sensor.known:

@@ -1,15 +1,18 @@
 """Tables of a scenario file turned into dataclasses, every complaint with the key that is wrong."""
 
 import difflib
-import math
 import types
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import shown
 
 Section = TypeVar("Section")
+
+LARGEST = 1e10
+"""Largest number of a scenario in any of its units; a clock that counts from 1970 starts below."""
 
 
 def section_from(cls: type[Section], table: Mapping[str, Any], where: str) -> Section:
@@ -50,11 +53,13 @@ def convert(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - TOML va
         return convert_tuple(value, get_args(hint), where)
     if is_dataclass(hint) and isinstance(hint, type):
         if not isinstance(value, Mapping):
-            raise ParameterError(f"{where} is {value!r}; it must be a section")
+            raise ParameterError(f"{where} is {shown(value)}; it must be a section")
         return section_from(hint, value, where)
     if hint is float and isinstance(value, int | float) and not isinstance(value, bool):
-        if not math.isfinite(value):
-            raise ParameterError(f"{where} is {value!r}; it must be a finite number")
+        if not abs(value) <= LARGEST:  # neither is what is not a number
+            raise ParameterError(
+                f"{where} is {shown(value)}; it must be a finite number, {LARGEST:g} at most"
+            )
         return float(value)
     if (
         isinstance(hint, type)
@@ -63,7 +68,7 @@ def convert(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - TOML va
     ):
         return value
     names = {float: "a number", int: "a whole number", bool: "true or false", str: "a word"}
-    raise ParameterError(f"{where} is {value!r}; it must be {names.get(hint, str(hint))}")
+    raise ParameterError(f"{where} is {shown(value)}; it must be {names.get(hint, str(hint))}")
 
 
 def convert_union(value: Any, options: tuple[Any, ...], where: str) -> Any:  # noqa: ANN401
@@ -79,14 +84,14 @@ def convert_union(value: Any, options: tuple[Any, ...], where: str) -> Any:  # n
         except ParameterError as error:
             complaint = error
     if complaint is None:
-        raise ParameterError(f"{where} cannot be {value!r}")
+        raise ParameterError(f"{where} cannot be {shown(value)}")
     raise complaint
 
 
 def convert_tagged(value: Any, options: Mapping[str, Any], where: str) -> Any:  # noqa: ANN401
     """Return a table as the section its `kind` names."""
     if not isinstance(value, Mapping):
-        raise ParameterError(f"{where} is {value!r}; it must be a section with a kind")
+        raise ParameterError(f"{where} is {shown(value)}; it must be a section with a kind")
     kind = str(value.get("kind", ""))
     if kind not in options:
         raise ParameterError(unknown_name(f"{where}.kind {kind!r}", kind, options))
@@ -96,7 +101,7 @@ def convert_tagged(value: Any, options: Mapping[str, Any], where: str) -> Any:  
 def convert_tuple(value: Any, items: tuple[Any, ...], where: str) -> tuple[Any, ...]:  # noqa: ANN401
     """Return a TOML array as a tuple of the declared length and type."""
     if not isinstance(value, list | tuple):
-        raise ParameterError(f"{where} is {value!r}; it must be a list")
+        raise ParameterError(f"{where} is {shown(value)}; it must be a list")
     if items[-1] is Ellipsis:
         return tuple(convert(v, items[0], f"{where}[{i}]") for i, v in enumerate(value))
     if len(value) != len(items):
