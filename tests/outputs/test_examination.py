@@ -1,0 +1,86 @@
+"""What is shown of an examination: one line, a record, and what heads outputs that mean nothing."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vftcli.doctor import Examination
+from vftcli.outputs.examination import (
+    examination_record,
+    health_line,
+    health_record,
+    overridden_lines,
+)
+from vftcli.outputs.log.run_record import to_json
+from vftcli.outputs.page.shell import health
+from vftcli.signals.recording import Recording, Source
+from vftcli.signals.remarks import Remark, fact, warning
+
+LOG = Recording(t=np.arange(4.0), q=np.zeros((4, 6)), source=Source(label="a.csv"))
+SLOW = warning("slow-rate", rate_Hz=10.0)
+NONE = warning("no-velocity")
+WRONG = warning("milliamperes", typical_A=5000.0)
+
+
+def examination(*findings: Remark, read: tuple[Remark, ...] = ()) -> Examination:
+    log = replace(LOG, source=replace(LOG.source, remarks=read))
+    return Examination(recording=log, findings=findings, robots=())
+
+
+def test_the_line_counts_warnings_and_says_the_first_whole() -> None:
+    assert health_line(examination()) == "log health: sound"
+    assert health_line(examination(fact("short", duration_s=1.0))) == "log health: sound"
+    one = health_line(examination(SLOW))
+    assert one.startswith("log health: 1 warning: slow-rate: 10 samples a second; vftcli inspect")
+    three = health_line(examination(SLOW, NONE, NONE), named=True)
+    assert three.startswith("a.csv: log health: 3 warnings: slow-rate: ")
+    assert "; also no-velocity; vftcli" in three
+
+
+def test_a_reader_s_warning_is_one_of_the_log() -> None:
+    """It has no consequence and no remedy of its own in the catalogue: its words are enough."""
+    cut = warning("effort-taken", effort="a", kind="b", factor=1.0)
+    line = health_line(examination(NONE, read=(cut, fact("short", duration_s=1.0))))
+    assert line.startswith("log health: 2 warnings: effort-taken: the a of the log")
+    assert "also no-velocity" in line
+
+
+def test_the_record_is_strict_json_with_codes_and_values() -> None:
+    odd = warning("slow-rate", rate_Hz=float("inf"))
+    (record,) = json.loads(to_json({"examination": health_record([examination(odd, WRONG)])}))[
+        "examination"
+    ]
+    assert (record["log"], record["sound"]) == ("a.csv", False)
+    assert record["overridden"] == ["milliamperes"]
+    assert [f["code"] for f in record["findings"]] == ["slow-rate", "milliamperes"]
+    assert record["findings"][0]["values"] == {"rate_Hz": None}
+    whole = json.loads(to_json(examination_record(examination(odd))))
+    assert whole["findings"][0]["values"] == {"rate_Hz": None}
+
+
+def test_only_what_refuses_heads_an_output() -> None:
+    assert overridden_lines([examination(SLOW)]) == []
+    (line,) = overridden_lines([examination(SLOW, WRONG)])
+    assert line.startswith("MEANINGLESS")
+    assert "milliamperes" in line
+
+
+def test_another_arm_does_not_head_what_identify_makes() -> None:
+    other = warning("no-robot-fits", ranked="ur5 50 %")
+    assert health_record([examination(other)])[0]["overridden"] == ["no-robot-fits"]
+    assert health_record([examination(other)], fitting=False)[0]["overridden"] == []
+
+
+@pytest.mark.parametrize("sound", [True, False])
+def test_the_page_shows_warnings_open_and_escapes_names(sound: bool) -> None:
+    note = fact("short", duration_s=1.0)
+    made = examination(*([] if sound else [WRONG]), note)
+    made = replace(made, recording=replace(LOG, source=Source(label="<b>.csv")))
+    page = health([made])
+    assert "<b>.csv" not in page
+    assert "&lt;b&gt;.csv" in page
+    assert ("<details>" in page) == sound
+    assert ("MEANINGLESS" in page) == (not sound)
+    assert health([]) == ""
