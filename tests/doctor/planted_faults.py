@@ -397,7 +397,9 @@ FAULTS: Mapping[str, Fault] = {
     "velocity_held_8": Fault(velocity_held, ("velocity-held",)),
     "effort_lag_5": Fault(effort_lag, ("effort-lag",)),
     "payload_2.8kg": Fault(payload, ("unmodelled-load",)),
-    "gravity_compensated": Fault(without_gravity, ("torque-without-gravity",)),
+    "gravity_compensated": Fault(
+        without_gravity, ("torque-without-gravity", "current-without-gravity")
+    ),
     "torque_called_current": Fault(torque_called_current, ("current-as-torque",), (), "current"),
     "current_called_torque": Fault(current_called_torque, ("torque-as-current",), (), "current"),
     "current_mA": Fault(milliamperes, ("milliamperes",), (), "current"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.doctor.signals import (
+    inverted_effort,
     inverted_joints,
     is_most,
     signal_findings,
@@ -34,7 +35,8 @@ def log_of(**changes: Array | None) -> Recording:
 
 def found(**changes: Array | None) -> dict[str, Remark]:
     log = log_of(**changes)
-    return {finding.code: finding for finding in signal_findings(log, velocity_fit(log))}
+    both = (*signal_findings(log, velocity_fit(log)), *inverted_effort(log))
+    return {finding.code: finding for finding in both}
 
 
 def scaled(x: Array, factor: float, *joints: int) -> Array:
@@ -151,9 +153,9 @@ def test_shares_of_joints_that_tell_nothing_are_not_known() -> None:
 @pytest.mark.parametrize(("share", "told"), [(-0.35, False), (-0.45, True)])
 def test_most_joints_are_inverted_from_two_fifths_of_their_work(share: float, told: bool) -> None:
     findings = found(torque=effort_of_share(share, 1, 2, 3, 4))
-    assert set(findings) == ({"effort-sign"} if told else set())
+    assert set(findings) == ({"effort-sign-by-work"} if told else set())
     if told:
-        assert findings["effort-sign"].where.joints == (1, 2, 3, 4)
+        assert findings["effort-sign-by-work"].where.joints == (1, 2, 3, 4)
 
 
 @pytest.mark.parametrize(("share", "told"), [(-0.8, False), (-0.9, True)])
@@ -169,7 +171,7 @@ def test_the_numbers_of_an_inverted_effort() -> None:
     turned = scaled(-3.0 * FRICTION, -1.0, 1)
     for name, unit, column in (("torque", "N·m", "tau"), ("current", "A", "current")):
         effort = {"torque": None, name: turned}
-        finding = found(**effort)["effort-sign"]
+        finding = found(**effort)["effort-sign-by-work"]
         assert finding.level == "warning"
         values = dict(finding.values)
         assert values.pop("shares_percent") == pytest.approx([-100.0] * 5)

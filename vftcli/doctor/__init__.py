@@ -1,9 +1,9 @@
 """The log doctor: what is wrong with a log, how one sees it, what it does, what to do."""
 
-from vftcli.doctor.examination import Examination, examine, guess_robot
+from vftcli.doctor.examination import Examination, examine
 from vftcli.doctor.examiner import Examiner
 from vftcli.doctor.findings import FindingWords, finding_record, in_words
-from vftcli.doctor.fit import RobotMatch
+from vftcli.doctor.fit import RobotMatch, guess_robot
 
 __all__ = [
     "Examination",

@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
-from vftcli.doctor.examination import Examination, examine, guess_robot
+from vftcli.doctor.examination import Examination, examine
 from vftcli.doctor.findings import in_words
+from vftcli.doctor.fit import guess_robot
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.drive import effort_name
@@ -34,6 +35,7 @@ CORRECTIONS = {
     "current-as-torque": Correction("torque"),
     "torque-as-current": Correction("current"),
     "torque-without-gravity": Correction("torque_without_gravity"),
+    "torque-with-gravity": Correction("torque"),
     "milliamperes": Correction("current", 1e-3),
     "effort-sign": Correction("", -1.0),
 }

@@ -1,14 +1,16 @@
-"""Findings about payload and drive constants, from what the controller itself expects."""
+"""Findings about load, payload and drive constants."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
+from vftcli.doctor.case import Case
 from vftcli.doctor.findings import on_joints
 from vftcli.robots import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, warning
+from vftcli.signals.remarks import Remark, caution, warning
 
 REST = 2e-3
 """Speed below which a joint counts as resting. [rad/s]"""
@@ -16,6 +18,24 @@ MISMATCH = 4.0
 """Difference at rest, on two joints, that stiction hardly explains. [N·m]"""
 USUAL_CONSTANT = 10.0
 """Torque per current near which every UR's large drives lie. [N·m/A]"""
+JOINT_CONSTANTS = np.array([3.571, 7.7, 9.839, 10.763, 11.976, 4.545, 9.312, 12.625, 13.13, 15.756])
+"""Torque per current of UR's five joint sizes, e-Series and CB3: the controllers' own tables.
+
+[N·m/A]
+"""
+SAME = 0.02
+"""Constants of one joint size scatter by this much from firmware to firmware."""
+HAND, LOAD = 0.4, 1.2
+"""A load from which it is worth telling, as a hand or gripper is; and one that nobody overlooks.
+
+Drive constants that are 3 % off look like .3 kg on a UR10e; hands weigh .5–1.1 kg. [kg]
+"""
+SURE = 4.0
+"""Standard deviations that a load has to be."""
+EXPLAINED, PARTLY = 0.5, 0.8
+"""Share of the misfit that such loads may leave."""
+DECLARED = 0.1
+"""A declared payload, or a difference from the mounted one, that is none. [kg]"""
 RATIO = 0.05
 """Relative difference between the log's own drive constants and the profile's that is reported."""
 
@@ -37,10 +57,9 @@ def drive_constants(recording: Recording) -> Array | None:
             i, tau = current[use, j], torque[use, j]
             # Through the origin: no current, no torque.
             slope = float(i @ tau / (i @ i))
-            misfit = float(np.std(tau - slope * i)) / max(
-                float(np.std(tau)), float(np.abs(tau).mean())
-            )
-            constants[j] = slope if misfit < 0.05 else np.nan
+            size = max(float(np.std(tau)), float(np.abs(tau).mean()))
+            # A joint that carries nothing has a target of zero and shows no constant.
+            constants[j] = slope if float(np.std(tau - slope * i)) < 0.05 * size else np.nan
     return constants
 
 
@@ -53,22 +72,69 @@ def resting(recording: Recording) -> Mask:
     return np.asarray(still & (np.abs(recording.dq) < 5 * REST).all(axis=1))
 
 
-def load_findings(recording: Recording, robot: Robot | None) -> Iterator[Remark]:
-    """Payload mismatch at rest, and drive constants against the profile that fits best."""
+def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Remark]:
+    """A load that the drives carry and neither the robot file nor the log knows of.
+
+    Args:
+        recording: The log.
+        robot: The arm with what its file mounts.
+        case: The log against it, whatever else is wrong put right.
+    """
+    mass, sd = float(case.loaded.values[0]), float(case.loaded.sd[0])
+    if not case.carries_load or mass < max(HAND, SURE * sd) or not case.lasts(case.loaded):
+        return
+    missing = missing_payload(recording, robot)
+    if missing and abs(mass - missing) < DECLARED + 0.3 * abs(missing):
+        return
+    share = case.loaded.size / case.bare.size
+    values: dict[str, Any] = {
+        "load_kg": mass,
+        "sd_kg": sd,
+        "robot": robot.name,
+        "bare_percent": 100 * case.bare.size / case.size,
+        "loaded_percent": 100 * case.loaded.size / case.size,
+    }
+    if mass > LOAD and share < EXPLAINED:
+        yield warning("unmodelled-load", **values)
+    elif share < PARTLY:
+        yield caution("light-load", **values)
+
+
+def declared_payload(recording: Recording, robot: Robot) -> Iterator[Remark]:
+    """A payload that the log declares and the robot does not carry."""
+    if missing := missing_payload(recording, robot):
+        declared = recording.payload_mass or 0.0
+        yield warning("payload-not-mounted", declared_kg=declared, mounted_kg=declared - missing)
+
+
+def missing_payload(recording: Recording, robot: Robot) -> float:
+    """How much more the log declares than the robot carries, 0 where it declares nothing. [kg]"""
+    declared = recording.payload_mass or 0.0
+    missing = declared - (0.0 if robot.payload is None else robot.payload.mass)
+    slight = declared < DECLARED or abs(missing) < max(DECLARED, 0.1 * declared)
+    return 0.0 if slight else missing
+
+
+def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[Remark]:
+    """Payload mismatch at rest, and the controller's drive constants against the robot file's."""
     constants = drive_constants(recording)
     yield from payload_mismatch(recording, constants)
-    if robot is not None and robot.torque_constant is not None and constants is not None:
-        ratio = constants / robot.torque_constant - 1
-        wrong = np.flatnonzero(np.abs(ratio) > RATIO)
-        if wrong.size:
-            yield warning(
-                "drive-constants",
-                on_joints(wrong),
-                robot=robot.name,
-                found_Nm_A=constants[wrong].tolist(),
-                profile_Nm_A=np.asarray(robot.torque_constant)[wrong].tolist(),
-                worst_percent=100 * float(np.nanmax(np.abs(ratio))),
-            )
+    if robot is None or robot.torque_constant is None or constants is None:
+        return
+    profile = np.asarray(robot.torque_constant)
+    ratio = constants / profile - 1
+    # Freedrive and old controllers follow other laws than K·i: a real joint's constant counts.
+    real = (np.abs(constants[:, None] / JOINT_CONSTANTS - 1) < SAME).any(axis=1)
+    wrong = np.flatnonzero(np.abs(ratio) > RATIO)
+    if wrong.size and real[wrong].all():
+        yield warning(
+            "drive-constants",
+            on_joints(wrong),
+            robot=robot.name,
+            found_Nm_A=constants[wrong].tolist(),
+            profile_Nm_A=profile[wrong].tolist(),
+            worst_percent=100 * float(np.nanmax(np.abs(ratio))),
+        )
 
 
 def payload_mismatch(recording: Recording, constants: Array | None) -> Iterator[Remark]:

@@ -62,7 +62,6 @@ def signal_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[R
         yield warning("no-effort")
     yield from odd_units(recording)
     yield from velocity_findings(recording, fit)
-    yield from inverted_effort(recording)
     yield from stuck_findings(recording)
 
 
@@ -133,7 +132,7 @@ def inverted_effort(recording: Recording) -> Iterator[Remark]:
     is_current = name == "current"
     forward = recording.dq[:, found[0]] > MOVING
     yield warning(
-        "effort-sign" if is_most(len(found), judged) else "effort-sign-of-some",
+        "effort-sign-by-work" if is_most(len(found), judged) else "effort-sign-of-some",
         on_joints(found),
         signal=name,
         shares_percent=(100 * work_shares(recording, value)[found]).tolist(),

@@ -1,0 +1,223 @@
+"""Whether an arm explains a log, and what is wrong where it does not: findings from the model."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.doctor.diagnosis import AMBIGUOUS, Cause, Diagnosis, diagnose
+from vftcli.doctor.effort import RANGE
+from vftcli.doctor.findings import on_joints
+from vftcli.doctor.fit import (
+    APART,
+    GUESSED,
+    HEAVY,
+    RobotMatch,
+    is_judgeable,
+    maker_case,
+    match,
+    match_of,
+    profiles,
+    ranking,
+)
+from vftcli.doctor.lateness import MISTIMED
+from vftcli.doctor.load import declared_payload, load_remarks
+from vftcli.doctor.signals import inverted_effort
+from vftcli.doctor.vendor import vendor_sign
+from vftcli.doctor.windows import up_axes
+from vftcli.robots import PROFILES, Robot, load_robot
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, fact, warning
+
+NO_FIT = 0.35
+"""Misfit of a measured effort that no friction of a sound log makes; they stay below .12.
+
+Load and contact are left out of it, and a log in which gravity hardly varies is not judged.
+"""
+DOUBTFUL = 0.15
+"""Misfit from which other arms are compared."""
+ANOTHER = 0.6
+"""Share of the misfit that another profile may leave to be the log's own."""
+MISTAKEN = 0.1
+"""Misfit up to which a cause is believed where nobody said which arm it is."""
+
+
+class ArmFindings(NamedTuple):
+    """What the model says of a log.
+
+    Attributes:
+        findings: The remarks.
+        robots: The arms that were compared, best fit first.
+    """
+
+    findings: tuple[Remark, ...]
+    robots: tuple[RobotMatch, ...]
+
+
+EFFORT = frozenset({"stuck-effort", "zero-effort", "saturation", "stuck-position"})
+"""Findings after which a joint's effort is no evidence."""
+
+
+def arm_findings(
+    recording: Recording, robot: Robot | None, known: Iterable[Remark] = ()
+) -> ArmFindings:
+    """Hold a log against its arm, or against the profiles where nobody says which it is.
+
+    Args:
+        recording: The log.
+        robot: The arm that the user names, or None.
+        known: What the signals themselves say: it is not said again as something else.
+    """
+    known = tuple(known)
+    if MISTIMED & {finding.code for finding in known} and recording.dq is not None:
+        # From the positions, so that the velocity hides nothing else.
+        recording = replace(recording, dq=np.gradient(recording.q, recording.t, axis=0))
+    ignored = sorted({j - 1 for f in known if f.code in EFFORT for j in f.where.joints})
+    if robot is None and recording.robot_hint in PROFILES:
+        robot = load_robot(str(recording.robot_hint))
+    if robot is not None:
+        if robot.joints != recording.joints or not is_judgeable(recording):
+            return ArmFindings((), ())
+        return of_known_arm(recording, robot, ignored)
+    return of_unknown_arm(recording, ignored)
+
+
+def of_known_arm(recording: Recording, robot: Robot, ignored: Sequence[int]) -> ArmFindings:
+    """Findings on a log whose arm the user knows."""
+    diagnosis = diagnose(recording, robot, ignored)
+    if diagnosis is None:
+        return ArmFindings((), ())
+    case = maker_case(recording, diagnosis.case.windows)
+    own = match(robot.name, case or diagnosis.case, by_maker=case is not None)
+    if (own.by_maker and own.misfit > GUESSED) or is_doubtful(diagnosis):
+        others = [
+            found
+            for name, other in profiles().items()
+            if name != robot.name
+            and other.joints == recording.joints
+            and (found := match_of(recording, name, other)) is not None
+        ]
+        others.sort(key=lambda found: (not found.fits, found.misfit))
+        if others and is_rather(others[0], own, diagnosis):
+            remark = warning(
+                "other-robot", own=str(own), best=str(others[0]), robot=others[0].robot
+            )
+            return ArmFindings((remark,), (others[0], replace(own, fits=False), *others[1:]))
+        robots = (own, *(replace(other, fits=False) for other in others))
+    else:
+        robots = (own,)
+    return ArmFindings(tuple(explained(recording, robot, diagnosis, robots)), robots)
+
+
+def is_doubtful(diagnosis: Diagnosis) -> bool:
+    """Whether another arm may explain a log better."""
+    case = diagnosis.case
+    heavy = case.carries_load and case.loaded.values[0] > HEAVY / 2
+    refuted = diagnosis.cause is not None and diagnosis.cause.code != "effort-offset"
+    return bool(case.misfit > DOUBTFUL or heavy or refuted)
+
+
+def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
+    """Whether a log is another profile's: no load, contact or other cause explains it as well."""
+    if other.by_maker:
+        return other.misfit < GUESSED and own.misfit > APART * other.misfit
+    lighter = own.load > other.load + HEAVY / 2
+    share = 1 / AMBIGUOUS if lighter else ANOTHER
+    return other.fits and other.misfit < share * diagnosis.healed.misfit
+
+
+def explained(
+    recording: Recording, robot: Robot, diagnosis: Diagnosis, robots: Iterable[RobotMatch]
+) -> Iterator[Remark]:
+    """The cause that was found, or that there is none; then what is left once it is put right."""
+    healed = diagnosis.healed
+    if diagnosis.cause is not None:
+        yield cause_remark(recording, diagnosis, diagnosis.cause)
+    elif healed.gravity_range < RANGE:
+        yield fact("effort-unchecked", range_Nm=healed.gravity_range, least_Nm=RANGE)
+        yield from declared_payload(recording, robot)
+        return
+    if healed.misfit > NO_FIT and (diagnosis.cause is None or healed.misfit > 2 * NO_FIT):
+        yield warning(
+            "no-robot-fits",
+            robot=robot.name,
+            misfit_percent=100 * healed.misfit,
+            ranked="; ".join(str(found) for found in robots),
+        )
+        return
+    yield from declared_payload(recording, robot)
+    yield from load_remarks(recording, robot, healed)
+    yield from vendor_sign(recording, healed)
+
+
+def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
+    """Findings on a log of which nobody says the arm: the profile that fits, or why none does."""
+    robots = profiles()
+    fits = ranking(recording, robots)
+    if not fits:
+        counts = sorted({robot.joints for robot in robots.values()})
+        if recording.joints in counts:
+            return ArmFindings((), ())
+        return ArmFindings(
+            (warning("no-profile", joint_count=recording.joints, counts=counts),), ()
+        )
+    if fits[0].fits:
+        robot = robots[fits[0].robot]
+        diagnosis = diagnose(recording, robot, ignored)
+        if diagnosis is None:
+            return ArmFindings((), fits)
+        return ArmFindings(tuple(explained(recording, robot, diagnosis, fits)), fits)
+    ranked = "; ".join(str(found) for found in fits)
+    found = [
+        (robots[found.robot], diagnosis)
+        for found in fits
+        if not found.by_maker  # a maker's own model that fits no profile is of another arm
+        and (diagnosis := diagnose(recording, robots[found.robot], ignored)) is not None
+        and diagnosis.cause is not None
+        and diagnosis.healed.misfit < MISTAKEN
+    ]
+    if not found:
+        still = float(np.max(np.ptp(recording.q, axis=0))) < 0.05
+        code = "no-robot-fits-at-rest" if still else "no-robot-fits-any"
+        # Without an arm the work of its effort is all that tells its sign.
+        return ArmFindings((*inverted_effort(recording), warning(code, ranked=ranked)), fits)
+    robot, diagnosis = min(found, key=lambda pair: pair[1].healed.misfit)
+    return ArmFindings(tuple(explained(recording, robot, diagnosis, fits)), fits)
+
+
+def cause_remark(recording: Recording, diagnosis: Diagnosis, cause: Cause) -> Remark:
+    """The finding on the cause that explains a log."""
+    rival = diagnosis.rival
+    robot_current = recording.current is not None and bool(np.any(cause.case.constant != 1))
+    values: dict[str, Any] = {
+        "misfit_percent": 100 * diagnosis.case.misfit,
+        "healed_percent": 100 * cause.misfit,
+        "rival": "nothing else" if rival is None else said(rival),
+        "signal": "current" if robot_current else "torque",
+        "column": "current" if robot_current else "tau",
+        "width": recording.joints,
+    }
+    if cause.vertical is not None:
+        values |= {
+            "angle_deg": float(np.rad2deg(cause.vertical.angle)),
+            "gravity": gravity_of(cause),
+        }
+    if cause.code == "milliamperes" and recording.current is not None:
+        values = {"typical_A": float(np.percentile(np.abs(recording.current), 99))}
+    if cause.code == "effort-offset":
+        values |= {"offset_Nm": cause.offset, "sd_Nm": cause.sd}
+    return warning(cause.code, on_joints(cause.joints), **values)
+
+
+def said(cause: Cause) -> str:
+    """A cause as the code of its finding, with its joints."""
+    joints = " ".join(f"J{j + 1}" for j in cause.joints)
+    return f"{cause.code} {joints}".strip()
+
+
+def gravity_of(cause: Cause) -> list[float]:
+    """The gravity vector in base axes that a log's effort says. (3,) [m/s²]"""
+    chain = cause.case.windows.chain
+    found = -up_axes(chain.gravity) @ cause.case.up
+    return [round(float(component), 2) for component in found]

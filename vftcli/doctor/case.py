@@ -1,0 +1,133 @@
+"""A log against an arm: what its effort is taken for, and what the arm's model leaves over."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from vftcli.doctor.robust import RobustFit, Terms, solve, terms
+from vftcli.doctor.windows import Windows
+from vftcli.signals.arrays import Array
+
+MAX_MASS, MAX_ARM = 12.0, 0.35
+"""Loads beyond these are no loads but another arm. [kg, m]"""
+TELLING = 0.9
+"""Share of the misfit that a load must leave at most, or it only adds freedom."""
+VARIED = 0.3
+"""Range of gravity's torque, relative to the effort, from which the poses tell a load."""
+FELT, REFUTED = 4.0, 0.6
+"""A cause shows in a window where it makes this many times what the fit leaves over; it is refuted
+there where the log without it leaves less than this share of what is left with it."""
+LASTING = 0.95
+"""Share of the windows in which a cause that lasts must not be refuted."""
+UPRIGHT = np.array([0.0, 0.0, 1.0])
+"""The robot file's own "up"."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A log against an arm.
+
+    Attributes:
+        windows: What the arm's model says.
+        given: Mean of the effort, as torque, over each window. (W, n) [N·m]
+        size: Root mean square of the column that was logged. [N·m]
+        constant: Torque per unit of the column that was logged, joint by joint. (n,)
+        up: Where "up" is, in axes whose third is the robot file's own. (3,)
+        rubs: Whether friction is in the effort; a maker's rigid-body model has none.
+    """
+
+    windows: Windows
+    given: Array
+    size: float
+    constant: Array
+    up: Array = field(default_factory=lambda: UPRIGHT)
+    rubs: bool = True
+
+    @cached_property
+    def needed(self) -> Array:
+        """Torque that inertia, rotors and gravity need. (W, n) [N·m]"""
+        return np.asarray(self.windows.inertial + self.windows.gravity @ self.up)
+
+    @property
+    def friction(self) -> Terms:
+        """The friction that may be in the effort."""
+        friction = self.windows.friction
+        return friction if self.rubs else terms(friction.columns[:, :, :0])
+
+    @cached_property
+    def bare(self) -> RobustFit:
+        """What friction alone leaves over."""
+        return solve(self.given - self.needed, self.friction)
+
+    @cached_property
+    def loaded(self) -> RobustFit:
+        """What friction and a load on the flange leave over; the load's four come first."""
+        return solve(self.given - self.needed, self.windows.load.beside(self.friction))
+
+    @property
+    def carries_load(self) -> bool:
+        """Whether a load explains a part of what friction leaves."""
+        mass, moment = float(self.loaded.values[0]), self.loaded.values[1:4]
+        if self.gravity_range < VARIED * self.size:
+            return False  # in one pose any residual passes for a load
+        plausible = 0.05 < mass < MAX_MASS and np.linalg.norm(moment) < MAX_ARM * mass + 0.3
+        return bool(plausible and self.loaded.size < TELLING * self.bare.size)
+
+    @property
+    def best(self) -> RobustFit:
+        """The fit with a load where one explains something, else without."""
+        return self.loaded if self.carries_load else self.bare
+
+    @property
+    def misfit(self) -> float:
+        """What stays unexplained, relative to the logged effort; loads and contacts are not."""
+        return self.best.size / self.size
+
+    @cached_property
+    def effort_sizes(self) -> Array:
+        """Root mean square of each joint's effort, contact set aside. (n,) [N·m]"""
+        sizes = np.sqrt(np.mean(self.given[self.bare.kept] ** 2, axis=0))
+        return np.asarray(np.maximum(sizes, 1e-9 * self.size))
+
+    @cached_property
+    def by_joint(self) -> Array:
+        """What friction leaves over of each joint, relative to the joint's effort. (n,)"""
+        return np.asarray(self.bare.by_joint / self.effort_sizes)
+
+    @property
+    def gravity_range(self) -> float:
+        """How much gravity's torque varies, on the joint where it varies most. [N·m]"""
+        gravity = self.windows.gravity @ self.up
+        return float(np.max(np.ptp(gravity, axis=0)))
+
+    def lasts(self, cause: RobustFit, change: Array | None = None) -> bool:
+        """Whether a cause is there all the time, as no push and no carried object is.
+
+        Args:
+            cause: The fit with it.
+            change: What it changes of the torque; None for the load of `loaded`. (W, n) [N·m]
+        """
+        if change is None:
+            change = self.windows.load.columns @ self.loaded.values[:4]
+        size = np.linalg.norm(change, axis=1)
+        felt = size > FELT * cause.size * np.sqrt(change.shape[1])
+        without = np.linalg.norm(cause.rest + change, axis=1)
+        refuted = felt & (without < REFUTED * np.linalg.norm(cause.rest, axis=1))
+        return bool(np.sum(refuted) <= (1 - LASTING) * max(np.sum(felt), 1))
+
+    def with_effort(self, given: Array) -> "Case":
+        """The same log with another effort."""
+        return replace(self, given=given)
+
+    def exchanged(self, i: int, j: int) -> "Case":
+        """The same log with the logged efforts of two joints exchanged."""
+        order = np.arange(len(self.constant))
+        order[[i, j]] = j, i
+        logged = self.given / self.constant
+        return self.with_effort(logged[:, order] * self.constant)
+
+
+def size_of(given: Array) -> float:
+    """Root mean square of a torque. [N·m]"""
+    return float(np.sqrt(np.mean(given**2)))

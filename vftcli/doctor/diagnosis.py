@@ -1,0 +1,242 @@
+"""One cause for a log that its arm does not explain: each is tried, the best one wins.
+
+A turned sign, two joints that changed places, a torque without gravity, a hanging base and a load
+all look alike in one number. So every cause gets its own fit, and only one that leaves much less
+than the arm as it is, and less than every other cause, is told.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.doctor.case import Case
+from vftcli.doctor.effort import CLEAR, RANGE, Reading, readings
+from vftcli.doctor.gravity import TILTED, Vertical, vertical_of
+from vftcli.doctor.order import SUSPECT, crossed_rests
+from vftcli.doctor.robust import solve, terms
+from vftcli.doctor.windows import spread, windows_of
+from vftcli.robots import Robot
+from vftcli.signals.recording import Recording
+
+EXPLAINED = 0.6
+"""Share of the misfit that a cause may leave."""
+TURNED = 0.5
+"""Share of one joint's misfit, or of two joints', that turning or exchanging them may leave."""
+AMBIGUOUS = 1.25
+"""A cause that explains less by a smaller factor is named beside the best."""
+SLIGHT = 0.75
+"""The same for an offset, which is a smaller thing than a turned sign."""
+TRAVEL = 0.05
+"""Travel from which a joint's friction and gravity tell its sign and its place. [rad]"""
+GOOD = 0.03
+"""Misfit below which nothing is left for a cause that costs much to look for."""
+OFFSET = 0.1
+"""Offset from which a joint's effort counts as shifted, relative to the effort."""
+FEW = 60
+"""Windows by which every pair of joints is tried: each pair needs the model anew."""
+
+
+class Cause(NamedTuple):
+    """What may be wrong with a log.
+
+    Attributes:
+        code: The finding it would be.
+        joints: The joints it is about, from zero.
+        case: The log with it put right.
+        vertical: The gravity that was fitted, where that is the cause.
+        offset: The constant that was fitted, where that is the cause. [N·m]
+        sd: Its standard deviation. [N·m]
+    """
+
+    code: str
+    joints: tuple[int, ...]
+    case: Case
+    vertical: Vertical | None = None
+    offset: float = 0.0
+    sd: float = 0.0
+
+    @property
+    def misfit(self) -> float:
+        """What stays unexplained once it is put right."""
+        return self.case.misfit
+
+
+class Diagnosis(NamedTuple):
+    """The cause that explains a log, and what was compared.
+
+    Attributes:
+        case: The log as its names say.
+        cause: What is wrong, None where nothing explains more.
+        rival: A second cause that explains nearly as much.
+    """
+
+    case: Case
+    cause: Cause | None
+    rival: Cause | None
+
+    @property
+    def healed(self) -> Case:
+        """The log with its cause put right."""
+        return self.case if self.cause is None else self.cause.case
+
+
+def diagnose(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> Diagnosis | None:
+    """Look for the one cause that explains a log by an arm; None without an effort to judge.
+
+    Args:
+        recording: The log.
+        robot: The arm.
+        ignored: Joints, from zero, whose effort is known to tell nothing.
+    """
+    windows = windows_of(recording, robot)
+    told = list(readings(recording, robot, windows, ignored))
+    if not told:
+        return None
+    case = told[0].case
+    found = [
+        *read_otherwise(told),
+        *turned_base(case),
+        *turned_or_swapped(case),
+    ]
+    found += offset_joint(case)
+    best = min((cause.misfit for cause in found), default=np.inf)
+    plain = any(is_plain(case, cause) for cause in found)
+    open_still = best > GOOD or (best > EXPLAINED * case.misfit and not plain)
+    if open_still and case.gravity_range >= RANGE:
+        found += exchanged_joints(case)
+    return chosen(case, found)
+
+
+def chosen(case: Case, found: list[Cause]) -> Diagnosis:
+    """The cause that leaves least, if it leaves little, and the next."""
+    found = sorted((c for c in found if is_accepted(case, c)), key=lambda cause: cause.misfit)
+    if not found:
+        return Diagnosis(case, None, None)
+    best = found[0]
+    if best.code == "joint-sign" and 2 * len(best.joints) > len(case.constant):
+        # Of most joints it is the sign of all: joints that rub or carry nothing do not show it.
+        all_turned = (c for c in found if c.code == "effort-sign")
+        best = next((c for c in all_turned if c.misfit < AMBIGUOUS * best.misfit), best)
+    near = (c for c in found if c.misfit < AMBIGUOUS * best.misfit and c.code != best.code)
+    return Diagnosis(case, best, next((c for c in near if not implied(best, c)), None))
+
+
+def implied(best: Cause, other: Cause) -> bool:
+    """Whether a cause says no more than another."""
+    return best.code == "effort-sign" and other.code == "joint-sign"
+
+
+def is_accepted(case: Case, cause: Cause) -> bool:
+    """Whether a cause leaves little enough to be told."""
+    limit = SLIGHT if cause.code == "effort-offset" else EXPLAINED
+    return cause.misfit < limit * case.misfit or is_plain(case, cause)
+
+
+def is_plain(case: Case, cause: Cause) -> bool:
+    """Whether a cause of single joints explains these joints, however little the rest changes."""
+    if cause.code not in {"joint-sign", "effort-order"} or cause.misfit > case.misfit:
+        return False
+    joints = list(cause.joints)
+    before, after = case.bare.by_joint[joints], cause.case.bare.by_joint[joints]
+    return bool(np.linalg.norm(after) < TURNED * np.linalg.norm(before))
+
+
+def offset_joint(case: Case) -> Iterator[Cause]:
+    """A constant on one joint's effort."""
+    if case.gravity_range < RANGE:
+        return
+    joints = np.arange(len(case.constant))
+    tried: set[int] = set()
+    for fit in (case.bare, case.loaded):
+        share = np.abs(np.mean(fit.rest[fit.kept], axis=0)) / case.effort_sizes
+        tried |= {int(j) for j in joints[share > OFFSET / 2]}
+    by = case.windows.load.beside(case.windows.friction)
+    for j in tried:
+        column = np.zeros((*case.given.shape, 1))
+        column[:, j] = 1.0
+        fit = solve(case.given - case.needed, terms(column).beside(by))
+        offset, sd = float(fit.values[0]), float(fit.sd[0])
+        if abs(offset) < max(OFFSET * case.effort_sizes[j], 4 * sd):
+            continue
+        if moves_both_ways(case, j) and case.lasts(fit, offset * column[:, :, 0]):
+            healed = case.with_effort(case.given - offset * column[:, :, 0])
+            yield Cause("effort-offset", (j,), healed, offset=offset, sd=sd)
+
+
+def moves_both_ways(case: Case, joint: int) -> bool:
+    """Whether a joint moves enough, to and fro, that its stiction is no offset."""
+    direction = case.windows.motion[0, :, joint]
+    forth, back = np.sum(direction > 0.8), np.sum(direction < -0.8)
+    return bool(min(forth, back) >= 8 and forth + back >= 30)
+
+
+def read_otherwise(readings: Sequence[Reading]) -> Iterator[Cause]:
+    """The effort taken for something else than its name says."""
+    told, *others = readings
+    if told.case.gravity_range < RANGE or not others:
+        return
+    others.sort(key=lambda reading: reading.case.misfit)
+    best = others[0]
+    second = min(told.case.misfit, *(other.case.misfit for other in others[1:]), np.inf)
+    if second > CLEAR * best.case.misfit:
+        yield Cause(best.code, (), best.case)
+
+
+def turned_base(case: Case) -> Iterator[Cause]:
+    """A base that is tilted or hangs."""
+    if case.gravity_range < RANGE:
+        return
+    vertical = vertical_of(case)
+    if vertical.angle > TILTED and 0.6 < vertical.length < 1.7:
+        code = "upside-down" if vertical.angle > np.pi - 2 * TILTED else "tilted-base"
+        change = case.windows.gravity @ (vertical.up - case.up)
+        if not case.lasts(vertical.solution, change):
+            return
+        yield Cause(code, (), replace(case, up=vertical.up / vertical.length), vertical)
+
+
+def turned_or_swapped(case: Case) -> Iterator[Cause]:
+    """Single joints whose effort is turned, and two whose efforts changed places."""
+    moving = np.ptp(case.windows.q, axis=(0, 1)) > TRAVEL
+    suspects = np.flatnonzero((case.by_joint > SUSPECT) & moving)
+    if not suspects.size:
+        return
+    rests = crossed_rests(case)
+    straight, turned = np.diagonal(rests[0]), np.diagonal(rests[1])
+    wrong = [int(j) for j in suspects if turned[j] < TURNED * straight[j]]
+    for joints in {tuple(wrong), *((j,) for j in wrong)} - {()}:
+        sign = np.ones(len(straight))
+        sign[list(joints)] = -1.0
+        yield Cause("joint-sign", joints, case.with_effort(case.given * sign))
+    for i, j in combinations(range(len(straight)), 2):
+        if not (moving[i] and moving[j] and (i in suspects or j in suspects)):
+            continue
+        before = np.hypot(straight[i], straight[j])
+        if np.hypot(rests[0, i, j], rests[0, j, i]) < 0.7 * before:
+            yield Cause("effort-order", (i, j), case.exchanged(i, j))
+
+
+def displaced(case: Case) -> list[int]:
+    """Joints that may be another's: their effort is far from what the model asks of them.
+
+    None unless gravity asks something of at least one of them.
+    """
+    far = case.by_joint > SUSPECT
+    gravity = np.sqrt(np.mean((case.windows.gravity @ case.up) ** 2, axis=0))
+    if not np.any(far & (gravity > 0.25 * case.effort_sizes)):
+        return []
+    return [int(j) for j in np.flatnonzero(far)]
+
+
+def exchanged_joints(case: Case) -> Iterator[Cause]:
+    """Two joints of which all signals changed places: the model is asked anew for each pair."""
+    few = spread(len(case.given), FEW)
+    for i, j in combinations(displaced(case), 2):
+        windows = case.windows.exchanged(i, j, FEW)
+        swapped = case.exchanged(i, j)
+        yield Cause(
+            "joint-order", (i, j), replace(swapped, windows=windows, given=swapped.given[few])
+        )

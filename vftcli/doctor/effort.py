@@ -1,0 +1,93 @@
+"""What is `effort`? The readings that an arm's model tells apart.
+
+Drivers publish motor currents, joint torques, or torques less gravity under one name, some with
+the sign turned. Each reading is judged by what the arm needs minus the reading, after friction,
+relative to the column as it was logged: relative to the reading a slow arm's currents would pass
+for torques without gravity.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.doctor.case import Case, size_of
+from vftcli.doctor.windows import Windows
+from vftcli.robots import Robot
+from vftcli.robots.drive import effort_name
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
+
+RANGE = 10.0
+"""Range of gravity's torque below which a log does not tell what its effort is. [N·m]
+
+Of real and simulated logs all 105 readings with 24 N·m and more were right, 3 of 10 below wrong.
+"""
+CLEAR = 1.5
+"""How much better another reading must explain a log than the second best."""
+
+
+class Reading(NamedTuple):
+    """What an effort may be.
+
+    Attributes:
+        code: The finding that it is this and not what its name says; "" for what the name says.
+        case: The log, its effort read so.
+    """
+
+    code: str
+    case: Case
+
+
+def case_of(recording: Recording, robot: Robot, windows: Windows) -> Case | None:
+    """The log with its effort as its name says, None without any."""
+    found = next(readings(recording, robot, windows), None)
+    return None if found is None else found.case
+
+
+def readings(
+    recording: Recording, robot: Robot, windows: Windows, ignored: Sequence[int] = ()
+) -> Iterator[Reading]:
+    """What an effort may be, what its name says first.
+
+    Args:
+        recording: The log.
+        robot: The arm.
+        windows: What the arm's model says of the log.
+        ignored: Joints, from zero, whose effort tells nothing: it is taken for what is needed.
+    """
+    name = effort_name(recording, robot)
+    value, constant = getattr(recording, name), robot.torque_constant
+    if value is None or (name == "current" and constant is None):
+        return
+    mean = windows.mean(value)
+    mean[:, list(ignored)] = 0.0
+    if not np.any(mean) or not np.all(np.isfinite(mean)):
+        return
+    gravity = windows.gravity[:, :, 2]
+    driven = mean.copy() if constant is None else mean * constant
+    as_torque, as_current = size_of(mean), size_of(driven)
+
+    def reading(code: str, given: Array, size: float) -> Reading:
+        columns = list(ignored)
+        given[:, columns] = windows.inertial[:, columns] + gravity[:, columns]
+        factor = constant if name == "current" and constant is not None else np.ones(mean.shape[1])
+        return Reading(code, Case(windows=windows, given=given, size=size, constant=factor))
+
+    if name == "current":
+        yield reading("", driven, as_current)
+        yield reading("current-as-torque", mean.copy(), as_torque)
+        yield reading("milliamperes", driven / 1e3, as_current / 1e3)
+        yield reading("effort-sign", -driven, as_current)
+        yield reading("torque-without-gravity", mean + gravity, as_torque)
+        yield reading("current-without-gravity", driven + gravity, as_current)
+        return
+    held = gravity if name == "torque_without_gravity" else 0.0
+    yield reading("", mean + held, as_torque)
+    yield reading("effort-sign", -mean + held, as_torque)
+    if name == "torque":
+        yield reading("torque-without-gravity", mean + gravity, as_torque)
+    else:
+        yield reading("torque-with-gravity", mean.copy(), as_torque)
+    if constant is not None:
+        yield reading("torque-as-current", driven, as_current)

@@ -1,0 +1,118 @@
+"""Least squares over windows that sets contact aside, with terms that cannot be negative.
+
+The normal equations of every window are made once; a round of trimming then only adds up those of
+the windows that are kept.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.signals.arrays import Array, Mask
+
+KEPT = 0.7
+"""Share of the windows that a fit is made from and judged by: the rest may be contact."""
+ROUNDS = 4
+"""Rounds of fitting and trimming; the kept windows no longer change by then."""
+OVERLAP = 2.0
+"""Windows that overlap by half count half."""
+
+
+class Terms(NamedTuple):
+    """What may explain a torque, column by column.
+
+    Attributes:
+        columns: Torque per unit of each coefficient. (W, n, k)
+        positive: Coefficients that only make sense above zero, as friction's do. (k,)
+        prior: Standard deviation that a coefficient has before any data; inf for none. (k,)
+    """
+
+    columns: Array
+    positive: Mask
+    prior: Array
+
+    def beside(self, other: "Terms") -> "Terms":
+        """These terms and others."""
+        return Terms(
+            np.concatenate([self.columns, other.columns], axis=2),
+            np.concatenate([self.positive, other.positive]),
+            np.concatenate([self.prior, other.prior]),
+        )
+
+
+def terms(columns: Array, *, positive: bool = False, prior: Array | None = None) -> Terms:
+    """Terms that are all alike."""
+    count = columns.shape[2]
+    sd = np.full(count, np.inf) if prior is None else prior
+    return Terms(columns, np.full(count, positive), sd)
+
+
+class RobustFit(NamedTuple):
+    """A fit.
+
+    Attributes:
+        values: Coefficients. (k,)
+        sd: Their standard deviations by the scatter of the kept windows. (k,)
+        rest: What they leave over, of all windows. (W, n) [N·m]
+        kept: Windows that the fit was made from. (W,)
+    """
+
+    values: Array
+    sd: Array
+    rest: Array
+    kept: Mask
+
+    @property
+    def size(self) -> float:
+        """Root mean square of what is left over in the kept windows. [N·m]"""
+        return float(np.sqrt(np.mean(self.rest[self.kept] ** 2)))
+
+    @property
+    def by_joint(self) -> Array:
+        """The same for each joint. (n,) [N·m]"""
+        size: Array = np.sqrt(np.mean(self.rest[self.kept] ** 2, axis=0))
+        return size
+
+
+def solve(target: Array, by: Terms, noise: float = 1.0) -> RobustFit:
+    """Fit a torque by some terms, the windows that fit worst left out.
+
+    Args:
+        target: The torque. (W, n) [N·m]
+        by: The terms.
+        noise: Scatter of a window's torque, by which priors weigh. [N·m]
+    """
+    columns = by.columns
+    gram = np.matmul(columns.swapaxes(1, 2), columns)
+    moment = np.matmul(columns.swapaxes(1, 2), target[:, :, None])[:, :, 0]
+    ridge = np.diag((noise / by.prior) ** 2)
+    used = np.abs(columns).max(axis=(0, 1), initial=0.0) > 1e-9
+    kept = np.ones(len(target), dtype=bool)
+    values, rest = np.zeros(columns.shape[2]), target
+    for _ in range(ROUNDS):
+        values = np.zeros(columns.shape[2])
+        inner = np.ix_(used, used)
+        matrix = (gram[kept].sum(axis=0) + ridge)[inner]
+        values[used] = solution_of(matrix, moment[kept].sum(axis=0)[used])
+        # Friction that would drive the arm is another error in disguise: it is left out.
+        wrong = by.positive & (values < 0)
+        used &= ~wrong
+        values[wrong] = 0.0
+        rest = target - columns @ values
+        left = np.einsum("wn,wn->w", rest, rest)
+        kept = left <= np.quantile(left, KEPT)
+    matrix = (gram[kept].sum(axis=0) + ridge)[np.ix_(used, used)]
+    sd = np.zeros(len(values))
+    variance = OVERLAP * float(np.mean(rest[kept] ** 2))
+    sd[used] = np.sqrt(np.abs(np.diag(np.linalg.pinv(matrix, hermitian=True))) * variance)
+    return RobustFit(values, sd, rest, kept)
+
+
+def solution_of(matrix: Array, moment: Array) -> Array:
+    """Solution of normal equations, directions that the data do not show left at zero. (k,)"""
+    if not len(moment):
+        return moment
+    # Scaled to a unit diagonal: kilograms and N·m s need not be alike in size.
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    inverse = np.linalg.pinv(matrix * np.outer(scale, scale), rcond=1e-10, hermitian=True)
+    return np.asarray(scale * (inverse @ (scale * moment)))
