@@ -138,7 +138,7 @@ def explained(
         yield fact("effort-unchecked", range_Nm=healed.gravity_range, least_Nm=RANGE)
         yield from declared_payload(recording, robot)
         return
-    if healed.misfit > NO_FIT and (diagnosis.cause is None or healed.misfit > 2 * NO_FIT):
+    if healed.misfit > NO_FIT and diagnosis.cause is None:
         yield warning(
             "no-robot-fits",
             robot=robot.name,
