@@ -72,7 +72,6 @@ class ParquetTable:
 
     def _first_length(self, column: int) -> int:
         """Length of the list in the first row of a column, 0 for an empty one."""
-        self._check_size({self._schema.names[column]})
         with guarded(self.path):
             batches = self._file.iter_batches(
                 batch_size=1, columns=[self._schema.names[column]], use_threads=False
@@ -93,24 +92,25 @@ class ParquetTable:
         # pyarrow would hand over both under one name.
         if any(names.count(names[c]) > 1 for c in columns):
             raise LogError(f"{self.path}: two columns have one name; rename one of them.")
-        self._check_size({names[c] for c in columns})
+        self._check_size(columns)
         with guarded(self.path):
             table = self._file.read(columns=[names[c] for c in columns], use_threads=False)
             if self._rows is not None:
                 table = table.take(self._rows)
             return {c: self._numbers(table.column(names[c]), c, clock) for c in columns}
 
-    def _check_size(self, wanted: set[str]) -> None:
-        """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
+    def _check_size(self, columns: Sequence[int]) -> None:
+        """Check that some columns may be unpacked: few bytes of a page may stand for a billion rows.
+
+        The rows are asked for, not the pages: on a damaged page's description pyarrow ends the
+        whole process.
 
         Raises:
             LogError: If they hold more numbers than a log of this size can.
         """
-        told, limit = self._file.metadata, max(UNPACKED_LIMIT, UNPACKED_RATIO * self._size)
-        groups = [told.row_group(k) for k in range(told.num_row_groups)]
-        pages = (group.column(k) for group in groups for k in range(group.num_columns))
-        counts = (p.num_values for p in pages if p.path_in_schema.split(".")[0] in wanted)
-        if 8 * max(sum(counts), told.num_rows * len(wanted)) > limit:
+        limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * self._size)
+        width = sum(self.lists.get(column, 1) for column in columns)
+        if 8 * width * self._file.metadata.num_rows > limit:
             raise LogError(
                 f"{self.path}: its columns unpack to more than {limit >> 20} MiB, more than a log "
                 "of this size can hold. It is damaged or made to fill memory."
