@@ -100,7 +100,7 @@ class ParquetTable:
             return {c: self._numbers(table.column(names[c]), c, clock) for c in columns}
 
     def _check_size(self, columns: Sequence[int]) -> None:
-        """Check that some columns may be unpacked: few bytes of a page may stand for a billion rows.
+        """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
 
         The rows are asked for, not the pages: on a damaged page's description pyarrow ends the
         whole process.
