@@ -131,16 +131,19 @@ class Trial:
         shutil.rmtree(self.folder / "out")
         shutil.copytree(self.folder / copy, self.folder / "out")
 
-    def after_moment(self, moment: float) -> Outcome:
-        """What a kill leaves `moment` seconds after the start."""
-        self.reset()
-        child = self.start(self.new_words)
-        try:
-            child.communicate(timeout=moment)
-        except subprocess.TimeoutExpired:
-            child.kill()
-            child.communicate()
-        return self.outcome(child.returncode)
+    def after_moment(self, share: float) -> Outcome:
+        """What a kill leaves after a share of the time that the command takes."""
+        while True:
+            self.reset()
+            child, begun = self.start(self.new_words), time.monotonic()
+            try:
+                child.communicate(timeout=share * self.length)
+            except subprocess.TimeoutExpired:
+                child.kill()
+                child.communicate()
+                return self.outcome(child.returncode)
+            # It was quicker than before and is over.
+            self.length = time.monotonic() - begun
 
     def after_changes(self, draw: random.Random, runs: int = 3) -> Iterator[Outcome]:
         """What a kill leaves before every change of a file's place; some of them run again."""
@@ -235,8 +238,8 @@ def main() -> None:
             trial = Trial(name, Path(folder) / name)
             # Half of them in the last quarter, where files come into their places.
             spans = [(0.0, 1.0), (0.75, 1.0)]
-            moments = [trial.length * draw.uniform(*spans[k % 2]) for k in range(asked.moments)]
-            outcomes = [trial.after_moment(moment) for moment in moments]
+            shares = [draw.uniform(*spans[k % 2]) for k in range(asked.moments)]
+            outcomes = [trial.after_moment(share) for share in shares]
             fine &= told(name, "at random", outcomes) if outcomes else True
             fine &= told(name, "at each change", list(trial.after_changes(draw)))
     sys.exit(not fine)

@@ -2,6 +2,7 @@ import json
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -262,6 +263,16 @@ def test_a_name_that_no_library_writes_is_refused(tmp_path: Path) -> None:
 def test_half_a_letter_in_a_name_does_not_stop_a_text(tmp_path: Path) -> None:
     write_text(tmp_path / "a.txt", "bad\udcff.csv")
     assert (tmp_path / "a.txt").read_text() == "bad\\udcff.csv"
+
+
+def test_runs_into_one_folder_at_once_do_not_mix(tmp_path: Path) -> None:
+    texts = [{name: f"{run}{name}" for name in "abcdef"} for run in range(8)]
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda text: sealed(tmp_path, text), texts))
+    found = {path.name: path.read_text() for path in tmp_path.iterdir()}
+    listed = json.loads(found.pop("run.json"))["files"]
+    assert found in texts
+    assert listed == {name: digest(tmp_path / name) for name in found}
 
 
 def test_a_kill_before_any_rename_leaves_no_two_runs_under_one_seal(
