@@ -126,6 +126,21 @@ def test_existing_files_are_kept_unless_forced(ur5: Simulation, tmp_path: Path) 
     assert sorted(p.name for p in tmp_path.iterdir() if p.name.startswith(".")) == []
 
 
+def test_a_bag_that_a_killed_run_left_is_made_anew(ur5: Simulation, tmp_path: Path) -> None:
+    """Its folder is there, with no metadata or nothing in it; another folder is left alone."""
+    bag = tmp_path / "bag"
+    save({bag: ur5}, "rosbag2")
+    whole = sorted(path.name for path in bag.iterdir())
+    for gone in ("metadata.yaml", "*"):
+        for path in bag.glob(gone):
+            path.unlink()
+        save({bag: ur5}, "rosbag2", force=True)
+        assert sorted(path.name for path in bag.iterdir()) == whole
+    (bag / "mine.txt").write_text("mine")
+    with pytest.raises(OutputError, match="no bag"):
+        save({bag: ur5}, "rosbag2", force=True)
+
+
 def test_a_robot_logs_only_in_its_own_formats(
     ur5: Simulation, panda: Simulation, tmp_path: Path
 ) -> None:

@@ -38,19 +38,20 @@ def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
     for path in paths:
         if not path.name:
             raise OutputError(f"{path} is a folder; give the name of a log file with -o")
-        if path.is_dir() and not (path / "metadata.yaml").is_file():
+        # A bag is a folder: the files of the one that is there go when the new ones come.
+        inside = [file for file in path.rglob("*") if not file.is_dir()] if path.is_dir() else []
+        # A killed run may have left it without its metadata, or empty.
+        if any(file.suffix not in {".mcap", ".db3", ".yaml"} for file in inside):
             raise OutputError(f"{path} is a folder and no bag; give another -o")
         if not path.parent.is_dir():
             raise OutputError(
                 f"{path.parent}: there is no such folder; make it, or give another -o"
             )
-        # A bag is a folder: the files of the one that is there go when the new ones come.
-        inside = [file for file in path.rglob("*") if not file.is_dir()] if path.is_dir() else []
         if inside and not force:
             raise OutputError(f"{path} exists; give another -o, or --force to overwrite it")
         names += [
             file.relative_to(path.parent).as_posix()
-            for file in (*(inside or [path]), *companions(path))
+            for file in (*(inside if path.is_dir() else [path]), *companions(path))
         ]
     folder = OutputFolder(path.parent, force, names)
     folder.check()
