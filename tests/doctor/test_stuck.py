@@ -169,6 +169,19 @@ def test_the_top_of_a_smooth_effort_of_coarse_resolution_is_not_clipped(step: fl
     assert clipped(np.clip(smooth, -0.8, 0.8))
 
 
+def test_an_effort_that_came_to_stand_at_its_extreme_is_stuck_and_not_saturated() -> None:
+    """From its largest value on to the end, a quarter of the log; twice there it is clipped."""
+    torque = 20 * np.cos(Q[:, :1]) + np.random.default_rng(0).normal(0, 0.1, (4001, 1))
+    once = torque.copy()
+    once[3000:] = 25.0
+    log = Recording(t=T, q=Q[:, :1], dq=DQ[:, :1], torque=once)
+    assert [f.code for f in stuck_findings(log)] == ["stuck-effort"]
+    twice = once.copy()
+    twice[2000:2100] = 25.0
+    log = Recording(t=T, q=Q[:, :1], dq=DQ[:, :1], torque=twice)
+    assert [f.code for f in stuck_findings(log)] == ["saturation"]
+
+
 def test_at_a_kilohertz_ten_samples_are_no_time() -> None:
     """A tenth of a second at the extreme is: 99 samples are not, 101 are."""
     t = 1e-3 * np.arange(4000)

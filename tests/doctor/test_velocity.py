@@ -284,3 +284,17 @@ def test_filtered_velocities_are_no_other_joint_s() -> None:
     assert set(found(q=q, dq=lfilter([1 - keep], [1, -keep], dq, axis=0, zi=start)[0])) == {
         "velocity-filtered"
     }
+
+
+def test_one_hard_stop_tells_no_lag() -> None:
+    """3 s at one speed, then at rest: stamps that are 30 ms off at the stop would be a lag."""
+    t = STEP * np.arange(400)
+    speed = np.where(t < 3, 0.5, 0.0)
+    way = np.cumsum(speed) * STEP
+    logged = np.where(t < 3.03, 0.5, 0.0)
+    assert "velocity-lag" not in found(t=t, q=way[:, None], dq=logged[:, None])
+
+
+def test_a_motion_in_two_windows_only_is_not_judged() -> None:
+    q = 0.2 * np.clip(T[:1000] - 5.0, 0, 0.3)[:, None]
+    assert velocity_fit(Recording(t=T[:1000], q=q, dq=2 * np.gradient(q, STEP, axis=0))) is None

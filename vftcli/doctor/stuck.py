@@ -39,6 +39,8 @@ SOME = 2000
 """Samples that tell most of what a column is like."""
 STILL = 1e-3
 """Travel below which a joint stands. [rad]"""
+ONCE = 0.2
+"""Share of a log that no effort stays at its limit in one go."""
 CLIPPED = 0.1
 """Time at the very extreme from which an effort is clipped. [s]"""
 
@@ -201,8 +203,14 @@ def resolution(position: Array) -> float:
 
 
 def is_extreme(value: Array, stretch: Stretch) -> bool:
-    """Whether a stretch is at the extreme of an effort that varies: that is saturation."""
+    """Whether a stretch is at the extreme of an effort that varies: that is saturation.
+
+    One that is long and the only time at its value is none: the effort came to stand there.
+    """
     at, low, high = value[stretch.first], value.min(), value.max()
+    alone = np.count_nonzero(value == at) == stretch.last + 1 - stretch.first
+    if alone and stretch.last - stretch.first > ONCE * len(value):
+        return False
     return bool(low < high and at in (low, high) and abs(at) >= 0.5 * (high - low))
 
 
@@ -258,7 +266,8 @@ def saturated_effort(recording: Recording) -> Iterator[Remark]:
     for name in ("current", "torque"):
         if (value := getattr(recording, name)) is not None:
             columns = zip(value.T, recording.q.T, strict=True)
-            joints = [j for j, (x, q) in enumerate(columns) if is_clipped(x, q, least)]
+            clipped = {j for j, (x, q) in enumerate(columns) if is_clipped(x, q, least)}
+            joints = sorted(clipped - set(stuck_joints(recording, name))) if clipped else []
             if joints:
                 yield warning("saturation", on_joints(joints), signal=name)
 

@@ -29,6 +29,8 @@ steps of a window then."""
 WINDOWS, WANTED, LEAST = 600, 12, 8
 """Windows that are looked at, at most: spread evenly, they tell as much as all; how many a short
 log is cut into, and how many tell anything."""
+SPREAD, TURNS = 5.0, 3.0
+"""Windows that a joint's motion has to be spread over, and its turns: one or two tell no error."""
 TRAVEL = 0.05
 """Travel from which a joint's own data tell anything. [rad]"""
 TELLING = 0.1
@@ -105,39 +107,67 @@ def velocity_fit(recording: Recording) -> VelocityFit | None:
     by_position, by_velocity = windows.by_position, windows.by_velocity
     n = recording.joints
     moved = travel_of(recording) >= TRAVEL
-    moved &= np.any(by_position != 0, axis=0)
+    moved &= spread_of(by_position) >= SPREAD
     if len(by_position) < LEAST or not moved.any():
         return None
     alone = {name: np.full(n, np.nan) for name in VelocityFit._fields[:-2]}
     factor, share = crossed(by_velocity, by_position)
     fit = VelocityFit(**alone, factor=factor, share=share)
     for j in np.flatnonzero(moved):
-        v, logged, w = by_position[:, j], by_velocity[:, j], windows.slope[:, j]
-        size = float(v @ v)
-
-        def without(x: Array, v: Array = v, size: float = size) -> Array:
-            return np.asarray(x - v * float(v @ x) / size)
-
-        rest, turn = without(logged), without(w)
-        # Noise of the positions would hide a lag; that of the logged velocities is another one.
-        tool = without(windows.logged_slope[:, j])
-        if float(tool @ turn) ** 2 < TELLING * float(tool @ tool) * float(turn @ turn):
-            tool = turn
-        common = float(tool @ turn)
-        delay = float(tool @ rest) / common if common != 0 else 0.0
-        gain = float(v @ (logged - delay * w)) / size
-        left = logged - gain * v - delay * w
-        noise = float(left @ left) / (len(v) - 2)
-        # What v and v̇ have in common, in a short log, both may explain.
-        apart = float(turn @ turn) / (float(w @ w) or 1.0)
-        fit.gain[j], fit.gain_error[j] = gain, np.sqrt(noise / size / max(apart, 1e-6))
-        error = np.sqrt(noise * float(tool @ tool)) / abs(common) if common != 0 else 0.0
-        fit.lag[j], fit.lag_error[j] = (delay / gain, error / abs(gain)) if gain else (0.0, 0.0)
-        total = float(logged @ logged)
-        fit.open[j] = float(left @ left) / total if total > 0 else 1.0
-        fit.amplitude[j] = np.sqrt(total / size)
-        fit.rate[j] = np.sqrt(abs(float(windows.logged_slope[:, j] @ w)) / abs(gain or 1) / size)
+        columns = (part[:, j] for part in windows)
+        for of, value in zip(fit, joint_fit(*columns), strict=False):
+            of[j] = value
     return fit
+
+
+def joint_fit(v: Array, logged: Array, w: Array, logged_w: Array) -> tuple[float, ...]:
+    """Gain and lag of one joint, their errors and what else `VelocityFit` holds of each joint.
+
+    Args:
+        v: The derivative of the position. (W,) [rad/s]
+        logged: The logged velocity. (W,) [rad/s]
+        w: −v̇ by the position. (W,) [rad/s²]
+        logged_w: −q̈ by the logged velocity. (W,) [rad/s²]
+    """
+    size = float(v @ v)
+
+    def without(x: Array) -> Array:
+        return np.asarray(x - v * float(v @ x) / size)
+
+    rest, turn, tool = without(logged), without(w), without(logged_w)
+    # Noise of the positions would hide a lag; that of the logged velocities is another one.
+    if float(tool @ turn) ** 2 < TELLING * float(tool @ tool) * float(turn @ turn):
+        tool = turn
+    common = float(tool @ turn)
+    delay = float(tool @ rest) / common if common != 0 else 0.0
+    gain = float(v @ (logged - delay * w)) / size
+    left = logged - gain * v - delay * w
+
+    def error(x: Array) -> float:
+        """Standard error of x·left, where the fast windows may be the worse ones as well."""
+        alike = float(left @ left) * float(x @ x) / (len(v) - 2)
+        return float(np.sqrt(max(alike, float((x * left) @ (x * left)))))
+
+    # What v and v̇ have in common, in a short log, both may explain.
+    apart = max(float(turn @ turn) / (float(w @ w) or 1.0), 1e-6)
+    total = float(logged @ logged)
+    return (
+        gain,
+        delay / gain if gain else 0.0,
+        error(v) / size / apart**0.5,
+        # One hard stop tells no lag, however little it leaves open.
+        error(tool) / abs(common * gain) if common * gain and spread_of(turn) > TURNS else np.inf,
+        float(left @ left) / total if total > 0 else 1.0,
+        (total / size) ** 0.5,
+        (abs(float(logged_w @ w)) / abs(gain or 1) / size) ** 0.5,
+    )
+
+
+def spread_of(v: Array) -> Array:
+    """Over how many windows a motion is spread, (Σv²)²/Σv⁴, column by column."""
+    fourth = np.sum(v**4, axis=0)
+    square = np.sum(v**2, axis=0) ** 2
+    return np.asarray(np.divide(square, fourth, out=np.zeros_like(square), where=fourth > 0))
 
 
 class WeighedWindows(NamedTuple):
