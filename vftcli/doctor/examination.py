@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from vftcli.doctor.arm import arm_findings
 from vftcli.doctor.clock import clock_findings
 from vftcli.doctor.fit import RobotMatch, profiles
-from vftcli.doctor.lateness import MISTIMED, effort_lag
+from vftcli.doctor.lateness import LAGLESS, effort_lag
 from vftcli.doctor.load import controller_findings
 from vftcli.doctor.signals import signal_findings, unusable_findings
 from vftcli.doctor.velocity import velocity_fit
@@ -79,7 +79,7 @@ def examine(recording: Recording, robot: Robot | None = None) -> Examination:
         by_signal = tuple(f for f in by_signal if f.code != "milliamperes")
     findings = [*by_signal, *controller_findings(recording, best), *by_arm]
     said = {finding.code for finding in findings}
-    if best is not None and not (MISTIMED | REFUSING) & said:
+    if best is not None and not (LAGLESS | REFUSING) & said:
         findings += effort_lag(recording, best)
     findings.sort(key=lambda finding: finding.level != "warning")
     return Examination(recording=recording, findings=tuple(findings), robots=fits)

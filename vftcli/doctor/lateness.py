@@ -48,10 +48,11 @@ AGREE, ENOUGH, NEAR = 0.65, 3, 0.35
 """Share and number of the joints whose own best lag is nearer to it than this share of it."""
 MISTIMED = frozenset(
     {"time-unit", "clock-rate", "velocity-unit", "velocity-sign", "velocity-mismatch"}
-    | {"velocity-order", "velocity-lag", "velocity-filtered", "velocity-held"}
-    | {"stuck-position", "stuck-velocity", "stuck-effort"}
+    | {"velocity-order", "velocity-lag", "velocity-filtered", "velocity-held", "stuck-velocity"}
 )
-"""Findings with which no effort can be late: it is the motion that is another one."""
+"""Findings that the logged velocity is another motion's."""
+LAGLESS = MISTIMED | {"stuck-position", "stuck-effort"}
+"""Findings with which no effort can be called late."""
 
 
 def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
