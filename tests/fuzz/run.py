@@ -197,7 +197,8 @@ def failure(status: int, made: Attempt, folder: Path, said: str) -> tuple[str, s
         return "left behind", f"{left} after: {said}"
     if status == 2:
         return ("usage", said) if made.family == "options" else ("exit code 2", said)
-    lines = [line for line in said.splitlines() if line.strip()]
+    # The health of a log that was read stands before what cannot be done with it.
+    lines = [line for line in said.splitlines() if line.strip() and "log health: " not in line]
     if len(lines) != 1 or not lines[0].startswith("error: "):
         return "several lines", said
     return "refused", said

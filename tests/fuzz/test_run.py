@@ -48,6 +48,7 @@ def attempt(*words: str, family: str = "table", rows: int | None = None) -> Atte
     ("status", "made", "files", "kind"),
     [
         (1, attempt("inspect"), {"stderr": "error: no log"}, "refused"),
+        (1, attempt("estimate"), {"stderr": "log health: sound\nerror: no current"}, "refused"),
         (0, attempt("estimate"), {}, "read"),
         (0, attempt("inspect", "--json", rows=9), {"stdout": '{"samples": 9}'}, "read"),
         (0, attempt("inspect", "--json", rows=9), {"stdout": '{"samples": 8}'}, "rows lost"),
