@@ -67,6 +67,9 @@ Seeds = dict[str, list[Seed]]
 BATCH = 40
 """Inputs that one child tries: a fork costs as much as refusing a file."""
 
+OF_HEALTH = re.compile(r"(\S.*: )?log health: |MEANINGLESS ")
+"""How the lines begin that say what the examination of a log found."""
+
 ENDED_BY_LIMIT = (signal.SIGXCPU, signal.SIGALRM, signal.SIGKILL)
 
 
@@ -198,7 +201,7 @@ def failure(status: int, made: Attempt, folder: Path, said: str) -> tuple[str, s
     if status == 2:
         return ("usage", said) if made.family == "options" else ("exit code 2", said)
     # The health of a log that was read stands before what cannot be done with it.
-    lines = [line for line in said.splitlines() if line.strip() and "log health: " not in line]
+    lines = [line for line in said.splitlines() if line.strip() and not OF_HEALTH.match(line)]
     if len(lines) != 1 or not lines[0].startswith("error: "):
         return "several lines", said
     return "refused", said
