@@ -27,6 +27,11 @@ TURNED = 0.5
 """Share of one joint's misfit, or of two joints', that turning or exchanging them may leave."""
 AMBIGUOUS = 1.25
 """A cause that explains less by a smaller factor is named beside the best."""
+READ_RIGHT, UPRIGHT = 0.2, 0.05
+"""Misfits below which an effort is what its name says, and a base as the robot file says.
+
+Read as something else it leaves 50 % and more; a tilt of 10° leaves 8 %.
+"""
 OPEN = 0.45
 """Misfit that no cause may leave: 37 % are left of an effort without gravity where a hand is."""
 SLIGHT = 0.75
@@ -180,7 +185,7 @@ def moves_both_ways(case: Case, joint: int) -> bool:
 def read_otherwise(readings: Sequence[Reading]) -> Iterator[Cause]:
     """The effort taken for something else than its name says."""
     told, *others = readings
-    if told.case.gravity_range < RANGE or not others:
+    if told.case.gravity_range < RANGE or not others or told.case.misfit < READ_RIGHT:
         return
     others.sort(key=lambda reading: reading.case.misfit)
     best = others[0]
@@ -191,7 +196,7 @@ def read_otherwise(readings: Sequence[Reading]) -> Iterator[Cause]:
 
 def turned_base(case: Case) -> Iterator[Cause]:
     """A base that is tilted or hangs."""
-    if case.gravity_range < RANGE:
+    if case.gravity_range < RANGE or case.misfit < UPRIGHT:
         return
     vertical = vertical_of(case)
     if vertical.angle > TILTED and 0.6 < vertical.length < 1.7:
