@@ -185,7 +185,9 @@ def moves_both_ways(case: Case, joint: int) -> bool:
 def read_otherwise(readings: Sequence[Reading]) -> Iterator[Cause]:
     """The effort taken for something else than its name says."""
     told, *others = readings
-    if told.case.gravity_range < RANGE or not others or told.case.misfit < READ_RIGHT:
+    case = told.case
+    # Gravity that is counted twice may look like a load, so none is taken off here.
+    if case.gravity_range < RANGE or not others or case.bare.size < READ_RIGHT * case.size:
         return
     others.sort(key=lambda reading: reading.case.misfit)
     best = others[0]
