@@ -82,7 +82,9 @@ def readings(
         yield reading("torque-without-gravity", mean + gravity, as_torque)
         yield reading("current-without-gravity", driven + gravity, as_current)
         return
-    held = gravity if name == "torque_without_gravity" else 0.0
+    held = gravity if name == "torque_without_gravity" else 0.0 * gravity
+    # What is left over is told relative to the whole torque, of which gravity is the most.
+    as_torque = max(as_torque, float(np.sqrt(np.mean((mean + held) ** 2))))
     yield reading("", mean + held, as_torque)
     yield reading("effort-sign", -mean + held, as_torque)
     if name == "torque":

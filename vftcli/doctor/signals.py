@@ -8,7 +8,7 @@ from vftcli.doctor.findings import on_joints
 from vftcli.doctor.stuck import stuck_findings
 from vftcli.doctor.velocity import VelocityFit, velocity_findings
 from vftcli.signals.arrays import Array
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, warning
 
 MOVING = 1e-3
@@ -58,7 +58,7 @@ def signal_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[R
     """
     if recording.dq is None:
         yield warning("no-velocity")
-    if recording.current is None and recording.torque is None:
+    if all(getattr(recording, name) is None for name in EFFORTS):
         yield warning("no-effort")
     yield from odd_units(recording)
     yield from velocity_findings(recording, fit)
