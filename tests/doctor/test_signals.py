@@ -60,6 +60,7 @@ def effort_of_share(share: float, *joints: int) -> Array:
 def test_a_sound_log_has_no_finding() -> None:
     assert found() == {}
     assert found(torque=None, current=FRICTION) == {}
+    assert found(torque=None, torque_without_gravity=FRICTION) == {}
 
 
 def test_a_log_without_velocity_or_effort() -> None:

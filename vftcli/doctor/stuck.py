@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vftcli.doctor.findings import on_joints
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, fact, warning
 
 LONG = 0.5
@@ -150,7 +150,7 @@ def long_repeats(recording: Recording, name: str) -> Iterator[Stretch]:
     """Stretches in which one joint's signal repeats itself for long while its others do not."""
     t, value = recording.t, getattr(recording, name)
     same = value[1:] == value[:-1]
-    others = [n for n in ("q", "dq", "current", "torque") if n != name]
+    others = [n for n in ("q", "dq", *EFFORTS) if n != name]
     for j in range(value.shape[1]):
         first, last = edges_of(same[:, j])
         long = (t[last] - t[first] >= LONG) & (last - first >= MANY)
@@ -216,7 +216,7 @@ def is_extreme(value: Array, stretch: Stretch) -> bool:
 
 def zero_signals(recording: Recording) -> Iterator[Remark]:
     """Signals that are zero in every sample, so were not measured."""
-    for name in ("current", "torque"):
+    for name in EFFORTS:
         if (value := getattr(recording, name)) is not None:
             zero = zero_columns(value)
             # Without noise a joint that never moves may need no torque at all.
@@ -263,7 +263,7 @@ def saturated_effort(recording: Recording) -> Iterator[Remark]:
     if recording.samples < 3:
         return
     least = max(10, round(CLIPPED / recording.median_step))
-    for name in ("current", "torque"):
+    for name in EFFORTS:
         if (value := getattr(recording, name)) is not None:
             columns = zip(value.T, recording.q.T, strict=True)
             clipped = {j for j, (x, q) in enumerate(columns) if is_clipped(x, q, least)}
