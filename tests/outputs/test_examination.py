@@ -78,9 +78,11 @@ def test_the_page_shows_warnings_open_and_escapes_names(sound: bool) -> None:
     note = fact("short", duration_s=1.0)
     made = examination(*([] if sound else [WRONG]), note)
     made = replace(made, recording=replace(LOG, source=Source(label="<b>.csv")))
-    page = health([made])
+    page = health([made, made])
     assert "<b>.csv" not in page
     assert "&lt;b&gt;.csv" in page
-    assert ("<details>" in page) == sound
+    warnings_shown, notes = page.split("<details>", 1)
+    assert ("milliamperes" in warnings_shown) == (not sound)
+    assert "<strong>short</strong>" in notes
     assert ("MEANINGLESS" in page) == (not sound)
     assert health([]) == ""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from vftcli.doctor import Examination, in_words
-from vftcli.outputs.examination import health_line, overridden_lines, warnings_of
+from vftcli.outputs.examination import warnings_of
 from vftcli.signals.remarks import Remark, explanation
 
 HERE = Path(__file__).parent
@@ -96,29 +96,43 @@ def remarks(lines: Sequence[Remark]) -> str:
 def health(examinations: Sequence[Examination], *, fitting: bool = True) -> str:
     """What is wrong with the logs: evidence, consequence and remedy of every finding.
 
-    Where there are warnings they stand open, above everything that they may make wrong.
+    Warnings stand open, above everything that they may make wrong; what only informs is folded.
     """
     if not examinations:
         return ""
-    alarms = "".join(
-        f'<p class="alarm">{escape(x)}</p>' for x in overridden_lines(examinations, fitting=fitting)
+    several = len(examinations) > 1
+    parts = [log_health(one, named=several, fitting=fitting) for one in examinations]
+    kind = "remarks" if any(map(warnings_of, examinations)) else "soft"
+    return f'<section class="{kind}" id="health"><h2>Log health</h2>{"".join(parts)}</section>'
+
+
+def log_health(examination: Examination, *, named: bool, fitting: bool) -> str:
+    """One log's warnings, each with what it does and what to do, and its notes folded."""
+    warnings = warnings_of(examination)
+    count = f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}" if warnings else "sound"
+    head = f"{examination.recording.name}: {count}" if named else count
+    refused = {finding.code for finding in examination.refusals(fitting=fitting)}
+    alarm = (
+        '<p class="alarm">MEANINGLESS unless the finding is wrong: these results were made with '
+        f"--anyway in spite of {escape(', '.join(sorted(refused)))}.</p>"
+        if refused
+        else ""
     )
-    lines = "".join(f"<li>{escape(health_line(one, named=True))}</li>" for one in examinations)
-    parts = []
-    for one in examinations:
-        found = [*warnings_of(one), *(f for f in one.findings if f.level != "warning")]
-        for said in map(in_words, found):
-            sentences = (said.evidence, said.consequence, said.remedy)
-            steps = "".join(f"<dd>{escape(x)}.</dd>" for x in sentences if x)
-            parts.append(f"<dt>{escape(f'{said.severity}: {said.name}')}</dt>{steps}")
-    sound = not any(map(warnings_of, examinations))
-    table = f'<dl class="pairs">{"".join(parts)}</dl>'
-    told = folded("All findings", table) if sound and parts else table
-    kind = "soft" if sound else "remarks"
+    notes = [finding for finding in examination.findings if finding.level != "warning"]
     return (
-        f'<section class="{kind}" id="health"><h2>Log health</h2>{alarms}'
-        f'<ul class="plain">{lines}</ul>{told}</section>'
+        f'<p class="verdict">{escape(head)}</p>{alarm}{"".join(map(finding_block, warnings))}'
+        + folded(f"{len(notes)} more noted", "".join(map(finding_block, notes)))
     )
+
+
+def finding_block(finding: Remark) -> str:
+    """A finding: its name and evidence, then what it does and what to do about it."""
+    said = in_words(finding)
+    rest = "".join(f" {escape(x)}." for x in (said.consequence,) if x)
+    remedy = f" <strong>What to do:</strong> {escape(said.remedy)}." if said.remedy else ""
+    then = f'<p class="then">{rest}{remedy}</p>' if rest or remedy else ""
+    evidence = f"<strong>{escape(said.name)}</strong>: {escape(said.evidence)}."
+    return f'<div class="finding"><p>{evidence}</p>{then}</div>'
 
 
 def soft(text: str) -> str:
