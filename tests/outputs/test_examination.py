@@ -68,7 +68,7 @@ def test_only_what_refuses_heads_an_output() -> None:
 
 
 def test_another_arm_does_not_head_what_identify_makes() -> None:
-    other = warning("no-robot-fits", ranked="ur5 50 %")
+    other = warning("no-robot-fits", robot="ur10e", misfit_percent=50.0, ranked="ur5 50 %")
     assert health_record([examination(other)])[0]["overridden"] == ["no-robot-fits"]
     assert health_record([examination(other)], fitting=False)[0]["overridden"] == []
 
