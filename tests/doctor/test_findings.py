@@ -236,7 +236,7 @@ def test_ur3_effort_is_inverted(logs: Path, name: str) -> None:
     examination = examine(read(logs / "ur3" / f"{name}.bag"))
     finding = next(f for f in told(examination) if f.name == "effort-sign")
     assert "J1, J2, J3, J4, J5, J6" in finding.evidence
-    assert "-tau=effort" in finding.remedy
+    assert "--columns -tau" in finding.remedy
     turned = examine(read(logs / "ur3" / f"{name}.bag", columns="-tau=effort"))
     assert "effort-sign" not in names(turned)
 
