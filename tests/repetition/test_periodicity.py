@@ -125,3 +125,11 @@ def test_positions_alone_tell_where_the_arm_rests(repeated: Make) -> None:
     # A joint counts as standing from 0.1 s before its rest to 0.1 s after it.
     assert (t[0], t[-1]) == (pytest.approx(1.1, abs=0.03), pytest.approx(15.7, abs=0.03))
     np.testing.assert_array_equal(q, moving_part(log)[1])
+
+
+def test_a_log_that_is_nearly_all_gap_is_refused(repeated: Make) -> None:
+    """A jump of the clock by 10⁶ s: an even series over it would hold 10⁸ samples."""
+    log = repeated()
+    late = np.arange(log.samples) > log.samples // 2
+    with pytest.raises(ReferenceTorqueError, match=r"is a gap, .* leave the gap out"):
+        find_period(replace(log, t=log.t + 1e6 * late))

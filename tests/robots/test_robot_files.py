@@ -254,6 +254,7 @@ def test_a_urdf_that_is_no_serial_revolute_arm_is_refused(
         ('"0.1 0.2 0.05"', '"0.1 0.2"', "link 'one': origin xyz is .* it must be 3 numbers"),
         ('"0.2 0.1 0"', '"0 90 0"', "joint 'a': origin rpy is 90 rad; on a robot it lies"),
         ('axis xyz="1 2 -0.5"', 'axis xyz="0 0 0"', "joint 'a': axis is '0 0 0'"),
+        ('axis xyz="1 2 -0.5"', 'axis xyz="1e154 2 0"', "joint 'a': axis is '1e154 2 0'; it must"),
         ('axis xyz="1 2 -0.5"', 'axis xyz="z"', "joint 'a': axis xyz is 'z'; it must be 3"),
         ('lower="-1"', 'lower="-1rad"', "joint 'b': limit lower is '-1rad'"),
         ('<joint name="b"', '<joint name="a"', "not a URDF that Pinocchio can read: .*unique"),

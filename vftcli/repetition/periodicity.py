@@ -33,6 +33,10 @@ AROUND = 0.03
 """How far from a stated period the true one is looked for, relative: clocks drift."""
 
 
+SPARSE = 10.0
+"""Spans this many times what the samples fill at their usual step are gaps, not motion."""
+
+
 class Period(NamedTuple):
     """A motion's period.
 
@@ -63,6 +67,11 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     t, q = moving_part(recording)
     check_stated(recording, stated, float(t[-1] - t[0]))
     step = recording.median_step
+    if float(t[-1] - t[0]) > SPARSE * step * len(t):
+        raise ReferenceTorqueError(
+            f"{recording.name}: {len(t)} samples over {t[-1] - t[0]:.4g} s: nearly all of that is "
+            "a gap, in which no repetition can be looked for; leave the gap out with --interval"
+        )
     x = resample_columns(np.arange(t[0], t[-1], step), t, q)
     spread = float(np.sqrt(np.mean((x - x.mean(axis=0)) ** 2) * x.shape[1]))
     closest = (float("nan"), float("inf"))

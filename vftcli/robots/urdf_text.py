@@ -78,8 +78,8 @@ class UrdfPart:
         if self.element.get("type") not in MOVING:
             return
         for axis in self.element.iterfind("axis"):
-            # An axis is normalised; this short, its direction is rounding.
-            if not any(abs(value) > 1e-9 for value in self.numbers(axis, "xyz", 3)):
+            # An axis is normalised: shorter, it is rounding, longer, its square overflows.
+            if not 1e-9 < max(map(abs, self.numbers(axis, "xyz", 3))) < 1e9:
                 self.refuse(f"axis is {axis.get('xyz')!r}; it must point somewhere")
 
     def check_origin(self, parent: ET.Element) -> None:
