@@ -148,7 +148,6 @@ def test_an_output_that_is_a_file_is_one_line(tmp_path: Path, run: Run) -> None:
     ("words", "expected"),
     [
         (("--robot", "ur9"), "Did you mean"),
-        ((), "choose one with --robot: ur5, ur5e, ur10e"),
         (("--robot", "ur5", "--observer", "kalman"), "there is fdo, gmo"),
         (("--robot", "ur5", "--set", "gmo.gain=-3"), "must be positive"),
         (("--robot", "ur5", "--set", "gmo.gain=1,2"), "one for each of 6"),

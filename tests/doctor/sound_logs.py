@@ -67,12 +67,10 @@ LOGS: tuple[SoundLog, ...] = (
     SoundLog("ur10_link4/link4.csv.gz", "t,q:6,dq:6,current:6,_:6", "ur10e"),
     SoundLog("fr3/run_a.npy", FR3, "fr3", ("gaps",)),
     SoundLog("fr3/run_b.npy", FR3, "fr3"),
-    SoundLog("panda_exciting", None, "panda", ("repeated-stamps",)),
+    SoundLog("panda_exciting", None, "panda"),
     # 29 Hz, a tool that the controller does not know, and in one the wrench is not computed.
-    SoundLog(
-        "franka_bags/calib_0108.bag", None, "fr3", ("slow-rate", "zero-wrench", "unmodelled-load")
-    ),
-    SoundLog("franka_bags/calib_0308.bag", None, "fr3", ("slow-rate", "unmodelled-load")),
+    SoundLog("franka_bags/calib_0108.bag", None, "fr3", ("slow-rate", "zero-wrench")),
+    SoundLog("franka_bags/calib_0308.bag", None, "fr3", ("slow-rate",)),
     *(
         SoundLog(f"ur3/{name}.bag", "-tau=effort", robot, known)
         for name in ("identification", "repeat_a", "repeat_b")
@@ -90,7 +88,7 @@ LOGS: tuple[SoundLog, ...] = (
     SoundLog("rtde/blank_lines.csv", None, "", ("no-robot-fits",)),  # ten samples at rest
     SoundLog("mujoco_ur5e/circle.csv", None, "mujoco_ur5e/robot.toml"),
     SoundLog("libfranka_sim/pushes.csv.gz", None, "libfranka_sim/robot.toml"),
-    SoundLog("libfranka_sim/pushes.csv.gz", None, "fr3", ("unmodelled-load",)),
+    SoundLog("libfranka_sim/pushes.csv.gz", None, "fr3", ("light-load",)),
     *(
         SoundLog(f"bullet_ur5/{name}.csv.gz", BULLET, "ur5")
         for name in ("free_5", "free_6", "free_7", "pushed_7_const", "pushed_7_vary")

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.doctor.diagnosis import AMBIGUOUS, Cause, Diagnosis, diagnose
-from vftcli.doctor.effort import RANGE
+from vftcli.doctor.effort import RANGE, case_of
 from vftcli.doctor.findings import on_joints
 from vftcli.doctor.fit import (
     APART,
@@ -25,7 +25,7 @@ from vftcli.doctor.lateness import MISTIMED
 from vftcli.doctor.load import declared_payload, load_remarks
 from vftcli.doctor.signals import inverted_effort
 from vftcli.doctor.vendor import vendor_sign
-from vftcli.doctor.windows import up_axes
+from vftcli.doctor.windows import up_axes, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
@@ -99,7 +99,11 @@ def of_known_arm(recording: Recording, robot: Robot, ignored: Sequence[int]) -> 
             and (found := match_of(recording, name, other)) is not None
         ]
         others.sort(key=lambda found: (not found.fits, found.misfit))
-        if others and is_rather(others[0], own, diagnosis):
+        if (
+            others
+            and is_rather(others[0], own, diagnosis)
+            and (robot.path in PROFILES.values() or is_driven_by(recording, others[0], diagnosis))
+        ):
             remark = warning(
                 "other-robot", own=str(own), best=str(others[0]), robot=others[0].robot
             )
@@ -125,6 +129,17 @@ def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
     lighter = own.load > other.load + HEAVY / 2
     share = 1 / AMBIGUOUS if lighter else ANOTHER
     return other.fits and other.misfit < share * diagnosis.healed.misfit
+
+
+def is_driven_by(recording: Recording, other: RobotMatch, diagnosis: Diagnosis) -> bool:
+    """Whether another arm explains the measured effort much better too.
+
+    A user's own file, identified or measured, may well be nearer to the arm than its maker's model:
+    it is not refused for differing from that.
+    """
+    robot = load_robot(other.robot)
+    case = case_of(recording, robot, windows_of(recording, robot))
+    return case is not None and case.misfit < ANOTHER * diagnosis.healed.misfit
 
 
 def explained(
