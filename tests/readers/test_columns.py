@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from seed_logs import ROWS, headerless_csv, matrix_npy, motion, parquet, table_csv
 
-from vftcli.readers import read
+from vftcli.readers import read, read_first_recording
 from vftcli.readers.columns import parse_columns
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.wrench import WrenchFrame
@@ -104,6 +104,9 @@ def test_one_of_several_recordings(tmp_path: Path) -> None:
     assert second.samples == 30
     assert second.q[0, 0] == 1.0
     assert "took recording 2 of 3, rows 31 to 60 (segment)" in second.source.repairs
+    told, *_ = read_first_recording(path).source.remarks
+    assert (told.code, told.level) == ("time-reset", "warning")
+    assert told.values["rows"] == [30, 60]
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,10 @@ from vftcli.signals.remarks import Remark, as_record
 
 
 def examination_record(examination: Examination) -> dict[str, Any]:
-    """Everything the doctor knows, for machines."""
+    """Everything the doctor knows, for machines; what the reader warns of is a finding too."""
     recording = examination.recording
     source = recording.source
+    read = [remark for remark in source.remarks if remark.level == "warning"]
     return {
         "format": source.format,
         "joints": recording.joints,
@@ -39,7 +40,7 @@ def examination_record(examination: Examination) -> dict[str, Any]:
         "payload_kg": recording.payload_mass,
         "sha256": source.sha256,
         "robots": [asdict(fit) for fit in examination.robots],
-        "findings": [finding_record(finding) for finding in examination.findings],
+        "findings": [finding_record(finding) for finding in (*read, *examination.findings)],
     }
 
 

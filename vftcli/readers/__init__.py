@@ -14,6 +14,7 @@ from vftcli.readers.opening import Digest
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import warning
 
 READERS: dict[str, Reader] = {
     reader.name: reader
@@ -90,9 +91,12 @@ def read_first_recording(
     """
     try:
         return read(path, format=format, columns=columns)
-    except RestartError:
+    except RestartError as error:
         segment = f"{columns},segment=1" if columns else "segment=1"
-        return read(path, format=format, columns=segment)
+        first = read(path, format=format, columns=segment)
+        told = warning("time-reset", restarts=len(error.rows), rows=list(error.rows))
+        remarks = (told, *first.source.remarks)
+        return replace(first, source=replace(first.source, remarks=remarks))
 
 
 def recognise(path: str | Path) -> Reader:
