@@ -286,7 +286,7 @@ def test_a_kill_before_any_rename_leaves_no_two_runs_under_one_seal(
         copies.append(shutil.copytree(out, tmp_path / f"copy-{len(copies)}"))
         return move(self, target)
 
-    def report(places: str, text: str) -> dict[str, str]:
+    def report(places: str, text: str, out: Path = out) -> dict[str, str]:
         with OutputFolder(out, force=True, names=["run.json", "index.html"]) as folder:
             for place in places:
                 folder.write(f"{place}/page.html", text + place)
@@ -300,7 +300,13 @@ def test_a_kill_before_any_rename_leaves_no_two_runs_under_one_seal(
     new = report("bc", "new")
     assert new.keys() == {"index.html", "run.json", *(f"{p}/{f}" for p in "bc" for f in
                                                       ("page.html", "run.json"))}  # fmt: skip
+    monkeypatch.undo()
     for copy in copies:
+        again = shutil.copytree(copy, tmp_path / "again")
+        report("bc", "new", again)
+        shutil.rmtree(next(again.glob(".vftcli-*.partial")))
+        assert digests(again) == new  # nothing of the first run outlives the second
+        shutil.rmtree(again)
         shutil.rmtree(next(copy.glob(".vftcli-*.partial")))
         found = digests(copy)
         for seal in [name for name in found if name.endswith("run.json")]:

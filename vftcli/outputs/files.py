@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from vftcli.outputs.partial import check_writable, held, partial_folder, to_disk
+from vftcli.outputs.partial import PARTIAL, check_writable, held, partial_folder, to_disk
 from vftcli.outputs.seals import SEAL, digests, is_seal, sealed_files
 from vftcli.signals.errors import OutputError
 from vftcli.signals.letters import whole
@@ -112,6 +112,10 @@ def put_text(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
+EARLIER = "earlier"
+"""Folder, in the temporary one, of the files that make room for new ones."""
+
+
 class OutputFolder:
     """A folder that gets all of its files at once, when the block ends well.
 
@@ -201,8 +205,10 @@ class OutputFolder:
     def _earlier(self) -> set[Path]:
         """Every file that an earlier run may have left and that must not outlive it."""
         declared = {self.path / name for name in self.names}
-        listed = (sealed_files(path) for path in declared if is_seal(path))
-        return declared.union(*listed)
+        listed = [sealed_files(path) for path in declared if is_seal(path)]
+        # A killed run had moved the seal of the one before it out of the way, first of all.
+        killed = self.path.glob(f"{PARTIAL}/{EARLIER}/0")
+        return declared.union(*listed, *(sealed_files(path, self.path) for path in killed))
 
     def _move(self) -> None:
         """Put every file where it belongs, after a last look that nothing is in the way."""
@@ -214,7 +220,7 @@ class OutputFolder:
             earlier = self._earlier()
             for path in places:
                 refuse_existing(path, self.force)
-            with kept_aside({*places, *earlier}, self.temporary / "earlier"):
+            with kept_aside({*places, *earlier}, self.temporary / EARLIER):
                 to_disk([self.path])
                 for path in sorted(places, key=last_sealed):
                     path.parent.mkdir(parents=True, exist_ok=True)

@@ -12,6 +12,9 @@ from pathlib import Path
 if sys.platform != "win32":
     import fcntl
 
+PARTIAL = ".vftcli-*.partial"
+"""Every temporary folder's name, as a pattern of paths."""
+
 NAME = re.compile(r"\.vftcli-(\d+)-[0-9a-f]{8}\.partial")
 """What a temporary folder is called; the number is that of the process that made it."""
 
@@ -42,7 +45,7 @@ def partial_folder(parent: Path) -> Iterator[Path]:
 
 def clear_leftovers(parent: Path) -> None:
     """Remove the temporary folders in `parent` whose processes are gone."""
-    for path in parent.glob(".vftcli-*.partial"):
+    for path in parent.glob(PARTIAL):
         found = NAME.fullmatch(path.name)
         if found is None or path.is_symlink() or not path.is_dir():
             continue

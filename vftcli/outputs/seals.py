@@ -29,19 +29,24 @@ def digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def sealed_files(seal: Path) -> Iterator[Path]:
+def sealed_files(seal: Path, at: Path | None = None) -> Iterator[Path]:
     """The files that an earlier run's seal lists, where they still are as that run left them.
 
     A seal is a file like any other: what it lists outside its folder is not believed.
+
+    Args:
+        seal: The seal.
+        at: The folder that it was written in, where it has been moved out of it.
     """
     try:
         files = json.loads(seal.read_text(encoding="utf-8"))["files"]
         listed = {str(name): str(sha) for name, sha in files.items()}
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return  # an earlier version's, or none of ours
-    folder = seal.parent.resolve()
+    top = seal.parent if at is None else at
+    folder = top.resolve()
     for name, sha in listed.items():
-        path = seal.parent / name
+        path = top / name
         try:
             inside = path.resolve().is_relative_to(folder)
             if inside and path.is_file() and digest(path) == sha:
