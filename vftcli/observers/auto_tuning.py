@@ -68,7 +68,11 @@ def kalman_smoother(omega_n: Array, r: Array | float = 1.0) -> KalmanSmoother:
 Kind = Callable[..., Observer]
 """Natural frequencies (n,) [rad/s], and R if it is not 1 → the observer."""
 
-KINDS: dict[str, Kind] = {"kfo-auto": kalman_filter, "rts-auto": kalman_smoother}
+KINDS: dict[str, Kind] = {
+    "best": kalman_smoother,
+    "kfo-auto": kalman_filter,
+    "rts-auto": kalman_smoother,
+}
 """Name at the command line → what is tuned."""
 
 
