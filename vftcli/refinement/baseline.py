@@ -9,8 +9,9 @@ import numpy as np
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Part, Spectra, spectra_of
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
+from vftcli.repetition.free_run import ModelledRun
 from vftcli.repetition.pairing import mean_of
-from vftcli.repetition.standstill import standing
+from vftcli.repetition.standstill import resting, standing
 from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask
@@ -164,12 +165,14 @@ class FreeReading(NamedTuple):
         estimate: Its estimate of the log.
         free: Its estimate along each free piece, in the pieces' order.
         samples: Of these, what it reads in the free samples, of all pieces in a row. (S, n) [N·m]
+        resting: Whether a joint rests in them. (S, n)
     """
 
     observer: Observer
     estimate: ExternalTorque
     free: tuple[ExternalTorque, ...]
     samples: Array
+    resting: Mask
 
     @property
     def rms(self) -> Array:
@@ -184,5 +187,17 @@ def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) 
         for piece in found.pieces
     )
     inside = [e.tau[piece.inside] for e, piece in zip(free, found.pieces, strict=True)]
-    samples = np.concatenate(inside) if inside else np.zeros((0, estimate.joints))
-    return FreeReading(observer, estimate, free, samples)
+    rests = [rests_in(piece.run)[piece.inside] for piece in found.pieces]
+    none = (0, estimate.joints)
+    return FreeReading(
+        observer,
+        estimate,
+        free,
+        samples=np.concatenate([np.zeros(none), *inside]),
+        resting=np.concatenate([np.zeros(none, dtype=bool), *rests]),
+    )
+
+
+def rests_in(run: ModelledRun) -> Mask:
+    """Where a joint of a recording rests. (T, n)"""
+    return resting(run.recording.t, run.recording.require("dq"))

@@ -1,19 +1,17 @@
 """From a log's baseline to finished estimates: bands drawn, bias removed, limits named."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from vftcli.observers.auto_tuning import AutoTuned, Curve
 from vftcli.observers.observer import Observer
-from vftcli.refinement.baseline import Baseline, FreeReading, free_reading
+from vftcli.refinement.band import band_remarks, with_band
+from vftcli.refinement.baseline import Baseline, free_reading
 from vftcli.refinement.bias import REMOVALS
 from vftcli.refinement.budget import Budget, budget, limits_remark
 from vftcli.refinement.consistency import Consistency, consistency
-from vftcli.signals.arrays import handed_over
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.remarks import Remark, Where, fact
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,13 +57,12 @@ def refine(
     remove = REMOVALS[removal]
     pairs = list(zip(observers, estimates, strict=True))
     readings = [free_reading(found, observer, estimate) for observer, estimate in pairs]
-    banded = [reading._replace(estimate=with_band(found, reading)) for reading in readings]
-    finished = remove(found, banded)
+    finished = remove(found, readings)
     spectra = found.spectra
     budgets = [] if spectra is None else [budget(found, spectra, reading) for reading in readings]
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
     return Refinement(
-        estimates=finished.estimates,
+        estimates=tuple(with_band(found, reading) for reading in finished.readings),
         baseline=found,
         curves=curves,
         budgets=tuple(budgets),
@@ -87,32 +84,3 @@ def refine(
             *(limits_remark(one, found.stuck) for one in budgets[-1:]),
         ),
     )
-
-
-def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
-    """The estimate with its band, and marked where joints move; itself without spectra.
-
-    The band is how far the estimate may be off, as the log itself shows it,
-
-        sd² = rms_free² + ∫ |1 − H|² S_τ df,
-
-    what the estimator reads where nothing touches the arm, bias and model error included, and what
-    its lag and bandwidth leave out of the torque there is. The Kalman covariance knows neither: it
-    is the filter's own account, of a model without error, and stands apart (`sd`).
-    """
-    estimate, spectra = reading.estimate, found.spectra
-    if spectra is None:
-        return estimate
-    response = reading.observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
-    sd = np.sqrt(reading.rms**2 + spectra.missed(response))
-    banded = np.broadcast_to(handed_over(sd), estimate.tau.shape)
-    return replace(estimate, error_sd=banded, moving=~found.standing)
-
-
-def band_remarks(found: Baseline) -> tuple[Remark, ...]:
-    """What the bands are, and where they do not hold."""
-    if found.spectra is None:
-        return ()
-    stuck = tuple(int(j) + 1 for j in np.flatnonzero(found.stuck))
-    limit = (caution("band-of-a-standing-joint", Where(joints=stuck)),) if stuck else ()
-    return (fact("band"), *limit)
