@@ -126,7 +126,12 @@ class ObserverChoice:
     @property
     def from_spectra(self) -> bool:
         """Whether an observer takes its gains from what the complete log shows."""
-        return self.gains == LOG_GAINS or any(OBSERVERS[name].from_spectra for name in self.names)
+        return self.gains_of_log or any(OBSERVERS[name].from_spectra for name in self.names)
+
+    @property
+    def gains_of_log(self) -> bool:
+        """Whether observers without gains of their own have those that the log calls for."""
+        return self.gains == LOG_GAINS
 
     @property
     def of_robot_file(self) -> bool:
@@ -158,7 +163,7 @@ class ObserverChoice:
             shown=shown,
         )
         observers, remarks = build_observers(self.names, setup)
-        if self.gains == LOG_GAINS and shown.gains is None:
+        if self.gains_of_log and shown.gains is None:
             remarks = (*remarks, caution("gains-without-free-part"))
         if self.match is None:
             return observers, remarks
@@ -169,7 +174,7 @@ class ObserverChoice:
 
     def gains_over(self, gains: Gains, shown: LogSpectra = LogSpectra()) -> Gains:
         """A robot's gains with those of the log or of the gains file put over them."""
-        if self.gains == LOG_GAINS and shown.gains is not None:
+        if self.gains_of_log and shown.gains is not None:
             return overlay_gains(gains, shown.gains)
         if self.gains_file is None:
             return gains

@@ -1,13 +1,15 @@
 """A log's free part and spectra, and what the observers read where nothing touches the arm."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Part, Spectra, spectra_of
+from vftcli.observers.table import BEST, LogSpectra
+from vftcli.refinement.tuning import gains_of
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.repetition.pairing import mean_of
@@ -19,6 +21,9 @@ from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import resample_columns
+
+if TYPE_CHECKING:
+    from vftcli.refinement.whole_log import WholeLogBias
 
 QUIETER = 0.85
 """A free part that was found is believed if on most joints the loaded part has this share of its
@@ -42,6 +47,9 @@ class Baseline:
         spectra: Spectra of the raw disturbance, None where the free part is too short or not free.
         standing: Where a joint stands still. (T, n)
         missing: Why there is no free part, or are no spectra; None where there are both.
+        correction: The bias of the whole log that is off the terms, None where none is.
+        on_correction: What was applied of it and what was not, and what stands in for a free part.
+        best: The baseline that `best` runs on, None where it is this one.
     """
 
     motion: FreeMotion
@@ -49,14 +57,55 @@ class Baseline:
     spectra: Spectra | None = None
     standing: Mask
     missing: Remark | None = None
+    correction: "WholeLogBias | None" = None
+    on_correction: tuple[Remark, ...] = ()
+    best: "Baseline | None" = None
+    _made: dict[ModelledRun, DynamicsTerms] = field(
+        init=False, repr=False, compare=False, default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "standing", frozen_mask(self.standing))
 
+    def under(self, name: str) -> "Baseline":
+        """The baseline that the observer of this name runs on."""
+        return self.best if name == BEST and self.best is not None else self
+
+    def terms_of(self, run: ModelledRun) -> DynamicsTerms:
+        """P and μ of the log or of one of its free runs, the correction off. Made once."""
+        if self.correction is None:
+            return run.terms
+        if run not in self._made:
+            own = run is self.motion.log
+            plain = run.terms
+            made = self.correction.corrected(plain) if own else self.correction.of(run)
+            self._made[run] = made
+        return self._made[run]
+
     @property
     def terms(self) -> DynamicsTerms:
-        """P and μ of the log."""
-        return self.motion.log.terms
+        """P and μ of the log, the correction off."""
+        return self.terms_of(self.motion.log)
+
+    def shown(self, *, gains: bool) -> LogSpectra:
+        """What it shows to the observers that are built for the log.
+
+        Args:
+            gains: Whether they are to have the gains that its spectra call for.
+        """
+        plain = self.spectra
+        called_for = gains_of(plain) if gains and plain is not None else None
+        return LogSpectra(plain=plain, best=self.under(BEST).spectra, gains=called_for)
+
+    @property
+    def correction_sd(self) -> Array | None:
+        """Standard deviation of the correction, None without one. (T, n) [N·m]"""
+        return self.correction.sd if self.correction is not None else None
+
+    @property
+    def samples(self) -> list[Part]:
+        """P and μ of the free pieces, the correction off, and which samples are free."""
+        return [Part(self.terms_of(piece.run), piece.inside) for piece in self.pieces]
 
     @property
     def pieces(self) -> tuple[FreePiece, ...]:
@@ -72,7 +121,9 @@ class Baseline:
     def remarks(self) -> tuple[Remark, ...]:
         """What was found, and what was not and why."""
         found = self.part.remarks if self.part is not None else ()
-        return found if self.missing is None else (*found, self.missing)
+        missing = () if self.missing is None else (self.missing,)
+        best = () if self.best is None else self.best.on_correction
+        return (*found, *missing, *self.on_correction, *best)
 
 
 def baseline_of(motion: FreeMotion) -> Baseline:
@@ -89,7 +140,7 @@ def baseline_of(motion: FreeMotion) -> Baseline:
     except ReferenceTorqueError as error:
         return replace(bare, missing=caution("no-free-part", reason=str(error)))
     try:
-        spectra = spectra_of(Part(log.terms, ~part.own), samples_of(part.pieces))
+        spectra = spectra_of(Part(log.terms, ~part.own), replace(bare, part=part).samples)
     except ParameterError as error:
         return replace(bare, part=part, missing=caution("no-spectra", reason=str(error)))
     if motion.choice.is_given or looks_free(spectra):
@@ -116,7 +167,7 @@ def without_free_motion(found: Baseline) -> Baseline:
     p = np.cumsum(step * np.nan_to_num(d), axis=0)
     left = Part(DynamicsTerms(t=found.terms.t, p=p, mu=np.zeros_like(p)), known)
     try:
-        loaded = spectra_of(left, samples_of(part.pieces))
+        loaded = spectra_of(left, found.samples)
     except ParameterError:
         return found
     floor = (1.0 + 1.0 / len(part.pairings)) * spectra.floor
@@ -143,11 +194,6 @@ def bias_at_phase(part: FreePart, series: Sequence[Array]) -> Array:
     laid = zip(part.pieces, series, strict=True)
     signals = [x for piece, x in laid for _ in piece.pairings]
     return mean_of(part.pairings, signals)
-
-
-def samples_of(pieces: Sequence[FreePiece]) -> list[Part]:
-    """P and μ of the free pieces, and which samples are free."""
-    return [Part(piece.run.terms, piece.inside) for piece in pieces]
 
 
 def looks_free(spectra: Spectra) -> bool:
@@ -183,7 +229,7 @@ class FreeReading(NamedTuple):
 def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:
     """Run an observer along the free pieces; along the log itself that is its estimate."""
     free = tuple(
-        estimate if piece.run is found.motion.log else observer.estimate(piece.run.terms)
+        estimate if piece.run is found.motion.log else observer.estimate(found.terms_of(piece.run))
         for piece in found.pieces
     )
     inside = [e.tau[piece.inside] for e, piece in zip(free, found.pieces, strict=True)]

@@ -48,11 +48,6 @@ class Removal(NamedTuple):
     remarks: tuple[Remark, ...] = ()
 
 
-def remove_nothing(_found: Baseline, readings: Sequence[FreeReading]) -> Removal:
-    """Leave the estimates as they are."""
-    return Removal(tuple(readings))
-
-
 def remove_free_cycle(found: Baseline, readings: Sequence[FreeReading]) -> Removal:
     """Subtract the free cycle's own estimate at the same phase, or the free run's, aligned.
 
@@ -187,8 +182,7 @@ def ridge(X: Array, y: Array, penalty: float) -> Array:
 
 
 REMOVALS: dict[str, Callable[[Baseline, Sequence[FreeReading]], Removal]] = {
-    "none": remove_nothing,
     "free-cycle": remove_free_cycle,
     "model": remove_modelled,
 }
-"""What ``--remove-bias`` takes."""
+"""The words of ``--remove-bias`` that take something off once the observers have run."""

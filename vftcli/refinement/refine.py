@@ -5,11 +5,14 @@ from dataclasses import dataclass
 
 from vftcli.observers.auto_tuning import AutoTuned, Curve
 from vftcli.observers.observer import Observer
+from vftcli.observers.table import BEST
 from vftcli.refinement.band import band_remarks, with_band
 from vftcli.refinement.baseline import Baseline, free_reading
-from vftcli.refinement.bias import REMOVALS
+from vftcli.refinement.bias import REMOVALS, Removal
 from vftcli.refinement.budget import Budget, budget, limits_remark
+from vftcli.refinement.choice import NOTHING
 from vftcli.refinement.consistency import Consistency, consistency
+from vftcli.refinement.paper_gap import expected_gap
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, fact
 
@@ -41,7 +44,7 @@ def refine(
     found: Baseline,
     observers: Sequence[Observer],
     estimates: Sequence[ExternalTorque],
-    removal: str = "none",
+    removal: str = NOTHING,
 ) -> Refinement:
     """Give estimates their bands, take their bias off, and say what limits them.
 
@@ -49,24 +52,33 @@ def refine(
         found: The log's baseline.
         observers: The observers.
         estimates: Their estimates, in the same order.
-        removal: A key of `REMOVALS`.
+        removal: What ``--remove-bias`` asks for.
 
     Raises:
         ParameterError: If the bias cannot be removed as asked.
     """
-    remove = REMOVALS[removal]
     pairs = list(zip(observers, estimates, strict=True))
-    readings = [free_reading(found, observer, estimate) for observer, estimate in pairs]
-    finished = remove(found, readings)
-    spectra = found.spectra
-    budgets = [] if spectra is None else [budget(found, spectra, reading) for reading in readings]
+    # Not every observer need run on the same terms: each is measured on those that it runs on.
+    under = [found.under(observer.name) for observer in observers]
+    readings = [free_reading(on, *pair) for on, pair in zip(under, pairs, strict=True)]
+    remove = REMOVALS.get(removal)
+    finished = Removal(tuple(readings)) if remove is None else remove(found, readings)
+    budgets = [
+        budget(on, on.spectra, reading)
+        for on, reading in zip(under, readings, strict=True)
+        if on.spectra is not None
+    ]
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
+    checks = [consistency(on, *pair) for on, pair in zip(under, pairs, strict=True)]
     return Refinement(
-        estimates=tuple(with_band(found, reading) for reading in finished.readings),
+        estimates=tuple(
+            with_band(on, reading, on.correction_sd)
+            for on, reading in zip(under, finished.readings, strict=True)
+        ),
         baseline=found,
         curves=curves,
         budgets=tuple(budgets),
-        consistency=tuple(c for o, e in pairs if (c := consistency(found, o, e)) is not None),
+        consistency=tuple(check for check in checks if check is not None),
         removed=removal,
         remarks=(
             *found.remarks,
@@ -81,6 +93,12 @@ def refine(
             ),
             *band_remarks(found),
             *finished.remarks,
-            *(limits_remark(one, found.stuck) for one in budgets[-1:]),
+            *(limits_remark(one, found.stuck) for one in leading(budgets)),
+            *(() if (gap := expected_gap(found)) is None else (gap,)),
         ),
     )
+
+
+def leading(budgets: Sequence[Budget]) -> Sequence[Budget]:
+    """The budget of the most accurate estimate: of `best` if it ran, else the last; or none."""
+    return [one for one in budgets if one.name == BEST] or budgets[-1:]

@@ -16,6 +16,7 @@ from vftcli.observers.auto_tuning import (
 )
 from vftcli.observers.matching import MatchTarget, tune
 from vftcli.observers.observer import Complex
+from vftcli.observers.settings import Gains
 from vftcli.observers.spectra import Spectra
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
@@ -147,6 +148,11 @@ def tune_all(spectra: Spectra, goal: TuningGoal) -> tuple[Tuned, ...]:
             )
         )
     return tuple(tuned)
+
+
+def gains_of(spectra: Spectra) -> Gains:
+    """The gains with the smallest expected error, as a gains file holds them."""
+    return {line.section: dict(line.gains) for line in tune_all(spectra, TuningGoal("rmse"))}
 
 
 def densities(omega_n: Array, spectra: Spectra) -> dict[str, Any]:

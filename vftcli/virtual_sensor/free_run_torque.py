@@ -1,12 +1,13 @@
 """What observers read in a free run, brought to the log: the zero that ``--zero LOG`` removes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vftcli.observers.observer import Observer
-from vftcli.repetition.free_run import FreeRun
+from vftcli.repetition.free_run import FreeRun, ModelledRun
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, fact
@@ -32,7 +33,18 @@ class FreeRunTorque:
     remark: Remark
 
 
-def free_run_torque(run: FreeRun, observers: Sequence[Observer]) -> FreeRunTorque:
+TermsOf = Callable[[str, ModelledRun], DynamicsTerms]
+"""Name of an observer, and a recording → p and μ of the recording as the observer has them."""
+
+
+def as_modelled(_name: str, run: ModelledRun) -> DynamicsTerms:
+    """P and μ as the robot's model gives them, whichever the observer."""
+    return run.terms
+
+
+def free_run_torque(
+    run: FreeRun, observers: Sequence[Observer], terms_of: TermsOf = as_modelled
+) -> FreeRunTorque:
     """What a free run reads, at the same place of the trajectory where it is the log's.
 
     The first `SETTLING` seconds count for no mean, since observers rise from zero.
@@ -40,9 +52,13 @@ def free_run_torque(run: FreeRun, observers: Sequence[Observer]) -> FreeRunTorqu
     Args:
         run: The free run beside its log.
         observers: The observers that run over it.
+        terms_of: What each of them runs on.
     """
     terms = run.run.terms
-    read = (*(o.estimate(terms) for o in observers), mean_disturbance(terms))
+    read = (
+        *(o.estimate(terms_of(o.name, run.run)) for o in observers),
+        mean_disturbance(terms),
+    )
     settled = terms.t - terms.t[0] >= min(SETTLING, 0.5 * float(terms.t[-1] - terms.t[0]))
     where, there = Where(run.recording.name), {}
     remark = fact("zero-mean-of-free-run", where)

@@ -17,7 +17,13 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
-from vftcli.virtual_sensor.free_run_torque import FreeRunTorque, free_run_torque, less_free_run
+from vftcli.virtual_sensor.free_run_torque import (
+    FreeRunTorque,
+    TermsOf,
+    as_modelled,
+    free_run_torque,
+    less_free_run,
+)
 from vftcli.virtual_sensor.log_wrench import logged_wrench
 from vftcli.virtual_sensor.mean_disturbance import mean_disturbance
 from vftcli.virtual_sensor.mounting import find_mounting, without_tool_weight
@@ -50,6 +56,7 @@ def sense(
     observers: Sequence[Observer],
     estimates: Sequence[ExternalTorque],
     choice: WrenchChoice,
+    terms_of: TermsOf = as_modelled,
 ) -> SensorReading:
     """Turn estimates into wrenches, remove the zero, and judge them.
 
@@ -62,6 +69,7 @@ def sense(
         observers: The observers, whose lag widens the band.
         estimates: Their torques, in the same order.
         choice: What is asked of the virtual sensor.
+        terms_of: What each observer runs on.
 
     Raises:
         ParameterError: If a pose or zero interval cannot be used, or cannot be found in the log.
@@ -70,7 +78,9 @@ def sense(
     """
     recording, robot, terms = motion.log.recording, motion.log.robot, motion.log.terms
     t, chain = recording.t, robot.chain
-    free_run = free_run_torque(motion.zero, observers) if motion.zero is not None else None
+    free_run = None
+    if motion.zero is not None:
+        free_run = free_run_torque(motion.zero, observers, terms_of)
     (disturbance,) = less_free_run((mean_disturbance(terms),), free_run)
     raw = VirtualSensor(frame="base").wrench(disturbance, recording.q, chain)
     mounting, found = find_mounting(recording, robot, disturbance, choice)
