@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from vftcli.doctor.examiner import Examiner
 from vftcli.observers.choice import ObserverChoice
-from vftcli.observers.table import BEST, LogSpectra
+from vftcli.observers.table import BEST, NOT_SHOWN
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
@@ -159,7 +159,7 @@ def observe(motion: FreeMotion, baseline: "Baseline | None", choice: AnalysisCho
     from vftcli.signals.remarks import caution
 
     log, step = motion.log, motion.log.recording.median_step
-    shown = LogSpectra()
+    shown = NOT_SHOWN
     if baseline is not None:
         shown = baseline.shown(gains=choice.observers.gains_of_log)
     observers, remarks = choice.observers.build(log.robot, step, shown)

@@ -33,7 +33,6 @@ def report(
     """
     from vftcli.cli.console import command_line, say, say_analysis
     from vftcli.evaluation.print_table import check_published, compare_with
-    from vftcli.observers.table import PAPER
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.report import report_files, write_report, write_reports
     from vftcli.outputs.log.tables import print_text, to_terminal
@@ -43,12 +42,10 @@ def report(
 
     library = Library(logs)
     OutputFolder(output, force, report_files([library.label(log) for log in logs])).check()
-    if published is not None and not analysis.observers.observer:
-        # Beside the paper's table stand the paper's observers.
-        analysis = analysis.changed(observers=analysis.observers.changed(observer=list(PAPER)))
     choice = analysis.choice(library, reference)
     if published is not None:
         check_published(published, reference.reference)
+        choice = replace(choice, observers=choice.observers.beside_print())
     analyses = []
     for made in analyse_logs(logs, choice):
         beside = None

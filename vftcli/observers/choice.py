@@ -1,7 +1,7 @@
 """What a user may choose of the observers: which run, with which gains, in which form."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ from vftcli.observers.settings import Gains, Settings, check_gains, load_gains, 
 from vftcli.observers.table import (
     BEST,
     DEFAULT,
+    NOT_SHOWN,
     OBSERVERS,
     PAPER,
     LogSpectra,
@@ -139,8 +140,12 @@ class ObserverChoice:
         changed = self.settings or self.gains_file is not None or self.match is not None
         return self.gains == PAPER_GAINS and not changed
 
+    def beside_print(self) -> "ObserverChoice":
+        """The choice beside a printed table: without `best` where that is there by default."""
+        return replace(self, names=PAPER) if self.names == DEFAULT else self
+
     def build(
-        self, robot: Robot, step: float, shown: LogSpectra = LogSpectra()
+        self, robot: Robot, step: float, shown: LogSpectra = NOT_SHOWN
     ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
         """Build the observers for one robot and sample time, with remarks on gains nobody gave.
 
@@ -172,7 +177,7 @@ class ObserverChoice:
         observers, on_match = match_observers(observers, self.match, setup)
         return observers, (*remarks, *on_match)
 
-    def gains_over(self, gains: Gains, shown: LogSpectra = LogSpectra()) -> Gains:
+    def gains_over(self, gains: Gains, shown: LogSpectra = NOT_SHOWN) -> Gains:
         """A robot's gains with those of the log or of the gains file put over them."""
         if self.gains_of_log and shown.gains is not None:
             return overlay_gains(gains, shown.gains)

@@ -50,6 +50,10 @@ class LogSpectra(NamedTuple):
         return self.best if name == BEST else self.plain
 
 
+NOT_SHOWN = LogSpectra()
+"""What is known of a log that is still being written, or has no free part."""
+
+
 class Setup(NamedTuple):
     """What an observer is built from.
 
@@ -67,7 +71,7 @@ class Setup(NamedTuple):
     joints: int
     step: float
     as_printed: bool
-    shown: LogSpectra = LogSpectra()
+    shown: LogSpectra = NOT_SHOWN
 
 
 Built = tuple[Observer, tuple[Remark, ...]]
