@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.chain import Chain
@@ -24,7 +25,7 @@ from vftcli.robots.regressor import (
     with_parameters,
 )
 from vftcli.robots.robot import JointFriction, Robot
-from vftcli.signals.arrays import Array, handed_over, seal
+from vftcli.signals.arrays import Array, seal
 from vftcli.signals.filters import derivative, zero_phase
 
 CUTOFF = 6.0
@@ -188,7 +189,7 @@ def error_of(values: Array, joints: int) -> ModelError:
     )
 
 
-def column_numbers(joint: int, joints: int) -> Array:
+def column_numbers(joint: int, joints: int) -> NDArray[np.intp]:
     """Which of all columns the row of one joint has, as `ModelError.own` gives them."""
     own = LINK * joints + (SHAPES + 3) * joint
     return np.concatenate(
@@ -252,9 +253,8 @@ def error_columns(
         rows = torque_regressor(run.robot.loaded_chain, q[span], dq[span], ddq[span])
         for j in range(n):
             columns[j][span, : LINK * (n - j)] = rows[:, j, LINK * j :]
-    for j, column in enumerate(columns):
+    for j in range(n):
         mine = [ddq[:, j], rigid[:, j], *(shape[:, j] for shape in shapes), np.ones(len(q))]
-        column[:, LINK * (n - j) :] = np.column_stack(mine)
-        column *= expected.own(j)
-        handed_over(column)
+        columns[j][:, LINK * (n - j) :] = np.column_stack(mine)
+        columns[j] *= expected.own(j)
     return columns

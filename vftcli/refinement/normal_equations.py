@@ -101,7 +101,7 @@ class Rows:
             numbers = column_numbers(j, self.joints)
             part = column @ covariance[np.ix_(numbers, numbers)]
             variance.append(np.einsum("ij,ij->i", part, column))
-        return np.sqrt(np.maximum(np.column_stack(variance), 0.0))
+        return np.asarray(np.sqrt(np.maximum(np.column_stack(variance), 0.0)))
 
     def model_sums(self, weight: Array) -> Sums:
         """Sums over all rows of the model's columns alone.

@@ -7,6 +7,7 @@ cut into contiguous folds; each is predicted from the others, with the model hel
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vftcli.refinement.normal_equations import Solution
 from vftcli.refinement.robust_fit import RobustFit
@@ -65,7 +66,7 @@ def guarded(fit: RobustFit) -> Guarded:
     return Guarded(fit.solved(whole, SCALES[best]), share, share <= WORTH)
 
 
-def fold_spans(free: Array, margin: int) -> list[tuple[slice, slice]]:
+def fold_spans(free: NDArray[np.intp], margin: int) -> list[tuple[slice, slice]]:
     """Contiguous folds of the free samples, and each with the margin around it.
 
     Args:
