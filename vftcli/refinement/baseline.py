@@ -99,8 +99,9 @@ class Baseline:
 
     @property
     def correction_sd(self) -> Array | None:
-        """Standard deviation of the correction, None without one. (T, n) [N·m]"""
-        return self.correction.sd if self.correction is not None else None
+        """Standard deviation of the correction where it is off, None without one. (T, n) [N·m]"""
+        off = self.correction
+        return None if off is None else np.where(off.applied, off.sd, 0.0)
 
     @property
     def samples(self) -> list[Part]:

@@ -207,7 +207,7 @@
       const [a, b] = state.view[this.axis], ink = colour === "ink";
       const from = Math.max(0, below(line.x, a) - 1), to = Math.min(line.x.length, below(line.x, b) + 1);
       c.strokeStyle = ink ? css("--ink") : colour;
-      c.lineWidth = (this.small ? 1 : 1.4) * (leads ? 1.6 : 1);
+      c.lineWidth = this.small ? 1 : leads ? 2.2 : 1.3;
       c.globalAlpha = ink && this.spec.series.length > 1 ? 0.62 : 1; // the reference lies under the estimates
       c.lineJoin = "round"; c.setLineDash(dashed ? [7, 5] : []);
       c.beginPath();
