@@ -103,8 +103,8 @@ def band_lines(analysis: Analysis, j: int) -> Iterator[PlotLine]:
     Every observer's would hide them all; the table of estimates holds the others.
     """
     colours = colours_of(analysis.estimates)
-    ranked = sorted(analysis.estimates[::-1], key=lambda estimate: estimate.name != BEST)
-    for estimate in ranked:
+    last_first = analysis.estimates[::-1]
+    for estimate in sorted(last_first, key=lambda estimate: estimate.name != BEST):
         if estimate.error_sd is not None:
             for sign, edge in ((1.0, "upper"), (-1.0, "lower")):
                 column = estimate.tau[:, j] + sign * COVERS * estimate.error_sd[:, j]
