@@ -179,8 +179,10 @@ def refine(analysis: "Analysis", baseline: "Baseline | None", choice: AnalysisCh
         return analysis
     from vftcli.refinement import refine as room
 
-    bias = choice.refinement.remove_bias
-    made = room.refine(baseline, analysis.observers, analysis.estimates, bias)
+    bias, of_file = choice.refinement.remove_bias, choice.observers.of_robot_file
+    made = room.refine(
+        baseline, analysis.observers, analysis.estimates, bias, gains_of_file=of_file
+    )
     remarks = (*analysis.remarks, *made.remarks)
     return replace(analysis, estimates=made.estimates, refinement=made, remarks=remarks)
 

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-import numpy as np
 import polars as pl
 
 from vftcli.evaluation.errors import evaluate
@@ -12,10 +11,10 @@ from vftcli.evaluation.reference_wrench import reference_wrench
 from vftcli.evaluation.wrenches import with_contacts, with_wrenches
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
-from vftcli.refinement.paper_gap import EXPECTED
+from vftcli.refinement.paper_gap import EXPECTED, gap_remark
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import Remark
 from vftcli.virtual_sensor.detection import ContactScore, judge_contacts
 from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference
 
@@ -48,18 +47,12 @@ def with_measured_gap(
     """
     rows = errors.filter(pl.col("joint").is_not_null() & pl.col("rmse_Nm").is_finite())
     means = dict(rows.group_by("observer").agg(pl.col("rmse_Nm").mean()).iter_rows())
-    ran = [name for name in PAPER if name in means]
-    if not ran or not means.get(BEST):
+    delays = {name: tunings[name].delay for name in PAPER if name in means}
+    if not delays or BEST not in means:
         return tuple(remarks)
-    ratios = {name: means[name] / means[BEST] for name in ran}
-    delays = [tunings[name].delay for name in ran]
-    gap = fact(
-        "paper-gains-measured",
-        ratio=float(np.mean(list(ratios.values()))),
-        ratios=ratios,
-        least_delay_ms=1e3 * float(np.min(delays)),
-        most_delay_ms=1e3 * float(np.max(delays)),
-    )
+    gap = gap_remark("paper-gains-measured", means, delays)
+    if gap is None:
+        return tuple(remarks)
     return (*(remark for remark in remarks if remark.code != EXPECTED), gap)
 
 

@@ -45,6 +45,8 @@ def refine(
     observers: Sequence[Observer],
     estimates: Sequence[ExternalTorque],
     removal: str = NOTHING,
+    *,
+    gains_of_file: bool = False,
 ) -> Refinement:
     """Give estimates their bands, take their bias off, and say what limits them.
 
@@ -53,6 +55,7 @@ def refine(
         observers: The observers.
         estimates: Their estimates, in the same order.
         removal: What ``--remove-bias`` asks for.
+        gains_of_file: Whether the paper's observers ran with the gains of the robot's file.
 
     Raises:
         ParameterError: If the bias cannot be removed as asked.
@@ -70,11 +73,13 @@ def refine(
     ]
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
     checks = [consistency(on, *pair) for on, pair in zip(under, pairs, strict=True)]
+    shown = tuple(
+        with_band(on, reading, on.correction_sd)
+        for on, reading in zip(under, finished.readings, strict=True)
+    )
+    gap = expected_gap(found, shown, gains_of_file=gains_of_file)
     return Refinement(
-        estimates=tuple(
-            with_band(on, reading, on.correction_sd)
-            for on, reading in zip(under, finished.readings, strict=True)
-        ),
+        estimates=shown,
         baseline=found,
         curves=curves,
         budgets=tuple(budgets),
@@ -99,7 +104,7 @@ def refine(
             *band_remarks(found),
             *finished.remarks,
             *(limits_remark(one, found.stuck) for one in leading(budgets)),
-            *(() if (gap := expected_gap(found)) is None else (gap,)),
+            *(() if gap is None else (gap,)),
         ),
     )
 
