@@ -35,7 +35,7 @@ def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -
     halves = {s["name"]: s["half"] for s in tau["series"]}
     band = worked_up.estimates[-1].error_sd
     assert band is not None
-    np.testing.assert_allclose(halves["rts-auto"], 1.96 * band[0])
+    np.testing.assert_allclose(halves["rts-auto"], 1.96 * np.sqrt(np.mean(band**2, axis=0)))
     assert all(s["half"] is None for s in error["series"])
     charts = {chart["key"]: chart for chart in data["responses"]}
     assert [s["name"] for s in charts["curve"]["series"]] == ["kfo-auto", "rts-auto"]

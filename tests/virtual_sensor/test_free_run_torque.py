@@ -26,7 +26,7 @@ def test_the_torque_at_the_same_place_goes_before_the_mean() -> None:
     read = FreeRunTorque(
         there={"gmo": there},
         mean={"gmo": np.array([9.0, 9.0]), "fdo": np.array([0.25, -1.0])},
-        rms={},
+        error={},
         remark=REMARK,
     )
     gmo, fdo = less_free_run([torque("gmo", 2.0), torque("fdo", 2.0)], read)
@@ -36,6 +36,6 @@ def test_the_torque_at_the_same_place_goes_before_the_mean() -> None:
 
 
 def test_an_observer_that_did_not_run_over_it_is_no_guess() -> None:
-    read = FreeRunTorque(there={}, mean={}, rms={}, remark=REMARK)
+    read = FreeRunTorque(there={}, mean={}, error={}, remark=REMARK)
     with pytest.raises(KeyError):
         less_free_run([torque("gmo", 2.0)], read)

@@ -11,7 +11,6 @@ A resting joint holds stiction that no estimator sees: there e is at least the s
 friction that drives were measured to hold.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -46,25 +45,19 @@ class FreeError(NamedTuple):
     unseen: Mask
 
 
-def free_error(
-    read: Sequence[Array], resting: Sequence[Mask], dry_friction: Array
-) -> FreeError | None:
-    """The mean squares of an estimator's free samples; None where there are none.
+def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:
+    """The mean squares of an estimator's free samples, of which there is one at least.
 
     Where a joint rests, or moves, in fewer than `ENOUGH` of them, all of them speak for it: a
     moving joint then adds `UNSEEN` of its dry friction, because friction in motion was not seen.
 
     Args:
-        read: What the estimator reads in the free samples of each piece, NaN where it does not
-            know. (S, n) each [N·m]
-        resting: Whether a joint rests in them. (S, n) each
+        read: What the estimator reads in them, NaN where it does not know. (S, n) [N·m]
+        resting: Whether a joint rests in them. (S, n)
         dry_friction: Of each joint, 0 where nothing is known of it. (n,) [N·m]
     """
-    if not sum(len(piece) for piece in read):
-        return None
-    tau, rests = np.concatenate(read), np.concatenate(resting)
-    known = np.isfinite(tau)
-    square = np.where(known, tau, 0.0) ** 2
+    known = np.isfinite(read)
+    square = np.where(known, read, 0.0) ** 2
     whole = np.sum(square, axis=0) / np.maximum(np.count_nonzero(known, axis=0), 1)
 
     def mean_over(where: Mask) -> tuple[Array, Mask]:
@@ -73,8 +66,8 @@ def free_error(
         mean = np.sum(np.where(where, square, 0.0), axis=0) / np.maximum(count, 1)
         return np.where(few, whole, mean), few
 
-    moving, unseen = mean_over(known & ~rests)
-    still, _ = mean_over(known & rests)
+    moving, unseen = mean_over(known & ~resting)
+    still, _ = mean_over(known & resting)
     return FreeError(
         moving=np.where(unseen, moving + (UNSEEN * dry_friction) ** 2, moving),
         resting=np.maximum(still, (HELD * dry_friction) ** 2),

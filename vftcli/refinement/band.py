@@ -28,9 +28,9 @@ def with_band(
     """
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
     friction = dry_friction(run.robot.friction, run.robot.joints)
-    free = free_error([reading.samples], [reading.resting], friction)
-    if spectra is None or free is None:
+    if spectra is None or not len(reading.samples):
         return estimate
+    free = free_error(reading.samples, reading.resting, friction)
     response = reading.observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
     sd = error_band(free, spectra.missed(response), rests_in(run), correction_sd)
     return replace(estimate, error_sd=handed_over(sd), moving=~found.standing)

@@ -3,10 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
+from vftcli.observers.error_band import FreeError, free_error
 from vftcli.observers.observer import Observer
 from vftcli.repetition.free_run import FreeRun, ModelledRun
+from vftcli.repetition.standstill import resting
+from vftcli.robots.friction import dry_friction
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.external_torque import ExternalTorque
@@ -23,13 +24,13 @@ class FreeRunTorque:
         there: Its torque at the same place of the trajectory, NaN beyond the free run; empty where
             the free run is of another trajectory. (T, n) [N·m]
         mean: Its mean over the free run. (n,) [N·m]
-        rms: Its root mean square over the free run. (n,) [N·m]
+        error: Its mean squares over the free run, at rest and in motion.
         remark: How it was brought to the log.
     """
 
     there: Mapping[str, Array]
     mean: Mapping[str, Array]
-    rms: Mapping[str, Array]
+    error: Mapping[str, FreeError]
     remark: Remark
 
 
@@ -60,6 +61,9 @@ def free_run_torque(
         mean_disturbance(terms),
     )
     settled = terms.t - terms.t[0] >= min(SETTLING, 0.5 * float(terms.t[-1] - terms.t[0]))
+    robot, recording = run.run.robot, run.recording
+    friction = dry_friction(robot.friction, robot.joints)
+    rests = resting(recording.t, recording.require("dq"))[settled]
     where, there = Where(run.recording.name), {}
     remark = fact("zero-mean-of-free-run", where)
     if run.is_same_motion:
@@ -68,7 +72,7 @@ def free_run_torque(
     return FreeRunTorque(
         there=there,
         mean={e.name: e.tau[settled].mean(axis=0) for e in read},
-        rms={e.name: np.sqrt(np.mean(e.tau[settled] ** 2, axis=0)) for e in read},
+        error={e.name: free_error(e.tau[settled], rests, friction) for e in read},
         remark=remark,
     )
 

@@ -1,8 +1,7 @@
 """From a log, its free motion and the estimates to what the virtual sensor says of it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import chain as chained
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from vftcli.observers.observer import Observer
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Mask
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution
@@ -32,10 +31,10 @@ from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.torque_error import (
     TorqueError,
     from_band,
-    from_default,
     from_free_part,
     given_error,
-    lag_sd,
+    missed_torque,
+    unknown_error,
 )
 from vftcli.virtual_sensor.vendor import check_vendor
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
@@ -88,11 +87,8 @@ def sense(
     sensor = VirtualSensor(solver=choice.solver, frame=choice.frame, mounting=mounting)
     torques = less_free_run(estimates, free_run)
     zero = zero_spans(choice.zero, raw)
-    quiet = motion.zero.run.terms if motion.zero is not None else None
-    lag = partial(lag_sd, terms, observers, quiet)
-    error = torque_error(choice, torques, zero.chosen(t), free_run, lag)
+    error = torque_error(choice, motion, observers, torques, zero.chosen(t), free_run)
     wrenches = sensor.wrenches(torques, recording.q, chain, dict(error.sd))
-    bands = (error.remark,) if error.remark else tuple(r for w in wrenches for r in w.remarks)
     # Drifts span by span: the first of each observer is its zero.
     drifts = [[zero_drift(wrench, span) for wrench in wrenches] for span in zero.spans]
     warnings = tuple(
@@ -133,7 +129,7 @@ def sense(
             *payload_remark(recording, robot),
             *mask_remark(raw),
             *moved,
-            *bands,
+            *error.remarks,
             *(() if free_run is None else (free_run.remark,)),
             *(() if vendor is None else vendor.remarks),
             *(remark for e in elsewhere for remark in e.remarks),
@@ -143,29 +139,31 @@ def sense(
 
 def torque_error(
     choice: WrenchChoice,
+    motion: FreeMotion,
+    observers: Sequence[Observer],
     torques: Sequence[ExternalTorque],
     free: Mask,
     free_run: FreeRunTorque | None,
-    lag: Callable[[Mask], Mapping[str, Array]],
 ) -> TorqueError:
-    """The torque error behind the band: what was given, else measured, else assumed.
+    """The torque error behind the band: what was given, else measured, else unknown.
 
     Args:
         choice: What is asked.
-        torques: The estimates.
+        motion: The log, and the free run that is its zero, if there is one.
+        observers: The observers.
+        torques: Their estimates, less the zero.
         free: Samples of the zero spans; none if no zero was given. (T,)
-        free_run: What a free run reads, or None.
-        lag: What each observer's lag leaves out of the contacts, by the free samples (T,); called
-            only where it counts, as it takes spectra of the whole log.
+        free_run: What the free run reads, or None.
     """
     if choice.torque_sd is not None:
         return given_error(choice.torque_sd, torques)
-    if free_run is not None or np.count_nonzero(free) > 1:
-        rms = None if free_run is None else free_run.rms
-        return from_free_part(torques, free, rms, lag(free))
     if torques and all(torque.error_sd is not None for torque in torques):
         return from_band(torques)
-    return from_default(torques, choice.solver)
+    if free_run is None and np.count_nonzero(free) < 2:
+        return unknown_error()
+    quiet = motion.zero.run.terms if motion.zero is not None else None
+    missed = missed_torque(motion.log.terms, observers, quiet, free)
+    return from_free_part(motion.log, torques, free, free_run, missed)
 
 
 def payload_remark(recording: Recording, robot: Robot) -> tuple[Remark, ...]:
