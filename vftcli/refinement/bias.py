@@ -48,6 +48,11 @@ class Removal(NamedTuple):
     remarks: tuple[Remark, ...] = ()
 
 
+def remove_nothing(_found: Baseline, readings: Sequence[FreeReading]) -> Removal:
+    """Leave the estimates as they are."""
+    return Removal(tuple(readings))
+
+
 def remove_free_cycle(found: Baseline, readings: Sequence[FreeReading]) -> Removal:
     """Subtract the free cycle's own estimate at the same phase, or the free run's, aligned.
 

@@ -8,7 +8,7 @@ from vftcli.observers.observer import Observer
 from vftcli.observers.table import BEST
 from vftcli.refinement.band import band_remarks, with_band
 from vftcli.refinement.baseline import Baseline, free_reading
-from vftcli.refinement.bias import REMOVALS, Removal
+from vftcli.refinement.bias import REMOVALS, remove_nothing
 from vftcli.refinement.budget import Budget, budget, limits_remark
 from vftcli.refinement.choice import NOTHING
 from vftcli.refinement.consistency import Consistency, consistency
@@ -64,8 +64,7 @@ def refine(
     # Not every observer need run on the same terms: each is measured on those that it runs on.
     under = [found.under(observer.name) for observer in observers]
     readings = [free_reading(on, *pair) for on, pair in zip(under, pairs, strict=True)]
-    remove = REMOVALS.get(removal)
-    finished = Removal(tuple(readings)) if remove is None else remove(found, readings)
+    finished = REMOVALS.get(removal, remove_nothing)(found, readings)
     budgets = [
         budget(on, on.spectra, reading)
         for on, reading in zip(under, readings, strict=True)
