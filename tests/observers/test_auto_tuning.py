@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.observers import OBSERVERS, Setup, build_observers
+from vftcli.observers import OBSERVERS, LogSpectra, Setup, build_observers
 from vftcli.observers.auto_tuning import (
     KINDS,
     bound_remarks,
@@ -118,7 +118,7 @@ def test_without_spectra_auto_falls_back_and_says_so(pushed: Pushed) -> None:
 def test_tuned_observers_have_nothing_left_to_tune(pushed: Pushed) -> None:
     loaded, free = pushed()
     setup = Setup(gains={}, settings={}, joints=2, step=STEP, as_printed=False)
-    setup = setup._replace(spectra=spectra_of(loaded, [free]))
+    setup = setup._replace(shown=LogSpectra(plain=spectra_of(loaded, [free])))
     observer, remarks = OBSERVERS["rts-auto"].build(setup)
     assert remarks == ()
     assert observer.tuning(STEP, 2).parameter_count == 0

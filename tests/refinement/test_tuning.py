@@ -93,7 +93,7 @@ def test_goals_that_are_none(goal: str, threshold: str | None) -> None:
 
 
 def test_a_tuned_file_goes_into_a_comparison(tmp_path: Path) -> None:
-    """tune writes it, --set-file takes it: GMO then errs as little as was promised."""
+    """tune writes it, --gains takes it: GMO then errs as little as was promised."""
     gains, runner = tmp_path / "gains.toml", CliRunner()
     asked = ["tune", str(FIXTURE), "--robot", "ur5", "-o", str(gains), "--json"]
     done = runner.invoke(app, asked)
@@ -102,8 +102,8 @@ def test_a_tuned_file_goes_into_a_comparison(tmp_path: Path) -> None:
     table = tomllib.loads(gains.read_text(encoding="utf-8"))["observers"]
     assert set(table) == {"fdo", "gmo", "kfo", "kfo-rts"}
     compare = ["compare", str(FIXTURE), "--robot", "ur5", "--json"]
-    compare += ["--reference", f"file:{FIXTURE}.truth.parquet", "--set-file", str(gains)]
-    compare += ["--observer", "gmo", "--observer", "kfo-rts", "--observer", "rts-auto", "--bands"]
+    compare += ["--reference", f"file:{FIXTURE}.truth.parquet", "--gains", str(gains)]
+    compare += ["--observer", "gmo", "--observer", "kfo-rts", "--observer", "rts-auto"]
     found = json.loads(runner.invoke(app, compare).stdout)
     rmse = {(r["observer"], r["joint"]): r["rmse_Nm"] for r in found}
     for j in (1, 2, 3, 4, 6):  # J5 rests
