@@ -93,49 +93,51 @@ class Innovation(NamedTuple):
     covariance: Array
 
 
-def update(
-    x: Array, P: Array, d: Array, J: Array, noise: Array
-) -> tuple[Array, Array, Innovation]:
+def update(x: Array, P: Array, d: Array, Ht: Array, R: Array) -> tuple[Array, Array, Innovation]:
     """State and covariance with a block's disturbance in them, and what it added.
 
     Args:
         x: Predicted state. (…, N)
         P: Its covariance. (…, N, N)
         d: Mean disturbance. (n,) [N·m]
-        J: Jacobian of the block. (6, n)
-        noise: diag R. (n, n) [(N·m)²]
+        Ht: [J; I], what turns a state into joint torques, turned round. (N, n)
+        R: Covariance of the white noise. (n, n) [(N·m)²]
     """
-    Jt = J.T
-    PHt = P[..., :6] @ J
-    PHt += P[..., 6:]
-    S = Jt @ PHt[..., :6, :]
-    S += PHt[..., 6:, :]
-    S += noise
-    nu = d - x[..., :6] @ J - x[..., 6:]
-    half = np.linalg.inv(S)
-    gain = PHt @ half
+    PHt = P @ Ht
+    S = Ht.T @ PHt
+    S += R
+    nu = d - x @ Ht
+    gain = PHt @ np.linalg.inv(S)
+    x = x + (gain @ nu[..., None])[..., 0]
     P = P - gain @ PHt.swapaxes(-1, -2)
-    P += P.swapaxes(-1, -2).copy()
-    P *= 0.5
-    x = x + np.squeeze(gain @ nu[..., None], axis=-1)
+    # Rounding leaves the two triangles apart, and lets them drift.
+    P = 0.5 * (P + P.swapaxes(-1, -2))
     return x, P, Innovation(nu, S)
+
+
+def observation(measured: Measurement) -> Array:
+    """[J; I] of every block. (K, N, n)"""
+    blocks, _, n = measured.jacobian.shape
+    return np.concatenate([measured.jacobian, np.broadcast_to(np.eye(n), (blocks, n, n))], axis=1)
 
 
 def filter_forward(evolution: Evolution, measured: Measurement) -> Filtered:
     """The forward pass of one setting."""
     decay, variance = evolution
     blocks, size = decay.shape
-    noise, diagonal = np.diag(measured.noise), np.arange(size)
+    R, Ht = np.diag(measured.noise), observation(measured)
     mean, covariance = np.empty((blocks, size)), np.empty((blocks, size, size))
     predicted = np.empty((blocks, size, size))
+    # One row a block, every size+1-th entry of which lies on the diagonal.
+    flat = predicted.reshape(blocks, -1)
     x, P = np.zeros(size), np.zeros((size, size))
-    both = decay[:, :, None] * decay[:, None, :]
     for k in range(blocks):
-        x = decay[k] * x
-        P = np.multiply(both[k], P, out=predicted[k])
-        P[diagonal, diagonal] += variance[k]
+        f = decay[k]
+        x = f * x
+        P = np.multiply(f[:, None] * f, P, out=predicted[k])
+        flat[k, :: size + 1] += variance[k]
         if measured.known[k]:
-            x, P, _ = update(x, P, measured.d[k], measured.jacobian[k], noise)
+            x, P, _ = update(x, P, measured.d[k], Ht[k], R)
         mean[k], covariance[k] = x, P
     return Filtered(mean, covariance, predicted)
 
@@ -185,26 +187,23 @@ def likelihoods(evolution: Evolution, measured: Measurement) -> Array:
     """
     decay, variance = evolution
     blocks, settings, size = decay.shape
-    joints = measured.d.shape[1]
-    noise, diagonal = np.diag(measured.noise), np.arange(size)
+    R, Ht = np.diag(measured.noise), observation(measured)
     x, P = np.zeros((settings, size)), np.zeros((settings, size, size))
     total = np.zeros(settings)
     for start in range(0, blocks, STRETCH):
-        stop = min(start + STRETCH, blocks)
         values: list[Array] = []
         spreads: list[Array] = []
-        for k in range(start, stop):
+        for k in range(start, min(start + STRETCH, blocks)):
             f = decay[k]
             x = f * x
-            P = f[:, :, None] * P
-            P *= f[:, None, :]
-            P[:, diagonal, diagonal] += variance[k]
+            P = f[:, :, None] * P * f[:, None, :]
+            P.reshape(settings, -1)[:, :: size + 1] += variance[k]
             if measured.known[k]:
-                x, P, innovation = update(x, P, measured.d[k], measured.jacobian[k], noise)
+                x, P, innovation = update(x, P, measured.d[k], Ht[k], R)
                 values.append(innovation.value)
                 spreads.append(innovation.covariance)
         if values:
-            nu = np.array(values).reshape(-1, settings, joints, 1)
+            nu = np.array(values)[..., None]
             S = np.array(spreads)
             squares = np.sum(nu * np.linalg.solve(S, nu), axis=(0, 2, 3))
             total -= 0.5 * (squares + np.linalg.slogdet(S).logabsdet.sum(axis=0))

@@ -48,10 +48,6 @@ LEAST_NOISE = 1e-6
 LEAST_BLOCKS = 20
 """Shortest unbroken stretch of the free part that has a spectrum, in blocks."""
 
-PAUSE = 1.0
-"""A rest of the whole arm that is longer is left out of the free part: what the model errs by in
-motion is learned from motion. [s]"""
-
 NEAR_REST = 0.3
 """Where no free part tells, stiction counts this long before and after a rest too. [s]"""
 
@@ -191,26 +187,17 @@ def assumed_noise(log: Blocks, dry: Array) -> TorqueNoise:
 
 
 def free_stretches(piece: FreeTerms, seconds: float) -> list[Blocks]:
-    """The stretches of motion in a free piece that are long enough for a spectrum, in blocks.
+    """The stretches of a free piece that are long enough for a spectrum, in blocks.
 
-    A piece without any is taken as it is: at rest.
+    They reach from its first motion to its last, since rest has a model error of its own; a piece
+    without motion counts as it is.
     """
     blocks = disturbance_blocks(piece.terms, piece.q, seconds, piece.inside)
-    runs = long_runs(blocks.known & ~pauses(blocks)) or long_runs(blocks.known)
+    motion = np.flatnonzero(blocks.known & ~resting(blocks).all(axis=1))
+    if len(motion):
+        blocks = blocks.part(slice(int(motion[0]), int(motion[-1]) + 1))
+    runs = [run for run in runs_of(blocks.known) if run[1] - run[0] >= LEAST_BLOCKS]
     return [blocks.part(slice(*run)) for run in runs]
-
-
-def long_runs(chosen: Mask) -> list[tuple[int, int]]:
-    """Runs of at least `LEAST_BLOCKS` chosen blocks."""
-    return [run for run in runs_of(chosen) if run[1] - run[0] >= LEAST_BLOCKS]
-
-
-def pauses(blocks: Blocks) -> Mask:
-    """Blocks of a rest of all joints that lasts longer than `PAUSE`. (K,)"""
-    paused = np.zeros(len(blocks.t), dtype=bool)
-    for start, stop in runs_of(resting(blocks).all(axis=1)):
-        paused[start:stop] = blocks.length[start:stop].sum() > PAUSE
-    return paused
 
 
 class JointFit(NamedTuple):
