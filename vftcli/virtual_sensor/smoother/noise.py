@@ -122,7 +122,7 @@ def resting(blocks: Blocks) -> Mask:
 
 
 def dry_torques(robot: Robot) -> Array:
-    """F_c of each joint: Coulomb torque, or a sigmoid's whole amplitude; 0 if unknown. (n,) [N·m]"""
+    """F_c of each joint: Coulomb torque or a sigmoid's whole amplitude, 0 if unknown. (n,) [N·m]"""
     if not robot.friction:
         return np.zeros(robot.joints)
     each = (joint.parameters for joint in robot.friction)
@@ -200,7 +200,7 @@ def free_stretches(piece: FreeTerms, seconds: float) -> list[Blocks]:
     return [blocks.part(slice(*run)) for run in runs]
 
 
-class JointFit(NamedTuple):
+class FittedNoise(NamedTuple):
     """What one joint's spectrum gives.
 
     Attributes:
@@ -214,7 +214,7 @@ class JointFit(NamedTuple):
     time: float
 
 
-def fit_joints(stretches: Sequence[Blocks], seconds: float) -> list[JointFit]:
+def fit_joints(stretches: Sequence[Blocks], seconds: float) -> list[FittedNoise]:
     """R, s² and T of every joint, by Whittle's likelihood over all stretches together."""
     f = np.concatenate([np.fft.rfftfreq(len(s.d), seconds)[1:] for s in stretches])
     P = np.concatenate([periodogram(s.d, seconds) for s in stretches])
@@ -229,7 +229,7 @@ def periodogram(d: Array, seconds: float) -> Array:
     return power
 
 
-def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> JointFit:
+def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> FittedNoise:
     """R, s² and T of one joint: the best of a grid over ln T and ln s²/R that narrows five times.
 
     The level follows in closed form, so that two numbers are left to search.
@@ -257,4 +257,4 @@ def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> JointFit
         low, high = np.maximum(low, best - reach), np.minimum(high, best + reach)
         count = 5
     time, ratio = np.exp(best)
-    return JointFit(max(level, LEAST_NOISE), float(level * ratio), float(time))
+    return FittedNoise(max(level, LEAST_NOISE), float(level * ratio), float(time))

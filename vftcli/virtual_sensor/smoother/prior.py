@@ -1,4 +1,4 @@
-"""How a wrench may move: its prior, the gate outside of which it is zero, and its choice by the log."""
+"""How a wrench may move: its prior, chosen by the log, and the gate outside of which it is zero."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from vftcli.virtual_sensor.smoother.kalman import Evolution, Measurement, likeli
 from vftcli.virtual_sensor.smoother.noise import TorqueNoise, steps
 
 LEVER = 0.1
-"""Lever that a moment's prior takes for the force's: sd of the moment over that of the force. [m]"""
+"""Standard deviation of a moment over that of the force. [m]"""
 
 TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Correlation times of a wrench that are tried. [s]"""

@@ -76,8 +76,7 @@ class SmoothedWrench:
     @property
     def sd(self) -> Array:
         """Standard deviation in base axes. (K, 6) [N, N·m]"""
-        variances: Array = np.sqrt(np.einsum("kii->ki", self.covariance))
-        return variances
+        return deviations(self.covariance)
 
     def at(self, t: Array) -> "MovedWrench":
         """Values and covariance at other times, straight between blocks. (T, 6), (T, 6, 6)"""
@@ -86,6 +85,22 @@ class SmoothedWrench:
             resample_columns(t, self.t, self.values),
             resample_columns(t, self.t, flat).reshape(-1, 6, 6),
         )
+
+    @property
+    def record(self) -> dict[str, object]:
+        """The model's numbers, as `run.json` holds them."""
+        noise = self.noise
+        return {
+            "block_s": self.seconds,
+            "force_time_s": self.prior.time,
+            "force_sd_N": self.prior.force,
+            "noise_sd_Nm": np.sqrt(noise.white).tolist(),
+            "model_error_sd_Nm": np.sqrt(noise.moving).tolist(),
+            "model_error_time_s": noise.moving_time.tolist(),
+            "model_error_at_rest_sd_Nm": np.sqrt(noise.resting).tolist(),
+            "free_s": noise.free_seconds,
+            "gated": self.gate,
+        }
 
     def remarks(self, name: str) -> tuple[Remark, ...]:
         """What a reader of the wrench should know.
@@ -127,8 +142,14 @@ class MovedWrench(NamedTuple):
     @property
     def sd(self) -> Array:
         """Standard deviation. (T, 6) [N, N·m]"""
-        # A pinned wrench's variance is zero, which rounding may leave on either side.
-        return np.sqrt(np.maximum(np.einsum("tii->ti", self.covariance), 0.0))
+        return deviations(self.covariance)
+
+
+def deviations(covariance: Array) -> Array:
+    """Standard deviations of covariances. (T, k)"""
+    # A pinned state's variance is zero, which rounding may leave on either side.
+    variances = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)
+    return np.asarray(np.sqrt(variances))
 
 
 def smooth_wrench(
@@ -170,13 +191,12 @@ def smooth_wrench(
     steps = evolution(blocks, noise, [prior], inside)
     single = Evolution(steps.decay[:, 0], steps.variance[:, 0])
     mean, covariance = smooth_backward(single, filter_forward(single, measured))
-    errors = np.sqrt(np.maximum(np.einsum("kii->ki", covariance[:, 6:, 6:]), 0.0))
     return SmoothedWrench(
         t=blocks.t,
         values=mean[:, :6],
         covariance=covariance[:, :6, :6] * np.outer(WIDENED, WIDENED),
         model_error=mean[:, 6:],
-        model_error_sd=errors,
+        model_error_sd=deviations(covariance[:, 6:, 6:]),
         inside=inside,
         seconds=seconds,
         prior=prior,
