@@ -15,7 +15,7 @@ from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import from_base
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
-from vftcli.virtual_sensor.smoother.smoothing import SmoothedWrench, smooth_wrench
+from vftcli.virtual_sensor.smoother.smoothing import SmoothedWrench, prior_of, smooth_wrench
 from vftcli.virtual_sensor.virtual_sensor import CHUNK, VirtualSensor
 
 Gate = Sequence[tuple[float, float]]
@@ -27,15 +27,21 @@ class SmootherInput(NamedTuple):
 
     Attributes:
         terms: p and μ along the log, corrected as the observer's are.
-        free: Motion that nobody touched; none where nothing is known of it.
+        free: Motion that nobody touched, corrected likewise; none where nothing is known of it.
+        uncorrected: The same as the robot's model alone gives it, None where nothing is corrected.
     """
 
     terms: DynamicsTerms
     free: tuple[FreeTerms, ...]
+    uncorrected: "SmootherInput | None" = None
 
 
 InputOf = Callable[[str], SmootherInput]
-"""From an observer's name to what its wrench is smoothed from."""
+"""From an observer's name to what its wrench is smoothed from.
+
+A correction of the model's error is used where the wrench comes and goes. Where the uncorrected
+log calls for one steady load it is left out, since a load and an error of the model look alike.
+"""
 
 
 def plain_input(motion: FreeMotion, name: str = "") -> SmootherInput:  # noqa: ARG001
@@ -53,8 +59,8 @@ def has_part(motion: FreeMotion) -> bool:
         return False
 
 
-def known_free(motion: FreeMotion, found: SmootherInput, unloaded: Mask) -> SmootherInput:
-    """The input with what a zero says is free where nothing else is.
+def known_free(motion: FreeMotion, found: SmootherInput, unloaded: Mask) -> tuple[FreeTerms, ...]:
+    """The free motion of an input, what a zero says is free where there is no other.
 
     Args:
         motion: The log and the free run of its zero.
@@ -62,7 +68,7 @@ def known_free(motion: FreeMotion, found: SmootherInput, unloaded: Mask) -> Smoo
         unloaded: Samples of the log that its zero says are unloaded. (T,)
     """
     if found.free:
-        return found
+        return found.free
     free = []
     if np.count_nonzero(unloaded) > 1:
         free.append(FreeTerms(found.terms, motion.log.recording.q, unloaded))
@@ -70,7 +76,7 @@ def known_free(motion: FreeMotion, found: SmootherInput, unloaded: Mask) -> Smoo
         run = motion.zero.run
         whole = np.ones(run.recording.samples, dtype=bool)
         free.append(FreeTerms(run.terms, run.recording.q, whole))
-    return found._replace(free=tuple(free))
+    return tuple(free)
 
 
 def less_torque(terms: DynamicsTerms, torque: Array | None) -> DynamicsTerms:
@@ -128,7 +134,6 @@ def smooth_all(
     Raises:
         RobotError: If the arm has fewer than six joints.
     """
-    log = motion.log
     made: dict[int, SmoothedWrench] = {}
     found: dict[str, SmoothedWrench] = {}
     take = input_of or partial(plain_input, motion)
@@ -136,8 +141,26 @@ def smooth_all(
         given = take(name)
         key = id(given.terms)
         if key not in made:
-            given = known_free(motion, given, unloaded)
-            terms = less_torque(given.terms, torque)
-            made[key] = smooth_wrench(terms, log.recording.q, log.robot, given.free, gate)
+            made[key] = smooth_input(motion, given, unloaded, torque, gate)
         found[name] = made[key]
     return found
+
+
+def smooth_input(
+    motion: FreeMotion,
+    given: SmootherInput,
+    unloaded: Mask,
+    torque: Array | None,
+    gate: Gate | None,
+) -> SmoothedWrench:
+    """What the smoother finds from one input; the other arguments as of `smooth_all`."""
+    q, robot, plain = motion.log.recording.q, motion.log.robot, given.uncorrected
+    if plain is not None:
+        free = known_free(motion, plain, unloaded)
+        terms = less_torque(plain.terms, torque)
+        prior = prior_of(terms, q, robot, free, gate)
+        if prior.is_steady:
+            found = smooth_wrench(terms, q, robot, free, gate, prior)
+            return replace(found, uncorrected=True)
+    free = known_free(motion, given, unloaded)
+    return smooth_wrench(less_torque(given.terms, torque), q, robot, free, gate)

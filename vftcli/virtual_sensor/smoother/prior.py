@@ -32,10 +32,18 @@ class WrenchPrior(NamedTuple):
     force: float
 
     @property
+    def is_steady(self) -> bool:
+        """Whether it is the prior of a load rather than of contacts."""
+        return self.time >= STEADY
+
+    @property
     def variance(self) -> Array:
         """Stationary variance of force and moment. (6,) [N², (N·m)²]"""
         return np.repeat([self.force**2, (LEVER * self.force) ** 2], 3)
 
+
+STEADY = 30.0
+"""A wrench that keeps for at least this long is a load. [s]"""
 
 GRID = tuple(WrenchPrior(time, force) for time in TIMES for force in FORCES)
 """The priors that are tried."""

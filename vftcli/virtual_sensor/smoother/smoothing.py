@@ -34,9 +34,6 @@ COARSE = 0.1
 FINE, JITTERED = 0.024, 5
 """Length of a block where the wrench moves [s]; on an uneven clock it holds so many samples."""
 
-STEADY = 30.0
-"""A wrench whose correlation time is at least this is a load. [s]"""
-
 WIDENED = np.repeat([1.5, 2.0], 3)
 """What the model's own standard deviations of force and moment are multiplied by. The error of the
 friction is not Gaussian; chosen once on six simulated seeds, for all logs."""
@@ -57,6 +54,7 @@ class SmoothedWrench:
         prior: How the wrench may move.
         noise: What counts as noise.
         gate: Whether contacts were listed; else the whole log is one.
+        uncorrected: Whether a correction of the model's error was left out; see `InputOf`.
     """
 
     t: Array
@@ -69,6 +67,7 @@ class SmoothedWrench:
     prior: WrenchPrior
     noise: TorqueNoise
     gate: bool
+    uncorrected: bool = False
 
     def __post_init__(self) -> None:
         seal(self, "t", "values", "covariance", "model_error", "model_error_sd")
@@ -100,6 +99,7 @@ class SmoothedWrench:
             "model_error_at_rest_sd_Nm": np.sqrt(noise.resting).tolist(),
             "free_s": noise.free_seconds,
             "gated": self.gate,
+            "correction_left_out": self.uncorrected,
         }
 
     def remarks(self, name: str) -> tuple[Remark, ...]:
@@ -120,6 +120,8 @@ class SmoothedWrench:
             found.append(fact("wrench-noise-learned", where, free_s=noise.free_seconds))
         else:
             found.append(caution("wrench-noise-assumed", where))
+        if self.uncorrected:
+            found.append(fact("wrench-uncorrected", where))
         return tuple(found)
 
 
@@ -180,14 +182,10 @@ def smooth_wrench(
             f"an arm of {terms.joints} joints cannot tell the six components of a wrench; "
             "leave --wrench out and use the joint torques"
         )
-    seconds = COARSE
-    model = blocks_of(terms, q, robot, free, gate, seconds)
     if prior is None:
-        prior = choose_prior(model.blocks, model.measured, model.noise, model.inside)
-    if prior.time < STEADY and (fine := fine_blocks(terms.t)) < COARSE:
-        seconds = fine
-        model = blocks_of(terms, q, robot, free, gate, seconds)
-    blocks, measured, noise, inside = model
+        prior = prior_of(terms, q, robot, free, gate)
+    seconds = COARSE if prior.is_steady else fine_blocks(terms.t)
+    blocks, measured, noise, inside = blocks_of(terms, q, robot, free, gate, seconds)
     steps = evolution(blocks, noise, [prior], inside)
     single = Evolution(steps.decay[:, 0], steps.variance[:, 0])
     mean, covariance = smooth_backward(single, filter_forward(single, measured))
@@ -205,12 +203,24 @@ def smooth_wrench(
     )
 
 
+def prior_of(
+    terms: DynamicsTerms,
+    q: Array,
+    robot: Robot,
+    free: Sequence[FreeTerms] = (),
+    gate: Sequence[tuple[float, float]] | None = None,
+) -> WrenchPrior:
+    """The prior under which a log is most likely; the arguments as of `smooth_wrench`."""
+    model = blocks_of(terms, q, robot, free, gate, COARSE)
+    return choose_prior(model.blocks, model.measured, model.noise, model.inside)
+
+
 def fine_blocks(t: Array) -> float:
     """Length of a block where the wrench moves. [s]"""
     if len(t) < 2:
         return COARSE
     step = median_step(t)
-    return max(FINE, step if is_uniform(t) else JITTERED * step)
+    return min(COARSE, max(FINE, step if is_uniform(t) else JITTERED * step))
 
 
 class BlockModel(NamedTuple):
