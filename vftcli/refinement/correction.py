@@ -74,7 +74,7 @@ def corrected(found: Baseline, bias: WholeLogBias) -> Baseline:
     if made.part is None or made.spectra is None:
         return made
     spectra = spectra_of(Part(made.terms, ~made.part.own), made.samples)
-    part = with_samples(made.part, made.motion.log, bias.free)
+    part = made.part
     return replace(made, spectra=spectra, part=part)
 
 

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from vftcli.observers.error_band import FreeError, free_error
 from vftcli.observers.observer import Observer
 from vftcli.repetition.free_run import FreeRun, ModelledRun
@@ -32,6 +34,16 @@ class FreeRunTorque:
     mean: Mapping[str, Array]
     error: Mapping[str, FreeError]
     remark: Remark
+
+    def everywhere(self, name: str) -> Array:
+        """One observer's torque in every sample, its mean where the free run does not reach.
+
+        Returns:
+            (T, n), or (n,) where the free run is of another trajectory. [N·m]
+        """
+        mean = self.mean[name]
+        there = self.there.get(name, mean)
+        return np.where(np.isnan(there), mean, there)
 
 
 TermsOf = Callable[[str, ModelledRun], DynamicsTerms]
