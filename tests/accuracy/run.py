@@ -60,7 +60,7 @@ def main() -> None:
         columns = [key for key in found[0] if isinstance(found[0][key], float)]
         show(f"{group} mean", {key: float(np.mean([x[key] for x in found])) for key in columns})
         for key in columns:
-            if key.endswith("/today") or key.endswith("/without"):
+            if key.endswith(("/today", "/without")):
                 show(f"{group} worst {key}", {key: max(x[key] for x in found)})
 
 

@@ -20,7 +20,7 @@ from vftcli.refinement.model_error import (
     usual_friction,
 )
 from vftcli.refinement.normal_equations import Rows
-from vftcli.refinement.robust_fit import RobustFit, fit_robustly
+from vftcli.refinement.robust_fit import WholeLogFit, fit_robustly
 from vftcli.refinement.slow_load import slow_loads
 from vftcli.refinement.unseen import Guarded, guarded
 from vftcli.repetition.free_run import ModelledRun
@@ -151,7 +151,7 @@ def untouched(terms: DynamicsTerms, why: Remark) -> WholeLogBias:
 
 
 def bias_of(
-    run: ModelledRun, fit: RobustFit, found: Guarded, expected: ModelError, stride: int
+    run: ModelledRun, fit: WholeLogFit, found: Guarded, expected: ModelError, stride: int
 ) -> WholeLogBias:
     """The bias on the log's own clock, with its uncertainty and what is said of it."""
     t, n = run.recording.t, run.robot.joints
