@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.refinement.normal_equations import Rows, FittedError, Sums, solve
+from vftcli.refinement.normal_equations import FittedError, Rows, Sums, solve
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import runs_of
 
