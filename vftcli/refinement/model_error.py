@@ -120,7 +120,7 @@ def usual_friction(robot: Robot) -> UsualFriction:
             found[j, 0] = 0.7 * abs(float(joint.parameters["amplitude"]))
         elif joint.model != "none":
             found[j] = fitted_curve(joint, float(robot.limits.qd_max[j]))
-            found[j, 0] = dry[j] or max(found[j, 0], 0.0)
+            found[j, 0] = abs(dry[j] or found[j, 0])
     return UsualFriction(*found.T)
 
 

@@ -20,7 +20,7 @@ from vftcli.refinement.model_error import (
     usual_friction,
 )
 from vftcli.refinement.normal_equations import Rows
-from vftcli.refinement.robust_fit import RobustFit, fit_robustly
+from vftcli.refinement.robust_fit import WholeLogFit, fit_robustly
 from vftcli.refinement.slow_load import slow_loads
 from vftcli.refinement.unseen import Guarded, guarded
 from vftcli.repetition.free_run import ModelledRun
@@ -34,7 +34,14 @@ MOVES = 0.02
 """The arm moves where a joint is faster than this. [rad/s]"""
 
 LEAST_MOTION = 10.0
-"""Less motion than this tells friction and inertia from a push no more. [s]"""
+"""From its first to its last motion a log has to take this long, a sample or two at its ends not
+counted: a shorter one tells friction and inertia from a push no more. [s]"""
+
+ENDS = 0.1
+"""What the ends may lack. [s]"""
+
+LEAST_SHARE = 0.1
+"""An arm that moves less of the time, and less than `LEAST_MOTION` in all, is held in a pose."""
 
 RATE = 30.0
 """Samples a second that are fitted, …"""
@@ -96,9 +103,7 @@ def whole_log_bias(run: ModelledRun) -> WholeLogBias:
         RobotError: If the number of joints differs.
     """
     terms, t = run.terms, run.recording.t
-    moving = time_in_motion(run)
-    if moving < LEAST_MOTION:
-        refused = caution("whole-log-too-short", motion_s=moving, least_s=LEAST_MOTION)
+    if (refused := refusal(run)) is not None:
         return untouched(terms, refused)
     motion = smooth_motion(run)
     stride = stride_of(t)
@@ -113,14 +118,21 @@ def whole_log_bias(run: ModelledRun) -> WholeLogBias:
     return bias_of(run, fit, guarded(fit), expected, stride)
 
 
-def time_in_motion(run: ModelledRun) -> float:
-    """How long some joint moves, its velocity's noise filtered off. [s]"""
-    t = run.recording.t
-    if len(t) < 2 or t[-1] - t[0] < LEAST_MOTION:
-        return 0.0 if len(t) < 2 else float(t[-1] - t[0])
-    dq = zero_phase(t, run.recording.require("dq"), CUTOFF)
-    moves = np.any(np.abs(dq) > MOVES, axis=1)
-    return float(np.count_nonzero(moves) * median_step(t))
+def refusal(run: ModelledRun) -> Remark | None:
+    """Why a log does not tell the model's error from a push, None where it may."""
+    t, span, moving = run.recording.t, 0.0, 0.0
+    if t[-1] - t[0] >= LEAST_MOTION - ENDS:
+        # noise is no motion
+        dq = zero_phase(t, run.recording.require("dq"), CUTOFF)
+        moves = np.any(np.abs(dq) > MOVES, axis=1)
+        moving = float(np.count_nonzero(moves) * median_step(t))
+        span = float(np.ptp(t[moves])) if moves.any() else 0.0
+    if span < LEAST_MOTION - ENDS:
+        return caution("whole-log-too-short", motion_s=span, least_s=LEAST_MOTION)
+    share = moving / float(t[-1] - t[0])
+    if moving < LEAST_MOTION and share < LEAST_SHARE:
+        return caution("whole-log-at-rest", motion_s=moving, share=share)
+    return None
 
 
 def stride_of(t: Array) -> int:
@@ -142,7 +154,7 @@ def untouched(terms: DynamicsTerms, why: Remark) -> WholeLogBias:
 
 
 def bias_of(
-    run: ModelledRun, fit: RobustFit, found: Guarded, expected: ModelError, stride: int
+    run: ModelledRun, fit: WholeLogFit, found: Guarded, expected: ModelError, stride: int
 ) -> WholeLogBias:
     """The bias on the log's own clock, with its uncertainty and what is said of it."""
     t, n = run.recording.t, run.robot.joints
