@@ -10,7 +10,7 @@ from vftcli.pipeline import AnalysisChoice, analyse_log, prepared, read
 from vftcli.readers.reader import ReadChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import Models
+from vftcli.repetition.free_run import ModelledRun, Models
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.terms import DynamicsTerms
@@ -20,6 +20,7 @@ from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.observer_wrench import (
     SmootherInput,
+    corrected_input,
     known_free,
     less_torque,
     plain_input,
@@ -161,3 +162,31 @@ def test_a_list_of_contacts_is_its_gate(motion: FreeMotion) -> None:
     assert wrench.sd is not None
     assert not wrench.sd[away].any()
     assert wrench.values[(t > 4.5) & (t < 5.0)].any()
+
+
+def test_an_observers_own_terms_go_with_the_uncorrected_ones(motion: FreeMotion) -> None:
+    pieces = motion.part.pieces
+    shifted = less_torque(motion.log.terms, np.ones_like(motion.log.terms.mu))
+
+    def terms_of(name: str, run: ModelledRun) -> DynamicsTerms:
+        return shifted if name == "best" and run is motion.log else run.terms
+
+    best, gmo = (corrected_input(motion, pieces, terms_of, name) for name in ("best", "gmo"))
+    assert gmo.uncorrected is None
+    assert gmo.terms is motion.log.terms
+    assert best.terms is shifted
+    assert best.free[0].terms is shifted
+    assert best.uncorrected is not None
+    assert best.uncorrected.terms is motion.log.terms
+
+
+def test_a_free_run_takes_the_place_of_a_correction(motion: FreeMotion) -> None:
+    plain = plain_input(motion)
+    shape = motion.log.terms.mu.shape
+    other = plain._replace(terms=less_torque(plain.terms, np.ones(shape)), uncorrected=plain)
+    nothing, torque = np.zeros(shape[0], dtype=bool), np.full(shape, 0.5)
+    both = [
+        smooth_all(motion, ["best"], lambda _, x=x: x, unloaded=nothing, torque=torque)["best"]
+        for x in (other, plain)
+    ]
+    np.testing.assert_array_equal(both[0].values, both[1].values)

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.repetition.free_motion import FreeMotion
+from vftcli.repetition.free_motion import FreeMotion, FreePiece
+from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.kinematics import link_poses
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, handed_over
@@ -47,8 +48,36 @@ log calls for one steady load it is left out, since a load and an error of the m
 def plain_input(motion: FreeMotion, name: str = "") -> SmootherInput:  # noqa: ARG001
     """The log as the robot's model explains it, with its free part; the same for every name."""
     pieces = motion.part.pieces if has_part(motion) else ()
-    free = (FreeTerms(piece.run.terms, piece.run.recording.q, piece.inside) for piece in pieces)
-    return SmootherInput(motion.log.terms, tuple(free))
+    return input_under(motion, pieces, lambda run: run.terms)
+
+
+def corrected_input(
+    motion: FreeMotion,
+    pieces: Sequence[FreePiece],
+    terms_of: Callable[[str, ModelledRun], DynamicsTerms],
+    name: str,
+) -> SmootherInput:
+    """The log and its free pieces as one observer has them, and as the robot's model does.
+
+    Args:
+        motion: The log.
+        pieces: What of it, and of free runs, is believed to be free.
+        terms_of: An observer's p and μ of a recording; the run's own where nothing is corrected.
+        name: The observer.
+    """
+    plain = input_under(motion, pieces, lambda run: run.terms)
+    own = input_under(motion, pieces, partial(terms_of, name))
+    return plain if own.terms is plain.terms else own._replace(uncorrected=plain)
+
+
+def input_under(
+    motion: FreeMotion,
+    pieces: Sequence[FreePiece],
+    terms_of: Callable[[ModelledRun], DynamicsTerms],
+) -> SmootherInput:
+    """The log and its free pieces under one correction."""
+    free = (FreeTerms(terms_of(piece.run), piece.run.recording.q, piece.inside) for piece in pieces)
+    return SmootherInput(terms_of(motion.log), tuple(free))
 
 
 def has_part(motion: FreeMotion) -> bool:
@@ -134,15 +163,14 @@ def smooth_all(
     Raises:
         RobotError: If the arm has fewer than six joints.
     """
-    made: dict[int, SmoothedWrench] = {}
+    made: list[tuple[DynamicsTerms, SmoothedWrench]] = []
     found: dict[str, SmoothedWrench] = {}
     take = input_of or partial(plain_input, motion)
     for name in names:
         given = take(name)
-        key = id(given.terms)
-        if key not in made:
-            made[key] = smooth_input(motion, given, unloaded, torque, gate)
-        found[name] = made[key]
+        same = next((smoothed for terms, smoothed in made if terms is given.terms), None)
+        found[name] = same or smooth_input(motion, given, unloaded, torque, gate)
+        made.append((given.terms, found[name]))
     return found
 
 
@@ -155,12 +183,14 @@ def smooth_input(
 ) -> SmoothedWrench:
     """What the smoother finds from one input; the other arguments as of `smooth_all`."""
     q, robot, plain = motion.log.recording.q, motion.log.robot, given.uncorrected
+    if plain is not None and torque is not None:
+        # A free run takes the model's error off by itself; the correction would do it again.
+        given, plain = plain, None
     if plain is not None:
         free = known_free(motion, plain, unloaded)
-        terms = less_torque(plain.terms, torque)
-        prior = prior_of(terms, q, robot, free, gate)
+        prior = prior_of(plain.terms, q, robot, free, gate)
         if prior.is_steady:
-            found = smooth_wrench(terms, q, robot, free, gate, prior)
+            found = smooth_wrench(plain.terms, q, robot, free, gate, prior)
             return replace(found, uncorrected=True)
     free = known_free(motion, given, unloaded)
     return smooth_wrench(less_torque(given.terms, torque), q, robot, free, gate)

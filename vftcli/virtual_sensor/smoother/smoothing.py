@@ -34,6 +34,9 @@ COARSE = 0.1
 FINE, JITTERED = 0.024, 5
 """Length of a block where the wrench moves [s]; on an uneven clock it holds so many samples."""
 
+MOST_BLOCKS = 30_000
+"""Blocks are longer in a log that would make more: each takes some 6 kB and .1 ms."""
+
 WIDENED = np.repeat([1.5, 2.0], 3)
 """What the model's own standard deviations of force and moment are multiplied by. The error of the
 friction is not Gaussian; chosen once on six simulated seeds, for all logs."""
@@ -184,7 +187,7 @@ def smooth_wrench(
         )
     if prior is None:
         prior = prior_of(terms, q, robot, free, gate)
-    seconds = COARSE if prior.is_steady else fine_blocks(terms.t)
+    seconds = block_length(terms.t, fine=not prior.is_steady)
     blocks, measured, noise, inside = blocks_of(terms, q, robot, free, gate, seconds)
     steps = evolution(blocks, noise, [prior], inside)
     single = Evolution(steps.decay[:, 0], steps.variance[:, 0])
@@ -211,16 +214,18 @@ def prior_of(
     gate: Sequence[tuple[float, float]] | None = None,
 ) -> WrenchPrior:
     """The prior under which a log is most likely; the arguments as of `smooth_wrench`."""
-    model = blocks_of(terms, q, robot, free, gate, COARSE)
+    model = blocks_of(terms, q, robot, free, gate, block_length(terms.t, fine=False))
     return choose_prior(model.blocks, model.measured, model.noise, model.inside)
 
 
-def fine_blocks(t: Array) -> float:
-    """Length of a block where the wrench moves. [s]"""
+def block_length(t: Array, *, fine: bool) -> float:
+    """Length of a block, fine where the wrench moves and coarse where it is a load. [s]"""
     if len(t) < 2:
         return COARSE
-    step = median_step(t)
-    return min(COARSE, max(FINE, step if is_uniform(t) else JITTERED * step))
+    step, length = median_step(t), COARSE
+    if fine:
+        length = min(COARSE, max(FINE, step if is_uniform(t) else JITTERED * step))
+    return max(length, float(t[-1] - t[0]) / MOST_BLOCKS)
 
 
 class BlockModel(NamedTuple):
