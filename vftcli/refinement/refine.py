@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from vftcli.observers.auto_tuning import AutoTuned, Curve
+from vftcli.observers.auto_tuning import AutoTuned, Curve, bound_remarks
 from vftcli.observers.observer import Observer
 from vftcli.refinement.band import band_remarks, with_band
 from vftcli.refinement.baseline import Baseline, free_reading
@@ -78,6 +78,11 @@ def refine(
                     expected_rmse_Nm=curve.least.tolist(),
                 )
                 for name, curve in curves.items()
+            ),
+            *(
+                remark
+                for name, curve in curves.items()
+                for remark in bound_remarks(name, curve.best, curve.omega_n)
             ),
             *band_remarks(found),
             *finished.remarks,
