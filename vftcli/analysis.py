@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from vftcli.signals.wrench import Wrench
     from vftcli.virtual_sensor.detection import ContactScore
     from vftcli.virtual_sensor.sensor_reading import SensorReading
+    from vftcli.virtual_sensor.smoother.observer_wrench import SmootherInput
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +93,15 @@ class Analysis:
         """P and μ of the log or of one of its free runs, as the observer of this name has them."""
         found = self.refinement
         return terms_of(found.baseline if found is not None else None, name, run)
+
+    def smoother_input(self, name: str) -> "SmootherInput":
+        """What the wrench of the observer of this name is smoothed from."""
+        from vftcli.virtual_sensor.smoother.observer_wrench import corrected_input, plain_input
+
+        if self.refinement is None:
+            return plain_input(self.motion)
+        pieces = self.refinement.baseline.untouched
+        return corrected_input(self.motion, pieces, self.terms_of, name)
 
     @property
     def t(self) -> Array:

@@ -193,8 +193,14 @@ def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
         return analysis
     from vftcli.virtual_sensor import sensing
 
-    made = analysis.observers, analysis.estimates
-    found = sensing.sense(analysis.motion, *made, choice.wrench, analysis.terms_of)
+    found = sensing.sense(
+        analysis.motion,
+        analysis.observers,
+        analysis.estimates,
+        choice.wrench,
+        analysis.terms_of,
+        analysis.smoother_input,
+    )
     return replace(analysis, virtual_sensor=found)
 
 

@@ -48,6 +48,8 @@ class Baseline:
         standing: Where a joint stands still. (T, n)
         missing: Why there is no free part, or are no spectra; None where there are both.
         correction: The bias of the whole log that is off the terms, None where none is.
+        by_fit: Whether the free part is what the fit of that bias takes for free: no contact that
+            comes and goes, though a load that stays may be in it.
         on_correction: What was applied of it and what was not, and what stands in for a free part.
         best: The baseline that `best` runs on, None where it is this one.
     """
@@ -58,6 +60,7 @@ class Baseline:
     standing: Mask
     missing: Remark | None = None
     correction: "WholeLogBias | None" = None
+    by_fit: bool = False
     on_correction: tuple[Remark, ...] = ()
     best: "Baseline | None" = None
     _made: dict[ModelledRun, DynamicsTerms] = field(
@@ -112,6 +115,11 @@ class Baseline:
     def pieces(self) -> tuple[FreePiece, ...]:
         """The free samples, of the log itself and of free runs; none without a free part."""
         return self.part.pieces if self.part is not None else ()
+
+    @property
+    def untouched(self) -> tuple[FreePiece, ...]:
+        """The pieces in which nothing at all touches the arm, as far as it is known."""
+        return () if self.by_fit else self.pieces
 
     @property
     def stuck(self) -> Mask:

@@ -15,7 +15,6 @@ from vftcli.refinement.baseline import Baseline, baseline_of, without_free_motio
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, VftError
 from vftcli.signals.remarks import caution, fact
@@ -58,7 +57,7 @@ def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
     log = found.motion.log
     remark = fact("free-by-the-fit", share=float(quiet.mean()))
     part = FreePart((FreePiece(log, quiet, ()),), quiet, (remark,))
-    made = replace(found, part=part, missing=None)
+    made = replace(found, part=part, by_fit=True, missing=None)
     try:
         return replace(made, spectra=spectra_of(Part(log.terms, ~quiet), made.samples))
     except ParameterError:  # all of it or nothing is taken for free, or never for long enough
@@ -73,16 +72,4 @@ def corrected(found: Baseline, bias: WholeLogBias) -> Baseline:
     made = replace(made, correction=bias)
     if made.part is None or made.spectra is None:
         return made
-    spectra = spectra_of(Part(made.terms, ~made.part.own), made.samples)
-    part = made.part
-    return replace(made, spectra=spectra, part=part)
-
-
-def with_samples(part: FreePart, log: ModelledRun, quiet: Mask) -> FreePart:
-    """A free part with further samples of the log that what is read there is measured on too."""
-    others = tuple(piece for piece in part.pieces if piece.run is not log)
-    own = next((piece for piece in part.pieces if piece.run is log), None)
-    pairings = own.pairings if own is not None else ()
-    inside = part.own | quiet
-    pieces = (FreePiece(log, inside, pairings), *others) if inside.any() else others
-    return part._replace(pieces=pieces)
+    return replace(made, spectra=spectra_of(Part(made.terms, ~made.part.own), made.samples))
