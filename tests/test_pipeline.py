@@ -55,9 +55,9 @@ def test_a_fixture_goes_all_the_way_to_a_table() -> None:
     assert joint_rows["samples"].to_list() == [analysis.recording.samples] * 30
     truth = analysis.reference
     assert truth is not None
-    # the estimates follow the pushes: J1 carries most of them
-    for estimate in analysis.estimates:
-        assert np.corrcoef(estimate.tau[:, 0], truth.tau[:, 0])[0, 1] > 0.8
+    # the estimates follow the pushes, most of which J1 carries; the smoother without lag
+    for estimate, least in zip(analysis.estimates, (0.99, 0.8), strict=False):
+        assert np.corrcoef(estimate.tau[:, 0], truth.tau[:, 0])[0, 1] > least
     # what the table says of the paper's gains is their mean RMSE over that of the best
     means = [rmse_of(analysis, name).mean() for name in named]
     (gap,) = [r for r in analysis.remarks if r.code.startswith("paper-gains")]
