@@ -34,11 +34,8 @@ MOVES = 0.02
 """The arm moves where a joint is faster than this. [rad/s]"""
 
 LEAST_MOTION = 10.0
-"""From its first to its last motion a log has to take this long, a sample or two at its ends not
-counted: a shorter one tells friction and inertia from a push no more. [s]"""
-
-ENDS = 0.1
-"""What the ends may lack. [s]"""
+"""From its first to its last motion a log has to take this long: a shorter one tells friction and
+inertia from a push no more. [s]"""
 
 LEAST_SHARE = 0.1
 """An arm that moves less of the time, and less than `LEAST_MOTION` in all, is held in a pose."""
@@ -121,13 +118,13 @@ def whole_log_bias(run: ModelledRun) -> WholeLogBias:
 def refusal(run: ModelledRun) -> Remark | None:
     """Why a log does not tell the model's error from a push, None where it may."""
     t, span, moving = run.recording.t, 0.0, 0.0
-    if t[-1] - t[0] >= LEAST_MOTION - ENDS:
+    if t[-1] - t[0] >= LEAST_MOTION:
         # noise is no motion
         dq = zero_phase(t, run.recording.require("dq"), CUTOFF)
         moves = np.any(np.abs(dq) > MOVES, axis=1)
         moving = float(np.count_nonzero(moves) * median_step(t))
         span = float(np.ptp(t[moves])) if moves.any() else 0.0
-    if span < LEAST_MOTION - ENDS:
+    if span < LEAST_MOTION:
         return caution("whole-log-too-short", motion_s=span, least_s=LEAST_MOTION)
     share = moving / float(t[-1] - t[0])
     if moving < LEAST_MOTION and share < LEAST_SHARE:
