@@ -33,7 +33,7 @@ AROUND = 0.03
 """How far from a stated period the true one is looked for, relative: clocks drift."""
 
 
-ENOUGH = 4096
+ENOUGH = 2560
 """Samples that refine a period: more of them only take longer."""
 
 SPARSE = 10.0
