@@ -104,7 +104,7 @@ def test_the_columns_times_an_error_are_the_torque_of_it(name):
                        out=np.zeros_like(error.own(j))) for j in range(robot.joints)]  # fmt: skip
     dense = np.column_stack([c @ u for c, u in zip(columns, share, strict=True)])
     # ṗ by central differences: ω²Ts²/6 of products of up to 1.8 Hz, .2 %, of 30 N·m at most
-    np.testing.assert_allclose(error.torque(run), dense, atol=0.06)
+    np.testing.assert_allclose(error.torque(run, smooth_motion(run)), dense, atol=0.06)
 
 
 def test_chunks_make_no_difference(monkeypatch):
@@ -124,7 +124,7 @@ def test_an_error_is_the_raw_disturbance_with_its_sign_turned():
     error = drawn_error(robot)
     run = wrong_run(robot, error)
     d = raw_disturbance(run.terms)
-    b = error.torque(run)
+    b = error.torque(run, smooth_motion(run))
     middle = 0.5 * (b[1:] + b[:-1])[50:-50]
     left = np.sqrt(np.mean((d[50:-50] + middle) ** 2, axis=0))
     # what is left is the sign's turn within a sample, some tenths of the dry friction's error of

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from known_errors import STEP, drawn_error, motion, shortened, ur10e, wrong_run
 
+from vftcli.refinement.model_error import smooth_motion
 from vftcli.refinement.whole_log import stride_of, whole_log_bias
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
@@ -42,7 +43,7 @@ def found(run):
 
 def test_a_planted_error_is_found_and_the_pushes_stay(run, found):
     """Against the error that was planted, on every joint that is corrected."""
-    error = drawn_error(ur10e()).torque(run)
+    error = drawn_error(ur10e()).torque(run, smooth_motion(run))
     assert found.applied.sum() >= 5
     left = rms(found.bias - error)[found.applied]
     # the prior's width in thirty seconds of motion, and friction's turns, which are filtered
@@ -65,7 +66,7 @@ def test_the_uncertainty_is_of_the_size_of_what_is_left(run, found):
     Weights take .3 s of noise for one sample, which makes the deviation two to three times too
     large for noise that is white.
     """
-    left = found.bias - drawn_error(ur10e()).torque(run)
+    left = found.bias - drawn_error(ur10e()).torque(run, smooth_motion(run))
     ratio = rms(left / found.sd)[found.applied].mean()
     assert 0.2 < ratio < 1.5
 
@@ -135,7 +136,7 @@ def test_seven_joints_behind_gears_work_too():
     panda = load_robot("panda")
     run = wrong_run(panda, drawn_error(panda), seconds=16.0, noise=0.1)
     found = whole_log_bias(run)
-    error = drawn_error(panda).torque(run)
+    error = drawn_error(panda).torque(run, smooth_motion(run))
     assert found.applied.any()
     left = rms(found.bias - error)[found.applied]
     assert np.all(left < rms(error)[found.applied])
@@ -173,6 +174,16 @@ def test_a_held_pose_is_refused():
     (still,) = whole_log_bias(held(20.0, 0.0)).remarks
     assert still.code == "whole-log-too-short"
     assert "no whole-log correction" in str(still)
+
+
+def test_what_no_arm_does_is_refused():
+    run = wrong_run(shortened(ur10e(), 3), seconds=12.0)
+    dq = run.recording.dq.copy()
+    dq[100:900] = 1e150
+    wild = ModelledRun(recording=replace(run.recording, dq=dq), robot=run.robot)
+    found = whole_log_bias(wild)
+    assert [r.code for r in found.remarks] == ["whole-log-without-solution"]
+    assert not found.bias.any()
 
 
 def test_long_logs_are_fitted_at_a_lower_rate():
