@@ -8,6 +8,7 @@ import numpy as np
 
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Part, Spectra, spectra_of
+from vftcli.refinement.free_load import FreeLoad, free_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.repetition.pairing import mean_of
@@ -42,6 +43,7 @@ class Baseline:
         spectra: Spectra of the raw disturbance, None where the free part is too short or not free.
         standing: Where a joint stands still. (T, n)
         missing: Why there is no free part, or are no spectra; None where there are both.
+        load: A load that the free part carries and the model lacks, None where none shows.
     """
 
     motion: FreeMotion
@@ -49,6 +51,7 @@ class Baseline:
     spectra: Spectra | None = None
     standing: Mask
     missing: Remark | None = None
+    load: FreeLoad | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "standing", frozen_mask(self.standing))
@@ -64,6 +67,14 @@ class Baseline:
         return self.part.pieces if self.part is not None else ()
 
     @property
+    def samples(self) -> list[Part]:
+        """P and μ of the free pieces, and which samples are free; a load there is no noise."""
+        return [
+            Part(piece.run.terms if self.load is None else self.load.off(piece.run), piece.inside)
+            for piece in self.pieces
+        ]
+
+    @property
     def stuck(self) -> Mask:
         """Joints that stand in most samples, where stiction decides. (n,)"""
         return np.asarray(self.standing.mean(axis=0) > STANDS)
@@ -72,6 +83,8 @@ class Baseline:
     def remarks(self) -> tuple[Remark, ...]:
         """What was found, and what was not and why."""
         found = self.part.remarks if self.part is not None else ()
+        if self.load is not None:
+            found = (*found, self.load.remark)
         return found if self.missing is None else (*found, self.missing)
 
 
@@ -88,12 +101,13 @@ def baseline_of(motion: FreeMotion) -> Baseline:
         part = motion.part
     except ReferenceTorqueError as error:
         return replace(bare, missing=caution("no-free-part", reason=str(error)))
+    known = replace(bare, part=part, load=free_load(part.pieces))
     try:
-        spectra = spectra_of(Part(log.terms, ~part.own), samples_of(part.pieces))
+        spectra = spectra_of(Part(log.terms, ~part.own), known.samples)
     except ParameterError as error:
-        return replace(bare, part=part, missing=caution("no-spectra", reason=str(error)))
+        return replace(known, missing=caution("no-spectra", reason=str(error)))
     if motion.choice.is_given or looks_free(spectra):
-        return replace(bare, part=part, spectra=spectra)
+        return replace(known, spectra=spectra)
     residuals = motion.free_cycles.residuals
     listed = [] if residuals is None else residuals.tolist()
     return replace(bare, missing=caution("free-part-not-quiet", residuals=listed))
@@ -116,7 +130,7 @@ def without_free_motion(found: Baseline) -> Baseline:
     p = np.cumsum(step * np.nan_to_num(d), axis=0)
     left = Part(DynamicsTerms(t=found.terms.t, p=p, mu=np.zeros_like(p)), known)
     try:
-        loaded = spectra_of(left, samples_of(part.pieces))
+        loaded = spectra_of(left, found.samples)
     except ParameterError:
         return found
     floor = (1.0 + 1.0 / len(part.pairings)) * spectra.floor
@@ -145,11 +159,6 @@ def bias_at_phase(part: FreePart, series: Sequence[Array]) -> Array:
     return mean_of(part.pairings, signals)
 
 
-def samples_of(pieces: Sequence[FreePiece]) -> list[Part]:
-    """P and μ of the free pieces, and which samples are free."""
-    return [Part(piece.run.terms, piece.inside) for piece in pieces]
-
-
 def looks_free(spectra: Spectra) -> bool:
     """Whether most joints have clearly less slow power in the free part than in the loaded one."""
     slow = spectra.frequency < CONTACT_BAND
@@ -164,7 +173,8 @@ class FreeReading(NamedTuple):
         observer: The observer.
         estimate: Its estimate of the log.
         free: Its estimate along each free piece, in the pieces' order.
-        samples: Of these, what it reads in the free samples, of all pieces in a row. (S, n) [N·m]
+        samples: Of these, what it reads in the free samples, of all pieces in a row, less a load
+            that the free part carries. (S, n) [N·m]
         resting: Whether a joint rests in them. (S, n)
     """
 
@@ -186,7 +196,12 @@ def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) 
         estimate if piece.run is found.motion.log else observer.estimate(piece.run.terms)
         for piece in found.pieces
     )
-    inside = [e.tau[piece.inside] for e, piece in zip(free, found.pieces, strict=True)]
+    read = [e.tau for e in free]
+    if found.load is not None:
+        # A load is torque, and no error of who reads it.
+        carried = [found.load.torque(piece.run) for piece in found.pieces]
+        read = [tau - load for tau, load in zip(read, carried, strict=True)]
+    inside = [tau[piece.inside] for tau, piece in zip(read, found.pieces, strict=True)]
     rests = [rests_in(piece.run)[piece.inside] for piece in found.pieces]
     none = (0, estimate.joints)
     return FreeReading(

@@ -82,5 +82,5 @@ def differs_by_noise(motion: DriveRun, cycles: Cycles, freest: int, other: int) 
     only = cycles.number(motion.t) == other
     pairing = pairing._replace(times=np.where(only, pairing.times, np.nan))
     found = difference(motion, [pairing], "model", band(motion.step, None)[0])
-    shown = np.sqrt(np.nanmean(found.tau**2, axis=0))
-    return bool(np.all(shown <= ALIKE * found.error.floor))
+    shown = found.error.rms_moving(found.tau)
+    return bool(np.all(shown <= ALIKE * found.error.floor_moving))
