@@ -72,15 +72,18 @@ def test_the_noise_band_lies_above_the_signal_and_below_half_the_rate() -> None:
     assert (low, high) == (pytest.approx(11.0), pytest.approx(22.0))  # 0.22 and 0.44 of 50 Hz
 
 
-def test_the_floor_of_a_joint_that_mostly_stands_is_over_all_samples() -> None:
+def test_the_floor_is_over_all_samples_and_the_floor_in_motion_over_those_that_move() -> None:
     sd = np.column_stack([np.full(10, 1.0), np.repeat([1.0, 3.0], 5)])
     standing = np.zeros((10, 2), dtype=bool)
     standing[5:, 1] = True
     model = ErrorModel(sd, standing)
     np.testing.assert_allclose(model.standing_share, [0.0, 0.5])
-    np.testing.assert_allclose(model.floor, [1.0, 1.0])  # moving half alone
+    np.testing.assert_allclose(model.floor, [1.0, np.sqrt(5.0)])  # (5·1 + 5·9)/10
+    np.testing.assert_allclose(model.floor_moving, [1.0, 1.0])  # moving half alone
+    np.testing.assert_allclose(model.rms_moving(2.0 * sd), [2.0, 2.0])
     assert np.isnan(model.floor_standing[0])
     assert model.floor_standing[1] == 3.0
     standing[4:, 1] = True
-    assert ErrorModel(sd, standing).floor[1] == pytest.approx(np.sqrt(5.0))  # all: (5·1 + 5·9)/10
+    # it mostly stands, so that all samples speak for its motion too
+    assert ErrorModel(sd, standing).floor_moving[1] == pytest.approx(np.sqrt(5.0))
     assert ErrorModel(sd, standing).trusted_joints.tolist() == [True, False]

@@ -22,11 +22,11 @@ LEAST_SHARE = 0.05
 REPEATED = 0.5
 """Share of the stiction that cancels between two stops of the same length at the same place."""
 
-AT_REST = 0.15
+AT_REST = 0.13
 """Share of the dry friction by which two torques differ where the whole arm rests in both motions.
 
 Where it stops at the same place after the same motion its stiction repeats, as long as nobody
-touches it: three runs of one motion of a UR10e differ by .05 to .5 of it, most by .06 to .17.
+touches it: three runs of one motion of a UR10e differ by .05 to .5 of it, .13 in the mean.
 """
 
 ANYWHERE = np.sqrt(2.0 / 3.0)
