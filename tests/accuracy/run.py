@@ -49,10 +49,11 @@ def main() -> None:
     parser.add_argument("--robot", help="robot file for the real UR10e logs instead of the profile")
     parser.add_argument("--oracle", action="store_true", help="the best fixed gains too")
     parser.add_argument("--best", action="store_true", help="the pipeline's observer `best` too")
+    parser.add_argument("--length", type=float, default=10.0, help="of the pieces [s]")
     chosen = parser.parse_args()
     lines = defaultdict(list)
     for group in chosen.groups:
-        for case in cases_of(group, chosen.robot):
+        for case in cases_of(group, chosen):
             line = steady_line(case) if group == "steady" else tuned_line(case, chosen)
             lines[group].append(line)
             show(f"{group} {case.name}", line)
@@ -60,7 +61,7 @@ def main() -> None:
         columns = [key for key in found[0] if isinstance(found[0][key], float)]
         show(f"{group} mean", {key: float(np.mean([x[key] for x in found])) for key in columns})
         for key in columns:
-            if key.endswith("/today") or key.endswith("/without"):
+            if key.endswith(("/today", "/without")):
                 show(f"{group} worst {key}", {key: max(x[key] for x in found)})
 
 
@@ -70,15 +71,17 @@ def show(name: str, line: dict[str, object]) -> None:
     print(f"{name:34}", "  ".join(words), flush=True)
 
 
-def cases_of(group: str, robot: str | None):
+def cases_of(group: str, chosen):
     """The logs of a group."""
     logs = Path(os.environ.get("VFT_LOGS", ""))
     if group in scenarios.SIMULATED:
         return scenarios.simulated_cases(group)
     if group == "bullet":
         return scenarios.bullet_cases(logs)
-    make = {"planted": scenarios.planted_cases, "pieces": scenarios.piece_cases}
-    return make.get(group, scenarios.steady_cases)(logs, robot)
+    if group == "pieces":
+        return scenarios.piece_cases(logs, chosen.robot, chosen.length)
+    make = scenarios.planted_cases if group == "planted" else scenarios.steady_cases
+    return make(logs, chosen.robot)
 
 
 def rmse(estimate, truth) -> np.ndarray:

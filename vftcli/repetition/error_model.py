@@ -26,8 +26,8 @@ REPEATED = 0.5
 PIECE = 0.4
 """Length of the pieces in which noise is told from slow loads. [s]"""
 
-LEAST_PIECES = 8
-"""Fewest pieces of which the quietest speak for the noise."""
+LEAST_PIECES = 20
+"""Fewest pieces of which the quietest speak for the noise: one short cycle may be pushed in all."""
 
 QUIET = 0.1
 """Share of the pieces that are without a fast contact."""

@@ -44,8 +44,9 @@ def standing(t: Array, dq: Array) -> Mask:
     for j, long in enumerate((duration(t, dq) >= LEAST).T):
         for start, end in runs_of(long):
             # A joint is stuck before its speed is zero and settles after it has broken away.
-            around = (t >= t[start] - BREAKAWAY) & (t <= t[end - 1] + BREAKAWAY)
-            found[around, j] = True
+            first = np.searchsorted(t, t[start] - BREAKAWAY)
+            last = np.searchsorted(t, t[end - 1] + BREAKAWAY, side="right")
+            found[first:last, j] = True
     return found
 
 

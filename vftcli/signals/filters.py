@@ -1,5 +1,6 @@
 """Filters without phase shift on clocks that may be uneven, and how much white noise they pass."""
 
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -113,17 +114,24 @@ def butterworth(
     Raises:
         ParameterError: If a cutoff is not between zero and half the sample rate.
     """
-    from scipy.signal import butter
-
     if not (np.all(np.asarray(cutoff) > 0) and np.all(np.asarray(cutoff) < 0.5 / step)):
         raise ParameterError(
             f"a filter at {cutoff} Hz is not possible on a log of {1.0 / step:.4g} Hz; "
             f"choose a cutoff between 0 and {0.5 / step:.4g} Hz"
         )
+    return designed(step, cutoff, kind, order).copy()
+
+
+@lru_cache
+def designed(step: float, cutoff: float | tuple[float, float], kind: Kind, order: int) -> Array:
+    """A filter's sections, designed once: that takes longer than to filter a short log."""
+    from scipy.signal import butter
+
     sections: Array = butter(order, cutoff, kind, fs=1.0 / step, output="sos")
     return sections
 
 
+@lru_cache
 def noise_passed(
     step: float, cutoff: float | tuple[float, float], kind: Kind, slope: int = 0
 ) -> float:
