@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.observers.spectra import Part, Spectra, neighbour_mean, spectra_of
+from vftcli.observers.spectra import Part, Spectra, around_impacts, neighbour_mean, spectra_of
 from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
@@ -66,7 +66,7 @@ def test_an_uneven_clock_has_the_spectrum_of_its_median_step(terms_of: TermsOf) 
 def test_a_part_too_short_for_a_spectrum_is_refused(terms_of: TermsOf) -> None:
     terms = terms_of(STEP * np.arange(100), np.zeros((100, 1)))
     few = np.arange(100) < 20
-    with pytest.raises(ParameterError, match="needs 32 samples in a row; the loaded part has 79"):
+    with pytest.raises(ParameterError, match="needs 32 samples in a row; the loaded part has 99"):
         spectra_of(Part(terms, ~few), [Part(terms, few)])
 
 
@@ -187,3 +187,23 @@ def test_octaves_are_half_an_octave_apart() -> None:
     np.testing.assert_allclose(spectra.floor[f <= 11.0], 1.0)
     # beyond it the free part itself, averaged over a fifth of the frequency
     np.testing.assert_allclose(spectra.floor[f >= 15.0], 100.0)
+
+
+def test_a_part_of_impacts_alone_has_the_spectrum_of_the_impacts() -> None:
+    """Taps of .1 s, 20 N·m: their power over their own time is what S_τ adds up to.
+
+    White noise of .1 N·m is nothing beside it; windows that overlap the taps unevenly move it by
+    a tenth or two.
+    """
+    step = 0.008
+    t = np.arange(0.0, 40.0, step)
+    phase = np.mod(t, 2.0)
+    tap = (t > 10.0) & (phase < 0.1)
+    tau = np.where(tap, 20.0 * np.sin(np.pi * phase / 0.1), 0.0)
+    tau += 0.1 * np.random.default_rng(2).standard_normal(len(t))
+    gained = np.cumsum(np.concatenate([[0.0], 0.5 * (tau[1:] + tau[:-1]) * step]))
+    terms = DynamicsTerms(t=t, p=gained[:, None], mu=np.zeros((len(t), 1)))
+    found = spectra_of(Part(terms, tap), [Part(terms, t < 10.0)])
+    power = float(np.sum(found.loaded - found.free) * found.width)
+    assert power == pytest.approx(np.mean(tau[tap] ** 2), rel=0.25)
+    assert np.array_equal(around_impacts(t, t > 10.0), t > 10.0)  # lasts, so stays as it is

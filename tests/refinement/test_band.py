@@ -58,3 +58,19 @@ def test_the_resting_joint_is_named(found: Baseline) -> None:
     assert (band.code, rest.code) == ("band", "band-of-a-standing-joint")
     assert rest.where.joints == (5,)
     assert all(str(remark) for remark in (band, rest))
+
+
+def test_samples_that_a_fit_calls_free_take_the_place_of_the_free_part(found: Baseline) -> None:
+    reading = free_reading(found, GMO, GMO.estimate(found.terms))
+    quiet = np.arange(found.terms.samples) % 7 == 0
+    rests = rests_in(found.motion.log)
+    sd = with_band(found, reading, quiet=quiet).error_sd
+    there = with_band(
+        found, reading._replace(samples=reading.estimate.tau[quiet], resting=rests[quiet])
+    )
+    np.testing.assert_array_equal(sd, there.error_sd)
+    # too few to speak for anything
+    few = np.arange(found.terms.samples) < 20
+    np.testing.assert_array_equal(
+        with_band(found, reading, quiet=few).error_sd, with_band(found, reading).error_sd
+    )

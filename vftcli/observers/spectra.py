@@ -25,7 +25,7 @@ from vftcli.robots.disturbance import disturbance_stretches
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, handed_over, seal
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.series import median_step
+from vftcli.signals.series import median_step, runs_of
 from vftcli.signals.spectrum import welch
 
 SEGMENT = 4.0
@@ -33,6 +33,9 @@ SEGMENT = 4.0
 
 LEAST_SEGMENT = 32
 """Fewest samples of a segment; a shorter free or loaded part has no spectrum."""
+
+IMPACT = 1.0
+"""A loaded part of which nothing lasts longer is one of impacts. [s]"""
 
 NEIGHBOURS = 0.2
 """How far the average of neighbouring frequencies reaches, as a share of the frequency."""
@@ -160,8 +163,27 @@ class Part(NamedTuple):
     inside: Mask
 
 
+def around_impacts(t: Array, inside: Mask) -> Mask:
+    """A part as it is, or half of `IMPACT` more on either side if none of it lasts that long. (T,)
+
+    Args:
+        t: Clock. (T,) [s]
+        inside: The loaded samples. (T,)
+    """
+    runs = runs_of(inside)
+    if not runs or any(t[stop - 1] - t[start] >= IMPACT for start, stop in runs):
+        return inside
+    wide = inside.copy()
+    for start, stop in runs:
+        wide |= (t >= t[start] - 0.5 * IMPACT) & (t <= t[stop - 1] + 0.5 * IMPACT)
+    return wide
+
+
 def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
     """The spectra of a loaded part and a free one, by the same estimator.
+
+    A loaded part of short impacts is widened until it holds a second in a row: its excess over the
+    free part is then that of the impacts, thinned by what stands around them, and set right.
 
     Args:
         loaded: The log and its loaded samples.
@@ -172,7 +194,8 @@ def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
     """
     t = loaded.terms.t
     nominal = median_step(t) if len(t) > 1 else 0.0
-    heavy = disturbance_stretches(loaded.terms, loaded.inside, nominal)
+    inside = around_impacts(t, loaded.inside)
+    heavy = disturbance_stretches(loaded.terms, inside, nominal)
     quiet = [d for part in free for d in disturbance_stretches(*part, nominal)]
     longest = [max((len(run) for run in found), default=0) for found in (heavy, quiet)]
     size = min(round(SEGMENT / nominal) if nominal else 0, *longest)
@@ -181,8 +204,10 @@ def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
             f"a spectrum needs {LEAST_SEGMENT} samples in a row; the loaded part has "
             f"{longest[0]}, the free part {longest[1]}"
         )
+    thinned = float(np.mean(inside) / max(float(np.mean(loaded.inside)), 1.0 / len(t)))
     size -= size % 2
     (noise, few), (both, many) = (welch(found, size, nominal) for found in (quiet, heavy))
+    both = noise + thinned * (both - noise) if thinned > 1.0 else both
     return Spectra(
         frequency=np.asarray(np.fft.rfftfreq(size, nominal), dtype=np.float64),
         free=handed_over(noise),

@@ -13,6 +13,7 @@ import numpy as np
 from vftcli.observers.spectra import Part, spectra_of
 from vftcli.refinement.baseline import Baseline, baseline_of, without_free_motion
 from vftcli.refinement.choice import RefinementChoice
+from vftcli.refinement.free_load import free_load
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.signals.arrays import Mask
@@ -57,7 +58,7 @@ def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
     log = found.motion.log
     remark = fact("free-by-the-fit", share=float(quiet.mean()))
     part = FreePart((FreePiece(log, quiet, ()),), quiet, (remark,))
-    made = replace(found, part=part, by_fit=True, missing=None)
+    made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
     try:
         return replace(made, spectra=spectra_of(Part(log.terms, ~quiet), made.samples))
     except ParameterError:  # all of it or nothing is taken for free, or never for long enough

@@ -97,5 +97,5 @@ def differs_by_noise(motion: DriveRun, pairing: Pairing) -> bool:
         pairing: Where in another cycle its samples belong.
     """
     found = difference(motion, [pairing], "model", band(motion.step, None)[0])
-    shown = np.sqrt(np.nanmean(found.tau**2, axis=0))
-    return bool(np.all(shown <= ALIKE * found.error.floor))
+    shown = found.error.rms_moving(found.tau)
+    return bool(np.all(shown <= ALIKE * found.error.floor_moving))
