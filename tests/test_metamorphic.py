@@ -292,8 +292,8 @@ def whole_interval(ask: Ask, logs: Logs) -> None:
 
 def observer_added(ask: Ask, logs: Logs) -> None:
     """What one observer says does not depend on who else is asked."""
-    alone = ask(logs.load, "--observer", "gmo", "--bands", "--free", logs.free)
-    more = ("--observer", "gmo", "--observer", "rts-auto", "--free", logs.free, "--bands")
+    alone = ask(logs.load, "--observer", "gmo", "--free", logs.free)
+    more = ("--observer", "gmo", "--observer", "rts-auto", "--free", logs.free)
     both = ask(logs.load, *more)
     # p_vs_best compares with the others by its meaning.
     kept = {key: both[key] for key in alone if key in both}

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.robot import Robot
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
@@ -16,11 +17,14 @@ if TYPE_CHECKING:
 
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.print_table import Comparison
+    from vftcli.refinement.baseline import Baseline
     from vftcli.refinement.refine import Refinement
     from vftcli.repetition.free_motion import FreeMotion
+    from vftcli.repetition.free_run import ModelledRun
     from vftcli.signals.wrench import Wrench
     from vftcli.virtual_sensor.detection import ContactScore
     from vftcli.virtual_sensor.sensor_reading import SensorReading
+    from vftcli.virtual_sensor.smoother.observer_wrench import SmootherInput
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +89,32 @@ class Analysis:
             return self.virtual_sensor.wrenches
         return (*self.virtual_sensor.wrenches, replace(reference, name="reference"))
 
+    def terms_of(self, name: str, run: "ModelledRun") -> DynamicsTerms:
+        """P and μ of the log or of one of its free runs, as the observer of this name has them."""
+        found = self.refinement
+        return terms_of(found.baseline if found is not None else None, name, run)
+
+    def smoother_input(self, name: str) -> "SmootherInput":
+        """What the wrench of the observer of this name is smoothed from."""
+        from vftcli.virtual_sensor.smoother.observer_wrench import corrected_input, plain_input
+
+        if self.refinement is None:
+            return plain_input(self.motion)
+        pieces = self.refinement.baseline.untouched
+        return corrected_input(self.motion, pieces, self.terms_of, name)
+
     @property
     def t(self) -> Array:
         """Time since the log's first sample. (T,) [s]"""
         return self.recording.t
+
+
+def terms_of(baseline: "Baseline | None", name: str, run: "ModelledRun") -> DynamicsTerms:
+    """P and μ of a recording as one observer of its log has them.
+
+    Args:
+        baseline: What the log shows, None where nothing asks for it.
+        name: The observer.
+        run: The log, or one of its free runs.
+    """
+    return run.terms if baseline is None else baseline.under(name).terms_of(run)

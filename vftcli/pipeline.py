@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from vftcli.doctor.examiner import Examiner
 from vftcli.observers.choice import ObserverChoice
+from vftcli.observers.table import BEST, NOT_SHOWN
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
@@ -144,28 +145,29 @@ def examine(motion: FreeMotion, choice: AnalysisChoice) -> tuple["Examination", 
 
 
 def model(motion: FreeMotion, choice: AnalysisChoice) -> "Baseline | None":
-    """The log's free part and spectra, None where nothing asks for them."""
+    """The log's free part, spectra and bias, None where nothing asks for them."""
     if not choice.looks_back:
         return None
-    from vftcli.refinement.baseline import baseline_of, without_free_motion
+    from vftcli.refinement.correction import baseline_for
 
-    found = baseline_of(motion)
-    return without_free_motion(found) if choice.refinement.at_phase else found
+    return baseline_for(motion, choice.refinement, best=BEST in choice.observers.names)
 
 
 def observe(motion: FreeMotion, baseline: "Baseline | None", choice: AnalysisChoice) -> "Analysis":
     """Run the observers along the log."""
-    from vftcli.analysis import Analysis
+    from vftcli.analysis import Analysis, terms_of
     from vftcli.signals.remarks import caution
 
     log, step = motion.log, motion.log.recording.median_step
-    spectra = baseline.spectra if baseline is not None else None
-    observers, remarks = choice.observers.build(log.robot, step, spectra)
+    shown = NOT_SHOWN
+    if baseline is not None:
+        shown = baseline.shown(gains=choice.observers.gains_of_log)
+    observers, remarks = choice.observers.build(log.robot, step, shown)
     printed = (caution("as-printed"),) if choice.observers.as_printed else ()
     return Analysis(
         motion=motion,
         observers=observers,
-        estimates=tuple(observer.estimate(log.terms) for observer in observers),
+        estimates=tuple(o.estimate(terms_of(baseline, o.name, log)) for o in observers),
         tunings={o.name: o.tuning(step, log.robot.joints) for o in observers},
         remarks=(*remarks, *printed),
     )
@@ -177,8 +179,10 @@ def refine(analysis: "Analysis", baseline: "Baseline | None", choice: AnalysisCh
         return analysis
     from vftcli.refinement import refine as room
 
-    bias = choice.refinement.remove_bias
-    made = room.refine(baseline, analysis.observers, analysis.estimates, bias)
+    bias, of_file = choice.refinement.remove_bias, choice.observers.of_robot_file
+    made = room.refine(
+        baseline, analysis.observers, analysis.estimates, bias, gains_of_file=of_file
+    )
     remarks = (*analysis.remarks, *made.remarks)
     return replace(analysis, estimates=made.estimates, refinement=made, remarks=remarks)
 
@@ -189,7 +193,14 @@ def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
         return analysis
     from vftcli.virtual_sensor import sensing
 
-    found = sensing.sense(analysis.motion, analysis.observers, analysis.estimates, choice.wrench)
+    found = sensing.sense(
+        analysis.motion,
+        analysis.observers,
+        analysis.estimates,
+        choice.wrench,
+        analysis.terms_of,
+        analysis.smoother_input,
+    )
     return replace(analysis, virtual_sensor=found)
 
 
@@ -201,4 +212,7 @@ def judge(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
 
     sensed = analysis.virtual_sensor
     found = judgement.judge(analysis.motion, analysis.estimates, sensed, choice.reference)
-    return replace(analysis, **found._asdict())
+    remarks = analysis.remarks
+    if choice.observers.of_robot_file:
+        remarks = judgement.with_measured_gap(remarks, found.errors, analysis.tunings)
+    return replace(analysis, **found._asdict(), remarks=remarks)

@@ -88,7 +88,7 @@ def test_estimates_and_truth_are_forces_too(admit: Run, tmp_path: Path, monkeypa
     assert peaks["x"] > 0.05  # the guiding hand pulls along +x with 7 N
     code, _, err = admit(estimates, "--robot", "panda", "--observer", "kfo")
     assert code == 1
-    assert "holds no estimates of 'kfo'; it holds fdo, gmo" in err
+    assert "holds no estimates of 'kfo'; it holds best, fdo, gmo" in err
 
 
 RELEASE = ("--release", "x=0.3", "--robot", "ur5")

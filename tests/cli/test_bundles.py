@@ -117,10 +117,7 @@ def test_a_bundle_has_the_words_that_its_choice_parses(bundle: type[ChoiceBundle
     module, _, name = bundle.HOME.partition(":")
     parsed = getattr(import_module(f"vftcli.{module}"), name).parsed
     words = inspect.signature(parsed).parameters
-    own = set(bundle.declared())
-    assert own <= set(words)
-    # `--bands` is what BiasOptions leaves out: it is implied where they stand alone.
-    assert set(words) - own <= ({"bands"} if bundle is opt.BiasOptions else set())
+    assert set(bundle.declared()) == set(words)
 
 
 @pytest.mark.parametrize("bundle", BUNDLES, ids=lambda b: b.__name__)

@@ -129,9 +129,9 @@ def test_one_run_given_twice_is_refused(logs, tmp_path):
     "command",
     [
         ("compare", "--reference", "two-cycle"),
-        ("compare", "--reference", "zero", "--bands"),
+        ("compare", "--reference", "zero"),
         ("compare", "--reference", "zero", "--remove-bias", "free-cycle"),
-        ("estimate", "--bands"),
+        ("estimate",),
         ("tune",),
     ],
     ids=" ".join,

@@ -38,8 +38,9 @@ BAD = {
     "--robot": ("ur9", "no robot 'ur9'"),
     "--friction": ("some", "there is profile, none"),
     "--payload": ("bucket", "no payload 'bucket'"),
-    "--observer": ("kalman", "no observer 'kalman'; there is fdo, gmo"),
+    "--observer": ("kalman", "no observer 'kalman'; there is best, fdo, gmo"),
     "--set": ("gmo.gain=much", "is not a number or a list"),
+    "--gains": ("nowhere.toml", "nowhere.toml"),
     "--set-file": ("nowhere.toml", "nowhere.toml"),
     "--match": ("speed=3", "is not delay=S (seconds) or bandwidth=HZ"),
     "--free": ("nowhere.csv", "nowhere.csv"),
@@ -48,7 +49,7 @@ BAD = {
     "--period": ("-3", "is not a positive time in seconds"),
     "--alignment": ("odd", "no alignment 'odd'"),
     "--low-pass": ("-3", "is not a positive cutoff in Hz, none or auto"),
-    "--remove-bias": ("all", "there is none, free-cycle, model"),
+    "--remove-bias": ("all", "there is auto, whole-log, free-cycle, model, none"),
     "--frame": ("world", "world"),
     "--solver": ("qr", "no solver 'qr'"),
     "--tool": ("1,2", "--tool"),
@@ -108,7 +109,7 @@ def test_the_same_bad_value_is_refused_with_the_same_line(
 
 def test_every_shared_option_is_tried() -> None:
     """A new option of several commands needs its bad value here, or is one that takes all."""
-    takes_all = {"--output", "--help", "--json", "--force", "--bands", "--wrench", "--as-printed",
+    takes_all = {"--output", "--help", "--json", "--force", "--causal", "--wrench", "--as-printed",
                  "--sensor-weight", "--contacts", "--reference-columns",
                  "--anyway"}  # fmt: skip
     count: dict[str, int] = {}
@@ -140,7 +141,7 @@ def test_a_command_that_reads_a_log_reads_it_as_all_do(command: str) -> None:
 
 @pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
 def test_a_command_that_estimates_takes_all_that_can_be_asked(command: str) -> None:
-    whole = {*BAD, "--bands", "--wrench", "--as-printed", "--sensor-weight"} - {"--reference"}
+    whole = {*BAD, "--causal", "--wrench", "--as-printed", "--sensor-weight"} - {"--reference"}
     assert set(parameters(command)) >= whole
 
 

@@ -33,6 +33,21 @@ def test_constant_error_is_bias_maximum_and_rmse() -> None:
     assert row["samples"] == len(T)
 
 
+def test_the_floor_is_over_the_samples_that_are_compared() -> None:
+    """The reference is off by 1 N·m in its first half and 3 in its second."""
+    sd = np.where(T[750] > T, 1.0, 3.0)[:, None]
+    file = torque("file", WAVE, sd=sd, floor=np.array([7.0]))
+    whole = rows_of(evaluate("log", [torque("fdo", WAVE)], file))["fdo", 1]
+    assert whole["reference_floor_Nm"] == pytest.approx(np.sqrt(5.0))  # (1 + 9)/2
+    known = np.where(T[750] > T, WAVE, np.nan)
+    half = rows_of(evaluate("log", [torque("fdo", known)], file))["fdo", 1]
+    assert half["reference_floor_Nm"] == pytest.approx(1.0)
+    # one number is all that a reference without sd knows
+    plain = torque("file", WAVE, floor=np.array([7.0]))
+    row = rows_of(evaluate("log", [torque("fdo", WAVE)], plain))["fdo", 1]
+    assert row["reference_floor_Nm"] == 7.0
+
+
 def test_columns_and_order() -> None:
     table = evaluate(
         "log", [torque("fdo", WAVE, WAVE), torque("gmo", WAVE, 0.0)], torque("x", 0, 0)

@@ -1,12 +1,15 @@
 """ObserverChoice: which observers, and whose gains go before whose."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from vftcli.observers import DEFAULT
+from vftcli.observers import BEST, DEFAULT, PAPER, LogSpectra
 from vftcli.observers.choice import ObserverChoice
+from vftcli.observers.spectra import Spectra
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 
@@ -14,14 +17,84 @@ UR5 = load_robot("ur5")
 STEP = 0.008
 
 
+@pytest.fixture
+def spectra() -> Spectra:
+    """A push that fades as f⁻⁴ beside white noise, on six joints alike."""
+    f = np.linspace(0.0, 62.5, 251)
+    noise = np.full((251, 6), 0.01)
+    push = (10.0 / (1.0 + f**4))[:, None]
+    return Spectra(frequency=f, free=noise, loaded=noise + push, step=STEP, segments=(9, 9))
+
+
 def gain(choice: ObserverChoice) -> float:
     """The momentum observer's gain on joint 1. [1/s]"""
     return float(choice.build(UR5, STEP)[0][0].gain[0])
 
 
-def test_nothing_said_runs_the_paper_s_four() -> None:
+def test_nothing_said_runs_the_best_and_the_paper_s_four() -> None:
     assert ObserverChoice.parsed() == ObserverChoice()
     assert [o.name for o in ObserverChoice().build(UR5, STEP)[0]] == list(DEFAULT)
+    assert (DEFAULT[0], DEFAULT[1:]) == (BEST, PAPER)
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        ({"causal": True}, PAPER),
+        # The printed formulas and one footing for all are asked of the paper's observers.
+        ({"as_printed": True}, PAPER),
+        ({"match": "delay=0.05"}, PAPER),
+        ({"as_printed": True, "observer": ["best", "gmo"]}, ("best", "gmo")),
+        ({"observer": ["gmo"]}, ("gmo",)),
+        ({"observer": ["gmo", "best", "gmo"]}, ("best", "gmo")),  # the best leads, each once
+        ({"observer": ["rts-auto", "kfo-auto", "kfo-rts", "fdo"], "causal": True}, ("fdo",)),
+    ],
+)
+def test_who_runs(words: dict[str, Any], names: tuple[str, ...]) -> None:
+    assert ObserverChoice.parsed(**words).names == names
+
+
+def test_what_is_left_out_must_leave_something() -> None:
+    with pytest.raises(ParameterError, match="--causal leaves out rts-auto, best"):
+        ObserverChoice.parsed(observer=["rts-auto", "best"], causal=True)
+
+
+def test_beside_a_print_stand_its_own_observers_unless_others_are_named() -> None:
+    assert ObserverChoice().beside_print().names == PAPER
+    named = ObserverChoice(names=("best", "gmo"))
+    assert named.beside_print() is named
+
+
+def test_gains_of_the_log_go_between_the_robot_and_set(spectra: Spectra) -> None:
+    gains = {"gmo": {"gain": 7.0}, "kfo": {"r_diag": 2.0}}
+    shown = LogSpectra(plain=spectra, best=spectra, gains=gains)
+    asked = ObserverChoice.parsed(gains="auto", observer=["gmo", "kfo-zoh"])
+    (gmo, zoh), remarks = asked.build(UR5, STEP, shown)
+    assert np.all(gmo.gain == 7.0)
+    assert np.all(zoh.r_diag == 2.0)
+    np.testing.assert_array_equal(zoh.q_p_diag, UR5.gains["kfo"]["q_p_diag"])
+    assert remarks == ()
+    both = ObserverChoice.parsed(gains="auto", observer=["gmo"], assignments=["gmo.gain=33"])
+    assert np.all(both.build(UR5, STEP, shown)[0][0].gain == 33.0)
+    # A log without a free part has none to give.
+    (gmo, _), remarks = asked.build(UR5, STEP)
+    np.testing.assert_array_equal(gmo.gain, UR5.gains["gmo"]["gain"])
+    assert [remark.code for remark in remarks] == ["gains-without-free-part"]
+
+
+def test_the_best_is_tuned_to_what_is_left_without_the_bias(spectra: Spectra) -> None:
+    """Each observer that the log tunes sees the spectra of the terms that it runs on."""
+    quiet = replace(spectra, free=0.01 * spectra.free)
+    shown = LogSpectra(plain=spectra, best=quiet)
+    choice = ObserverChoice(names=("best", "rts-auto"))
+    best, plain = choice.build(UR5, STEP, shown)[0]
+    assert (best.name, plain.name) == ("best", "rts-auto")
+    rates = [o.tuning(STEP, 6).omega_n for o in (best, plain)]
+    assert np.all(rates[0] > rates[1])  # less noise is followed faster
+    (best, plain), remarks = choice.build(UR5, STEP, LogSpectra(plain=spectra))
+    assert best.curve is None
+    assert plain.curve is not None
+    assert [(r.code, r.where.about) for r in remarks] == [("tuning-without-free-part", "best")]
 
 
 def test_set_goes_before_a_file_and_a_file_before_the_robot(tmp_path: Path) -> None:
@@ -42,6 +115,20 @@ def test_a_file_leaves_what_it_does_not_name(tmp_path: Path) -> None:
     assert UR5.gains["gmo"]["gain"] != 21.0
 
 
+def test_a_gains_file_has_two_names(tmp_path: Path) -> None:
+    file = tmp_path / "gains.toml"
+    file.write_text("[observers.gmo]\ngain = 21.0\n", encoding="utf-8")
+    new = ObserverChoice.parsed(observer=["gmo"], gains=str(file))
+    assert new == ObserverChoice.parsed(observer=["gmo"], gains_file=file)
+    assert gain(new) == 21.0
+    assert not new.of_robot_file
+    paper = ObserverChoice.parsed(observer=["gmo"], gains="paper")
+    assert paper == ObserverChoice.parsed(observer=["gmo"])
+    assert paper.of_robot_file
+    with pytest.raises(ParameterError, match="the old name of --gains FILE"):
+        ObserverChoice.parsed(gains="auto", gains_file=file)
+
+
 def test_a_match_moves_the_gains() -> None:
     matched = ObserverChoice.parsed(observer=["gmo"], match="delay=0.05")
     # First order: the delay behind a slow ramp is 1/K.
@@ -49,14 +136,16 @@ def test_a_match_moves_the_gains() -> None:
 
 
 def test_only_observers_that_a_log_tunes_need_its_spectra() -> None:
-    assert not ObserverChoice().from_spectra
+    assert not ObserverChoice(causal=True).from_spectra
+    assert ObserverChoice(causal=True, gains="auto").from_spectra
+    assert ObserverChoice().from_spectra
     assert ObserverChoice(names=("gmo", "rts-auto")).from_spectra
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ({"observer": ["kalman"]}, "no observer 'kalman'; there is fdo, gmo"),
+        ({"observer": ["kalman"]}, "no observer 'kalman'; there is best, fdo, gmo"),
         ({"assignments": ["gmo"]}, "is not OBSERVER.PARAMETER=VALUE"),
         ({"assignments": ["gmo.gian=3"]}, "Did you mean gain"),
         ({"match": "speed=3"}, "is not delay=S"),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.observers import DEFAULT, Setup, build_observers
+from vftcli.observers import PAPER, Setup, build_observers
 from vftcli.observers.matching import match_observers, parse_target
 from vftcli.observers.observer import Observer
 from vftcli.robots.terms import DynamicsTerms
@@ -24,7 +24,7 @@ def setup(step: float = 0.008, **changed: object) -> Setup:
 def tuned(goal: str, step: float = 0.008, convention: str | None = None) -> list[Observer]:
     settings = {"kfo": {"noise_convention": convention}} if convention else {}
     how = setup(step, settings=settings)
-    return list(match_observers(build_observers(DEFAULT, how)[0], parse_target(goal), how)[0])
+    return list(match_observers(build_observers(PAPER, how)[0], parse_target(goal), how)[0])
 
 
 @pytest.mark.parametrize("step", [0.001, 0.008])
@@ -64,7 +64,7 @@ def test_matched_fdo_and_gmo_are_one_filter() -> None:
     fdo, gmo = (o.estimate(terms).tau for o in tuned("delay=0.05")[:2])
     assert np.max(np.abs(fdo - gmo)) < 1e-10 * np.max(np.abs(p)) / 0.05
     _, remarks = match_observers(
-        build_observers(DEFAULT, setup())[0], parse_target("delay=0.05"), setup()
+        build_observers(PAPER, setup())[0], parse_target("delay=0.05"), setup()
     )
     assert [r.code for r in remarks] == ["delay-matched", "first-order-observers-alike"]
     assert remarks[0].values["delay_s"] == 0.05
@@ -98,7 +98,7 @@ def test_one_joint_out_of_reach_is_refused() -> None:
 
 def test_printed_formulas_are_not_matched() -> None:
     how = setup(as_printed=True)
-    observers, _ = build_observers(DEFAULT, how)
+    observers, _ = build_observers(PAPER, how)
     with pytest.raises(ParameterError, match="--as-printed"):
         match_observers(observers, parse_target("delay=0.05"), how)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vftcli.observers import (
-    DEFAULT,
+    PAPER,
     FilteredDynamicsObserver,
     KalmanObserver,
     MomentumObserver,
@@ -29,7 +29,7 @@ def setup(robot: str, *assignments: str, joints: int = 6, step: float = 0.008) -
 
 
 def test_the_profile_gives_the_papers_gains() -> None:
-    (fdo, gmo, fe, _), remarks = build_observers(DEFAULT, setup("ur5"))
+    (fdo, gmo, fe, _), remarks = build_observers(PAPER, setup("ur5"))
     assert isinstance(fdo, FilteredDynamicsObserver)
     assert fdo.omega == 10.0
     assert isinstance(gmo, MomentumObserver)
@@ -91,7 +91,7 @@ def test_another_number_of_gains_is_refused() -> None:
 
 
 def test_an_unknown_observer_lists_what_there_is() -> None:
-    with pytest.raises(ParameterError, match="there is fdo, gmo, kfo-fe, kfo-zoh"):
+    with pytest.raises(ParameterError, match="there is best, fdo, gmo, kfo-fe, kfo-zoh"):
         build_observers(["kalman"], setup("ur5"))
 
 

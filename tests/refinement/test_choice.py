@@ -1,35 +1,40 @@
-"""RefinementChoice: bands, and what is taken off."""
+"""RefinementChoice: which bias comes off what."""
 
 import pytest
 
 from vftcli.refinement import bias
-from vftcli.refinement.choice import NOTHING, REMOVALS, RefinementChoice
+from vftcli.refinement.choice import AUTOMATIC, REMOVALS, RefinementChoice
 from vftcli.signals.errors import ParameterError
 
 
-def test_nothing_said_needs_no_free_part() -> None:
-    assert RefinementChoice.parsed() == RefinementChoice()
+def test_nothing_said_asks_for_no_complete_log_by_itself() -> None:
+    """The observers do: `best` runs on what the whole log allows."""
+    assert RefinementChoice.parsed() == RefinementChoice(remove_bias=AUTOMATIC)
     assert not RefinementChoice().looks_back
 
 
-def test_bands_and_removal_look_back() -> None:
-    assert RefinementChoice(bands=True).looks_back
-    assert all(
-        RefinementChoice(remove_bias=name).looks_back for name in REMOVALS if name != NOTHING
-    )
+@pytest.mark.parametrize(
+    ("word", "best", "everyone", "afterwards", "phase"),
+    [
+        ("auto", True, False, False, False),
+        ("whole-log", True, True, False, False),
+        ("free-cycle", False, False, True, True),
+        ("model", False, False, True, False),
+        ("none", False, False, False, False),
+    ],
+)
+def test_what_is_taken_off(
+    word: str, best: bool, everyone: bool, afterwards: bool, phase: bool
+) -> None:
+    asked = RefinementChoice.parsed(remove_bias=word)
+    assert (asked.corrects_best, asked.corrects_all) == (best, everyone)
+    assert (asked.removes_bias, asked.at_phase) == (afterwards, phase)
+    assert asked.looks_back == (everyone or afterwards)
+    # What comes off once the observers have run has its maker; what comes off before has none.
+    assert (word in bias.REMOVALS) == afterwards
 
 
-def test_the_table_makes_what_may_be_chosen() -> None:
-    assert tuple(bias.REMOVALS) == REMOVALS
-
-
-def test_another_removal_is_refused_before_a_log_is_read() -> None:
-    with pytest.raises(ParameterError, match="there is none, free-cycle, model"):
+def test_the_words_are_all_there_is() -> None:
+    assert REMOVALS == ("auto", "whole-log", "free-cycle", "model", "none")
+    with pytest.raises(ParameterError, match="there is auto, whole-log, free-cycle, model, none"):
         RefinementChoice(remove_bias="all")
-
-
-def test_what_is_taken_off() -> None:
-    model = RefinementChoice.parsed(remove_bias="model")
-    assert (model.removes_bias, model.at_phase) == (True, False)
-    assert RefinementChoice(remove_bias="free-cycle").at_phase
-    assert not RefinementChoice(bands=True).removes_bias

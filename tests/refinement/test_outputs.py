@@ -1,5 +1,6 @@
 """Bands, curves and limits reach the Parquet, the page, the recording and `run.json`."""
 
+import base64
 import json
 import re
 from pathlib import Path
@@ -32,11 +33,13 @@ def test_the_parquet_holds_the_band_beside_the_covariance(worked_up: Analysis) -
 def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -> None:
     data = payload(worked_up)
     tau, error = data["charts"][:2]
-    halves = {s["name"]: s["half"] for s in tau["series"]}
+    halves = {s["name"]: s["lines"][2]["half"] for s in tau["series"] if "half" in s["lines"][2]}
+    assert set(halves) == {e.name for e in worked_up.estimates}
     band = worked_up.estimates[-1].error_sd
     assert band is not None
-    np.testing.assert_allclose(halves["rts-auto"], 1.96 * band[0])
-    assert all(s["half"] is None for s in error["series"])
+    drawn = np.frombuffer(base64.b64decode(halves["rts-auto"]), dtype="<f4")
+    np.testing.assert_allclose(drawn, 1.96 * band[:, 2], rtol=1e-6)  # seven digits of a float32
+    assert not any("half" in line for s in error["series"] for line in s["lines"])
     charts = {chart["key"]: chart for chart in data["responses"]}
     assert [s["name"] for s in charts["curve"]["series"]] == ["kfo-auto", "rts-auto"]
     assert len(charts["spectra"]["series"]) == 2
@@ -60,7 +63,8 @@ def test_the_recording_shows_both_edges_of_the_last_band(worked_up: Analysis) ->
 def test_run_json_records_what_was_chosen(worked_up: Analysis) -> None:
     record = json.loads(to_json(run_record(worked_up, "vftcli report")))
     told = record["complete_log"]
-    assert told["bias_removed"] == "none"
+    assert told["bias_removed"] == "auto"
+    assert told["best"] is None  # it was not asked for
     assert len(told["tuned"]["rts-auto"]["omega_n_rad_s"]) == 6
     assert set(told["error_budget_Nm"]) == {e.name for e in worked_up.estimates}
     assert "filter" in next(o["parameters"] for o in record["observers"] if o["name"] == "rts-auto")

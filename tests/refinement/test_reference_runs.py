@@ -36,7 +36,6 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
     log, robot, truth = run.recording, run.robot, run.truth.tau_ext
     asked = AnalysisChoice(
         observers=ObserverChoice(names=("kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto")),
-        refinement=RefinementChoice(bands=True),
     )
     motion = read(log, robot, asked, Models())
     terms, found = motion.log.terms, model(motion, asked)
@@ -128,7 +127,6 @@ def test_ur10e_payload_by_the_free_run(logs: Path) -> None:
         read=ReadChoice(columns=UR10E),
         robot=RobotChoice(name="ur10e"),
         observers=ObserverChoice(names=("fdo", "gmo", "kfo-fe", "kfo-zoh", "rts-auto")),
-        refinement=RefinementChoice(bands=True),
         reference=ReferenceChoice(name="two-cycle"),
     )
     path = folder / "load_14harm.csv"

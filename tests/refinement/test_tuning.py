@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from vftcli.cli import app
 from vftcli.observers.spectra import Spectra
-from vftcli.refinement.tuning import crossings, parse_goal, tune_all
+from vftcli.refinement.tuning import bounds_reached, crossings, parse_goal, tune_all
 from vftcli.signals.errors import ParameterError, VftError
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
@@ -93,7 +93,7 @@ def test_goals_that_are_none(goal: str, threshold: str | None) -> None:
 
 
 def test_a_tuned_file_goes_into_a_comparison(tmp_path: Path) -> None:
-    """tune writes it, --set-file takes it: GMO then errs as little as was promised."""
+    """tune writes it, --gains takes it: GMO then errs as little as was promised."""
     gains, runner = tmp_path / "gains.toml", CliRunner()
     asked = ["tune", str(FIXTURE), "--robot", "ur5", "-o", str(gains), "--json"]
     done = runner.invoke(app, asked)
@@ -102,8 +102,8 @@ def test_a_tuned_file_goes_into_a_comparison(tmp_path: Path) -> None:
     table = tomllib.loads(gains.read_text(encoding="utf-8"))["observers"]
     assert set(table) == {"fdo", "gmo", "kfo", "kfo-rts"}
     compare = ["compare", str(FIXTURE), "--robot", "ur5", "--json"]
-    compare += ["--reference", f"file:{FIXTURE}.truth.parquet", "--set-file", str(gains)]
-    compare += ["--observer", "gmo", "--observer", "kfo-rts", "--observer", "rts-auto", "--bands"]
+    compare += ["--reference", f"file:{FIXTURE}.truth.parquet", "--gains", str(gains)]
+    compare += ["--observer", "gmo", "--observer", "kfo-rts", "--observer", "rts-auto"]
     found = json.loads(runner.invoke(app, compare).stdout)
     rmse = {(r["observer"], r["joint"]): r["rmse_Nm"] for r in found}
     for j in (1, 2, 3, 4, 6):  # J5 rests
@@ -152,3 +152,24 @@ def test_a_kalman_filters_rate_is_the_fourth_root_of_its_densities(name: str) ->
     (line,) = (x for x in tune_all(spectra(0.3), parse_goal("rmse")) if x.observer == name)
     ratio = np.array(line.gains["q_tau_diag"]) / np.array(line.gains["r_diag"])
     np.testing.assert_allclose(ratio**0.25, line.rate, rtol=1e-12)
+
+
+def test_a_gain_at_a_bound_is_said_with_the_numbers() -> None:
+    """No torque beyond the noise: every observer runs to the slowest; a stated delay has none."""
+    quiet = spectra()
+    silent = Spectra(
+        frequency=quiet.frequency,
+        free=quiet.free,
+        loaded=quiet.free,
+        step=quiet.step,
+        segments=(8, 8),
+    )
+    goal = parse_goal("rmse")
+    remarks = bounds_reached(tune_all(silent, goal), silent, goal)
+    assert {r.where.about for r in remarks} == {"fdo", "gmo", "kfo-zoh", "kfo-rts"}
+    for remark in remarks:
+        assert (remark.code, remark.level) == ("gain-at-slowest", "warning")
+        assert remark.values["rate_rad_s"] == 1.0
+    assert bounds_reached(tune_all(quiet, goal), quiet, goal) == ()
+    slow = parse_goal("delay=1")
+    assert bounds_reached(tune_all(quiet, slow), quiet, slow) == ()

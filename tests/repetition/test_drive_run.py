@@ -41,3 +41,13 @@ def test_a_joint_that_stands_is_marked() -> None:
     run = drive_run_of(log, ROBOT, dynamics_terms(log, ROBOT))
     assert run.standstill_s[600, 2] == pytest.approx(0.6)
     assert run.standing[600].tolist() == [False, False, True, False, False, False]
+
+
+def test_a_part_of_a_run_keeps_what_belongs_to_joints() -> None:
+    log = swing()
+    run = drive_run_of(log, ROBOT, dynamics_terms(log, ROBOT))
+    part = run.taken(slice(100, 300))
+    for name in ("t", "q", "dq", "standing", "standstill_s", "torque", "model", "momentum"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(run, name)[100:300])
+    assert part.coulomb is run.coulomb
+    assert part.name == run.name

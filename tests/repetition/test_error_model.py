@@ -9,10 +9,13 @@ from vftcli.repetition.error_model import (
     less_noise,
     local_rms,
     noise_of,
+    noise_when_quiet,
+    off_line,
     rms,
     slope_noise,
     white,
 )
+from vftcli.signals.filters import low_pass
 
 STEP = 0.008
 T = STEP * np.arange(6000)
@@ -35,16 +38,48 @@ def test_white_noise_is_measured_under_a_smooth_signal() -> None:
 @pytest.mark.parametrize("cutoff", [6.0, 12.0])
 def test_what_a_low_pass_leaves_of_white_noise(cutoff: float) -> None:
     """Measured beside the signal, predicted for the band that passes."""
-    from vftcli.signals.filters import low_pass
-
     x = np.random.default_rng(2).standard_normal((6000, 1))
     left = float(np.sqrt(np.mean(low_pass(T, x, cutoff) ** 2)))
     assert noise_of(T, x, MOVING, STEP, cutoff) == pytest.approx(left, rel=0.1)
 
 
-def test_what_a_differentiated_noise_leaves() -> None:
-    from vftcli.signals.filters import low_pass
+def coloured(memory: float, seed: int) -> np.ndarray:
+    """Noise of one newton-metre whose correlation falls to 1/e within a time. (6000, 1)"""
+    keep = np.exp(-STEP / memory)
+    drive = np.random.default_rng(seed).standard_normal(8000) * np.sqrt(1.0 - keep**2)
+    x = np.zeros(8000)
+    for k in range(1, 8000):
+        x[k] = keep * x[k - 1] + drive[k]
+    return x[2000:, None]
 
+
+@pytest.mark.parametrize(("memory", "share"), [(0.03, 0.8), (0.1, 0.55)])
+def test_coloured_noise_is_measured_where_it_is_quiet(memory: float, share: float) -> None:
+    """Beside a slow load and short contacts. What is slower than a piece counts for nothing: of an
+    exponential correlation a line over .4 s leaves 86 % of the variance at .03 s, 45 % at .1 s."""
+    load = 10.0 * np.sin(2 * np.pi * 0.1 * T)[:, None]
+    contact = np.where(np.sin(2 * np.pi * 0.25 * T) > 0.0, 30.0 * np.sin(2 * np.pi * T) ** 2, 0.0)
+    x = coloured(memory, 4) + load + contact[:, None]
+    left = float(np.sqrt(np.mean(low_pass(T, coloured(memory, 4), 12.0) ** 2)))
+    quiet = noise_when_quiet(T, x, MOVING, STEP, 12.0)[0]
+    assert share * left < quiet < 1.15 * left
+    # taken to be white, the band about the cutoff says less than half of that at .1 s
+    assert noise_of(T, x, MOVING, STEP, 12.0)[0] < quiet
+
+
+def test_the_quietest_pieces_of_white_noise_are_those_of_white_noise() -> None:
+    x = np.random.default_rng(6).standard_normal((6000, 1))
+    assert noise_when_quiet(T, x, MOVING, STEP, None) == pytest.approx(1.0, rel=0.05)
+    assert noise_when_quiet(T[:300], x[:300], MOVING[:300], STEP, None) == 0.0  # six pieces
+
+
+def test_a_straight_line_leaves_nothing() -> None:
+    x = np.column_stack([3.0 + 0.5 * T, np.ones(6000)])
+    np.testing.assert_allclose(off_line(x, 50), 0.0, atol=1e-9)
+    assert off_line(x, 50).shape == (120, 2)
+
+
+def test_what_a_differentiated_noise_leaves() -> None:
     p = np.random.default_rng(3).standard_normal((6000, 1))
     slope = np.gradient(low_pass(T, p, 8.0), T, axis=0)
     shown = float(np.sqrt(np.mean(slope[50:-50] ** 2)))
@@ -72,15 +107,18 @@ def test_the_noise_band_lies_above_the_signal_and_below_half_the_rate() -> None:
     assert (low, high) == (pytest.approx(11.0), pytest.approx(22.0))  # 0.22 and 0.44 of 50 Hz
 
 
-def test_the_floor_of_a_joint_that_mostly_stands_is_over_all_samples() -> None:
+def test_the_floor_is_over_all_samples_and_the_floor_in_motion_over_those_that_move() -> None:
     sd = np.column_stack([np.full(10, 1.0), np.repeat([1.0, 3.0], 5)])
     standing = np.zeros((10, 2), dtype=bool)
     standing[5:, 1] = True
     model = ErrorModel(sd, standing)
     np.testing.assert_allclose(model.standing_share, [0.0, 0.5])
-    np.testing.assert_allclose(model.floor, [1.0, 1.0])  # moving half alone
+    np.testing.assert_allclose(model.floor, [1.0, np.sqrt(5.0)])  # (5·1 + 5·9)/10
+    np.testing.assert_allclose(model.floor_moving, [1.0, 1.0])  # moving half alone
+    np.testing.assert_allclose(model.rms_moving(2.0 * sd), [2.0, 2.0])
     assert np.isnan(model.floor_standing[0])
     assert model.floor_standing[1] == 3.0
     standing[4:, 1] = True
-    assert ErrorModel(sd, standing).floor[1] == pytest.approx(np.sqrt(5.0))  # all: (5·1 + 5·9)/10
+    # it mostly stands, so that all samples speak for its motion too
+    assert ErrorModel(sd, standing).floor_moving[1] == pytest.approx(np.sqrt(5.0))
     assert ErrorModel(sd, standing).trusted_joints.tolist() == [True, False]

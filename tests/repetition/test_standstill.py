@@ -4,7 +4,15 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vftcli.repetition.standstill import BREAKAWAY, LEAST, STILL, duration, standing
+from vftcli.repetition.standstill import (
+    AROUND,
+    BREAKAWAY,
+    LEAST,
+    STILL,
+    duration,
+    resting,
+    standing,
+)
 
 STEP = 0.01
 T = STEP * np.arange(400)
@@ -58,3 +66,16 @@ def test_durations_add_up_to_the_still_samples(still: list[bool]) -> None:
     for value in [*still, False]:
         k = k + 1 if value else (runs.append(k) or 0)
     assert np.isclose(found.sum(), STEP * sum(k * k for k in runs))
+
+
+def test_rest_is_what_lasts_longer_than_half_of_the_time_around() -> None:
+    """A stop of 0.4 s at 100 Hz: at its edge half of ±.15 s is slow; counted by a loop."""
+    t = np.arange(0.0, 2.0, 0.01)
+    dq = np.where((t > 0.795) & (t < 1.195), 0.0, 0.5)[:, None]
+    found = resting(t, dq)
+    near = [np.abs(dq[np.abs(t - x) <= AROUND + 1e-9, 0]) < STILL for x in t]
+    expected = np.array([np.mean(slow) > 0.5 for slow in near])
+    # rounding of the clock may move one sample in or out of the window
+    assert np.count_nonzero(found[:, 0] != expected) <= 2
+    assert found[100, 0]
+    assert not found[70, 0]

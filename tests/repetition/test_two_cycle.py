@@ -152,22 +152,36 @@ def test_floor_covers_real_free_pairs(
     robot = load_robot("ur10e")
     choice = FreeChoice(low_pass=low_pass)
     reference = two_cycle_difference(repeats[pair[0]], repeats[pair[1]], robot, choice)
+    moving, all_of_it = shares_of_error(reference)
+    assert np.all((moving >= HONEST[0]) & (moving <= HONEST[1])), moving
+    # At rest the stiction of one motion repeats better on one joint than on another: .05 to .5 of
+    # the dry friction for an expected .13, in three pairs of two joints' worth of samples.
+    assert np.all((all_of_it >= 0.4) & (all_of_it <= 3.0)), all_of_it
+    assert 0.6 < all_of_it.mean() < 1.4
+
+
+def shares_of_error(reference: ExternalTorque) -> tuple[np.ndarray, np.ndarray]:
+    """What a difference of free runs shows over what it expects: in motion, and over all. (n,)"""
     assert reference.floor is not None
     assert reference.moving is not None
-    moving = reference.moving
-    shown = np.sqrt(np.nanmean(np.where(moving, reference.tau, np.nan) ** 2, axis=0))
-    ratio = shown / reference.floor
-    assert np.all((ratio >= HONEST[0]) & (ratio <= HONEST[1])), ratio
+    assert reference.sd is not None
+    known = reference.known
+    found = []
+    for used in (reference.moving & known, known):
+        shown, expected = (
+            np.nanmean(np.where(used, x, np.nan) ** 2, axis=0)
+            for x in (reference.tau, reference.sd)
+        )
+        found.append(np.sqrt(shown / expected))
+    np.testing.assert_allclose(expected, reference.floor**2, rtol=1e-9)  # the floor's own samples
+    return found[0], found[1]
 
 
 def test_three_free_runs_measure_the_floor(repeats: dict[str, Recording]) -> None:
     free = [repeats["b"], repeats["c"]]
     reference = two_cycle_difference(repeats["a"], free, load_robot("ur10e"))
-    assert reference.floor is not None
-    assert reference.moving is not None
-    shown = np.where(reference.moving, reference.tau, np.nan)
-    ratio = np.sqrt(np.nanmean(shown**2, axis=0)) / reference.floor
-    assert np.all((ratio >= HONEST[0]) & (ratio <= HONEST[1])), ratio
+    moving, _ = shares_of_error(reference)
+    assert np.all((moving >= HONEST[0]) & (moving <= HONEST[1])), moving
 
 
 def test_a_payload_is_seen(logs: Path) -> None:

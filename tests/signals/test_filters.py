@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from vftcli.signals.errors import ParameterError
-from vftcli.signals.filters import band_pass, even_clock, low_pass, noise_passed
+from vftcli.signals.errors import ClockError, ParameterError
+from vftcli.signals.filters import (
+    band_pass,
+    butterworth,
+    derivative,
+    even_clock,
+    low_pass,
+    noise_passed,
+    zero_phase,
+)
 
 RNG = np.random.default_rng(4)
 
@@ -83,3 +91,25 @@ def test_an_even_clock_keeps_both_ends() -> None:
     assert (clock[0], clock[-1]) == (t[0], t[-1])
     assert np.ptp(np.diff(clock)) < 1e-9
     assert abs(np.diff(clock)[0] - 1.0) < 0.5 / len(clock) * 2
+
+
+def test_what_is_differentiated_goes_through_a_steep_filter() -> None:
+    """Order 4 a pass, three periods of the cutoff to settle; a slow clock leaves it as it is."""
+    t = 0.01 * np.arange(500)
+    x = RNG.standard_normal((500, 2))
+    np.testing.assert_array_equal(zero_phase(t, x, 6.0), low_pass(t, x, 6.0, order=4, settling=0.5))
+    np.testing.assert_array_equal(zero_phase(10.0 * t, x, 6.0), x)
+    with pytest.raises(ClockError, match=r"0\.19 s of log are too short for a 6 Hz filter"):
+        zero_phase(t[:20], x[:20], 6.0)
+
+
+def test_differences_are_of_second_order_on_uneven_clocks_too() -> None:
+    t = np.cumsum(RNG.uniform(0.5, 1.5, 50))
+    # a parabola's slope is exact, at the ends too: rounding of numbers up to 2500
+    np.testing.assert_allclose(derivative(t, t[:, None] ** 2)[:, 0], 2.0 * t, rtol=1e-10)
+
+
+def test_a_filter_that_is_designed_once_is_nobody_s_to_change() -> None:
+    first = butterworth(0.01, 5.0, "lowpass")
+    first[:] = 0.0
+    assert butterworth(0.01, 5.0, "lowpass").any()

@@ -47,7 +47,8 @@ def coverage(scheme: str, runs: int, first: int = 150, last: int = 250) -> np.nd
         q = np.tile(POSE, (last, 1))
         estimate = observer.estimate(terms)
         truth = ExternalTorque(name="truth", t=terms.t, tau=tau)
-        told, true = sensor.wrenches((estimate, truth), q, chain)
+        own = {estimate.name: estimate.sd}
+        told, true = sensor.wrenches((estimate, truth), q, chain, own)
         assert told.sd is not None
         inside = np.abs(told.values - true.values) <= 1.96 * told.sd
         held += inside[first:].mean(axis=0)

@@ -10,6 +10,7 @@ from vftcli.virtual_sensor.contact import find_contacts
 from vftcli.virtual_sensor.detection import (
     LEAST_TORQUE,
     WRENCH_LIMITS,
+    floor_in_motion,
     judge_contacts,
     learned_free,
     true_intervals,
@@ -51,6 +52,21 @@ def test_a_reference_with_a_floor_calls_only_what_exceeds_five_times_it_a_contac
     assert one.detection.contacts == 1
     (none,) = judge_contacts([estimate], None, reference(2.0, np.array([0.5, np.nan])))
     assert none.detection.contacts == 0
+
+
+def test_stiction_at_rest_deafens_no_reference() -> None:
+    """The floor in motion is 1 N·m, over all samples √((1 + 25)/2)."""
+    t = np.arange(200) * 0.01
+    moving = np.arange(200)[:, None] < 100
+    one = ExternalTorque(
+        name="two-cycle",
+        t=t,
+        tau=np.zeros((200, 1)),
+        sd=np.where(moving, 1.0, 5.0),
+        floor=np.array([np.sqrt(13.0)]),
+        moving=moving,
+    )
+    np.testing.assert_allclose(floor_in_motion(one), [1.0])
 
 
 def test_a_free_band_of_torques_is_never_narrower_than_half_a_newton_metre() -> None:

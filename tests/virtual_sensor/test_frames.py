@@ -76,7 +76,9 @@ def sensed(frame: str, mounting: Mounting, robot: str = "ur5", turn: np.ndarray 
     q = motion(joints=chain.joints)
     tau = np.random.default_rng(5).normal(size=q.shape)
     torque = ExternalTorque(name="x", t=np.arange(len(q)) * 0.01, tau=tau)
-    return VirtualSensor(frame=frame, mounting=mounting).wrench(torque, q, chain)
+    return VirtualSensor(frame=frame, mounting=mounting).wrench(
+        torque, q, chain, np.ones(chain.joints)
+    )
 
 
 TOOL = Pose(rpy_matrix((0.2, 0.5, -0.4)), np.array([0.05, -0.1, 0.15]))

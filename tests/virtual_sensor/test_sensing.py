@@ -91,10 +91,10 @@ def test_a_panda_has_the_null_space_channel() -> None:
     ("choice", "code"),
     [
         ({"torque_sd": "0.5"}, "band-given"),
-        ({"torque_sd": "own"}, "band-assumed"),
+        ({"torque_sd": "own"}, "no-covariance"),
         ({"zero": START}, "band-from-free-part"),
-        ({}, "band-assumed"),
-        ({"solver": "map"}, "band-assumed-for-prior"),
+        ({}, "no-wrench-band"),
+        ({"solver": "map"}, "no-wrench-band"),
     ],
 )
 def test_the_band_says_where_it_comes_from(choice: dict[str, object], code: str) -> None:

@@ -1,21 +1,32 @@
-"""The torque error behind a band: given, measured, brought along or assumed."""
+"""The torque error behind a band: given, measured, brought along or unknown."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from vftcli.observers import MomentumObserver
+from vftcli.observers.choice import ObserverChoice
+from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots import load_robot
+from vftcli.robots.choice import RobotChoice
+from vftcli.robots.friction import dry_friction
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.virtual_sensor.solvers import TORQUE_SD
+from vftcli.signals.recording import Recording
+from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
+from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.torque_error import (
     from_band,
-    from_default,
     from_free_part,
     given_error,
-    lag_sd,
+    missed_torque,
+    unknown_error,
 )
 
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 T = np.arange(0.0, 40.0, 0.01)
 
 
@@ -29,8 +40,11 @@ def test_a_given_error_is_one_for_all_or_one_a_joint(text: str, sd: list[float])
     np.testing.assert_array_equal(given_error(text, [torque()]).sd["gmo"], sd)
 
 
-def test_own_leaves_every_observer_its_covariance() -> None:
-    assert given_error("own", [torque()]).sd == {}
+def test_own_takes_the_covariance_of_those_that_have_one() -> None:
+    own = torque("kfo-fe", sd=np.ones((len(T), 2)))
+    found = given_error("own", [torque(), own])
+    assert set(found.sd) == {"kfo-fe"}
+    assert [r.code for r in found.remarks] == ["band-of-observer", "no-covariance"]
 
 
 @pytest.mark.parametrize("text", ["1,2,3", "0", "-1", "nan", "much"])
@@ -39,30 +53,62 @@ def test_what_is_no_error(text: str) -> None:
         given_error(text, [torque()])
 
 
-def test_a_band_that_is_constant_is_one_a_joint() -> None:
-    constant = torque(error_sd=np.tile([[0.2, 0.3]], (len(T), 1)))
-    varying = torque("kfo-fe", error_sd=np.linspace(0.1, 0.2, 2 * len(T)).reshape(-1, 2))
-    found = from_band([constant, varying])
-    np.testing.assert_array_equal(found.sd["gmo"], [0.2, 0.3])
-    assert found.sd["kfo-fe"].shape == (len(T), 2)
-    assert found.remark is not None
-    assert found.remark.code == "band-from-torques"
+def test_a_measured_band_is_taken_as_it_is() -> None:
+    varying = torque(error_sd=np.linspace(0.1, 0.2, 2 * len(T)).reshape(-1, 2))
+    found = from_band([varying])
+    np.testing.assert_array_equal(found.sd["gmo"], varying.error_sd)
+    assert [r.code for r in found.remarks] == ["band-from-torques"]
 
 
-def test_a_default_stands_for_a_covariance_only_under_a_prior() -> None:
-    own = torque("kfo-fe", sd=np.ones((len(T), 2)))
-    assert from_default([torque(), own], "pinv").sd == {}
-    found = from_default([torque(), own], "map").sd
-    np.testing.assert_array_equal(found["kfo-fe"], [TORQUE_SD, TORQUE_SD])
+def test_where_nothing_is_known_there_is_no_band() -> None:
+    found = unknown_error()
+    assert found.sd == {}
+    assert [r.code for r in found.remarks] == ["no-wrench-band"]
 
 
-def test_a_free_part_measures_the_spread_about_its_mean() -> None:
-    one = torque()
+def log_run(dq: np.ndarray) -> ModelledRun:
+    """A UR5 log whose joints move as given."""
+    recording = Recording(t=T, q=np.cumsum(dq, axis=0) * 0.01, dq=dq, current=np.zeros((len(T), 6)))
+    return ModelledRun(recording=recording, robot=load_robot("ur5"))
+
+
+@pytest.mark.parametrize("moves", [True, False])
+def test_a_free_part_measures_the_spread_about_its_mean(moves: bool) -> None:
+    """A free part at rest says nothing of friction in motion: a fifth of it is added."""
+    rng = np.random.default_rng(3)
+    one = ExternalTorque(name="gmo", t=T, tau=1.0 + rng.normal(0.0, 0.5, (len(T), 6)))
     free = T < 20.0
-    found = from_free_part([one], free, None, {})
-    np.testing.assert_allclose(found.sd["gmo"], one.tau[free].std(axis=0))
-    rms = {"gmo": np.array([3.0, 4.0])}
-    np.testing.assert_array_equal(from_free_part([one], free, rms, {}).sd["gmo"], [3.0, 4.0])
+    speed = np.where(free & (not moves), 0.0, 0.5)
+    run = log_run(np.tile(speed[:, None], 6))
+    found = from_free_part(run, [one], free, None, {"gmo": np.full(6, 0.3**2)})
+    friction = dry_friction(run.robot.friction, 6)
+    spread = one.tau[free].std(axis=0)
+    expected = spread**2 + 0.3**2 + (0.0 if moves else (0.2 * friction) ** 2)
+    np.testing.assert_allclose(found.sd["gmo"][-1], np.sqrt(expected))
+    still = np.maximum(spread**2, (0.45 * friction) ** 2) + 0.3**2
+    if not moves:
+        np.testing.assert_allclose(found.sd["gmo"][5], np.sqrt(still))
+    codes = [r.code for r in found.remarks]
+    assert codes == ["band-from-free-part", *(["band-of-free-rest"] if not moves else [])]
+
+
+def test_two_observers_of_one_response_have_one_band() -> None:
+    """FE and ZOH read nearly the same and are told nearly the same, whatever P₂₂ each has."""
+    found = reading_of("kfo-fe", "kfo-zoh")
+    one, other = (wrench.known_sd for wrench in found.wrenches)
+    np.testing.assert_allclose(one, other, rtol=0.02)
+
+
+def reading_of(*names: str) -> SensorReading:
+    """The reference fixture's wrenches, its zero the unloaded start."""
+    choice = AnalysisChoice(
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=names),
+        wrench=WrenchChoice(zero=ZeroChoice(start=True)),
+    )
+    found = analyse_log(FIXTURE, choice).virtual_sensor
+    assert found is not None
+    return found
 
 
 def test_the_lag_adds_what_it_leaves_out_of_the_contacts() -> None:
@@ -72,18 +118,17 @@ def test_the_lag_adds_what_it_leaves_out_of_the_contacts() -> None:
     p = np.concatenate([np.zeros((1, 1)), np.cumsum(gained, axis=0)])
     terms = DynamicsTerms(t=T, p=p, mu=np.zeros_like(p))
     observers = (MomentumObserver(gain=5.0),)
-    lag = lag_sd(terms, observers, None, T < 20.0)["gmo"]
+    lag = np.sqrt(missed_torque(terms, observers, None, T < 20.0)["gmo"])
     omega = 2 * np.pi * 0.5
     expected = 8.0 / np.sqrt(2) * omega / np.hypot(omega, 5.0)
     # windows of a few seconds spread the line over ± .5 Hz, where |1 − H| bends
     assert lag[0] == pytest.approx(expected, rel=0.1)
     run = DynamicsTerms(t=T, p=np.zeros_like(p), mu=np.zeros_like(p))
-    beside = lag_sd(terms, observers, run, T < 0.0)["gmo"]
+    beside = np.sqrt(missed_torque(terms, observers, run, T < 0.0)["gmo"])
     # over the whole log half of the samples are in contact: 1/√2 of it
     assert beside[0] == pytest.approx(expected / np.sqrt(2), rel=0.1)
 
 
-def test_a_part_too_short_for_a_spectrum_adds_nothing() -> None:
+def test_a_part_too_short_for_a_spectrum_is_no_part() -> None:
     terms = DynamicsTerms(t=T, p=np.zeros((len(T), 1)), mu=np.zeros((len(T), 1)))
-    lag = lag_sd(terms, (MomentumObserver(gain=5.0),), None, T < 0.05)
-    np.testing.assert_array_equal(lag["gmo"], [0.0])
+    assert missed_torque(terms, (MomentumObserver(gain=5.0),), None, T < 0.05) is None

@@ -62,7 +62,7 @@ COMMANDS = {
     ),
     "tune": ListedCommand(
         "tune:tune_gains",
-        "Find gains on a log for a stated goal, and write them to a file for --set-file.",
+        "Find gains on a log for a stated goal, and write them to a file for --gains.",
     ),
     "simulate": ListedCommand(
         "simulate:simulate_log",

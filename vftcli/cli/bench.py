@@ -53,6 +53,10 @@ def bench(measured: BenchOptions, json: opt.Json = False) -> None:
         "all of these with dynamics, smoother and tuning included / the four causal ones: "
         f"{ratios['complete_over_core']:.2f}"
     )
+    typer.echo(
+        "best, gains and correction given / the four causal ones, dynamics in neither: "
+        f"{ratios['best_over_observers']:.2f}"
+    )
     if measured.examination:
         cost = result["examination"]
         typer.echo(

@@ -106,15 +106,24 @@ class ObserverOptions(ChoiceBundle["ObserverChoice"]):
 
     HOME = "observers.choice:ObserverChoice"
 
-    observer: Words = option("--observer", "NAME", "Repeatable. Default: fdo gmo kfo-fe kfo-zoh.")
+    observer: Words = option(
+        "--observer", "NAME", "Repeatable. Default: best fdo gmo kfo-fe kfo-zoh."
+    )
+    causal: bool = flag(
+        "--causal", "Leave out what could not run while the log is written: best, and smoothers."
+    )
     assignments: Words = option(
         "--set",
         "OBSERVER.PARAMETER=VALUE",
         "Repeatable: gmo.gain=30, gmo.gain=5,3,4,10,10,10, kfo.noise_convention=discrete.",
     )
-    gains_file: Path | None = option(
-        "--set-file", "FILE", "Gains that `vftcli tune` wrote; --set goes before them."
+    gains: str | None = option(
+        "--gains",
+        "auto|paper|FILE",
+        "Gains of the other observers: those the log's spectra call for, the robot file's "
+        "(default), or those that `vftcli tune` wrote; --set goes before them.",
     )
+    gains_file: Path | None = option("--set-file", "FILE", "The old name of --gains FILE.")
     match: str | None = option(
         "--match",
         "delay=S|bandwidth=HZ",
@@ -159,19 +168,10 @@ class BiasOptions(ChoiceBundle["RefinementChoice"]):
 
     remove_bias: str | None = option(
         "--remove-bias",
-        "free-cycle|model|none",
-        "Subtract what the observers read in free motion at the same phase, or a model of it over "
-        "position and velocity. Default: none.",
-    )
-
-
-class RefinementOptions(BiasOptions):
-    """What only a complete log allows."""
-
-    bands: bool = flag(
-        "--bands",
-        "Measure on the free part how far the estimates may be off. Implied by --free, "
-        "--free-part, --free-cycles and --period.",
+        "auto|whole-log|free-cycle|model|none",
+        "What comes off: the bias fitted to the whole log, what the observers read in free motion "
+        "at the same phase, or a model of it over position and velocity. auto: the whole log's for "
+        "best, none for the others.",
     )
 
 
@@ -189,9 +189,10 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
     )
     solver: str | None = option(
         "--solver",
-        "pinv|damped|map",
-        "How torques become a wrench: least squares (default), damped, or with a prior of 50 N and "
-        "10 N·m. Implies --wrench.",
+        "smoother|pinv|damped|map",
+        "How torques become a wrench: smoothed over the whole log with a band in every pose "
+        "(default for best), least squares (default for the others), damped, or with a prior of "
+        "50 N and 10 N·m. Implies --wrench.",
     )
     tool: str | None = option(
         "--tool",
@@ -265,7 +266,7 @@ class AnalysisOptions(Bundle):
     robot: RobotOptions
     observers: ObserverOptions
     free: FreeOptions
-    refinement: RefinementOptions
+    refinement: BiasOptions
     wrench: WrenchOptions
     anyway: bool = flag(*ANYWAY)
 

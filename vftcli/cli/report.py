@@ -45,6 +45,7 @@ def report(
     choice = analysis.choice(library, reference)
     if published is not None:
         check_published(published, reference.reference)
+        choice = replace(choice, observers=choice.observers.beside_print())
     analyses = []
     for made in analyse_logs(logs, choice):
         beside = None

@@ -1,6 +1,5 @@
 """`vftcli tune`: gains from the log itself, for a stated goal."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -40,13 +39,14 @@ def tune_gains(
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
-    """Find gains on a log for a stated goal, and write them to a file for --set-file.
+    """Find gains on a log for a stated goal, and write them to a file for --gains.
 
     The spectra of the log's free and loaded part tell how much error every gain makes.
 
     Example: vftcli tune fixtures/ur5_circle.csv --robot ur5 -o gains.toml
     """
     from vftcli.cli.console import command_line, health_of, say, say_json, say_recording
+    from vftcli.observers.choice import LOG_GAINS, ObserverChoice
     from vftcli.outputs.examination import health_record, overridden_lines
     from vftcli.outputs.files import check_file, write_text
     from vftcli.outputs.grid import terminal
@@ -54,7 +54,7 @@ def tune_gains(
     from vftcli.outputs.log.run_record import jsonable
     from vftcli.pipeline import AnalysisChoice, examine, model, prepared, read
     from vftcli.readers.library import Library
-    from vftcli.refinement.tuning import parse_goal, tune_all
+    from vftcli.refinement.tuning import bounds_reached, parse_goal, tune_all
     from vftcli.repetition.free_run import Models
     from vftcli.robots.writing import lines_of
     from vftcli.signals.errors import ParameterError
@@ -66,7 +66,8 @@ def tune_gains(
         read=reading.choice(),
         robot=robot.choice(),
         free=free.choice(),
-        refinement=replace(bias.choice(), bands=True),
+        observers=ObserverChoice(gains=LOG_GAINS, causal=True),
+        refinement=bias.choice(),
         library=library,
         examiner=health_of(library, anyway=anyway),
     )
@@ -76,8 +77,9 @@ def tune_gains(
     found = model(motion, choice)
     if found is None or found.spectra is None:
         raise ParameterError(f"nothing to tune on: {found.missing if found else 'no free part'}")
-    notes = [str(remark) for remark in found.remarks]
     tuned = tune_all(found.spectra, wanted)
+    reached = bounds_reached(tuned, found.spectra, wanted)
+    notes = [str(remark) for remark in (*found.remarks, *reached)]
     doubts = overridden_lines(examinations)
     heading = [*doubts, command_line(), f"goal: {goal}", f"robot: {arm.name}", *notes]
     comments = "".join(f"# {line}\n" for line in heading)
@@ -92,4 +94,4 @@ def tune_gains(
     for note in notes:
         say(f"note: {note}")
     typer.echo(terminal(tuned_grid(tuned, wanted.threshold is not None)).rstrip("\n"))
-    say(f"wrote {output}: use it with --set-file {output}")
+    say(f"wrote {output}: use it with --gains {output}")

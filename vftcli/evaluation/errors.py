@@ -144,7 +144,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> li
                 estimates=x[known],
                 reference=y[known],
                 moving=moving[known, j],
-                floor=float(reference.floor[j]) if reference.floor is not None else float("nan"),
+                floor=floor_over(reference, j, known),
                 resampled=draws,
                 lag=lag[:, j],
                 within=np.array([within[j] for within, _ in covered]),
@@ -152,6 +152,21 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> li
             )
         )
     return found
+
+
+def floor_over(reference: ExternalTorque, joint: int, known: Mask) -> float:
+    """The reference's own error on one joint over the compared samples, NaN if unknown. [N·m]
+
+    Args:
+        reference: What estimates are judged by.
+        joint: Joint number, from 0.
+        known: The compared samples. (T,)
+    """
+    if reference.floor is None:
+        return float("nan")
+    if reference.sd is None or not known.any():
+        return float(reference.floor[joint])
+    return float(np.sqrt(np.nanmean(reference.sd[known, joint] ** 2)))
 
 
 def covered_samples(estimate: ExternalTorque, reference: ExternalTorque) -> tuple[Array, Array]:

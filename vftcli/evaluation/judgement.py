@@ -1,6 +1,6 @@
 """From estimates and wrenches to how they compare with a reference: one table of errors."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import polars as pl
@@ -9,8 +9,12 @@ from vftcli.evaluation.errors import evaluate
 from vftcli.evaluation.reference_choice import ReferenceChoice, ReferenceSource, make_reference
 from vftcli.evaluation.reference_wrench import reference_wrench
 from vftcli.evaluation.wrenches import with_contacts, with_wrenches
+from vftcli.observers.observer import Tuning
+from vftcli.observers.table import BEST, PAPER
+from vftcli.refinement.paper_gap import EXPECTED, gap_remark
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.remarks import Remark
 from vftcli.virtual_sensor.detection import ContactScore, judge_contacts
 from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference
 
@@ -29,6 +33,27 @@ class Judgement(NamedTuple):
     errors: pl.DataFrame
     virtual_sensor: SensorReading | None
     contacts: tuple[ContactScore, ...]
+
+
+def with_measured_gap(
+    remarks: Sequence[Remark], errors: pl.DataFrame, tunings: Mapping[str, Tuning]
+) -> tuple[Remark, ...]:
+    """Remarks in which what the paper's gains cost is measured, where both sides of it ran.
+
+    Args:
+        remarks: What there is to say of the run; what was expected of the gains gives way.
+        errors: The errors of the run's observers.
+        tunings: What their gains mean, by name; they are those of the robot's file.
+    """
+    rows = errors.filter(pl.col("joint").is_not_null() & pl.col("rmse_Nm").is_finite())
+    means = dict(rows.group_by("observer").agg(pl.col("rmse_Nm").mean()).iter_rows())
+    delays = {name: tunings[name].delay for name in PAPER if name in means}
+    if not delays or BEST not in means:
+        return tuple(remarks)
+    gap = gap_remark("paper-gains-measured", means, delays)
+    if gap is None:
+        return tuple(remarks)
+    return (*(remark for remark in remarks if remark.code != EXPECTED), gap)
 
 
 def judge(

@@ -6,18 +6,24 @@ from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.observers.settings import Settings
 from vftcli.observers.table import (
+    BEST,
     DEFAULT,
     OBSERVERS,
+    PAPER,
+    LogSpectra,
     Setup,
     build_observers,
     observer_settings,
 )
 
 __all__ = [
+    "BEST",
     "DEFAULT",
     "OBSERVERS",
+    "PAPER",
     "FilteredDynamicsObserver",
     "KalmanObserver",
+    "LogSpectra",
     "MomentumObserver",
     "Observer",
     "Settings",

@@ -3,7 +3,9 @@
 The raw disturbance d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) is the external torque, averaged over a
 sample, plus everything else: noise, friction and model error. Its spectrum over the free part, S_n,
 is the error's; what the loaded part has beyond it, S_τ = (S_d − S_n)₊, is the external torque's.
-From the two follows the error of every linear estimator with frequency response H:
+Above 5 Hz it is so only as far as contacts reach: their spectra fall, and a drive that chatters
+under load makes a plateau there, which counts as noise. From the two follows the error of every
+linear estimator with frequency response H:
 
     rms² = ∫ |1 − H|² S_τ + |H|² S_n df
 
@@ -13,6 +15,7 @@ an error too.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +25,7 @@ from vftcli.robots.disturbance import disturbance_stretches
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, handed_over, seal
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.series import median_step
+from vftcli.signals.series import median_step, runs_of
 from vftcli.signals.spectrum import welch
 
 SEGMENT = 4.0
@@ -31,8 +34,18 @@ SEGMENT = 4.0
 LEAST_SEGMENT = 32
 """Fewest samples of a segment; a shorter free or loaded part has no spectrum."""
 
+IMPACT = 1.0
+"""A loaded part of which nothing lasts longer is one of impacts. [s]"""
+
 NEIGHBOURS = 0.2
 """How far the average of neighbouring frequencies reaches, as a share of the frequency."""
+
+SLOW = 5.0
+"""Up to here the spectrum of the external torque is taken as it is measured. [Hz]"""
+
+FALL = 2.5
+"""Beyond, it is held to fall at least as f to the minus this: between the 2 of a torque that jumps
+and the 4 of one that has no jumps and no corners."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,15 +79,36 @@ class Spectra:
         """Distance of two frequencies. [Hz]"""
         return float(self.frequency[1] - self.frequency[0])
 
-    @property
-    def external(self) -> Array:
-        """S_τ = (S_d − S_n)₊, the spectrum of the external torque. (F, n) [(N·m)²/Hz]
+    @cached_property
+    def excess(self) -> Array:
+        """(S_d − S_n)₊, what the loaded part has beyond the free one. (F, n) [(N·m)²/Hz]
 
         The difference is averaged over neighbouring frequencies before it is cut at zero: bin by
         bin, chance would count where it is positive and not where it is negative.
         """
-        excess = neighbour_mean(self.loaded - self.free)
-        return np.maximum(excess, 0.0)
+        return handed_over(np.maximum(neighbour_mean(self.loaded - self.free), 0.0))
+
+    @cached_property
+    def external(self) -> Array:
+        """S_τ, the spectrum of the external torque. (F, n) [(N·m)²/Hz]
+
+        It is the excess, above `SLOW` at most c/f^`FALL`, c the mean of f^`FALL` times the excess
+        up to there.
+        """
+        f = self.frequency[:, None]
+        slow = (self.frequency > 0.0) & (self.frequency <= SLOW)
+        fast = self.frequency > SLOW
+        if not (slow.any() and fast.any()):
+            return self.excess
+        level = np.mean(f[slow] ** FALL * self.excess[slow], axis=0)
+        capped = self.excess.copy()
+        capped[fast] = np.minimum(capped[fast], level / f[fast] ** FALL)
+        return handed_over(capped)
+
+    @cached_property
+    def noise(self) -> Array:
+        """S_n, and what of the excess is no external torque. (F, n) [(N·m)²/Hz]"""
+        return handed_over(self.free + (self.excess - self.external))
 
     @property
     def floor(self) -> Array:
@@ -102,9 +136,9 @@ class Spectra:
         return np.asarray(np.sum(share * self.external, axis=0) * self.width)
 
     def passed(self, response: NDArray[np.complex128]) -> Array:
-        """∫|H|² S_n df, what of the error comes through. (n,) [(N·m)²]"""
+        """∫|H|² S_n df, what of the noise comes through. (n,) [(N·m)²]"""
         share: Array = np.abs(response) ** 2
-        return np.asarray(np.sum(share * self.free, axis=0) * self.width)
+        return np.asarray(np.sum(share * self.noise, axis=0) * self.width)
 
 
 def neighbour_mean(spectrum: Array) -> Array:
@@ -129,8 +163,27 @@ class Part(NamedTuple):
     inside: Mask
 
 
+def around_impacts(t: Array, inside: Mask) -> Mask:
+    """A part as it is, or half of `IMPACT` more on either side if none of it lasts that long. (T,)
+
+    Args:
+        t: Clock. (T,) [s]
+        inside: The loaded samples. (T,)
+    """
+    runs = runs_of(inside)
+    if not runs or any(t[stop - 1] - t[start] >= IMPACT for start, stop in runs):
+        return inside
+    wide = inside.copy()
+    for start, stop in runs:
+        wide |= (t >= t[start] - 0.5 * IMPACT) & (t <= t[stop - 1] + 0.5 * IMPACT)
+    return wide
+
+
 def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
     """The spectra of a loaded part and a free one, by the same estimator.
+
+    A loaded part of short impacts is widened until it holds a second in a row: its excess over the
+    free part is then that of the impacts, thinned by what stands around them, and set right.
 
     Args:
         loaded: The log and its loaded samples.
@@ -141,7 +194,8 @@ def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
     """
     t = loaded.terms.t
     nominal = median_step(t) if len(t) > 1 else 0.0
-    heavy = disturbance_stretches(loaded.terms, loaded.inside, nominal)
+    inside = around_impacts(t, loaded.inside)
+    heavy = disturbance_stretches(loaded.terms, inside, nominal)
     quiet = [d for part in free for d in disturbance_stretches(*part, nominal)]
     longest = [max((len(run) for run in found), default=0) for found in (heavy, quiet)]
     size = min(round(SEGMENT / nominal) if nominal else 0, *longest)
@@ -150,8 +204,10 @@ def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
             f"a spectrum needs {LEAST_SEGMENT} samples in a row; the loaded part has "
             f"{longest[0]}, the free part {longest[1]}"
         )
+    thinned = float(np.mean(inside) / max(float(np.mean(loaded.inside)), 1.0 / len(t)))
     size -= size % 2
     (noise, few), (both, many) = (welch(found, size, nominal) for found in (quiet, heavy))
+    both = noise + thinned * (both - noise) if thinned > 1.0 else both
     return Spectra(
         frequency=np.asarray(np.fft.rfftfreq(size, nominal), dtype=np.float64),
         free=handed_over(noise),

@@ -28,6 +28,31 @@ if TYPE_CHECKING:
 FALLBACK_RATE = 10.0
 """First-order gain where a robot gives no gains at all. [1/s]"""
 
+BEST = "best"
+"""The most accurate estimate that a log allows."""
+
+
+class LogSpectra(NamedTuple):
+    """What a complete log shows of noise and contact, None where its free part is not known.
+
+    Attributes:
+        plain: Of p and μ as the robot's model gives them.
+        best: Of those that `best` runs on, the bias of the whole log taken off.
+        gains: The gains that `plain` calls for, as a gains file holds them.
+    """
+
+    plain: "Spectra | None" = None
+    best: "Spectra | None" = None
+    gains: Gains | None = None
+
+    def under(self, name: str) -> "Spectra | None":
+        """The spectra of what the observer of this name runs on."""
+        return self.best if name == BEST else self.plain
+
+
+NOT_SHOWN = LogSpectra()
+"""What is known of a log that is still being written, or has no free part."""
+
 
 class Setup(NamedTuple):
     """What an observer is built from.
@@ -38,7 +63,7 @@ class Setup(NamedTuple):
         joints: Number of joints n.
         step: Nominal sample time. [s]
         as_printed: Use the paper's printed formulas.
-        spectra: What the log shows of noise and contact, None where its free part is not known.
+        shown: What the complete log shows of noise and contact.
     """
 
     gains: Gains
@@ -46,7 +71,7 @@ class Setup(NamedTuple):
     joints: int
     step: float
     as_printed: bool
-    spectra: "Spectra | None" = None
+    shown: LogSpectra = NOT_SHOWN
 
 
 Built = tuple[Observer, tuple[Remark, ...]]
@@ -63,6 +88,7 @@ class Entry(NamedTuple):
         summary: What it does, in a sentence.
         build: Makes it from a Setup, with remarks on gains nobody gave.
         from_spectra: Whether it takes its gains from the log's spectra.
+        online: Whether it could run while the log is being written.
     """
 
     title: str
@@ -71,6 +97,7 @@ class Entry(NamedTuple):
     summary: str
     build: Callable[[Setup], Built]
     from_spectra: bool = False
+    online: bool = True
 
 
 def build_fdo(setup: Setup) -> Built:
@@ -160,8 +187,8 @@ def build_auto(name: str, by_hand: Callable[[Setup], Built]) -> Callable[[Setup]
     def build(setup: Setup) -> Built:
         from vftcli.observers.auto_tuning import AutoTuned, tune_to_spectra
 
-        if setup.spectra is not None:
-            return tune_to_spectra(name, setup.spectra), ()
+        if (spectra := setup.shown.under(name)) is not None:
+            return tune_to_spectra(name, spectra), ()
         observer, remarks = by_hand(setup)
         fallback = caution("tuning-without-free-part", Where(name), observer=observer.name)
         return AutoTuned(name=name, observer=observer), (*remarks, fallback)
@@ -170,6 +197,15 @@ def build_auto(name: str, by_hand: Callable[[Setup], Built]) -> Callable[[Setup]
 
 
 OBSERVERS: dict[str, Entry] = {
+    BEST: Entry(
+        "the most accurate that a complete log allows",
+        "kfo",
+        "not in the paper",
+        "rts-auto once the bias of the whole log is off; else what the log does allow, said",
+        build_auto(BEST, build_rts),
+        from_spectra=True,
+        online=False,
+    ),
     "fdo": Entry(
         "filtered dynamics observer",
         "fdo",
@@ -204,6 +240,7 @@ OBSERVERS: dict[str, Entry] = {
         "not in the paper",
         "the same with the whole log in view: no delay, but it leads before a tap",
         build_rts,
+        online=False,
     ),
     "kfo-auto": Entry(
         "disturbance Kalman filter tuned by the log",
@@ -212,6 +249,7 @@ OBSERVERS: dict[str, Entry] = {
         "ω_n of each joint from the spectra of the log's free and loaded part",
         build_auto("kfo-auto", build_kfo("zoh")),
         from_spectra=True,
+        online=False,
     ),
     "rts-auto": Entry(
         "Rauch–Tung–Striebel smoother tuned by the log",
@@ -220,11 +258,16 @@ OBSERVERS: dict[str, Entry] = {
         "the same for the smoother",
         build_auto("rts-auto", build_rts),
         from_spectra=True,
+        online=False,
     ),
 }
 """Name at the command line → the observer."""
 
-DEFAULT = ("fdo", "gmo", "kfo-fe", "kfo-zoh")
+PAPER = ("fdo", "gmo", "kfo-fe", "kfo-zoh")
+"""The four of the paper, each of which runs while the log is being written."""
+
+DEFAULT = (BEST, *PAPER)
+"""What runs where nobody chooses."""
 
 
 def sections() -> dict[str, Sequence[str]]:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from vftcli.signals.external_torque import ExternalTorque
 
 COLOURS = {
+    "best": "#d3224b",
     "fdo": "#2f86d0",
     "gmo": "#dd6415",
     "kfo-fe": "#0c9f76",

@@ -1,16 +1,20 @@
 """A log's free part and spectra, and what the observers read where nothing touches the arm."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Part, Spectra, spectra_of
+from vftcli.observers.table import BEST, LogSpectra
+from vftcli.refinement.free_load import FreeLoad, free_load
+from vftcli.refinement.tuning import gains_of
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
+from vftcli.repetition.free_run import ModelledRun
 from vftcli.repetition.pairing import mean_of
-from vftcli.repetition.standstill import standing
+from vftcli.repetition.standstill import resting, standing
 from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask
@@ -18,6 +22,9 @@ from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import resample_columns
+
+if TYPE_CHECKING:
+    from vftcli.refinement.whole_log import WholeLogBias
 
 QUIETER = 0.85
 """A free part that was found is believed if on most joints the loaded part has this share of its
@@ -41,6 +48,12 @@ class Baseline:
         spectra: Spectra of the raw disturbance, None where the free part is too short or not free.
         standing: Where a joint stands still. (T, n)
         missing: Why there is no free part, or are no spectra; None where there are both.
+        load: A load that the free part carries and the model lacks, None where none shows.
+        correction: The bias of the whole log that is off the terms, None where none is.
+        by_fit: Whether the free part is what the fit of that bias takes for free: no contact that
+            comes and goes, though a load that stays may be in it.
+        on_correction: What was applied of it and what was not, and what stands in for a free part.
+        best: The baseline that `best` runs on, None where it is this one.
     """
 
     motion: FreeMotion
@@ -48,19 +61,87 @@ class Baseline:
     spectra: Spectra | None = None
     standing: Mask
     missing: Remark | None = None
+    load: FreeLoad | None = None
+    correction: "WholeLogBias | None" = None
+    by_fit: bool = False
+    on_correction: tuple[Remark, ...] = ()
+    best: "Baseline | None" = None
+    _made: dict[ModelledRun, DynamicsTerms] = field(
+        init=False, repr=False, compare=False, default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "standing", frozen_mask(self.standing))
 
+    def under(self, name: str) -> "Baseline":
+        """The baseline that the observer of this name runs on."""
+        return self.best if name == BEST and self.best is not None else self
+
+    def terms_of(self, run: ModelledRun) -> DynamicsTerms:
+        """P and μ of the log or of one of its free runs, the correction off. Made once."""
+        if self.correction is None:
+            return run.terms
+        if run not in self._made:
+            own = run is self.motion.log
+            plain = run.terms
+            made = self.correction.corrected(plain) if own else self.correction.of(run)
+            self._made[run] = made
+        return self._made[run]
+
     @property
     def terms(self) -> DynamicsTerms:
-        """P and μ of the log."""
-        return self.motion.log.terms
+        """P and μ of the log, the correction off."""
+        return self.terms_of(self.motion.log)
+
+    def shown(self, *, gains: bool) -> LogSpectra:
+        """What it shows to the observers that are built for the log.
+
+        Args:
+            gains: Whether they are to have the gains that its spectra call for.
+        """
+        plain = self.tunable
+        called_for = gains_of(plain) if gains and plain is not None else None
+        return LogSpectra(plain=plain, best=self.under(BEST).tunable, gains=called_for)
+
+    @property
+    def tunable(self) -> Spectra | None:
+        """The spectra where gains may be taken from them, else None.
+
+        Not from a free part that only the fit calls so and that carries a load: on a UR10e with an
+        untold 2.8 kg they ran to the slowest there is on two joints, 2.3 N·m rms where the gains of
+        the robot file leave 1.7.
+        """
+        return None if self.by_fit and self.load is not None else self.spectra
+
+    @property
+    def correction_sd(self) -> Array | None:
+        """Standard deviation of the correction where it is off, None without one. (T, n) [N·m]"""
+        off = self.correction
+        return None if off is None else np.where(off.applied, off.sd, 0.0)
+
+    @property
+    def samples(self) -> list[Part]:
+        """P and μ of the free pieces, the correction off, and which samples are free.
+
+        A load that they carry is no noise, and is off too.
+        """
+        parts = []
+        for piece in self.pieces:
+            terms = self.terms_of(piece.run)
+            if self.load is not None:
+                terms = self.load.off(piece.run, terms)
+            parts.append(Part(terms, piece.inside))
+        return parts
 
     @property
     def pieces(self) -> tuple[FreePiece, ...]:
         """The free samples, of the log itself and of free runs; none without a free part."""
         return self.part.pieces if self.part is not None else ()
+
+    @property
+    def untouched(self) -> tuple[FreePiece, ...]:
+        """The pieces in which nothing at all touches the arm, as far as it is known."""
+        return () if self.by_fit else self.pieces
 
     @property
     def stuck(self) -> Mask:
@@ -71,7 +152,10 @@ class Baseline:
     def remarks(self) -> tuple[Remark, ...]:
         """What was found, and what was not and why."""
         found = self.part.remarks if self.part is not None else ()
-        return found if self.missing is None else (*found, self.missing)
+        load = () if self.load is None else (self.load.remark,)
+        missing = () if self.missing is None else (self.missing,)
+        best = () if self.best is None else self.best.on_correction
+        return (*found, *load, *missing, *self.on_correction, *best)
 
 
 def baseline_of(motion: FreeMotion) -> Baseline:
@@ -87,12 +171,13 @@ def baseline_of(motion: FreeMotion) -> Baseline:
         part = motion.part
     except ReferenceTorqueError as error:
         return replace(bare, missing=caution("no-free-part", reason=str(error)))
+    known = replace(bare, part=part, load=free_load(part.pieces))
     try:
-        spectra = spectra_of(Part(log.terms, ~part.own), samples_of(part.pieces))
+        spectra = spectra_of(Part(log.terms, ~part.own), known.samples)
     except ParameterError as error:
-        return replace(bare, part=part, missing=caution("no-spectra", reason=str(error)))
+        return replace(known, missing=caution("no-spectra", reason=str(error)))
     if motion.choice.is_given or looks_free(spectra):
-        return replace(bare, part=part, spectra=spectra)
+        return replace(known, spectra=spectra)
     residuals = motion.free_cycles.residuals
     listed = [] if residuals is None else residuals.tolist()
     return replace(bare, missing=caution("free-part-not-quiet", residuals=listed))
@@ -115,7 +200,7 @@ def without_free_motion(found: Baseline) -> Baseline:
     p = np.cumsum(step * np.nan_to_num(d), axis=0)
     left = Part(DynamicsTerms(t=found.terms.t, p=p, mu=np.zeros_like(p)), known)
     try:
-        loaded = spectra_of(left, samples_of(part.pieces))
+        loaded = spectra_of(left, found.samples)
     except ParameterError:
         return found
     floor = (1.0 + 1.0 / len(part.pairings)) * spectra.floor
@@ -144,11 +229,6 @@ def bias_at_phase(part: FreePart, series: Sequence[Array]) -> Array:
     return mean_of(part.pairings, signals)
 
 
-def samples_of(pieces: Sequence[FreePiece]) -> list[Part]:
-    """P and μ of the free pieces, and which samples are free."""
-    return [Part(piece.run.terms, piece.inside) for piece in pieces]
-
-
 def looks_free(spectra: Spectra) -> bool:
     """Whether most joints have clearly less slow power in the free part than in the loaded one."""
     slow = spectra.frequency < CONTACT_BAND
@@ -163,13 +243,16 @@ class FreeReading(NamedTuple):
         observer: The observer.
         estimate: Its estimate of the log.
         free: Its estimate along each free piece, in the pieces' order.
-        samples: Of these, what it reads in the free samples, of all pieces in a row. (S, n) [N·m]
+        samples: Of these, what it reads in the free samples, of all pieces in a row, less a load
+            that the free part carries. (S, n) [N·m]
+        resting: Whether a joint rests in them. (S, n)
     """
 
     observer: Observer
     estimate: ExternalTorque
     free: tuple[ExternalTorque, ...]
     samples: Array
+    resting: Mask
 
     @property
     def rms(self) -> Array:
@@ -180,9 +263,26 @@ class FreeReading(NamedTuple):
 def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:
     """Run an observer along the free pieces; along the log itself that is its estimate."""
     free = tuple(
-        estimate if piece.run is found.motion.log else observer.estimate(piece.run.terms)
+        estimate if piece.run is found.motion.log else observer.estimate(found.terms_of(piece.run))
         for piece in found.pieces
     )
-    inside = [e.tau[piece.inside] for e, piece in zip(free, found.pieces, strict=True)]
-    samples = np.concatenate(inside) if inside else np.zeros((0, estimate.joints))
-    return FreeReading(observer, estimate, free, samples)
+    read = [e.tau for e in free]
+    if found.load is not None:
+        # A load is torque, and no error of who reads it.
+        carried = [found.load.torque(piece.run) for piece in found.pieces]
+        read = [tau - load for tau, load in zip(read, carried, strict=True)]
+    inside = [tau[piece.inside] for tau, piece in zip(read, found.pieces, strict=True)]
+    rests = [rests_in(piece.run)[piece.inside] for piece in found.pieces]
+    none = (0, estimate.joints)
+    return FreeReading(
+        observer,
+        estimate,
+        free,
+        samples=np.concatenate([np.zeros(none), *inside]),
+        resting=np.concatenate([np.zeros(none, dtype=bool), *rests]),
+    )
+
+
+def rests_in(run: ModelledRun) -> Mask:
+    """Where a joint of a recording rests. (T, n)"""
+    return resting(run.recording.t, run.recording.require("dq"))

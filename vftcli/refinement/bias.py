@@ -17,7 +17,6 @@ from vftcli.refinement.baseline import Baseline, FreeReading, bias_at_phase
 from vftcli.repetition.free_motion import FreePart
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 
@@ -41,17 +40,17 @@ class Removal(NamedTuple):
     """Estimates with their bias taken off.
 
     Attributes:
-        estimates: One an observer.
+        readings: One an observer: its estimate, and what of it is left in the free samples.
         remarks: What was subtracted and what was not.
     """
 
-    estimates: tuple[ExternalTorque, ...]
+    readings: tuple[FreeReading, ...]
     remarks: tuple[Remark, ...] = ()
 
 
 def remove_nothing(_found: Baseline, readings: Sequence[FreeReading]) -> Removal:
     """Leave the estimates as they are."""
-    return Removal(tuple(reading.estimate for reading in readings))
+    return Removal(tuple(readings))
 
 
 def remove_free_cycle(found: Baseline, readings: Sequence[FreeReading]) -> Removal:
@@ -82,20 +81,23 @@ def remove_free_cycle(found: Baseline, readings: Sequence[FreeReading]) -> Remov
     return Removal(removed, tuple(remarks))
 
 
-def minus_free_motion(part: FreePart, reading: FreeReading) -> ExternalTorque:
-    """An estimate less what its observer reads in the free motion at the same phase."""
+def minus_free_motion(part: FreePart, reading: FreeReading) -> FreeReading:
+    """An estimate less what its observer reads in the free motion at the same phase.
+
+    What two free motions leave of one another takes the place of what one reads; after a single
+    one nothing measures what is left, and the free samples stay those of before.
+    """
     estimate = reading.estimate
     bias = bias_at_phase(part, [e.tau for e in reading.free])
     # A free cycle that no other is laid under reads nothing but bias.
     own = part.own & ~np.isfinite(bias[:, 0])
     bias[own] = estimate.tau[own]
-    error_sd = estimate.error_sd
-    if error_sd is not None and part.own.any() and len(part.pairings) > 1:
-        left = np.sqrt(np.nanmean((estimate.tau - bias)[part.own] ** 2, axis=0))
-        # What two free motions leave of one another takes the place of what one reads.
-        variance = np.maximum(error_sd**2 - reading.rms**2, 0.0) + left**2
-        error_sd = handed_over(np.sqrt(variance))
-    return replace(estimate, tau=handed_over(estimate.tau - np.nan_to_num(bias)), error_sd=error_sd)
+    less = replace(estimate, tau=handed_over(estimate.tau - np.nan_to_num(bias)))
+    if not (part.own.any() and len(part.pairings) > 1):
+        return reading._replace(estimate=less)
+    inside = part.pieces[0].inside
+    left = (estimate.tau - bias)[inside]
+    return reading._replace(estimate=less, samples=left, resting=reading.resting[: len(left)])
 
 
 def remove_modelled(found: Baseline, readings: Sequence[FreeReading]) -> Removal:
@@ -114,13 +116,11 @@ def remove_modelled(found: Baseline, readings: Sequence[FreeReading]) -> Removal
         weights, share = fitted(scale.applied(X), reading.samples)
         used = share <= WORTH
         bias = np.where(used, here @ weights[1:] + weights[0], 0.0)
-        estimate, error_sd = reading.estimate, reading.estimate.error_sd
-        if error_sd is not None:
-            # The band gets rid of what the model predicts of free samples that it has not seen.
-            predicted = np.mean(reading.samples**2, axis=0) * np.where(used, 1.0 - share**2, 0.0)
-            error_sd = handed_over(np.sqrt(np.maximum(error_sd**2 - predicted, 0.0)))
-        tau = handed_over(estimate.tau - bias)
-        removed.append(replace(estimate, tau=tau, error_sd=error_sd))
+        estimate = reading.estimate
+        less = replace(estimate, tau=handed_over(estimate.tau - bias))
+        # The band gets rid of what the model predicts of free samples that it has not seen.
+        left = reading.samples * np.where(used, share, 1.0)
+        removed.append(reading._replace(estimate=less, samples=left))
         where = Where(about=estimate.name, joints=tuple(int(j) + 1 for j in np.flatnonzero(used)))
         code = "bias-modelled" if used.any() else "bias-not-modelled"
         remarks.append(fact(code, where, share=share[used].tolist()))
@@ -187,8 +187,7 @@ def ridge(X: Array, y: Array, penalty: float) -> Array:
 
 
 REMOVALS: dict[str, Callable[[Baseline, Sequence[FreeReading]], Removal]] = {
-    "none": remove_nothing,
     "free-cycle": remove_free_cycle,
     "model": remove_modelled,
 }
-"""What ``--remove-bias`` takes."""
+"""The words of ``--remove-bias`` that take something off once the observers have run."""

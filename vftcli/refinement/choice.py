@@ -1,14 +1,21 @@
-"""What a user may choose of what only a complete log allows: bands, and bias removal."""
+"""What a user may choose of what only a complete log allows: which bias is taken off."""
 
 from dataclasses import dataclass
 
 from vftcli.signals.parsing import check_known
 
+AUTOMATIC = "auto"
+"""The word for what the log allows: the whole log's bias for `best`, none for the others."""
+
+WHOLE_LOG = "whole-log"
+"""The word for the bias that is fitted to the whole log and taken off before observers run."""
+
 NOTHING = "none"
 """The word for a bias that stays."""
 
-REMOVALS = (NOTHING, "free-cycle", "model")
-"""What ``--remove-bias`` takes; `vftcli.refinement.bias.REMOVALS` makes them."""
+REMOVALS = (AUTOMATIC, WHOLE_LOG, "free-cycle", "model", NOTHING)
+"""What ``--remove-bias`` takes; `vftcli.refinement.bias.REMOVALS` makes what is left of them once
+observers have run."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,28 +23,36 @@ class RefinementChoice:
     """What is done with the estimates once the whole log is known.
 
     Attributes:
-        bands: Whether to measure on the free part how far the estimates may be off.
-        remove_bias: "none", "free-cycle" or "model".
+        remove_bias: One of `REMOVALS`.
 
     Raises:
         ParameterError: If there is no such way to remove a bias.
     """
 
-    bands: bool = False
-    remove_bias: str = NOTHING
+    remove_bias: str = AUTOMATIC
 
     def __post_init__(self) -> None:
         check_known(self.remove_bias, REMOVALS, f"--remove-bias {self.remove_bias!r}")
 
     @classmethod
-    def parsed(cls, *, bands: bool = False, remove_bias: str | None = None) -> "RefinementChoice":
-        """The choice that ``--bands`` and ``--remove-bias`` state."""
-        return cls(bands=bands, remove_bias=remove_bias or NOTHING)
+    def parsed(cls, *, remove_bias: str | None = None) -> "RefinementChoice":
+        """The choice that ``--remove-bias`` states."""
+        return cls(remove_bias=remove_bias or AUTOMATIC)
+
+    @property
+    def corrects_all(self) -> bool:
+        """Whether every observer runs on what is left without the whole log's bias."""
+        return self.remove_bias == WHOLE_LOG
+
+    @property
+    def corrects_best(self) -> bool:
+        """Whether `best` does."""
+        return self.remove_bias in {AUTOMATIC, WHOLE_LOG}
 
     @property
     def removes_bias(self) -> bool:
-        """Whether a bias is taken off."""
-        return self.remove_bias != NOTHING
+        """Whether the estimates lose what their observers read of free motion."""
+        return self.remove_bias in {"free-cycle", "model"}
 
     @property
     def at_phase(self) -> bool:
@@ -46,5 +61,5 @@ class RefinementChoice:
 
     @property
     def looks_back(self) -> bool:
-        """Whether it needs the log's free part."""
-        return self.bands or self.removes_bias
+        """Whether it needs the complete log, whichever observers run."""
+        return self.removes_bias or self.corrects_all

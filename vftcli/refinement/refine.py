@@ -1,19 +1,20 @@
 """From a log's baseline to finished estimates: bands drawn, bias removed, limits named."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import numpy as np
-
-from vftcli.observers.auto_tuning import AutoTuned, Curve
+from vftcli.observers.auto_tuning import AutoTuned, Curve, bound_remarks
 from vftcli.observers.observer import Observer
-from vftcli.refinement.baseline import Baseline, FreeReading, free_reading
-from vftcli.refinement.bias import REMOVALS
+from vftcli.observers.table import BEST
+from vftcli.refinement.band import band_remarks, with_band
+from vftcli.refinement.baseline import Baseline, free_reading
+from vftcli.refinement.bias import REMOVALS, remove_nothing
 from vftcli.refinement.budget import Budget, budget, limits_remark
+from vftcli.refinement.choice import NOTHING
 from vftcli.refinement.consistency import Consistency, consistency
-from vftcli.signals.arrays import handed_over
+from vftcli.refinement.paper_gap import expected_gap
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.remarks import Remark, Where, fact
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +44,9 @@ def refine(
     found: Baseline,
     observers: Sequence[Observer],
     estimates: Sequence[ExternalTorque],
-    removal: str = "none",
+    removal: str = NOTHING,
+    *,
+    gains_of_file: bool = False,
 ) -> Refinement:
     """Give estimates their bands, take their bias off, and say what limits them.
 
@@ -51,25 +54,35 @@ def refine(
         found: The log's baseline.
         observers: The observers.
         estimates: Their estimates, in the same order.
-        removal: A key of `REMOVALS`.
+        removal: What ``--remove-bias`` asks for.
+        gains_of_file: Whether the paper's observers ran with the gains of the robot's file.
 
     Raises:
         ParameterError: If the bias cannot be removed as asked.
     """
-    remove = REMOVALS[removal]
     pairs = list(zip(observers, estimates, strict=True))
-    readings = [free_reading(found, observer, estimate) for observer, estimate in pairs]
-    banded = [reading._replace(estimate=with_band(found, reading)) for reading in readings]
-    finished = remove(found, banded)
-    spectra = found.spectra
-    budgets = [] if spectra is None else [budget(found, spectra, reading) for reading in readings]
+    # Not every observer need run on the same terms: each is measured on those that it runs on.
+    under = [found.under(observer.name) for observer in observers]
+    readings = [free_reading(on, *pair) for on, pair in zip(under, pairs, strict=True)]
+    finished = REMOVALS.get(removal, remove_nothing)(found, readings)
+    budgets = [
+        budget(on, on.spectra, reading)
+        for on, reading in zip(under, readings, strict=True)
+        if on.spectra is not None
+    ]
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
+    checks = [consistency(on, *pair) for on, pair in zip(under, pairs, strict=True)]
+    shown = tuple(
+        with_band(on, reading, on.correction_sd)
+        for on, reading in zip(under, finished.readings, strict=True)
+    )
+    gap = expected_gap(found, shown, gains_of_file=gains_of_file)
     return Refinement(
-        estimates=finished.estimates,
+        estimates=shown,
         baseline=found,
         curves=curves,
         budgets=tuple(budgets),
-        consistency=tuple(c for o, e in pairs if (c := consistency(found, o, e)) is not None),
+        consistency=tuple(check for check in checks if check is not None),
         removed=removal,
         remarks=(
             *found.remarks,
@@ -82,37 +95,19 @@ def refine(
                 )
                 for name, curve in curves.items()
             ),
+            *(
+                remark
+                for name, curve in curves.items()
+                for remark in bound_remarks(name, curve.best, curve.omega_n)
+            ),
             *band_remarks(found),
             *finished.remarks,
-            *(limits_remark(one, found.stuck) for one in budgets[-1:]),
+            *(limits_remark(one, found.stuck) for one in leading(budgets)),
+            *(() if gap is None else (gap,)),
         ),
     )
 
 
-def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
-    """The estimate with its band, and marked where joints move; itself without spectra.
-
-    The band is how far the estimate may be off, as the log itself shows it,
-
-        sd² = rms_free² + ∫ |1 − H|² S_τ df,
-
-    what the estimator reads where nothing touches the arm, bias and model error included, and what
-    its lag and bandwidth leave out of the torque there is. The Kalman covariance knows neither: it
-    is the filter's own account, of a model without error, and stands apart (`sd`).
-    """
-    estimate, spectra = reading.estimate, found.spectra
-    if spectra is None:
-        return estimate
-    response = reading.observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
-    sd = np.sqrt(reading.rms**2 + spectra.missed(response))
-    banded = np.broadcast_to(handed_over(sd), estimate.tau.shape)
-    return replace(estimate, error_sd=banded, moving=~found.standing)
-
-
-def band_remarks(found: Baseline) -> tuple[Remark, ...]:
-    """What the bands are, and where they do not hold."""
-    if found.spectra is None:
-        return ()
-    stuck = tuple(int(j) + 1 for j in np.flatnonzero(found.stuck))
-    limit = (caution("band-of-a-standing-joint", Where(joints=stuck)),) if stuck else ()
-    return (fact("band"), *limit)
+def leading(budgets: Sequence[Budget]) -> Sequence[Budget]:
+    """The budget of the most accurate estimate: of `best` if it ran, else the last; or none."""
+    return [one for one in budgets if one.name == BEST] or budgets[-1:]

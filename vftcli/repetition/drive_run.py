@@ -1,6 +1,6 @@
 """What a difference of two motions is made from: the drive torques, and the model's of them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,6 +47,15 @@ class DriveRun:
     def step(self) -> float:
         """Median sample time. [s]"""
         return median_step(self.t)
+
+    def taken(self, samples: slice) -> "DriveRun":
+        """Some of its samples as a run of its own."""
+        series = {name: x[samples] for name, x in vars(self).items() if name in ALONG_TIME}
+        return replace(self, **series)
+
+
+ALONG_TIME = ("t", "q", "dq", "standing", "standstill_s", "torque", "model", "momentum")
+"""Attributes of a run that have a value for each sample."""
 
 
 def drive_run_of(recording: Recording, robot: Robot, terms: DynamicsTerms) -> DriveRun:

@@ -1,6 +1,7 @@
 """What a two-cycle difference cannot know: its own error, sample by sample and joint by joint."""
 
 from collections.abc import Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,28 @@ LEAST_SHARE = 0.05
 
 REPEATED = 0.5
 """Share of the stiction that cancels between two stops of the same length at the same place."""
+
+PIECE = 0.4
+"""Length of the pieces in which noise is told from slow loads. [s]"""
+
+LEAST_PIECES = 20
+"""Fewest pieces of which the quietest speak for the noise: one short cycle may be pushed in all."""
+
+QUIET = 0.1
+"""Share of the pieces that are without a fast contact."""
+
+SEED = 15
+"""Of the white noise that the quietest pieces are compared with."""
+
+AT_REST = 0.13
+"""Share of the dry friction by which two torques differ where the whole arm rests in both motions.
+
+Where it stops at the same place after the same motion its stiction repeats, as long as nobody
+touches it: three runs of one motion of a UR10e differ by .05 to .5 of it, .13 in the mean.
+"""
+
+ANYWHERE = np.sqrt(2.0 / 3.0)
+"""The same share for two torques anywhere within ±F_c: a joint that rests while others move."""
 
 TRUSTED_SHARE = 0.5
 """A joint is trusted if it moves in at least this share of the samples."""
@@ -55,10 +78,19 @@ class ErrorModel(NamedTuple):
 
     @property
     def floor(self) -> Array:
-        """Root mean square of `sd` while the joint moves; over all samples if it mostly stands."""
+        """Root mean square of `sd` over the samples with a reference. (n,) [N·m]"""
+        return rms(self.sd[self.known], np.ones_like(self.standing[self.known]))
+
+    @property
+    def floor_moving(self) -> Array:
+        """The same while the joint moves; over all samples if it mostly stands. (n,) [N·m]"""
+        return self.rms_moving(self.sd)
+
+    def rms_moving(self, x: Array) -> Array:
+        """Root mean square of a signal over the samples of `floor_moving`. (n,)"""
         moving = ~self.standing[self.known]
         used = np.where(self.standing_share <= 1.0 - TRUSTED_SHARE, moving, True)
-        return rms(self.sd[self.known], used)
+        return rms(x[self.known], used)
 
     @property
     def floor_standing(self) -> Array:
@@ -80,12 +112,13 @@ def error_model(
 
     Its square is the sum of
     - noise: √2·K·σ_i where nothing repeats, measured on the difference itself, so that ripple
-      which does repeat does not count and what the correction adds does;
+      which does repeat does not count and what the correction adds does; the larger of what the
+      band about the cutoff says, as if it were white, and what the quietest seconds do;
     - motion: the model's torque of the motion difference, Coulomb friction that turns over at
       another instant included; all of it without the correction, with it the share by which the
       model misses the free run's own torque;
     - stiction where a joint stops: two torques anywhere within ±F_c differ by √(2/3)·F_c, after a
-      stop shorter than `STUCK` by its share.
+      stop shorter than `STUCK` by its share, and by `AT_REST` of F_c where the whole arm rests.
 
     Args:
         motion: The log.
@@ -103,6 +136,7 @@ def error_model(
     modelled = change[known]
     signal = raw[known] + modelled if corrected else raw[known]
     noise = noise_of(t, signal, moving, step, cutoff)
+    noise = np.maximum(noise, noise_when_quiet(t, signal, moving, step, cutoff))
     motion_error = local_rms(low_pass(t, modelled, band(step, cutoff)[0]), step)
     if corrected:
         motion_error = motion_error * np.maximum(LEAST_SHARE, misfit(pairings))
@@ -110,7 +144,9 @@ def error_model(
         # The model's torque differentiates momenta: their noise is no difference of the motions.
         own = slope_noise(t, momentum[known], moving, step, band(step, cutoff)[0])
         motion_error = less_noise(motion_error, own)
-    stuck = np.sqrt(2.0 / 3.0) * motion.coulomb * stopped(motion, pairings)[known]
+    share = ANYWHERE * stopped(motion, pairings)
+    share[standing.all(axis=1)] = AT_REST
+    stuck = motion.coulomb * share[known]
     square = noise**2 + motion_error**2 + stuck**2
     sd = np.full(raw.shape, np.nan)
     sd[known] = np.sqrt(square)
@@ -148,6 +184,57 @@ def noise_of(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None
     limits = (0.7 * middle, min(1.3 * middle, 0.45 / step))
     dense = rms(band_pass(t, x, *limits), moving) / np.sqrt(noise_passed(step, limits, "bandpass"))
     return np.asarray(dense * np.sqrt(noise_passed(step, cutoff, "lowpass")))
+
+
+def noise_when_quiet(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:
+    """Noise of a difference as its quietest pieces show it, coloured as it is. (n,) [N·m]
+
+    Real noise is denser at low frequencies than where contacts leave it alone. In a piece of
+    `PIECE` it is what departs from a straight line, which a slow load would make; `QUIET` of the
+    pieces are taken to be without a fast contact. What wanders more slowly counts for nothing, so
+    this errs to the low side. Zero where there are fewer than `LEAST_PIECES`.
+
+    Args:
+        t: Clock of the paired samples. (S,) [s]
+        x: The difference. (S, n) [N·m]
+        moving: Whether the joint moves. (S, n)
+        step: Sample time. [s]
+        cutoff: Cutoff of its low-pass, None without. [Hz]
+    """
+    size = round(PIECE / step)
+    count = len(t) // size
+    found = np.zeros(x.shape[1])
+    if size < 8 or count < LEAST_PIECES:
+        return found
+    smooth = x if cutoff is None else low_pass(t, x, cutoff)
+    left = off_line(smooth, size)
+    moves = moving[: count * size].reshape(count, size, -1).mean(axis=1) > 0.5
+    whole = t[size - 1 : count * size : size] - t[: count * size : size] < 1.5 * PIECE
+    for j in range(x.shape[1]):
+        pieces = left[whole & moves[:, j], j]
+        if len(pieces) >= LEAST_PIECES:
+            found[j] = np.sqrt(np.quantile(pieces, QUIET) / white_when_quiet(size, step, cutoff))
+    return found
+
+
+def off_line(x: Array, size: int) -> Array:
+    """Mean square departure from a straight line, piece by piece of so many samples. (pieces, n)"""
+    count = len(x) // size
+    pieces = x[: count * size].reshape(count, size, -1)
+    along = np.linspace(-1.0, 1.0, size)
+    line = np.column_stack([np.ones(size) / np.sqrt(size), along / np.linalg.norm(along)])
+    share = np.einsum("sk,psn->pkn", line, pieces)
+    square = np.sum(pieces**2, axis=1) - np.sum(share**2, axis=1)
+    return np.asarray(np.maximum(square, 0.0) / size)
+
+
+@cache
+def white_when_quiet(size: int, step: float, cutoff: float | None) -> float:
+    """What `noise_when_quiet` takes the root of for white noise, over its variance, drawn once."""
+    noise: Array = np.random.default_rng(SEED).standard_normal((400 * size, 1))
+    clock = step * np.arange(len(noise), dtype=np.float64)
+    smooth = noise if cutoff is None else low_pass(clock, noise, cutoff)
+    return float(np.quantile(off_line(smooth, size), QUIET) / np.mean(smooth**2))
 
 
 def slope_noise(t: Array, momentum: Array, moving: Mask, step: float, cutoff: float) -> Array:

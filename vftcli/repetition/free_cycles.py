@@ -8,7 +8,7 @@ from vftcli.repetition.cycles import Cycles
 from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.error_model import band
 from vftcli.repetition.ladder import difference
-from vftcli.repetition.pairing import pair_with_cycle
+from vftcli.repetition.pairing import Pairing, pair_with_cycle
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
@@ -16,6 +16,9 @@ from vftcli.signals.remarks import Remark, fact
 
 ALIKE = 1.5
 """A cycle is free too if its difference from the freest is within this many expected errors."""
+
+SETTLES = 2.0
+"""A cycle is taken with what is around it, in which filters settle. [s]"""
 
 
 class FreeCycles(NamedTuple):
@@ -56,9 +59,19 @@ def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
         )
     residual = residuals(motion, cycles)
     freest = int(np.argmin(residual))
-    also = [
-        c for c in range(cycles.whole) if c == freest or differs_by_noise(motion, cycles, freest, c)
-    ]
+    number, pairing = (
+        cycles.number(motion.t),
+        pair_with_cycle(motion, cycles, freest, cycles.period),
+    )
+    first, last = np.searchsorted(motion.t, np.add(cycles.span(freest), (-SETTLES, SETTLES)))
+    free = motion.taken(slice(int(first), int(last)))
+    also = []
+    for cycle in range(cycles.whole):
+        inside = np.flatnonzero(number == cycle)
+        span = slice(int(inside[0]), int(inside[-1]) + 1)
+        there = Pairing(free, pairing.times[span])
+        if cycle == freest or differs_by_noise(motion.taken(span), there):
+            also.append(cycle)
     if len(also) == cycles.whole > 1:
         # Something must be left that the free cycles can be laid under.
         also.pop()
@@ -76,11 +89,13 @@ def residuals(motion: DriveRun, cycles: Cycles) -> Array:
     return np.asarray(relative.mean(axis=1))
 
 
-def differs_by_noise(motion: DriveRun, cycles: Cycles, freest: int, other: int) -> bool:
-    """Whether two cycles differ by no more than their difference's own error on any joint."""
-    pairing = pair_with_cycle(motion, cycles, freest, cycles.period)
-    only = cycles.number(motion.t) == other
-    pairing = pairing._replace(times=np.where(only, pairing.times, np.nan))
+def differs_by_noise(motion: DriveRun, pairing: Pairing) -> bool:
+    """Whether a cycle differs from its partner by no more than the difference's own error.
+
+    Args:
+        motion: The log in that cycle.
+        pairing: Where in another cycle its samples belong.
+    """
     found = difference(motion, [pairing], "model", band(motion.step, None)[0])
-    shown = np.sqrt(np.nanmean(found.tau**2, axis=0))
-    return bool(np.all(shown <= ALIKE * found.error.floor))
+    shown = found.error.rms_moving(found.tau)
+    return bool(np.all(shown <= ALIKE * found.error.floor_moving))

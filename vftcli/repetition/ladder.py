@@ -122,13 +122,14 @@ def difference(
 def most_certain(made: Sequence[Difference]) -> Difference:
     """The difference with the smallest expected error, the simpler one where they are alike.
 
-    Compared is the mean over trusted joints of expected error relative to the lowest rung's.
+    Compared is the mean over trusted joints of expected error in motion, relative to the lowest
+    rung's.
     """
-    lowest = made[0].error.floor
+    lowest = made[0].error.floor_moving
     trusted = made[0].error.trusted_joints
     chosen, least = made[0], 1.0
     for candidate in made[1:]:
-        share = float(np.mean((candidate.error.floor / lowest)[trusted]))
+        share = float(np.mean((candidate.error.floor_moving / lowest)[trusted]))
         if share < WORTH * least:
             chosen, least = candidate, share
     return chosen

@@ -33,6 +33,9 @@ AROUND = 0.03
 """How far from a stated period the true one is looked for, relative: clocks drift."""
 
 
+ENOUGH = 2560
+"""Samples that refine a period: more of them only take longer."""
+
 SPARSE = 10.0
 """Spans this many times what the samples fill at their usual step are gaps, not motion."""
 
@@ -183,25 +186,31 @@ def refined_period(t: Array, q: Array, period: float) -> float:
     holds, each joint weighted by its own spread, samples by Cauchy's weight, so that pushes do not
     pull the period.
     """
+    # Interpolation goes along time, column by column.
+    q = np.asfortranarray(q)
+    dq = np.asfortranarray(np.gradient(q, t, axis=0))
     last = max(1, int((t[-1] - t[0]) / period - LEAST_REPEATED))
     several = np.unique(np.linspace(1, last, min(last, MULTIPLES)).astype(int))
     for multiples in (several[:1], several):
         for _ in range(20):
-            change = period_step(t, q, period, multiples)
+            change = period_step(t, q, dq, period, multiples)
             period -= change
             if abs(change) < 1e-9 * period:
                 break
     return period
 
 
-def period_step(t: Array, q: Array, period: float, multiples: NDArray[np.int64]) -> float:
+def period_step(
+    t: Array, q: Array, dq: Array, period: float, multiples: NDArray[np.int64]
+) -> float:
     """How far a period is off, to first order, over some of its multiples. [s]"""
-    dq = np.gradient(q, t, axis=0)
+    every = -(-len(t) // ENOUGH)
+    here, path = t[::every], q[::every]
     move = weight = 0.0
     for m in multiples:
-        there = t + m * period
+        there = here + m * period
         inside = there <= t[-1]
-        distance = resample_columns(there[inside], t, q) - q[inside]
+        distance = resample_columns(there[inside], t, q) - path[inside]
         slope = m * resample_columns(there[inside], t, dq)
         scale = 1.4826 * np.median(np.abs(distance), axis=0) + 1e-7
         share = 1.0 / (scale**2 + distance**2)

@@ -14,6 +14,9 @@ LEAST = 0.25
 BREAKAWAY = 0.1
 """Time around a stop in which the joint settles or breaks away. [s]"""
 
+AROUND = 0.15
+"""Time before and after a sample that says whether the joint rests in it. [s]"""
+
 
 def duration(t: Array, dq: Array) -> Array:
     """How long the stop lasts that a sample belongs to, 0 where the joint moves. (T, n) [s]
@@ -41,6 +44,23 @@ def standing(t: Array, dq: Array) -> Mask:
     for j, long in enumerate((duration(t, dq) >= LEAST).T):
         for start, end in runs_of(long):
             # A joint is stuck before its speed is zero and settles after it has broken away.
-            around = (t >= t[start] - BREAKAWAY) & (t <= t[end - 1] + BREAKAWAY)
-            found[around, j] = True
+            first = np.searchsorted(t, t[start] - BREAKAWAY)
+            last = np.searchsorted(t, t[end - 1] + BREAKAWAY, side="right")
+            found[first:last, j] = True
     return found
+
+
+def resting(t: Array, dq: Array) -> Mask:
+    """Where a joint is slower than `STILL` for more than half of the time around. (T, n)
+
+    Unlike `standing` it knows no shortest stop: it tells friction at rest from friction in motion.
+
+    Args:
+        t: Clock. (T,) [s]
+        dq: Joint velocities. (T, n) [rad/s]
+    """
+    slow = np.concatenate([np.zeros((1, dq.shape[1]), dtype=np.intp), np.abs(dq) < STILL])
+    count = np.cumsum(slow, axis=0)
+    first = np.searchsorted(t, t - AROUND, side="left")
+    last = np.searchsorted(t, t + AROUND, side="right")
+    return np.asarray(2 * (count[last] - count[first]) > (last - first)[:, None])

@@ -89,12 +89,15 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     moving = np.isfinite(chosen.tau) & ~chosen.error.standing
     # Cycles of one log lie too close in time for friction to change between them.
     change = friction_change(log.drive, chosen.tau, moving) if motion.runs else np.zeros(len(scale))
+    # Friction changes while a joint moves; the scale was measured while it moved, too.
+    wider = np.hypot(chosen.error.sd * scale, change)
+    sd = np.where(chosen.error.standing, chosen.error.sd, wider)
     return ExternalTorque(
         name="two-cycle",
         t=log.recording.t,
         tau=chosen.tau,
-        sd=np.hypot(chosen.error.sd * scale, change),
-        floor=np.hypot(chosen.error.floor * scale, change),
+        sd=sd,
+        floor=rms(sd, np.isfinite(sd)),
         moving=moving,
         remarks=(
             *partners.remarks,

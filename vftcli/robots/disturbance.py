@@ -1,10 +1,12 @@
 """The raw disturbance: the external torque as p and μ show it unfiltered, with all their noise."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, is_uniform
-from vftcli.signals.series import gaps_of, resample_columns, runs_of
+from vftcli.signals.series import gaps_of, median_step, resample_columns, runs_of
 
 GAP = 5.5
 """A step of more than this many median steps is a gap; no stretch reaches across."""
@@ -20,6 +22,91 @@ def raw_disturbance(terms: DynamicsTerms) -> Array:
     d /= np.diff(terms.t)[:, None]
     d -= 0.5 * (terms.mu[1:] + terms.mu[:-1])
     return d
+
+
+def disturbance_impulse(terms: DynamicsTerms) -> Array:
+    """The raw disturbance integrated from the first sample on, pᵗ − p⁰ − ∫μ. (T, n) [N·m·s]
+
+    A difference of two of its values over the time between them is the mean of d there.
+    """
+    gained = raw_disturbance(terms) * np.diff(terms.t)[:, None]
+    return np.concatenate([np.zeros((1, terms.joints)), np.cumsum(gained, axis=0)])
+
+
+class Blocks(NamedTuple):
+    """The raw disturbance averaged over blocks of time that follow one another.
+
+    Attributes:
+        t: Middle of each block. (K,) [s]
+        length: How long it lasts. (K,) [s]
+        d: Mean disturbance over it. (K, n) [N·m]
+        q: Joint positions at its middle. (K, n) [rad]
+        velocity: Mean joint velocity over it, from the positions. (K, n) [rad/s]
+        known: Whether its disturbance is known: not across a gap of the clock. (K,)
+    """
+
+    t: Array
+    length: Array
+    d: Array
+    q: Array
+    velocity: Array
+    known: Mask
+
+    def part(self, chosen: slice) -> "Blocks":
+        """Some of the blocks."""
+        t, length, d, q, velocity, known = self
+        return Blocks(
+            t[chosen], length[chosen], d[chosen], q[chosen], velocity[chosen], known[chosen]
+        )
+
+
+def disturbance_blocks(
+    terms: DynamicsTerms, q: Array, seconds: float, inside: Mask | None = None
+) -> Blocks:
+    """Block averages d = (s(e′) − s(e))/(e′ − e) with s = p − ∫μ, without lag and without gain.
+
+    A block holds whole samples, on an uneven clock too, so that its edges are samples; what is
+    left at the end of a stretch joins the last block where it is less than half of one. A gap of
+    the clock is a block of its own, its disturbance unknown. A log of one sample is such a block.
+
+    Args:
+        terms: p and μ along a log.
+        q: Joint positions. (T, n) [rad]
+        seconds: Length of a block, rounded to whole samples. [s]
+        inside: The samples to take, as if gaps lay between them; None for all. (T,)
+    """
+    t, joints = terms.t, terms.joints
+    if len(t) < 2:
+        nothing, never = np.zeros((1, joints)), np.zeros(1, dtype=bool)
+        return Blocks(t, np.zeros(1), nothing, q, nothing, never)
+    size = max(round(seconds / median_step(t)), 1)
+    whole = np.ones(len(t) - 1, dtype=bool)
+    whole[gaps_of(t, GAP)] = False
+    if inside is not None:
+        whole &= inside[1:] & inside[:-1]
+    # The unbroken runs of intervals give the edges; between two runs one block reaches across.
+    edges: list[int] = [0]
+    known: list[bool] = []
+    for start, stop in runs_of(whole):
+        if start > edges[-1]:
+            edges.append(start)
+            known.append(False)
+        count = max(round((stop - start) / size), 1)
+        edges += [*range(start + size, start + size * count, size), stop]
+        known += [True] * count
+    if edges[-1] < len(t) - 1:
+        edges.append(len(t) - 1)
+        known.append(False)
+    at = t[edges]
+    middle, length = 0.5 * (at[1:] + at[:-1]), np.diff(at)
+    return Blocks(
+        t=middle,
+        length=length,
+        d=np.diff(disturbance_impulse(terms)[edges], axis=0) / length[:, None],
+        q=resample_columns(middle, t, q),
+        velocity=np.diff(q[edges], axis=0) / length[:, None],
+        known=np.array(known),
+    )
 
 
 def disturbance_stretches(terms: DynamicsTerms, inside: Mask, step: float) -> list[Array]:

@@ -1,15 +1,20 @@
 """Filters without phase shift on clocks that may be uneven, and how much white noise they pass."""
 
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
 from vftcli.signals.arrays import Array, is_uniform
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.errors import ClockError, ParameterError
 from vftcli.signals.series import median_step, resample_columns
 
 ORDER = 2
 """Order of the Butterworth filter; run forwards and backwards it attenuates twice as much."""
+
+STEEP = 4
+"""Order of one pass where what is behind the filter is differentiated: its noise above the cutoff
+has to be gone."""
 
 Kind = Literal["lowpass", "bandpass"]
 """What a filter lets pass."""
@@ -40,6 +45,34 @@ def low_pass(
         ParameterError: If the cutoff is not below half the sample rate.
     """
     return filter_columns(t, x, butterworth(median_step(t), cutoff, "lowpass", order), settling)
+
+
+def zero_phase(t: Array, signals: Array, cutoff: float) -> Array:
+    """The signals low-passed steeply and without delay, fit to be differentiated. (T, m)
+
+    A clock too slow for the cutoff leaves them as they are.
+
+    Args:
+        t: Time. (T,) [s]
+        signals: One column a signal. (T, m)
+        cutoff: Frequency at which one pass loses 3 dB. [Hz]
+
+    Raises:
+        ClockError: If the log is shorter than two periods of the cutoff.
+    """
+    if t[-1] - t[0] < 2.0 / cutoff:
+        raise ClockError(
+            f"{t[-1] - t[0]:.2f} s of log are too short for a {cutoff:g} Hz filter; "
+            f"use a longer interval than {2.0 / cutoff:g} s"
+        )
+    if cutoff >= 0.45 / median_step(t):
+        return signals
+    return low_pass(t, signals, cutoff, order=STEEP, settling=3.0 / cutoff)
+
+
+def derivative(t: Array, signals: Array) -> Array:
+    """Central differences on the clock as it is, second order also where it is uneven. (T, m)"""
+    return np.asarray(np.gradient(signals, t, axis=0, edge_order=2))
 
 
 def band_pass(t: Array, x: Array, low: float, high: float) -> Array:
@@ -81,17 +114,24 @@ def butterworth(
     Raises:
         ParameterError: If a cutoff is not between zero and half the sample rate.
     """
-    from scipy.signal import butter
-
     if not (np.all(np.asarray(cutoff) > 0) and np.all(np.asarray(cutoff) < 0.5 / step)):
         raise ParameterError(
             f"a filter at {cutoff} Hz is not possible on a log of {1.0 / step:.4g} Hz; "
             f"choose a cutoff between 0 and {0.5 / step:.4g} Hz"
         )
+    return designed(step, cutoff, kind, order).copy()
+
+
+@lru_cache
+def designed(step: float, cutoff: float | tuple[float, float], kind: Kind, order: int) -> Array:
+    """A filter's sections, designed once: that takes longer than to filter a short log."""
+    from scipy.signal import butter
+
     sections: Array = butter(order, cutoff, kind, fs=1.0 / step, output="sos")
     return sections
 
 
+@lru_cache
 def noise_passed(
     step: float, cutoff: float | tuple[float, float], kind: Kind, slope: int = 0
 ) -> float:

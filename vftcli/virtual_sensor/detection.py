@@ -72,6 +72,19 @@ def learned_free(t: Array, true: Sequence[ContactInterval]) -> Mask:
     return free
 
 
+def floor_in_motion(reference: ExternalTorque) -> Array:
+    """A reference's own error while a joint moves, zero where it states none. (n,) [N·m]
+
+    Stiction at rest would deafen the reference to contacts in motion.
+    """
+    if reference.floor is None or reference.sd is None or reference.moving is None:
+        return np.zeros(reference.joints) if reference.floor is None else reference.floor
+    known = reference.moving & np.isfinite(reference.sd)
+    square = np.sum(np.where(known, reference.sd, 0.0) ** 2, axis=0)
+    count = np.count_nonzero(known, axis=0)
+    return np.where(count > 0, np.sqrt(square / np.maximum(count, 1)), reference.floor)
+
+
 def judge_contacts(
     estimates: Sequence[ExternalTorque], measured: SensorReading | None, reference: ExternalTorque
 ) -> tuple[ContactScore, ...]:
@@ -83,13 +96,13 @@ def judge_contacts(
     Args:
         estimates: The observers' torques.
         measured: Their wrenches, or None.
-        reference: The true torque; beyond `TRUE_TORQUE`, or five times its floor, it is a contact.
+        reference: The true torque; beyond `TRUE_TORQUE`, or five times its floor in
+            motion, it is a contact.
 
     Raises:
         ParameterError: If there is no free part to learn the band from.
     """
-    floor = np.zeros(reference.joints) if reference.floor is None else reference.floor
-    limits = np.maximum(TRUE_TORQUE, 5.0 * np.nan_to_num(floor))
+    limits = np.maximum(TRUE_TORQUE, 5.0 * np.nan_to_num(floor_in_motion(reference)))
     true = true_intervals(reference.t, reference.tau, limits)
     kind, least = "torque", np.asarray(LEAST_TORQUE)
     signals = {estimate.name: estimate.tau for estimate in estimates}

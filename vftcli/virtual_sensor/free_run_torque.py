@@ -1,12 +1,16 @@
 """What observers read in a free run, brought to the log: the zero that ``--zero LOG`` removes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vftcli.observers.error_band import FreeError, free_error
 from vftcli.observers.observer import Observer
-from vftcli.repetition.free_run import FreeRun
+from vftcli.repetition.free_run import FreeRun, ModelledRun
+from vftcli.repetition.standstill import resting
+from vftcli.robots.friction import dry_friction
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, fact
@@ -22,17 +26,38 @@ class FreeRunTorque:
         there: Its torque at the same place of the trajectory, NaN beyond the free run; empty where
             the free run is of another trajectory. (T, n) [N·m]
         mean: Its mean over the free run. (n,) [N·m]
-        rms: Its root mean square over the free run. (n,) [N·m]
+        error: Its mean squares over the free run, at rest and in motion.
         remark: How it was brought to the log.
     """
 
     there: Mapping[str, Array]
     mean: Mapping[str, Array]
-    rms: Mapping[str, Array]
+    error: Mapping[str, FreeError]
     remark: Remark
 
+    def everywhere(self, name: str) -> Array:
+        """One observer's torque in every sample, its mean where the free run does not reach.
 
-def free_run_torque(run: FreeRun, observers: Sequence[Observer]) -> FreeRunTorque:
+        Returns:
+            (T, n), or (n,) where the free run is of another trajectory. [N·m]
+        """
+        mean = self.mean[name]
+        there = self.there.get(name, mean)
+        return np.where(np.isnan(there), mean, there)
+
+
+TermsOf = Callable[[str, ModelledRun], DynamicsTerms]
+"""Name of an observer, and a recording → p and μ of the recording as the observer has them."""
+
+
+def as_modelled(_name: str, run: ModelledRun) -> DynamicsTerms:
+    """P and μ as the robot's model gives them, whichever the observer."""
+    return run.terms
+
+
+def free_run_torque(
+    run: FreeRun, observers: Sequence[Observer], terms_of: TermsOf = as_modelled
+) -> FreeRunTorque:
     """What a free run reads, at the same place of the trajectory where it is the log's.
 
     The first `SETTLING` seconds count for no mean, since observers rise from zero.
@@ -40,10 +65,17 @@ def free_run_torque(run: FreeRun, observers: Sequence[Observer]) -> FreeRunTorqu
     Args:
         run: The free run beside its log.
         observers: The observers that run over it.
+        terms_of: What each of them runs on.
     """
     terms = run.run.terms
-    read = (*(o.estimate(terms) for o in observers), mean_disturbance(terms))
+    read = (
+        *(o.estimate(terms_of(o.name, run.run)) for o in observers),
+        mean_disturbance(terms),
+    )
     settled = terms.t - terms.t[0] >= min(SETTLING, 0.5 * float(terms.t[-1] - terms.t[0]))
+    robot, recording = run.run.robot, run.recording
+    friction = dry_friction(robot.friction, robot.joints)
+    rests = resting(recording.t, recording.require("dq"))[settled]
     where, there = Where(run.recording.name), {}
     remark = fact("zero-mean-of-free-run", where)
     if run.is_same_motion:
@@ -52,7 +84,7 @@ def free_run_torque(run: FreeRun, observers: Sequence[Observer]) -> FreeRunTorqu
     return FreeRunTorque(
         there=there,
         mean={e.name: e.tau[settled].mean(axis=0) for e in read},
-        rms={e.name: np.sqrt(np.mean(e.tau[settled] ** 2, axis=0)) for e in read},
+        error={e.name: free_error(e.tau[settled], rests, friction) for e in read},
         remark=remark,
     )
 

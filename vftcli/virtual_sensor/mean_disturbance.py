@@ -7,7 +7,7 @@ with their order; so they are asked of this quantity, which no option touches an
 
 import numpy as np
 
-from vftcli.robots.disturbance import raw_disturbance
+from vftcli.robots.disturbance import disturbance_impulse
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import handed_over
 from vftcli.signals.external_torque import ExternalTorque
@@ -29,8 +29,7 @@ def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
     t, joints = terms.t, terms.joints
     if len(t) < 2:
         return ExternalTorque(name=DISTURBANCE, t=t, tau=np.zeros((len(t), joints)))
-    gained = raw_disturbance(terms) * np.diff(t)[:, None]
-    total = np.concatenate([np.zeros((1, joints)), np.cumsum(gained, axis=0)])
+    total = disturbance_impulse(terms)
     before, after = np.maximum(t - HALF, t[0]), np.minimum(t + HALF, t[-1])
     mean = resample_columns(after, t, total) - resample_columns(before, t, total)
     mean /= (after - before)[:, None]

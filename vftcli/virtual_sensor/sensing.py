@@ -1,8 +1,7 @@
 """From a log, its free motion and the estimates to what the virtual sensor says of it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import chain as chained
 from typing import Any
 
@@ -11,25 +10,37 @@ import numpy as np
 from vftcli.observers.observer import Observer
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Mask
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
-from vftcli.virtual_sensor.free_run_torque import FreeRunTorque, free_run_torque, less_free_run
+from vftcli.virtual_sensor.free_run_torque import (
+    FreeRunTorque,
+    TermsOf,
+    as_modelled,
+    free_run_torque,
+    less_free_run,
+)
 from vftcli.virtual_sensor.log_wrench import logged_wrench
-from vftcli.virtual_sensor.mean_disturbance import mean_disturbance
+from vftcli.virtual_sensor.mean_disturbance import DISTURBANCE, mean_disturbance
 from vftcli.virtual_sensor.mounting import find_mounting, without_tool_weight
 from vftcli.virtual_sensor.null_space import contact_elsewhere
 from vftcli.virtual_sensor.sensor_reading import SensorReading
+from vftcli.virtual_sensor.smoother.observer_wrench import (
+    Gate,
+    InputOf,
+    smooth_all,
+    smoothed_wrench,
+)
 from vftcli.virtual_sensor.torque_error import (
     TorqueError,
     from_band,
-    from_default,
     from_free_part,
     given_error,
-    lag_sd,
+    missed_torque,
+    unknown_error,
 )
 from vftcli.virtual_sensor.vendor import check_vendor
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
@@ -50,6 +61,9 @@ def sense(
     observers: Sequence[Observer],
     estimates: Sequence[ExternalTorque],
     choice: WrenchChoice,
+    terms_of: TermsOf = as_modelled,
+    input_of: InputOf | None = None,
+    gate: Gate | None = None,
 ) -> SensorReading:
     """Turn estimates into wrenches, remove the zero, and judge them.
 
@@ -62,6 +76,11 @@ def sense(
         observers: The observers, whose lag widens the band.
         estimates: Their torques, in the same order.
         choice: What is asked of the virtual sensor.
+        terms_of: What each observer runs on.
+        input_of: What the smoother takes for an observer whose wrench it makes, by name; None for
+            the log and its free part as they are.
+        gate: The contacts, outside of which the smoother's wrench is zero; None where the whole log
+            is one.
 
     Raises:
         ParameterError: If a pose or zero interval cannot be used, or cannot be found in the log.
@@ -70,19 +89,31 @@ def sense(
     """
     recording, robot, terms = motion.log.recording, motion.log.robot, motion.log.terms
     t, chain = recording.t, robot.chain
-    free_run = free_run_torque(motion.zero, observers) if motion.zero is not None else None
+    free_run = None
+    if motion.zero is not None:
+        free_run = free_run_torque(motion.zero, observers, terms_of)
     (disturbance,) = less_free_run((mean_disturbance(terms),), free_run)
     raw = VirtualSensor(frame="base").wrench(disturbance, recording.q, chain)
     mounting, found = find_mounting(recording, robot, disturbance, choice)
     # The disturbance was solved in base axes, so that --frame moves no zero.
-    sensor = VirtualSensor(solver=choice.solver, frame=choice.frame, mounting=mounting)
+    sensor = VirtualSensor(solver=choice.by_pose, frame=choice.frame, mounting=mounting)
     torques = less_free_run(estimates, free_run)
     zero = zero_spans(choice.zero, raw)
-    quiet = motion.zero.run.terms if motion.zero is not None else None
-    lag = partial(lag_sd, terms, observers, quiet)
-    error = torque_error(choice, torques, zero.chosen(t), free_run, lag)
+    error = torque_error(choice, motion, observers, torques, zero.chosen(t), free_run)
     wrenches = sensor.wrenches(torques, recording.q, chain, dict(error.sd))
-    bands = (error.remark,) if error.remark else tuple(r for w in wrenches for r in w.remarks)
+    smoothed = smooth_all(
+        motion,
+        [wrench.name for wrench in wrenches if choice.smooths(wrench.name)],
+        input_of,
+        unloaded=zero.chosen(t),
+        torque=None if free_run is None else free_run.everywhere(DISTURBANCE),
+        gate=gate,
+    )
+    wrenches = tuple(
+        smoothed_wrench(smoothed[w.name], w, sensor, motion) if w.name in smoothed else w
+        for w in wrenches
+    )
+    bands = band_remarks(error, wrenches, smoothed)
     # Drifts span by span: the first of each observer is its zero.
     drifts = [[zero_drift(wrench, span) for wrench in wrenches] for span in zero.spans]
     warnings = tuple(
@@ -116,12 +147,13 @@ def sense(
         free=free,
         logged=logged,
         vendor=vendor,
+        smoothed=smoothed,
         elsewhere=elsewhere,
         remarks=(
             *warnings,
             *found,
             *payload_remark(recording, robot),
-            *mask_remark(raw),
+            *(mask_remark(raw) if any(w.hidden.any() for w in wrenches) else ()),
             *moved,
             *bands,
             *(() if free_run is None else (free_run.remark,)),
@@ -131,31 +163,42 @@ def sense(
     )
 
 
+def band_remarks(
+    error: TorqueError, wrenches: Sequence[Wrench], smoothed: Collection[str]
+) -> tuple[Remark, ...]:
+    """Where the wrenches' bands come from: the error of the torques, and each smoother's own."""
+    own = [r for w in wrenches if w.name in smoothed for r in w.remarks]
+    common = error.remarks if len(smoothed) < len(wrenches) else ()
+    return (*common, *own)
+
+
 def torque_error(
     choice: WrenchChoice,
+    motion: FreeMotion,
+    observers: Sequence[Observer],
     torques: Sequence[ExternalTorque],
     free: Mask,
     free_run: FreeRunTorque | None,
-    lag: Callable[[Mask], Mapping[str, Array]],
 ) -> TorqueError:
-    """The torque error behind the band: what was given, else measured, else assumed.
+    """The torque error behind the band: what was given, else measured, else unknown.
 
     Args:
         choice: What is asked.
-        torques: The estimates.
+        motion: The log, and the free run that is its zero, if there is one.
+        observers: The observers.
+        torques: Their estimates, less the zero.
         free: Samples of the zero spans; none if no zero was given. (T,)
-        free_run: What a free run reads, or None.
-        lag: What each observer's lag leaves out of the contacts, by the free samples (T,); called
-            only where it counts, as it takes spectra of the whole log.
+        free_run: What the free run reads, or None.
     """
     if choice.torque_sd is not None:
         return given_error(choice.torque_sd, torques)
-    if free_run is not None or np.count_nonzero(free) > 1:
-        rms = None if free_run is None else free_run.rms
-        return from_free_part(torques, free, rms, lag(free))
     if torques and all(torque.error_sd is not None for torque in torques):
         return from_band(torques)
-    return from_default(torques, choice.solver)
+    if free_run is None and np.count_nonzero(free) < 2:
+        return unknown_error()
+    quiet = motion.zero.run.terms if motion.zero is not None else None
+    missed = missed_torque(motion.log.terms, observers, quiet, free)
+    return from_free_part(motion.log, torques, free, free_run, missed)
 
 
 def payload_remark(recording: Recording, robot: Robot) -> tuple[Remark, ...]:

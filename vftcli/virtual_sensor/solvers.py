@@ -29,7 +29,8 @@ PRIOR = np.repeat([50.0, 10.0 / LENGTH], 3)
 """Standard deviations of the MAP solver's prior about zero: 50 N and 10 N·m, of w_s. (6,) [N]"""
 
 TORQUE_SD = 0.3
-"""Joint torque error where neither the observer nor an unloaded span says it. [N·m]"""
+"""Joint torque error against which the MAP solver weighs its prior where none is known: a weight,
+no band. [N·m]"""
 
 
 class Decomposition(NamedTuple):
@@ -138,6 +139,10 @@ SOLVERS: dict[str, Callable[[Decomposition, Array], Solution]] = {
     "map": maximum_a_posteriori,
 }
 """Name at the command line → what turns a decomposed Jacobian and torque sd (T, n) into A and B."""
+
+
+LEAST_SQUARES = "pinv"
+"""The solver where none is asked for."""
 
 
 def check_solver(name: str) -> None:

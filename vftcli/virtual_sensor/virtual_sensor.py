@@ -11,11 +11,11 @@ from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import Mounting, check_frame, frame_pose, from_base
 from vftcli.virtual_sensor.solvers import (
     LEAST_SIGMA,
+    LEAST_SQUARES,
     SOLVERS,
     TORQUE_SD,
     Decomposition,
@@ -42,7 +42,7 @@ class VirtualSensor:
         ParameterError: If there is no such solver or frame, or the frame's pose is not known.
     """
 
-    solver: str = "pinv"
+    solver: str = LEAST_SQUARES
     frame: str = "flange"
     mounting: Mounting = field(default_factory=Mounting)
     least_sigma: float = LEAST_SIGMA
@@ -54,7 +54,7 @@ class VirtualSensor:
     def wrench(
         self, torque: ExternalTorque, q: Array, chain: Chain, sd: Array | None = None
     ) -> Wrench:
-        """The wrench of one estimate; see `wrenches`."""
+        """The wrench of one estimate, with a band where `sd` is given; see `wrenches`."""
         return self.wrenches((torque,), q, chain, {} if sd is None else {torque.name: sd})[0]
 
     def wrenches(
@@ -70,8 +70,8 @@ class VirtualSensor:
             torques: Estimates on the log's clock.
             q: Joint positions. (T, n) [rad]
             chain: The arm.
-            sd: Name of an estimate → standard deviation of its torques, (n,) or (T, n) [N·m], to
-                be used in place of the estimate's own account.
+            sd: Name of an estimate → standard deviation of its torques, (n,) or (T, n) [N·m]; one
+                without has a wrench without band.
 
         Raises:
             RobotError: If the arm has fewer than six joints.
@@ -80,7 +80,12 @@ class VirtualSensor:
         for torque in torques:
             if torque.tau.shape != q.shape:
                 raise ShapeError(f"{torque.name}: torque {torque.tau.shape} against q {q.shape}")
-        errors = [torque_sd_of(torque, (sd or {}).get(torque.name)) for torque in torques]
+        known = sd or {}
+        # A view: one row stands for every sample. Zero is raised, so that weights stay finite.
+        errors = [
+            np.broadcast_to(np.maximum(known.get(torque.name, TORQUE_SD), 1e-6), q.shape)
+            for torque in torques
+        ]
         values = np.empty((len(torques), samples, 6))
         spread = np.empty((len(torques), samples, 6))
         residual = np.empty((len(torques), samples))
@@ -92,7 +97,7 @@ class VirtualSensor:
             sigma[span] = parts.sigma_min
             for k, torque in enumerate(torques):
                 tau = torque.tau[span]
-                values[k, span], spread[k, span] = self.solve(parts, X, tau, errors[k][0][span])
+                values[k, span], spread[k, span] = self.solve(parts, X, tau, errors[k][span])
                 if n > 6:
                     residual[k, span] = np.linalg.norm(null_space(parts, tau), axis=1)
         masked = sigma < self.least_sigma
@@ -102,11 +107,10 @@ class VirtualSensor:
                 t=torque.t,
                 values=handed_over(values[k].copy()),
                 frame=self.frame,
-                sd=handed_over(spread[k].copy()),
+                sd=handed_over(spread[k].copy()) if torque.name in known else None,
                 sigma_min=sigma,
                 masked=masked,
                 null_space=handed_over(residual[k].copy()) if n > 6 else None,
-                remarks=(errors[k][1],),
             )
             for k, torque in enumerate(torques)
         )
@@ -148,22 +152,3 @@ class ForceArrow(NamedTuple):
 
     origin: Array
     force: Array
-
-
-def torque_sd_of(torque: ExternalTorque, given: Array | None) -> tuple[Array, Remark]:
-    """The torque error a wrench's covariance starts from, and where it comes from.
-
-    It is the given one, the observer's own, or an assumed one. (T, n) [N·m] Zero is raised to a
-    micronewton-metre, so that weights stay finite.
-    """
-    where = Where(torque.name)
-    sd: Array | float
-    if given is not None:
-        sd, remark = given, fact("band-given", where)
-    elif torque.sd is not None:
-        sd, remark = torque.sd, caution("band-of-observer", where)
-    else:
-        sd, remark = TORQUE_SD, caution("band-assumed", where, torque_sd_Nm=TORQUE_SD)
-    least = np.maximum(np.asarray(sd, dtype=np.float64), 1e-6)
-    # A view: one row stands for every sample without being copied.
-    return np.broadcast_to(least, torque.tau.shape), remark

@@ -25,7 +25,7 @@ def messages(analysis: Analysis, tmp_path_factory: pytest.TempPathFactory) -> di
 
 
 def test_every_topic_has_every_sample(messages: dict[str, list]) -> None:
-    observers = ("fdo", "gmo", "kfo_fe", "kfo_zoh", "reference")
+    observers = ("best", "fdo", "gmo", "kfo_fe", "kfo_zoh", "reference")
     topics = ["/joint_states", *(f"/vftcli/external/{name}" for name in observers)]
     assert {topic: len(messages[topic]) for topic in topics} == dict.fromkeys(topics, 600)
     assert len(messages["/robot_description"]) == 1
@@ -44,7 +44,7 @@ def test_joint_states_are_the_log(messages: dict[str, list], analysis: Analysis)
 
 def test_estimates_are_efforts(messages: dict[str, list], analysis: Analysis) -> None:
     found = [message.effort for _, message in messages["/vftcli/external/kfo_fe"]]
-    np.testing.assert_array_equal(found, analysis.estimates[2].tau)
+    np.testing.assert_array_equal(found, analysis.estimates[3].tau)
     assert len(messages["/vftcli/external/kfo_fe"][0][1].position) == 0
 
 

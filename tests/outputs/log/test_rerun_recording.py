@@ -65,6 +65,7 @@ def test_every_plot_has_all_of_its_lines(rows: dict[str, dict[str, list]]) -> No
     for j in range(1, 7):
         assert column(rows, f"/tau_ext/J{j}", "SeriesLines:names")[-1] == [
             "reference (vendor)",
+            "best",
             "fdo",
             "gmo",
             "kfo-fe",
@@ -97,9 +98,9 @@ def test_the_arm_moves(rows: dict[str, dict[str, list]]) -> None:
 def test_the_arrow_is_the_force_to_scale(
     rows: dict[str, dict[str, list]], analysis: Analysis
 ) -> None:
-    """About 50 arrows a second: every second sample of this log at 125 Hz, first Kalman filter."""
+    """About 50 arrows a second: every second sample of this log at 125 Hz, of the best."""
     drawn = column(rows, "/robot/flange_force", "Arrows3D:vectors")
-    q, tau = analysis.recording.q[::2], analysis.estimates[2].tau[::2]
+    q, tau = analysis.recording.q[::2], analysis.estimates[0].tau[::2]
     found = wrench_of(tau, flange_jacobian(analysis.robot.chain, q))
     expected = np.where(found.known[:, None], found.values[:, :3], np.nan)
     assert len(drawn) == len(expected)

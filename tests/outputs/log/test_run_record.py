@@ -32,7 +32,7 @@ def test_run_json_says_how_to_make_it_again(analysis: Analysis) -> None:
 def test_run_json_has_every_observers_parameters(analysis: Analysis) -> None:
     record = json.loads(to_json(analysis.run))
     found = {o["name"]: o for o in record["observers"]}
-    assert list(found) == ["fdo", "gmo", "kfo-fe", "kfo-zoh"]
+    assert list(found) == ["best", "fdo", "gmo", "kfo-fe", "kfo-zoh"]
     assert found["gmo"]["parameters"]["gain"] == [5.0, 3.0, 4.0, 10.0, 10.0, 10.0]
     assert found["fdo"]["zeta"] == [None] * 6
     for observer in found.values():
@@ -86,9 +86,9 @@ def test_a_remark_of_an_estimate_says_whose_it_is_once(analysis: Analysis) -> No
     first, *others = analysis.estimates
     noted = replace(analysis, estimates=(replace(first, remarks=(own, own)), *others), remarks=())
     found = all_remarks(noted)
-    assert [str(remark) for remark in found].count("fdo: shifted by 0.25 s") == 1
+    assert [str(remark) for remark in found].count("best: shifted by 0.25 s") == 1
     of_run = replace(noted, remarks=(own,))
-    assert "fdo: shifted by 0.25 s" not in map(str, all_remarks(of_run))
+    assert "best: shifted by 0.25 s" not in map(str, all_remarks(of_run))
 
 
 @pytest.mark.usefixtures("catalogue")

@@ -20,20 +20,24 @@ def floats(text: str) -> np.ndarray:
 def test_a_chart_over_time_keeps_every_column_and_its_band() -> None:
     t = np.arange(4.0)
     values = np.array([[1.0, 2.0], [3.0, np.nan], [5.0, 6.0], [7.0, 8.0]])
-    line = ChartLine("gmo", values, "#112233", dashed=True, half=np.array([0.5, np.inf]))
+    half = np.array([[0.5, 1.0], [0.5, 2.0], [np.nan, 3.0], [0.5, 4.0]])
+    line = ChartLine("gmo", values, "#112233", dashed=True, half=half)
     found = packed(Chart("tau", "Torque", "N·m", (line,), np.array([1.0, 2.0]), "floor"), t)
     (series,) = found["series"]
     assert (series["name"], series["colour"], series["dashed"]) == ("gmo", "#112233", True)
-    assert series["half"] == [0.5, None]
+    np.testing.assert_array_equal(floats(series["lines"][1]["half"]), half[:, 1])
+    assert np.isnan(floats(series["lines"][0]["half"])[2])
     assert (found["band"], found["bandLabel"]) == ([1.0, 2.0], "floor")
     np.testing.assert_array_equal(floats(series["lines"][1]["y"]), values[:, 1])
     np.testing.assert_array_equal(floats(series["lines"][0]["x"]), t)
 
 
-def test_a_long_log_is_decimated() -> None:
+def test_a_long_log_is_decimated_its_ribbon_with_it() -> None:
     t = np.arange(5.0 * STRETCHES)
-    found = packed(Chart("q", "", "rad", (ChartLine("q", t[:, None]),)), t)
-    drawn = floats(found["series"][0]["lines"][0]["x"])
+    line = ChartLine("q", t[:, None], half=0.5 * t[:, None])
+    found = packed(Chart("q", "", "rad", (line,)), t)
+    drawn, half = (floats(found["series"][0]["lines"][0][key]) for key in ("x", "half"))
+    np.testing.assert_array_equal(half, 0.5 * drawn)
     assert 2 * STRETCHES - 2 <= len(drawn) <= 2 * STRETCHES + 2  # two a stretch, and both ends
 
 

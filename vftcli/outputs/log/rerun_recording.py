@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
+from vftcli.observers.table import BEST
 from vftcli.outputs.arm import ArmPoses, motion
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.log.run_record import CONVENTIONS, all_remarks
@@ -25,6 +26,9 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.wrench import AXES, unit_of
 from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
+
+LEADING = 2.0
+"""Width of the line of `best`; the others are thinner. [px]"""
 
 SHAFT = 0.012
 """Radius of the force arrow. [m]"""
@@ -79,7 +83,10 @@ def joint_lines(
 ) -> Lines:
     """All estimates of one joint less something, and the reference first if it is wanted."""
     colours = colours_of(analysis.estimates)
-    lines = [PlotLine(e.name, e.tau[:, j] - minus, colours[e.name]) for e in analysis.estimates]
+    lines = [
+        PlotLine(e.name, e.tau[:, j] - minus, colours[e.name], LEADING if e.name == BEST else 1.2)
+        for e in analysis.estimates
+    ]
     if group == "tau_ext":
         lines += band_lines(analysis, j)
     if reference is not None:
@@ -91,12 +98,13 @@ def joint_lines(
 
 
 def band_lines(analysis: Analysis, j: int) -> Iterator[PlotLine]:
-    """Both edges of the last observer's 95 % band of one joint, thin in its colour.
+    """Both edges of one 95 % band of a joint, thin in its colour: that of `best`, else the last.
 
-    Every observer's would hide them all; the tables and the page hold the others.
+    Every observer's would hide them all; the table of estimates holds the others.
     """
     colours = colours_of(analysis.estimates)
-    for estimate in reversed(analysis.estimates):
+    last_first = analysis.estimates[::-1]
+    for estimate in sorted(last_first, key=lambda estimate: estimate.name != BEST):
         if estimate.error_sd is not None:
             for sign, edge in ((1.0, "upper"), (-1.0, "lower")):
                 column = estimate.tau[:, j] + sign * COVERS * estimate.error_sd[:, j]
@@ -189,9 +197,13 @@ def summary(analysis: Analysis) -> str:
 
 
 def force_source(estimates: Sequence[ExternalTorque]) -> ExternalTorque | None:
-    """The estimate the force arrow is made from: the first Kalman filter's, else the first."""
-    kalman = [estimate for estimate in estimates if estimate.name.startswith("kfo")]
-    return next(iter([*kalman, *estimates]), None)
+    """The estimate the force arrow is made from: `best`, else a Kalman filter's, else the first."""
+    ranks = [
+        [estimate for estimate in estimates if estimate.name == BEST],
+        [estimate for estimate in estimates if estimate.name.startswith("kfo")],
+        estimates,
+    ]
+    return next((estimate for rank in ranks for estimate in rank), None)
 
 
 def force_arrow(

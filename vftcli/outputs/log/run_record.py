@@ -16,6 +16,7 @@ import vftcli
 from vftcli.analysis import Analysis
 from vftcli.observers.auto_tuning import AutoTuned
 from vftcli.observers.observer import Observer, Tuning
+from vftcli.observers.table import BEST
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.files import OutputFolder
 from vftcli.robots.robot import Robot
@@ -235,7 +236,8 @@ def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
     return {
         "frame": sensed.sensor.frame,
         "meaning": f"force and moment ON the robot; {FRAMES[sensed.sensor.frame]}",
-        "solver": sensed.sensor.solver,
+        "solver": sensed.solver,
+        "smoothed": {name: found.record for name, found in sensed.smoothed.items()},
         "least_sigma_m": sensed.sensor.least_sigma,
         "masked_share": sensed.masked_share,
         "tool": sensed.sensor.mounting.tool,
@@ -254,6 +256,7 @@ def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
     return {
         "bias_removed": found.removed,
         "segments_free_loaded": spectra.segments if spectra is not None else None,
+        "best": best_record(analysis),
         "tuned": {
             name: {"omega_n_rad_s": curve.best, "expected_rmse_Nm": curve.least}
             for name, curve in found.curves.items()
@@ -266,6 +269,29 @@ def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
             if e.error_sd is not None
         },
         "notes": list(found.remarks),
+    }
+
+
+def best_record(analysis: Analysis) -> dict[str, Any] | None:
+    """What `best` is made of: gains, free part, and the bias that is off; None where it is not."""
+    found, ran = analysis.refinement, {o.name: o for o in analysis.observers}
+    best = ran.get(BEST)
+    if found is None or best is None:
+        return None
+    under, tuned = found.baseline.under(BEST), BEST in found.curves
+    corrected = under.correction
+    return {
+        "observer": "rts-auto" if tuned else "kfo-rts",
+        "gains": "log" if tuned else "robot",
+        "omega_n_rad_s": analysis.tunings[BEST].omega_n,
+        "free_part": list(under.part.remarks) if under.part is not None else None,
+        "whole_log_bias": None
+        if corrected is None
+        else {
+            "joints": [j + 1 for j in np.flatnonzero(corrected.applied)],
+            "rms_Nm": np.sqrt(np.mean(corrected.bias**2, axis=0)),
+            "sd_Nm": np.sqrt(np.mean(corrected.sd**2, axis=0)),
+        },
     }
 
 

@@ -21,7 +21,8 @@ class ChartLine(NamedTuple):
         values: One column a joint. (T, n)
         colour: ``#rrggbb``, or "ink" for the page's own text colour.
         dashed: Whether the line is dashed.
-        half: Half the width of a ribbon about the line, one a joint, or None. (n,)
+        half: Half the width of a ribbon about the line, NaN where it is not known. (T, n)
+        leads: Whether it is the line to look at: drawn thicker, and on top of the others.
     """
 
     name: str
@@ -29,6 +30,7 @@ class ChartLine(NamedTuple):
     colour: str = "ink"
     dashed: bool = False
     half: Array | None = None
+    leads: bool = False
 
 
 class Chart(NamedTuple):
@@ -60,8 +62,10 @@ def packed(chart: Chart, t: Array) -> dict[str, Any]:
         "series": [
             {
                 **style_of(line),
-                "half": known(line.half),
-                "lines": [packed_line(part) for part in decimated(t, line.values, STRETCHES)],
+                "lines": [
+                    {**packed_line(part), **ribbon_of(line, j, t, part.t)}
+                    for j, part in enumerate(decimated(t, line.values, STRETCHES))
+                ],
             }
             for line in chart.series
         ],
@@ -98,13 +102,32 @@ def frame_of(chart: Chart) -> dict[str, Any]:
 
 
 def style_of(line: ChartLine) -> dict[str, Any]:
-    """A line's name, colour and dashes, as the script takes them."""
-    return {"name": line.name, "colour": line.colour, "dashed": line.dashed}
+    """A line's name, colour, dashes and rank, as the script takes them."""
+    return {
+        "name": line.name,
+        "colour": line.colour,
+        "dashed": line.dashed,
+        "leads": line.leads,
+    }
 
 
 def packed_line(line: Line) -> dict[str, str]:
     """A line's points: both coordinates as base64 float32."""
     return {"x": base64_float32(line.t), "y": base64_float32(line.y)}
+
+
+def ribbon_of(line: ChartLine, j: int, t: Array, drawn: Array) -> dict[str, str]:
+    """Half the width of one column's ribbon at the times that are drawn; nothing without one.
+
+    Args:
+        line: The line.
+        j: The column.
+        t: Times of its samples. (T,) [s]
+        drawn: Times that are drawn. (P,) [s]
+    """
+    if line.half is None:
+        return {}
+    return {"half": base64_float32(np.interp(drawn, t, line.half[:, j]))}
 
 
 def base64_float32(values: Array) -> str:

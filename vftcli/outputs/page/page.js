@@ -10,7 +10,7 @@
   };
   for (const chart of [...data.charts, ...(data.wrenches || []), ...data.responses])
     for (const series of chart.series)
-      series.lines = series.lines.map((line) => ({ x: floats(line.x), y: floats(line.y) }));
+      series.lines = series.lines.map((line) => ({ x: floats(line.x), y: floats(line.y), half: line.half && floats(line.half) }));
 
   const nyquist = (() => {
     const first = data.responses.length && data.responses[0].series[0];
@@ -92,14 +92,12 @@
       const [a, b] = state.view[this.axis];
       let low = Infinity, high = -Infinity;
       for (const series of lines) {
-        const { line } = series;
+        const { line } = series, half = this.half(series);
         const from = Math.max(0, below(line.x, a) - 1), to = Math.min(line.x.length, below(line.x, b) + 2);
         for (let k = from; k < to; k++) {
-          const y = line.y[k];
-          if (Number.isFinite(y)) { if (y < low) low = y; if (y > high) high = y; }
+          const y = line.y[k], wide = half ? half[k] : 0;
+          if (Number.isFinite(y + wide)) { if (y - wide < low) low = y - wide; if (y + wide > high) high = y + wide; }
         }
-        const half = this.half(series);
-        if (half) { low -= half; high += half; }
       }
       const band = this.spec.band && this.spec.band[this.at];
       if (band) { low = Math.min(low, -band); high = Math.max(high, band); }
@@ -127,7 +125,8 @@
       c.beginPath(); c.rect(this.box.l, this.box.t, this.box.w, this.box.h); c.clip();
       this.band(c);
       for (const item of lines) this.ribbon(c, item);
-      for (const item of lines) this.trace(c, item);
+      for (const item of lines) if (!item.leads) this.trace(c, item);
+      for (const item of lines) if (item.leads) this.trace(c, item); // on top of the others
       c.restore();
       this.hover();
     }
@@ -182,7 +181,7 @@
       c.fillStyle = css("--band");
       c.fillRect(this.box.l, this.top(half), this.box.w, this.top(-half) - this.top(half));
     }
-    half(series) { return series.half && !this.small ? series.half[this.at] : null; }
+    half(series) { return this.small ? null : series.line.half; }
     ribbon(c, series) { // the 95 % band about an estimate
       const half = this.half(series), { line } = series;
       if (!half) return;
@@ -193,22 +192,22 @@
       const fill = (end) => {
         if (begin >= 0 && end > begin) {
           c.beginPath();
-          for (let k = begin; k < end; k++) c.lineTo(this.left(line.x[k]), this.top(line.y[k] + half));
-          for (let k = end - 1; k >= begin; k--) c.lineTo(this.left(line.x[k]), this.top(line.y[k] - half));
+          for (let k = begin; k < end; k++) c.lineTo(this.left(line.x[k]), this.top(line.y[k] + half[k]));
+          for (let k = end - 1; k >= begin; k--) c.lineTo(this.left(line.x[k]), this.top(line.y[k] - half[k]));
           c.fill();
         }
         begin = -1;
       };
       for (let k = from; k < to; k++) {
-        if (!Number.isFinite(line.y[k])) fill(k); else if (begin < 0) begin = k;
+        if (!Number.isFinite(line.y[k] + half[k])) fill(k); else if (begin < 0) begin = k;
       }
       fill(to); c.globalAlpha = 1;
     }
-    trace(c, { line, colour, dashed }) {
+    trace(c, { line, colour, dashed, leads }) {
       const [a, b] = state.view[this.axis], ink = colour === "ink";
       const from = Math.max(0, below(line.x, a) - 1), to = Math.min(line.x.length, below(line.x, b) + 1);
       c.strokeStyle = ink ? css("--ink") : colour;
-      c.lineWidth = this.small ? 1 : 1.4;
+      c.lineWidth = this.small ? 1 : leads ? 2.2 : 1.3;
       c.globalAlpha = ink && this.spec.series.length > 1 ? 0.62 : 1; // the reference lies under the estimates
       c.lineJoin = "round"; c.setLineDash(dashed ? [7, 5] : []);
       c.beginPath();
@@ -336,11 +335,12 @@
     document.querySelectorAll("#joints button").forEach((button, j) => button.setAttribute("aria-pressed", String(j === joint)));
     redraw();
   };
-  const swatch = ({ colour, dashed }) => {
+  const swatch = ({ colour, dashed, leads }) => {
     const space = "http://www.w3.org/2000/svg", svg = document.createElementNS(space, "svg"), line = document.createElementNS(space, "line");
     svg.setAttribute("class", "swatch"); svg.setAttribute("viewBox", "0 0 24 8"); svg.setAttribute("aria-hidden", "true");
     for (const [name, value] of [["x1", 0], ["x2", 24], ["y1", 4], ["y2", 4], ["stroke", colour === "ink" ? "currentColor" : colour]]) line.setAttribute(name, value);
     if (dashed) line.setAttribute("stroke-dasharray", "7 4");
+    if (leads) line.setAttribute("style", "stroke-width: 3.5");
     svg.append(line);
     return svg;
   };

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.analysis import Analysis
+from vftcli.observers.table import BEST
 from vftcli.outputs.log.rmse_tables import blocks
 from vftcli.outputs.page.charts import Chart, ChartLine, packed, packed_over_frequency
 from vftcli.outputs.page.refinement_part import spectra_chart, tuning_chart
@@ -57,15 +58,23 @@ def time_charts(analysis: Analysis) -> Iterator[Chart]:
 
 
 def estimate_series(analysis: Analysis) -> tuple[ChartLine, ...]:
-    """Every observer's torque in its colour, within its 95 % band where it has one."""
+    """Every observer's torque in its colour, the leading one within its 95 % band.
+
+    Where `best` ran it leads, and its band is the one that is drawn: five would hide one another.
+    """
     styles = styles_of(analysis.estimates)
-    lines = (ChartLine(e.name, e.tau, *styles[e.name]) for e in analysis.estimates)
-    # Half the width of a band is its root mean square over time: one number a joint.
+    alone = BEST not in styles
     return tuple(
-        line
-        if e.error_sd is None
-        else line._replace(half=COVERS * np.sqrt(np.mean(e.error_sd**2, axis=0)))
-        for line, e in zip(lines, analysis.estimates, strict=True)
+        ChartLine(
+            e.name,
+            e.tau,
+            *styles[e.name],
+            half=COVERS * e.error_sd
+            if e.error_sd is not None and (alone or e.name == BEST)
+            else None,
+            leads=e.name == BEST,
+        )
+        for e in analysis.estimates
     )
 
 
@@ -99,7 +108,10 @@ def wrench_charts(analysis: Analysis) -> Iterator[Chart]:
     for k, axis in enumerate(AXES if found else ()):
         lines = tuple(
             ChartLine(
-                legend_name(analysis, w.name), w.known[:, [k]], *styles.get(w.name, ("ink", False))
+                legend_name(analysis, w.name),
+                w.known[:, [k]],
+                *styles.get(w.name, ("ink", False)),
+                leads=w.name == BEST,
             )
             for w in found
         )

@@ -163,4 +163,6 @@ def value_text(value: Any) -> str:  # noqa: ANN401 - whatever JSON can hold
             return value_text(value[0])
         case list():
             return ", ".join(value_text(entry) for entry in value)
+        case dict():
+            return ", ".join(f"{key} {value_text(entry)}" for key, entry in value.items())
     return str(value)

@@ -1,0 +1,76 @@
+"""The band around an estimate: drawn where something is free of contact, from what is known."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.observers import MomentumObserver
+from vftcli.readers import read
+from vftcli.refinement.band import band_remarks, with_band
+from vftcli.refinement.baseline import Baseline, baseline_of, free_reading, rests_in
+from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.free_motion import FreeMotion
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots import load_robot
+
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
+GMO = MomentumObserver(gain=np.full(6, 20.0))
+
+
+@pytest.fixture(scope="module")
+def found() -> Baseline:
+    log = ModelledRun(recording=read(FIXTURE), robot=load_robot("ur5"))
+    return baseline_of(FreeMotion(log=log, choice=FreeChoice(cycles=(1,))))
+
+
+def test_a_correction_adds_its_own_variance(found: Baseline) -> None:
+    reading = free_reading(found, GMO, GMO.estimate(found.terms))
+    plain = with_band(found, reading).error_sd
+    sd = np.full(plain.shape, 0.7)
+    np.testing.assert_allclose(
+        with_band(found, reading, sd).error_sd, np.hypot(plain, 0.7), rtol=1e-12
+    )
+
+
+def test_rest_and_motion_have_bands_of_their_own(found: Baseline) -> None:
+    """Every sample of a joint has one of two values, by whether it rests."""
+    reading = free_reading(found, GMO, GMO.estimate(found.terms))
+    sd, rests = with_band(found, reading).error_sd, rests_in(found.motion.log)
+    for j in range(6):
+        for where in (rests[:, j], ~rests[:, j]):
+            assert len(np.unique(sd[where, j])) <= 1
+    assert len(np.unique(sd[:, 4])) == 2  # J5 rests, and slides where it is pushed hard
+
+
+def test_without_spectra_or_free_samples_there_is_none(found: Baseline) -> None:
+    reading = free_reading(found, GMO, GMO.estimate(found.terms))
+    assert with_band(replace(found, spectra=None), reading).error_sd is None
+    nothing = reading._replace(samples=reading.samples[:0], resting=reading.resting[:0])
+    assert with_band(found, nothing).error_sd is None
+    said = band_remarks(replace(found, part=None, spectra=None))
+    assert [r.code for r in said] == ["no-band"]
+
+
+def test_the_resting_joint_is_named(found: Baseline) -> None:
+    (band, rest) = band_remarks(found)
+    assert (band.code, rest.code) == ("band", "band-of-a-standing-joint")
+    assert rest.where.joints == (5,)
+    assert all(str(remark) for remark in (band, rest))
+
+
+def test_samples_that_a_fit_calls_free_take_the_place_of_the_free_part(found: Baseline) -> None:
+    reading = free_reading(found, GMO, GMO.estimate(found.terms))
+    quiet = np.arange(found.terms.samples) % 7 == 0
+    rests = rests_in(found.motion.log)
+    sd = with_band(found, reading, quiet=quiet).error_sd
+    there = with_band(
+        found, reading._replace(samples=reading.estimate.tau[quiet], resting=rests[quiet])
+    )
+    np.testing.assert_array_equal(sd, there.error_sd)
+    # too few to speak for anything
+    few = np.arange(found.terms.samples) < 20
+    np.testing.assert_array_equal(
+        with_band(found, reading, quiet=few).error_sd, with_band(found, reading).error_sd
+    )

@@ -1,0 +1,80 @@
+"""What the paper's gains cost: bands against bands, and the truth where there is one."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.analysis import Analysis
+from vftcli.evaluation.judgement import with_measured_gap
+from vftcli.observers.choice import ObserverChoice
+from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.refinement.paper_gap import expected_gap, gap_remark
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.remarks import Remark, fact
+
+FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
+UR5 = AnalysisChoice(robot=RobotChoice(name="ur5"))
+
+
+@pytest.fixture(scope="module")
+def analysis() -> Analysis:
+    return analyse_log(FIXTURE, UR5)
+
+
+def gaps(analysis: Analysis) -> list[Remark]:
+    return [remark for remark in analysis.remarks if remark.code.startswith("paper-gains")]
+
+
+def test_the_ratio_is_that_of_the_bands(analysis: Analysis) -> None:
+    (gap,) = gaps(analysis)
+    assert gap.code == "paper-gains-expected"
+    best, *paper = (np.sqrt(np.mean(e.error_sd**2, axis=0)).mean() for e in analysis.estimates)
+    assert gap.values["ratio"] == pytest.approx(np.mean(paper) / best, rel=1e-12)
+    assert set(gap.values["ratios"]) == {"fdo", "gmo", "kfo-fe", "kfo-zoh"}
+    assert "the paper's gains are " in str(gap)
+    assert "(delay 100–333 ms)" in str(gap)
+
+
+def test_other_gains_in_the_run_do_not_change_what_the_paper_s_cost(analysis: Analysis) -> None:
+    """Those of --gains auto and of --set ran; the paper's run beside them for the line."""
+    for words in ({"gains": "auto"}, {"assignments": ["gmo.gain=30"]}, {"observer": ["best"]}):
+        other = analyse_log(FIXTURE, replace(UR5, observers=ObserverChoice.parsed(**words)))
+        assert gaps(other)[0].values["ratio"] == pytest.approx(
+            gaps(analysis)[0].values["ratio"], rel=1e-12
+        )
+
+
+def test_nothing_is_said_where_a_side_is_not_known(analysis: Analysis) -> None:
+    assert analysis.refinement is not None
+    found, estimates = analysis.refinement.baseline, analysis.estimates
+    assert expected_gap(found, estimates[1:], gains_of_file=True) is None
+    bare = [replace(estimates[0], error_sd=None), *estimates[1:]]
+    assert expected_gap(found, bare, gains_of_file=True) is None
+    delay = {"gmo": np.array([0.1, 0.2])}
+    assert gap_remark("paper-gains-expected", {"best": 0.0, "gmo": 1.0}, delay) is None
+    assert gap_remark("paper-gains-expected", {"best": 1.0, "gmo": np.nan}, delay) is None
+    said = gap_remark("paper-gains-expected", {"best": 0.5, "gmo": 1.0}, delay)
+    assert said is not None
+    assert said.values == {
+        "ratio": 2.0,
+        "ratios": {"gmo": 2.0},
+        "least_delay_ms": 100.0,
+        "most_delay_ms": 200.0,
+    }
+
+
+def test_what_is_measured_takes_the_place_of_what_was_expected(analysis: Analysis) -> None:
+    import polars as pl
+
+    rows = [("best", 1, 0.5), ("best", 2, 1.5), ("gmo", 1, 2.0), ("gmo", 2, 4.0), ("gmo", 3, None)]
+    errors = pl.DataFrame(rows, schema=["observer", "joint", "rmse_Nm"], orient="row")
+    other = fact("band")
+    before = (gaps(analysis)[0], other)
+    after = with_measured_gap(before, errors, analysis.tunings)
+    assert [remark.code for remark in after] == ["band", "paper-gains-measured"]
+    assert after[1].values["ratio"] == pytest.approx(3.0 / 1.0)
+    # Without the best there is nothing to measure against.
+    alone = errors.filter(pl.col("observer") == "gmo")
+    assert with_measured_gap(before, alone, analysis.tunings) == before

@@ -1,0 +1,76 @@
+"""What observers run on once the bias of the whole log is off, and what `best` is made of.
+
+The bias of the whole log (`vftcli.refinement.whole_log`) comes off μ before an observer runs.
+`best` runs on what is left, tuned on the spectra of that; the other observers do where
+``--remove-bias whole-log`` asks for it. Nothing here refuses a log: what cannot be done is said,
+and `best` is made of what is left.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vftcli.observers.spectra import Part, spectra_of
+from vftcli.refinement.baseline import Baseline, baseline_of, without_free_motion
+from vftcli.refinement.choice import RefinementChoice
+from vftcli.refinement.free_load import free_load
+from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
+from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
+from vftcli.signals.arrays import Mask
+from vftcli.signals.errors import ParameterError, VftError
+from vftcli.signals.remarks import caution, fact
+
+
+def baseline_for(motion: FreeMotion, choice: RefinementChoice, *, best: bool) -> Baseline:
+    """The baseline of a log, and beside it that of `best` where it is another.
+
+    Args:
+        motion: The log and its free motion.
+        choice: Which bias comes off.
+        best: Whether `best` is among the observers.
+
+    Raises:
+        ParameterError: If a span that is given as free holds no samples of the log, or all.
+    """
+    found = baseline_of(motion)
+    if choice.at_phase:
+        return without_free_motion(found)
+    if not (choice.corrects_all or (best and choice.corrects_best)):
+        return found
+    try:
+        bias = whole_log_bias(motion.log)
+    except (VftError, np.linalg.LinAlgError) as error:
+        failed = caution("whole-log-bias-failed", reason=str(error))
+        return replace(found, on_correction=(failed,))
+    if found.spectra is None:
+        found = on_quiet_samples(found, bias.free)
+    made = corrected(found, bias)
+    return made if choice.corrects_all else replace(found, best=made)
+
+
+def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
+    """A baseline whose free part is what the fit of the bias takes for free, where that will do.
+
+    Args:
+        found: A baseline without spectra.
+        quiet: The samples that are taken for free. (T,)
+    """
+    log = found.motion.log
+    remark = fact("free-by-the-fit", share=float(quiet.mean()))
+    part = FreePart((FreePiece(log, quiet, ()),), quiet, (remark,))
+    made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
+    try:
+        return replace(made, spectra=spectra_of(Part(log.terms, ~quiet), made.samples))
+    except ParameterError:  # all of it or nothing is taken for free, or never for long enough
+        return found
+
+
+def corrected(found: Baseline, bias: WholeLogBias) -> Baseline:
+    """A baseline with the bias of the whole log off, where its guards apply any of it."""
+    made = replace(found, on_correction=bias.remarks)
+    if not bias.applied.any():
+        return made
+    made = replace(made, correction=bias)
+    if made.part is None or made.spectra is None:
+        return made
+    return replace(made, spectra=spectra_of(Part(made.terms, ~made.part.own), made.samples))

@@ -1,0 +1,171 @@
+"""A load that nobody told of: the free part is weighed before its noise is learned.
+
+A payload that the model lacks pulls in the free part too. Taken for noise it makes every tuned
+gain slow and every band wide; it is an external torque, and stays in the estimates. The free
+part's disturbance is fitted with a load's weight, its friction beside it,
+
+    d = J_Fᵀ(q) [m g; m c × g] + a tanh(q̇/v₀) + o,
+
+with friction and offset held to what a model usually misses of them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.repetition.free_motion import FreePiece
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.friction import dry_friction
+from vftcli.robots.regressor import load_regressor
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, handed_over, seal
+from vftcli.signals.errors import ClockError
+from vftcli.signals.filters import derivative, zero_phase
+from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.series import median_step
+
+LEAST = 0.4
+"""A load from which it is one: drive constants that are 3 % off look like .3 kg. [kg]"""
+
+SURE = 4.0
+"""Standard deviations that it has to be."""
+
+PARTLY = 0.8
+"""Share of the free part's disturbance that it may leave at most."""
+
+CUTOFF = 6.0
+"""Where the disturbance is low-passed before it is weighed. [Hz]"""
+
+RATE = 30.0
+"""Samples a second that are weighed."""
+
+MEMORY = 0.3
+"""Time over which the model's errors resemble one another: so much counts as one sample. [s]"""
+
+SIGN_SPEED = 0.02
+"""Velocity over which the sign of friction turns. [rad/s]"""
+
+PASSES = 4
+"""Fits, each with the joints' errors that the last one left."""
+
+WIDE = (20.0, 5.0, 5.0, 5.0)
+"""Standard deviations of a load's mass and first moment. [kg, kg·m]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeLoad:
+    """A load in the free part.
+
+    Attributes:
+        mass: Its mass. [kg]
+        moment: Mass times its centre, in flange axes. (3,) [kg·m]
+        sd: Standard deviation of the mass. [kg]
+        share: What is left of the free part's disturbance with it.
+    """
+
+    mass: float
+    moment: Array
+    sd: float
+    share: float
+
+    def __post_init__(self) -> None:
+        seal(self, "moment")
+
+    @property
+    def remark(self) -> Remark:
+        """What the free part carries, and what to do about it."""
+        return caution(
+            "free-part-loaded",
+            load_kg=self.mass,
+            sd_kg=self.sd,
+            left_percent=100.0 * self.share,
+        )
+
+    def torque(self, run: ModelledRun) -> Array:
+        """External joint torque of its weight along a recording. (T, n) [N·m]"""
+        weights = np.concatenate([[self.mass], self.moment])
+        return handed_over(load_regressor(run.robot.chain, run.recording.q) @ weights)
+
+    def off(self, run: ModelledRun, terms: DynamicsTerms) -> DynamicsTerms:
+        """A recording's terms, corrected or not, as they were without it, μ ← μ + τ_load."""
+        return replace(terms, mu=handed_over(terms.mu + self.torque(run)))
+
+
+class Weighing(NamedTuple):
+    """A fit of the free part.
+
+    Attributes:
+        weights: Of the columns. (m,)
+        sd: Their standard deviations. (m,)
+        left: Root mean square of what is left, joint by joint. (n,) [N·m]
+    """
+
+    weights: Array
+    sd: Array
+    left: Array
+
+
+def free_load(pieces: Sequence[FreePiece]) -> FreeLoad | None:
+    """The load that explains much of the free part's disturbance, None where none does."""
+    parts = [part for piece in pieces if (part := columns(piece)) is not None]
+    if not parts:
+        return None
+    robot = pieces[0].run.robot
+    d = np.concatenate([part[0] for part in parts])
+    A = np.concatenate([part[1] for part in parts])
+    if len(d) < 2 * A.shape[2]:
+        return None
+    friction = dry_friction(robot.friction, robot.joints)
+    prior = np.concatenate([WIDE, 0.2 * friction + 0.05, 0.15 * friction + 0.02])
+    loaded = weigh(d, A, prior)
+    bare = weigh(d, A[:, :, 4:], prior[4:])
+    mass, sd = float(loaded.weights[0]), float(loaded.sd[0])
+    share = float(np.sqrt(np.mean((loaded.left / bare.left) ** 2)))
+    if mass < max(LEAST, SURE * sd) or share > PARTLY:
+        return None
+    return FreeLoad(mass=mass, moment=loaded.weights[1:4].copy(), sd=sd, share=share)
+
+
+def columns(piece: FreePiece) -> tuple[Array, Array] | None:
+    """The disturbance of a piece, and the columns that explain it; None of a piece too short.
+
+    Returns:
+        (S, n) [N·m] and (S, n, 4 + 2n).
+    """
+    run = piece.run
+    t, terms, n = run.recording.t, run.terms, run.robot.joints
+    dq = run.recording.require("dq")
+    try:
+        smooth = zero_phase(t, np.hstack([derivative(t, terms.p) - terms.mu, dq]), CUTOFF)
+    except (ClockError, ValueError):
+        return None
+    used = np.flatnonzero(piece.inside)[:: max(1, int(1.0 / (RATE * median_step(t))))]
+    A = np.zeros((len(used), n, 4 + 2 * n))
+    A[:, :, :4] = load_regressor(run.robot.chain, run.recording.q[used])
+    j = np.arange(n)
+    A[:, j, 4 + j] = np.tanh(smooth[used][:, n:] / SIGN_SPEED)
+    A[:, j, 4 + n + j] = 1.0
+    return smooth[used][:, :n], A
+
+
+def weigh(d: Array, A: Array, prior: Array) -> Weighing:
+    """Regularised least squares, each joint weighed by what the fit leaves of it.
+
+    Args:
+        d: Disturbance. (S, n) [N·m]
+        A: Columns. (S, n, m)
+        prior: Standard deviations of their weights about zero. (m,)
+    """
+    together = max(1.0, MEMORY * RATE)
+    spread = np.sqrt(np.mean(d**2, axis=0)) + 1e-6
+    for _ in range(PASSES):
+        scaled = A / spread[:, None]
+        gram = np.einsum("sjm,sjk->mk", scaled, scaled) / together + np.diag(prior**-2)
+        right = np.einsum("sjm,sj->m", scaled, d / spread) / together
+        covariance = np.linalg.inv(gram)
+        weights = covariance @ right
+        left = np.sqrt(np.mean((d - A @ weights) ** 2, axis=0))
+        spread = np.maximum(left, 1e-3 * np.max(left) + 1e-6)
+    return Weighing(weights, np.sqrt(np.diag(covariance)), left)

@@ -1,0 +1,260 @@
+"""What a smoother takes for noise: white noise of the drives, and model error that wanders slowly.
+
+Of each joint d = b + n, with n white of variance R and b an Ornstein–Uhlenbeck process of variance
+s² and correlation time T. Over blocks of B seconds its spectrum is
+
+    S(f) = B [R + s² (1 − a²)/(1 − 2a cos 2πfB + a²)],    a = exp(−B/T),
+
+and the free part's periodogram P fixes the three by Whittle's likelihood, Σ ln S + P/S.
+
+References:
+    P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.robots.disturbance import Blocks, disturbance_blocks
+from vftcli.robots.friction import dry_torque
+from vftcli.robots.robot import Robot
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.series import runs_of
+from vftcli.virtual_sensor.solvers import TORQUE_SD
+
+STILL = 0.01
+"""A joint slower than this over a block rests: what holds it is stiction. [rad/s]"""
+
+REST_SHARE = 0.5
+"""Standard deviation of the model error at rest, of the joint's dry friction F_c: on real UR10e
+logs the residual at rest is .31 to .61 of it."""
+
+REST_TIME = 2.0
+"""Stiction keeps its state at least this long. [s]"""
+
+UNSEEN_SHARE, UNSEEN_TIME, SEEN = 0.2, 1.0, 0.2
+"""A joint that moves in less than the share `SEEN` of the free part's blocks: the model error of
+its motion, as a share of F_c, and its least correlation time. [s]"""
+
+USUAL_TIME, TIME_SPREAD = 0.5, 1.5
+"""Prior of the correlation time T: its median [s] and the spread of ln T."""
+
+LEAST_NOISE = 1e-6
+"""Smallest R: a millinewton-metre, far below any drive's. [(N·m)²]"""
+
+LEAST_BLOCKS = 20
+"""Shortest unbroken stretch of the free part that has a spectrum, in blocks."""
+
+NEAR_REST = 0.3
+"""Where no free part tells, stiction counts this long before and after a rest too. [s]"""
+
+ASSUMED_SHARES = 0.2, 0.6 / 1.96
+"""Where no free part tells: the model error of motion and of rest, as shares of F_c."""
+
+
+class FreeTerms(NamedTuple):
+    """A stretch of log that nobody touched.
+
+    Attributes:
+        terms: p and μ of the log.
+        q: Its joint positions. (T, n) [rad]
+        inside: The free samples. (T,)
+    """
+
+    terms: DynamicsTerms
+    q: Array
+    inside: Mask
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueNoise:
+    """White noise and model error of every joint, by blocks of one length.
+
+    Attributes:
+        white: R, variance of the white noise. (n,) [(N·m)²]
+        moving: Variance of the model error in motion. (n,) [(N·m)²]
+        moving_time: Its correlation time. (n,) [s]
+        resting: Variance of the model error at rest. (n,) [(N·m)²]
+        resting_time: Its correlation time. (n,) [s]
+        near: How long before and after a rest that of rest holds. [s]
+        free_seconds: How much free motion it was learned from; 0 where it is assumed. [s]
+    """
+
+    white: Array
+    moving: Array
+    moving_time: Array
+    resting: Array
+    resting_time: Array
+    near: float = 0.0
+    free_seconds: float = 0.0
+
+    def variance(self, blocks: Blocks) -> Array:
+        """Stationary variance of the model error in every block. (K, n) [(N·m)²]"""
+        return np.where(self.rests(blocks), self.resting, self.moving)
+
+    def decay(self, blocks: Blocks) -> Array:
+        """Share of the model error that is kept from one block to the next. (K, n)"""
+        time = np.where(self.rests(blocks), self.resting_time, self.moving_time)
+        return np.exp(-steps(blocks)[:, None] / time)
+
+    def rests(self, blocks: Blocks) -> Mask:
+        """Blocks in which each joint rests, those within `near` of one too. (K, n)"""
+        still = resting(blocks)
+        if self.near:
+            for j, column in enumerate(still.T):
+                for start, stop in runs_of(column.copy()):
+                    begin, end = blocks.t[start] - self.near, blocks.t[stop - 1] + self.near
+                    still[(blocks.t >= begin) & (blocks.t <= end), j] = True
+        return still
+
+
+def steps(blocks: Blocks) -> Array:
+    """Time from the middle of the block before; 0 for the first. (K,) [s]"""
+    return np.diff(blocks.t, prepend=blocks.t[:1])
+
+
+def resting(blocks: Blocks) -> Mask:
+    """Blocks in which each joint rests. (K, n)"""
+    return np.asarray(np.abs(blocks.velocity) < STILL)
+
+
+def dry_torques(robot: Robot) -> Array:
+    """F_c of each joint: Coulomb torque or a sigmoid's whole amplitude, 0 if unknown. (n,) [N·m]"""
+    if not robot.friction:
+        return np.zeros(robot.joints)
+    each = (joint.parameters for joint in robot.friction)
+    return np.array([max(float(dry_torque(p)), abs(p.get("amplitude", 0.0))) for p in each])
+
+
+def torque_noise(
+    log: Blocks, free: Sequence[FreeTerms], robot: Robot, seconds: float
+) -> TorqueNoise:
+    """The noise that the free part shows, else what the drives' dry friction lets assume.
+
+    At rest the model error is at least `REST_SHARE` of the dry friction, whatever the free part
+    shows: stiction keeps what the last motion, or the last touch, left.
+
+    Args:
+        log: The blocks to be smoothed.
+        free: Motion that nobody touched, of this log or of others.
+        robot: The arm, for its dry friction.
+        seconds: Length of a block. [s]
+    """
+    dry = dry_torques(robot)
+    stretches = [s for piece in free for s in free_stretches(piece, seconds)]
+    if not stretches:
+        return assumed_noise(log, dry)
+    white, variance, time = (np.array(v) for v in zip(*fit_joints(stretches, seconds), strict=True))
+    # An offset is an error too.
+    every = np.concatenate([s.d for s in stretches])
+    variance += every.mean(axis=0) ** 2
+    moving = ~np.concatenate([resting(s) for s in stretches])
+    unseen = moving.mean(axis=0) < SEEN
+    return TorqueNoise(
+        white=white,
+        moving=variance + unseen * (UNSEEN_SHARE * dry) ** 2,
+        moving_time=np.where(unseen, np.maximum(time, UNSEEN_TIME), time),
+        resting=np.maximum(variance, (REST_SHARE * dry) ** 2),
+        resting_time=np.maximum(time, REST_TIME),
+        free_seconds=float(sum(s.length.sum() for s in stretches)),
+    )
+
+
+def assumed_noise(log: Blocks, dry: Array) -> TorqueNoise:
+    """Model error as shares of the dry friction; white noise as neighbouring blocks differ.
+
+    Args:
+        log: The blocks to be smoothed.
+        dry: F_c; a joint without is taken for `TORQUE_SD`. (n,) [N·m]
+    """
+    moving, resting_sd = (np.maximum(share * dry, TORQUE_SD) for share in ASSUMED_SHARES)
+    bend = log.d[1:-1] - 0.5 * (log.d[2:] + log.d[:-2])
+    white = np.full(len(dry), TORQUE_SD**2)
+    if len(bend):
+        # The median square of a normal variable is .455 of its mean square; the bend has 1.5 R.
+        white = np.median(bend**2, axis=0) / (0.455 * 1.5)
+    return TorqueNoise(
+        white=np.maximum(white, LEAST_NOISE),
+        moving=moving**2,
+        moving_time=np.full(len(dry), USUAL_TIME),
+        resting=resting_sd**2,
+        resting_time=np.full(len(dry), REST_TIME),
+        near=NEAR_REST,
+    )
+
+
+def free_stretches(piece: FreeTerms, seconds: float) -> list[Blocks]:
+    """The stretches of a free piece that are long enough for a spectrum, in blocks.
+
+    They reach from its first motion to its last, since rest has a model error of its own; a piece
+    without motion counts as it is.
+    """
+    blocks = disturbance_blocks(piece.terms, piece.q, seconds, piece.inside)
+    motion = np.flatnonzero(blocks.known & ~resting(blocks).all(axis=1))
+    if len(motion):
+        blocks = blocks.part(slice(int(motion[0]), int(motion[-1]) + 1))
+    runs = [run for run in runs_of(blocks.known) if run[1] - run[0] >= LEAST_BLOCKS]
+    return [blocks.part(slice(*run)) for run in runs]
+
+
+class FittedNoise(NamedTuple):
+    """What one joint's spectrum gives.
+
+    Attributes:
+        white: R. [(N·m)²]
+        variance: s². [(N·m)²]
+        time: T. [s]
+    """
+
+    white: float
+    variance: float
+    time: float
+
+
+def fit_joints(stretches: Sequence[Blocks], seconds: float) -> list[FittedNoise]:
+    """R, s² and T of every joint, by Whittle's likelihood over all stretches together."""
+    f = np.concatenate([np.fft.rfftfreq(len(s.d), seconds)[1:] for s in stretches])
+    P = np.concatenate([periodogram(s.d, seconds) for s in stretches])
+    longest = max(float(s.length.sum()) for s in stretches)
+    return [fit_spectrum(f, p, seconds, longest) for p in P.T]
+
+
+def periodogram(d: Array, seconds: float) -> Array:
+    """Two-sided periodogram at the positive frequencies. (N//2, n) [(N·m)²/Hz]"""
+    spectrum = np.fft.rfft(d, axis=0)[1:]
+    power: Array = (spectrum.real**2 + spectrum.imag**2) * (seconds / len(d))
+    return power
+
+
+def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> FittedNoise:
+    """R, s² and T of one joint: the best of a grid over ln T and ln s²/R that narrows five times.
+
+    The level follows in closed form, so that two numbers are left to search.
+
+    Args:
+        f: Frequencies. (F,) [Hz]
+        P: Periodogram. (F,) [(N·m)²/Hz]
+        seconds: Length of a block B. [s]
+        longest: Longest stretch: no correlation time is longer. [s]
+    """
+    cosine = np.cos(2.0 * np.pi * f * seconds)
+    low, high = np.log([2.0 * seconds, 1e-2]), np.log([max(longest, 4.0 * seconds), 1e6])
+    best, level, count = np.zeros(2), 0.0, 13
+    for _ in range(6):
+        times, ratios = (np.linspace(low[i], high[i], count) for i in range(2))
+        a = np.exp(-seconds / np.exp(times))[:, None]
+        shape = (1.0 - a * a) / (1.0 - 2.0 * a * cosine + a * a)
+        S = 1.0 + np.exp(ratios)[None, :, None] * shape[:, None, :]
+        levels = np.mean(P / S, axis=2) / seconds
+        cost = np.sum(np.log(S), axis=2) + len(f) * np.log(np.maximum(levels, LEAST_NOISE**2))
+        cost += 0.5 * ((times[:, None] - np.log(USUAL_TIME)) / TIME_SPREAD) ** 2
+        i, j = np.unravel_index(np.argmin(cost), cost.shape)
+        best, level = np.array([times[i], ratios[j]]), float(levels[i, j])
+        reach = (high - low) / (count - 1)
+        low, high = np.maximum(low, best - reach), np.minimum(high, best + reach)
+        count = 5
+    time, ratio = np.exp(best)
+    return FittedNoise(max(level, LEAST_NOISE), float(level * ratio), float(time))

@@ -1,0 +1,105 @@
+"""How a wrench may move: its prior, chosen by the log, and the gate outside of which it is zero."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.robots.disturbance import Blocks
+from vftcli.signals.arrays import Array, Mask
+from vftcli.virtual_sensor.smoother.kalman import Evolution, Measurement, likelihoods
+from vftcli.virtual_sensor.smoother.noise import TorqueNoise, steps
+
+LEVER = 0.1
+"""Standard deviation of a moment over that of the force. [m]"""
+
+TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+"""Correlation times of a wrench that are tried. [s]"""
+
+FORCES = (10.0, 30.0, 60.0)
+"""Standard deviations of a force that are tried. [N]"""
+
+
+class WrenchPrior(NamedTuple):
+    """An Ornstein–Uhlenbeck prior of the wrench in base axes.
+
+    Attributes:
+        time: Correlation time τ_w. [s]
+        force: Standard deviation σ_f of each component of the force. [N]
+    """
+
+    time: float
+    force: float
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether it is the prior of a load rather than of contacts."""
+        return self.time >= STEADY
+
+    @property
+    def variance(self) -> Array:
+        """Stationary variance of force and moment. (6,) [N², (N·m)²]"""
+        return np.repeat([self.force**2, (LEVER * self.force) ** 2], 3)
+
+
+STEADY = 30.0
+"""A wrench that keeps for at least this long is a load. [s]"""
+
+GRID = tuple(WrenchPrior(time, force) for time in TIMES for force in FORCES)
+"""The priors that are tried."""
+
+
+def gated(blocks: Blocks, intervals: Sequence[tuple[float, float]] | None) -> Mask:
+    """Blocks in which there may be a wrench: listed intervals and a block on either side. (K,)
+
+    Args:
+        blocks: The blocks.
+        intervals: From and to [s]; None where the whole log is one contact.
+    """
+    if intervals is None:
+        return np.ones(len(blocks.t), dtype=bool)
+    inside = np.zeros(len(blocks.t), dtype=bool)
+    half = 0.5 * blocks.length
+    for start, stop in intervals:
+        touched = (blocks.t + half > start) & (blocks.t - half < stop)
+        inside |= touched
+        inside[1:] |= touched[:-1]
+        inside[:-1] |= touched[1:]
+    return inside
+
+
+def evolution(
+    blocks: Blocks, noise: TorqueNoise, priors: Sequence[WrenchPrior], inside: Mask
+) -> Evolution:
+    """How wrench and model error go from block to block under each of G priors. (K, G, 6 + n)
+
+    Outside the gate the wrench is pinned to zero; the first block inside starts it with the prior's
+    own variance, independent of before. So does the first block of the log the model error.
+
+    Args:
+        blocks: The blocks.
+        noise: Noise and model error.
+        priors: The priors.
+        inside: Blocks in which there may be a wrench. (K,)
+    """
+    count, n = blocks.d.shape
+    decay, variance = (np.zeros((count, len(priors), 6 + n)) for _ in range(2))
+    goes_on = inside & np.concatenate([[False], inside[:-1]])
+    step = steps(blocks)
+    for g, prior in enumerate(priors):
+        kept = np.where(goes_on, np.exp(-step / prior.time), 0.0)[:, None]
+        decay[:, g, :6] = kept
+        variance[:, g, :6] = np.where(inside[:, None], prior.variance * (1.0 - kept**2), 0.0)
+    kept = noise.decay(blocks)
+    kept[0] = 0.0
+    decay[:, :, 6:] = kept[:, None, :]
+    variance[:, :, 6:] = (noise.variance(blocks) * (1.0 - kept**2))[:, None, :]
+    return Evolution(decay, variance)
+
+
+def choose_prior(
+    blocks: Blocks, measured: Measurement, noise: TorqueNoise, inside: Mask
+) -> WrenchPrior:
+    """The prior of `GRID` under which the log is most likely."""
+    nats = likelihoods(evolution(blocks, noise, GRID, inside), measured)
+    return GRID[int(np.argmax(nats))]

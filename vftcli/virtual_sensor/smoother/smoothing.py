@@ -1,0 +1,260 @@
+"""From a log to its smoothed wrench: block averages, noise, prior, filter and smoother in a row.
+
+The wrench and the model error are told apart by how they move: the error as the free part shows it,
+the wrench as its prior says. No pose hides anything: where a force turns no joint the estimate
+leans on its past and future, and its band grows.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.robots.disturbance import Blocks, disturbance_blocks
+from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.robot import Robot
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, Mask, is_uniform, seal
+from vftcli.signals.errors import RobotError
+from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.series import median_step, resample_columns
+from vftcli.virtual_sensor.smoother.kalman import (
+    Evolution,
+    Measurement,
+    filter_forward,
+    smooth_backward,
+)
+from vftcli.virtual_sensor.smoother.noise import FreeTerms, TorqueNoise, torque_noise
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior, choose_prior, evolution, gated
+
+COARSE = 0.1
+"""Length of a block for steady loads, and for the choice of the prior. [s]"""
+
+FINE, JITTERED = 0.024, 5
+"""Length of a block where the wrench moves [s]; on an uneven clock it holds so many samples."""
+
+MOST_BLOCKS = 30_000
+"""Blocks are longer in a log that would make more: each takes some 6 kB and .1 ms."""
+
+WIDENED = np.repeat([1.5, 2.0], 3)
+"""What the model's own standard deviations of force and moment are multiplied by. The error of the
+friction is not Gaussian; chosen once on six simulated seeds, for all logs."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmoothedWrench:
+    """The wrench in base axes about the flange point, block by block, and what it rests on.
+
+    Attributes:
+        t: Middle of each block. (K,) [s]
+        values: Force and moment on the robot. (K, 6) [N, N·m]
+        covariance: Their covariance, widened by `WIDENED`. (K, 6, 6)
+        model_error: What the model errs by, as far as it can be told from the wrench. (K, n) [N·m]
+        model_error_sd: Its standard deviation. (K, n) [N·m]
+        inside: Blocks in which there may be a wrench; zero with certainty in the others. (K,)
+        seconds: Length of a block. [s]
+        prior: How the wrench may move.
+        noise: What counts as noise.
+        gate: Whether contacts were listed; else the whole log is one.
+        uncorrected: Whether a correction of the model's error was left out; see `InputOf`.
+    """
+
+    t: Array
+    values: Array
+    covariance: Array
+    model_error: Array
+    model_error_sd: Array
+    inside: Mask
+    seconds: float
+    prior: WrenchPrior
+    noise: TorqueNoise
+    gate: bool
+    uncorrected: bool = False
+
+    def __post_init__(self) -> None:
+        seal(self, "t", "values", "covariance", "model_error", "model_error_sd")
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviation in base axes. (K, 6) [N, N·m]"""
+        return deviations(self.covariance)
+
+    def at(self, t: Array) -> "MovedWrench":
+        """Values and covariance at other times, straight between blocks. (T, 6), (T, 6, 6)"""
+        flat = self.covariance.reshape(len(self.t), 36)
+        return MovedWrench(
+            resample_columns(t, self.t, self.values),
+            resample_columns(t, self.t, flat).reshape(-1, 6, 6),
+        )
+
+    @property
+    def record(self) -> dict[str, object]:
+        """The model's numbers, as `run.json` holds them."""
+        noise = self.noise
+        return {
+            "block_s": self.seconds,
+            "force_time_s": self.prior.time,
+            "force_sd_N": self.prior.force,
+            "noise_sd_Nm": np.sqrt(noise.white).tolist(),
+            "model_error_sd_Nm": np.sqrt(noise.moving).tolist(),
+            "model_error_time_s": noise.moving_time.tolist(),
+            "model_error_at_rest_sd_Nm": np.sqrt(noise.resting).tolist(),
+            "free_s": noise.free_seconds,
+            "gated": self.gate,
+            "correction_left_out": self.uncorrected,
+        }
+
+    def remarks(self, name: str) -> tuple[Remark, ...]:
+        """What a reader of the wrench should know.
+
+        Args:
+            name: The estimate that the wrench belongs to.
+        """
+        where, noise = Where(name), self.noise
+        model = {
+            "block_s": self.seconds,
+            "time_s": self.prior.time,
+            "force_N": self.prior.force,
+            "error_Nm": np.sqrt(noise.moving).tolist(),
+        }
+        found = [fact("wrench-smoothed", where, **model)]
+        if noise.free_seconds:
+            found.append(fact("wrench-noise-learned", where, free_s=noise.free_seconds))
+        else:
+            found.append(caution("wrench-noise-assumed", where))
+        if self.uncorrected:
+            found.append(fact("wrench-uncorrected", where))
+        return tuple(found)
+
+
+class MovedWrench(NamedTuple):
+    """A wrench at some times, or in another frame.
+
+    Attributes:
+        values: (T, 6) [N, N·m]
+        covariance: (T, 6, 6)
+    """
+
+    values: Array
+    covariance: Array
+
+    def seen_in(self, X: Array) -> "MovedWrench":
+        """The wrench in the frame that matrices X (T, 6, 6) lead to."""
+        values = np.squeeze(X @ self.values[:, :, None], axis=2)
+        return MovedWrench(values, X @ self.covariance @ np.swapaxes(X, 1, 2))
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviation. (T, 6) [N, N·m]"""
+        return deviations(self.covariance)
+
+
+def deviations(covariance: Array) -> Array:
+    """Standard deviations of covariances. (T, k)"""
+    # A pinned state's variance is zero, which rounding may leave on either side.
+    variances = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)
+    return np.asarray(np.sqrt(variances))
+
+
+def smooth_wrench(
+    terms: DynamicsTerms,
+    q: Array,
+    robot: Robot,
+    free: Sequence[FreeTerms] = (),
+    gate: Sequence[tuple[float, float]] | None = None,
+    prior: WrenchPrior | None = None,
+) -> SmoothedWrench:
+    """The wrench at the flange from the whole log, by the model of `kalman`.
+
+    Args:
+        terms: p and μ along the log, corrected or not.
+        q: Its joint positions. (T, n) [rad]
+        robot: The arm.
+        free: Motion that nobody touched, which tells the noise; none to take it from the drives'
+            dry friction.
+        gate: From and to of every contact [s], the wrench being zero outside of them; None where
+            the whole log is one.
+        prior: How the wrench may move; None to choose it by the log's likelihood.
+
+    Raises:
+        RobotError: If the arm has fewer than six joints, which no pose can tell a wrench from.
+    """
+    if terms.joints < 6:
+        raise RobotError(
+            f"an arm of {terms.joints} joints cannot tell the six components of a wrench; "
+            "leave --wrench out and use the joint torques"
+        )
+    if prior is None:
+        prior = prior_of(terms, q, robot, free, gate)
+    seconds = block_length(terms.t, fine=not prior.is_steady)
+    blocks, measured, noise, inside = blocks_of(terms, q, robot, free, gate, seconds)
+    steps = evolution(blocks, noise, [prior], inside)
+    single = Evolution(steps.decay[:, 0], steps.variance[:, 0])
+    mean, covariance = smooth_backward(single, filter_forward(single, measured))
+    return SmoothedWrench(
+        t=blocks.t,
+        values=mean[:, :6],
+        covariance=covariance[:, :6, :6] * np.outer(WIDENED, WIDENED),
+        model_error=mean[:, 6:],
+        model_error_sd=deviations(covariance[:, 6:, 6:]),
+        inside=inside,
+        seconds=seconds,
+        prior=prior,
+        noise=noise,
+        gate=gate is not None,
+    )
+
+
+def prior_of(
+    terms: DynamicsTerms,
+    q: Array,
+    robot: Robot,
+    free: Sequence[FreeTerms] = (),
+    gate: Sequence[tuple[float, float]] | None = None,
+) -> WrenchPrior:
+    """The prior under which a log is most likely; the arguments as of `smooth_wrench`."""
+    model = blocks_of(terms, q, robot, free, gate, block_length(terms.t, fine=False))
+    return choose_prior(model.blocks, model.measured, model.noise, model.inside)
+
+
+def block_length(t: Array, *, fine: bool) -> float:
+    """Length of a block, fine where the wrench moves and coarse where it is a load. [s]"""
+    if len(t) < 2:
+        return COARSE
+    step, length = median_step(t), COARSE
+    if fine:
+        length = min(COARSE, max(FINE, step if is_uniform(t) else JITTERED * step))
+    return max(length, float(t[-1] - t[0]) / MOST_BLOCKS)
+
+
+class BlockModel(NamedTuple):
+    """A log in blocks of one length, with its noise and its gate.
+
+    Attributes:
+        blocks: The blocks.
+        measured: What they say of the state.
+        noise: Noise and model error.
+        inside: Blocks in which there may be a wrench. (K,)
+    """
+
+    blocks: Blocks
+    measured: Measurement
+    noise: TorqueNoise
+    inside: Mask
+
+
+def blocks_of(
+    terms: DynamicsTerms,
+    q: Array,
+    robot: Robot,
+    free: Sequence[FreeTerms],
+    gate: Sequence[tuple[float, float]] | None,
+    seconds: float,
+) -> BlockModel:
+    """A log in blocks of a length [s]; the other arguments as of `smooth_wrench`."""
+    blocks = disturbance_blocks(terms, q, seconds)
+    noise = torque_noise(blocks, free, robot, seconds)
+    jacobian = flange_jacobian(robot.chain, blocks.q)
+    measured = Measurement(blocks.d, jacobian, noise.white, blocks.known)
+    return BlockModel(blocks, measured, noise, gated(blocks, gate))
