@@ -21,7 +21,7 @@ from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.friction import dry_torque
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, median
 from vftcli.signals.series import runs_of
 from vftcli.virtual_sensor.solvers import TORQUE_SD
 
@@ -147,7 +147,7 @@ def torque_noise(
     stretches = [s for piece in free for s in free_stretches(piece, seconds)]
     if not stretches:
         return assumed_noise(log, dry)
-    white, variance, time = (np.array(v) for v in zip(*fit_joints(stretches, seconds), strict=True))
+    white, variance, time = (np.array(v) for v in zip(*fit_joints(stretches), strict=True))
     # An offset is an error too.
     every = np.concatenate([s.d for s in stretches])
     variance += every.mean(axis=0) ** 2
@@ -214,8 +214,10 @@ class FittedNoise(NamedTuple):
     time: float
 
 
-def fit_joints(stretches: Sequence[Blocks], seconds: float) -> list[FittedNoise]:
+def fit_joints(stretches: Sequence[Blocks]) -> list[FittedNoise]:
     """R, s² and T of every joint, by Whittle's likelihood over all stretches together."""
+    # A block holds whole samples, so that it is not quite as long as was asked.
+    seconds = median(np.concatenate([s.length for s in stretches]))
     f = np.concatenate([np.fft.rfftfreq(len(s.d), seconds)[1:] for s in stretches])
     P = np.concatenate([periodogram(s.d, seconds) for s in stretches])
     longest = max(float(s.length.sum()) for s in stretches)
