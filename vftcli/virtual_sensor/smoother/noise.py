@@ -51,8 +51,8 @@ LEAST_BLOCKS = 20
 NEAR_REST = 0.3
 """Where no free part tells, stiction counts this long before and after a rest too. [s]"""
 
-ASSUMED_SHARES = 0.2, 0.6 / 1.96
-"""Where no free part tells: the model error of motion and of rest, as shares of F_c."""
+ASSUMED_SHARE = 0.2
+"""Where no free part tells: the model error of motion, as a share of F_c."""
 
 
 class FreeTerms(NamedTuple):
@@ -170,7 +170,7 @@ def assumed_noise(log: Blocks, dry: Array) -> TorqueNoise:
         log: The blocks to be smoothed.
         dry: F_c; a joint without is taken for `TORQUE_SD`. (n,) [N·m]
     """
-    moving, resting_sd = (np.maximum(share * dry, TORQUE_SD) for share in ASSUMED_SHARES)
+    moving, rest = (np.maximum(share * dry, TORQUE_SD) for share in (ASSUMED_SHARE, REST_SHARE))
     bend = log.d[1:-1] - 0.5 * (log.d[2:] + log.d[:-2])
     white = np.full(len(dry), TORQUE_SD**2)
     if len(bend):
@@ -180,7 +180,7 @@ def assumed_noise(log: Blocks, dry: Array) -> TorqueNoise:
         white=np.maximum(white, LEAST_NOISE),
         moving=moving**2,
         moving_time=np.full(len(dry), USUAL_TIME),
-        resting=resting_sd**2,
+        resting=rest**2,
         resting_time=np.full(len(dry), REST_TIME),
         near=NEAR_REST,
     )
