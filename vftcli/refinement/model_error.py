@@ -120,7 +120,7 @@ def usual_friction(robot: Robot) -> UsualFriction:
             found[j, 0] = 0.7 * abs(float(joint.parameters["amplitude"]))
         elif joint.model != "none":
             found[j] = fitted_curve(joint, float(robot.limits.qd_max[j]))
-            found[j, 0] = dry[j] or max(found[j, 0], 0.0)
+            found[j, 0] = abs(dry[j] or found[j, 0])
     return UsualFriction(*found.T)
 
 
@@ -160,13 +160,17 @@ class ModelError:
         mine = [*drives, *self.friction[:, joint], self.offset[joint]]
         return np.concatenate([self.inertial[LINK * joint :], mine])
 
-    def torque(self, run: ModelledRun) -> Array:
+    def torque(self, run: ModelledRun, motion: SmoothMotion) -> Array:
         """The torque A δx that a model with this error asks for too little. (T, n) [N·m]
 
         The rigid body's part is the difference of two inverse dynamics, that of the chain with
         these errors and that of the robot's own, which costs a fiftieth of the regressor.
+
+        Args:
+            run: A recording of the arm.
+            motion: Its smooth motion.
         """
-        motion, chain = smooth_motion(run), run.robot.loaded_chain
+        chain = run.robot.loaded_chain
         wrong = with_parameters(
             chain, chain_parameters(chain) + self.inertial, chain.rotor_inertia + self.rotor
         )

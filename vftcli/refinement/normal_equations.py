@@ -39,7 +39,7 @@ class Sums(NamedTuple):
         return Sums(self.matrix - other.matrix, self.vector - other.vector, constant)
 
 
-class Solution(NamedTuple):
+class FittedError(NamedTuple):
     """What the rows say of the unknowns.
 
     Attributes:
@@ -170,7 +170,7 @@ def finished(total: Array) -> Sums:
     return Sums(total[:-1, :-1], total[:-1, -1], float(total[-1, -1]))
 
 
-def solve(sums: Sums, unknowns: int, sizes: Sequence[int], scale: float = 1.0) -> Solution:
+def solve(sums: Sums, unknowns: int, sizes: Sequence[int], scale: float = 1.0) -> FittedError:
     """The most likely model error, with the slow loads that make the rows likely enough.
 
     The loads' groups are nested, and so are the Cholesky factors with and without them: one factor
@@ -195,4 +195,4 @@ def solve(sums: Sums, unknowns: int, sizes: Sequence[int], scale: float = 1.0) -
     size = unknowns + loads
     factor, z = factor[:size, :size], z[:size]
     values = -solve_triangular(factor, z, lower=True, trans="T", check_finite=False)
-    return Solution(scale * values[:unknowns], values[unknowns:], scale, factor)
+    return FittedError(scale * values[:unknowns], values[unknowns:], scale, factor)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.refinement.normal_equations import Rows, Solution, Sums, solve
+from vftcli.refinement.normal_equations import FittedError, Rows, Sums, solve
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import runs_of
 
@@ -69,7 +69,7 @@ FEWEST = 30
 
 
 @dataclass(frozen=True, kw_only=True)
-class RobustFit:
+class WholeLogFit:
     """What a log says of the model's error.
 
     Attributes:
@@ -86,12 +86,12 @@ class RobustFit:
     scale: Array
     weight: Array
 
-    def solved(self, sums: Sums, scale: float = 1.0) -> Solution:
+    def solved(self, sums: Sums, scale: float = 1.0) -> FittedError:
         """The solution for some of its rows."""
         return solve(sums, self.rows.unknowns, self.rows.loads.sizes, scale)
 
 
-def fit_robustly(rows: Rows, step: float, dry: Array) -> RobustFit:
+def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
     """Fit the model's error, and find where the log is free of contact.
 
     Args:
@@ -109,7 +109,7 @@ def fit_robustly(rows: Rows, step: float, dry: Array) -> RobustFit:
         found = solve(rows.all_sums(weight, free, [])[0], rows.unknowns, rows.loads.sizes)
         residual = rows.d + rows.modelled(found.model) + rows.loads.made_by(found.loads)
         scale = np.maximum(NORMAL * np.median(np.abs(residual[free]), axis=0), least)
-    return RobustFit(rows=rows, step=step, free=free, scale=scale, weight=weight)
+    return WholeLogFit(rows=rows, step=step, free=free, scale=scale, weight=weight)
 
 
 def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Array, Array]:

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.refinement.normal_equations import Solution
-from vftcli.refinement.robust_fit import RobustFit
+from vftcli.refinement.normal_equations import FittedError
+from vftcli.refinement.robust_fit import WholeLogFit
 from vftcli.signals.arrays import Array, Mask
 
 FOLDS = 5
@@ -38,12 +38,12 @@ class Guarded(NamedTuple):
         applied: Joints on which it is worth having. (n,)
     """
 
-    solution: Solution | None
+    solution: FittedError | None
     share: Array
     applied: Mask
 
 
-def guarded(fit: RobustFit) -> Guarded:
+def guarded(fit: WholeLogFit) -> Guarded:
     """Try a fit on folds of its free samples, and keep what predicts."""
     folds = fold_spans(np.flatnonzero(fit.free), round(MARGIN / fit.step))
     left_out = [mask_of(len(fit.free), outer) for _, outer in folds]

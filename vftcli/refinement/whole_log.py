@@ -12,6 +12,7 @@ import numpy as np
 from vftcli.refinement.model_error import (
     CUTOFF,
     ModelError,
+    SmoothMotion,
     column_numbers,
     error_columns,
     error_of,
@@ -20,7 +21,7 @@ from vftcli.refinement.model_error import (
     usual_friction,
 )
 from vftcli.refinement.normal_equations import Rows
-from vftcli.refinement.robust_fit import RobustFit, fit_robustly
+from vftcli.refinement.robust_fit import WholeLogFit, fit_robustly
 from vftcli.refinement.slow_load import slow_loads
 from vftcli.refinement.unseen import Guarded, guarded
 from vftcli.repetition.free_run import ModelledRun
@@ -34,7 +35,11 @@ MOVES = 0.02
 """The arm moves where a joint is faster than this. [rad/s]"""
 
 LEAST_MOTION = 10.0
-"""Less motion than this tells friction and inertia from a push no more. [s]"""
+"""From its first to its last motion a log has to take this long: a shorter one tells friction and
+inertia from a push no more. [s]"""
+
+LEAST_SHARE = 0.1
+"""An arm that moves less of the time, and less than `LEAST_MOTION` in all, is held in a pose."""
 
 RATE = 30.0
 """Samples a second that are fitted, …"""
@@ -84,7 +89,7 @@ class WholeLogBias:
         """The terms of another recording of the arm without the same model error."""
         if self.error is None or not self.applied.any():
             return other.terms
-        bias = np.where(self.applied, self.error.torque(other), 0.0)
+        bias = np.where(self.applied, self.error.torque(other, smooth_motion(other)), 0.0)
         return replace(other.terms, mu=handed_over(other.terms.mu - bias))
 
 
@@ -96,31 +101,50 @@ def whole_log_bias(run: ModelledRun) -> WholeLogBias:
         RobotError: If the number of joints differs.
     """
     terms, t = run.terms, run.recording.t
-    moving = time_in_motion(run)
-    if moving < LEAST_MOTION:
-        refused = caution("whole-log-too-short", motion_s=moving, least_s=LEAST_MOTION)
+    if (refused := refusal(run)) is not None:
         return untouched(terms, refused)
-    motion = smooth_motion(run)
-    stride = stride_of(t)
-    expected = expected_error(run.robot)
-    d = zero_phase(t, derivative(t, terms.p) - terms.mu, CUTOFF)[::stride]
-    rows = Rows(
-        columns=error_columns(run, motion, expected, stride),
+    # What no arm does overflows, and is refused.
+    with np.errstate(all="ignore"):
+        try:
+            motion, stride = smooth_motion(run), stride_of(t)
+            fit = fit_robustly(
+                rows_of(run, motion, stride),
+                stride * median_step(t),
+                usual_friction(run.robot).dry,
+            )
+            found = bias_of(run, motion, fit, guarded(fit), stride)
+        except np.linalg.LinAlgError:
+            return untouched(terms, caution("whole-log-without-solution"))
+    known = np.all(np.isfinite(found.bias)) and np.all(np.isfinite(found.sd))
+    return found if known else untouched(terms, caution("whole-log-without-solution"))
+
+
+def rows_of(run: ModelledRun, motion: SmoothMotion, stride: int) -> Rows:
+    """What is fitted: every so many samples of the log."""
+    t, terms = run.recording.t, run.terms
+    d = zero_phase(t, derivative(t, terms.p) - terms.mu, CUTOFF)
+    return Rows(
+        columns=error_columns(run, motion, expected_error(run.robot), stride),
         loads=slow_loads(run.robot.loaded_chain, t[::stride], motion.q[::stride]),
-        d=d,
+        d=d[::stride],
     )
-    fit = fit_robustly(rows, stride * median_step(t), usual_friction(run.robot).dry)
-    return bias_of(run, fit, guarded(fit), expected, stride)
 
 
-def time_in_motion(run: ModelledRun) -> float:
-    """How long some joint moves, its velocity's noise filtered off. [s]"""
-    t = run.recording.t
-    if len(t) < 2 or t[-1] - t[0] < LEAST_MOTION:
-        return 0.0 if len(t) < 2 else float(t[-1] - t[0])
-    dq = zero_phase(t, run.recording.require("dq"), CUTOFF)
-    moves = np.any(np.abs(dq) > MOVES, axis=1)
-    return float(np.count_nonzero(moves) * median_step(t))
+def refusal(run: ModelledRun) -> Remark | None:
+    """Why a log does not tell the model's error from a push, None where it may."""
+    t, span, moving = run.recording.t, 0.0, 0.0
+    if t[-1] - t[0] >= LEAST_MOTION:
+        # noise is no motion
+        dq = zero_phase(t, run.recording.require("dq"), CUTOFF)
+        moves = np.any(np.abs(dq) > MOVES, axis=1)
+        moving = float(np.count_nonzero(moves) * median_step(t))
+        span = float(np.ptp(t[moves])) if moves.any() else 0.0
+    if span < LEAST_MOTION:
+        return caution("whole-log-too-short", motion_s=span, least_s=LEAST_MOTION)
+    share = moving / float(t[-1] - t[0])
+    if moving < LEAST_MOTION and share < LEAST_SHARE:
+        return caution("whole-log-at-rest", motion_s=moving, share=share)
+    return None
 
 
 def stride_of(t: Array) -> int:
@@ -142,7 +166,7 @@ def untouched(terms: DynamicsTerms, why: Remark) -> WholeLogBias:
 
 
 def bias_of(
-    run: ModelledRun, fit: RobustFit, found: Guarded, expected: ModelError, stride: int
+    run: ModelledRun, motion: SmoothMotion, fit: WholeLogFit, found: Guarded, stride: int
 ) -> WholeLogBias:
     """The bias on the log's own clock, with its uncertainty and what is said of it."""
     t, n = run.recording.t, run.robot.joints
@@ -150,11 +174,11 @@ def bias_of(
     if found.solution is None:
         said = remarks_of(found, np.zeros(n), float(fit.free.mean()))
         return replace(untouched(run.terms, said[0]), free=free, remarks=said)
-    sds = np.zeros(fit.rows.unknowns)
+    sds, expected = np.zeros(fit.rows.unknowns), expected_error(run.robot)
     for j in range(n):
         sds[column_numbers(j, n)] = expected.own(j)
     error = error_of(sds * found.solution.model, n)
-    bias = np.where(found.applied, error.torque(run), 0.0)
+    bias = np.where(found.applied, error.torque(run, motion), 0.0)
     spread = fit.rows.spread(found.solution.covariance)
     return WholeLogBias(
         applied=found.applied,
