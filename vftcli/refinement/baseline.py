@@ -69,10 +69,11 @@ class Baseline:
     @property
     def samples(self) -> list[Part]:
         """P and μ of the free pieces, and which samples are free; a load there is no noise."""
-        return [
-            Part(piece.run.terms if self.load is None else self.load.off(piece.run), piece.inside)
-            for piece in self.pieces
-        ]
+        return [Part(self.without_load(piece.run), piece.inside) for piece in self.pieces]
+
+    def without_load(self, run: ModelledRun) -> DynamicsTerms:
+        """The terms of a free piece's recording, less a load that it carries."""
+        return run.terms if self.load is None else self.load.off(run.terms, run)
 
     @property
     def stuck(self) -> Mask:

@@ -88,9 +88,9 @@ class FreeLoad:
         weights = np.concatenate([[self.mass], self.moment])
         return handed_over(load_regressor(run.robot.chain, run.recording.q) @ weights)
 
-    def off(self, run: ModelledRun) -> DynamicsTerms:
-        """The terms of a recording as they were without it, μ ← μ + τ_load."""
-        return replace(run.terms, mu=handed_over(run.terms.mu + self.torque(run)))
+    def off(self, terms: DynamicsTerms, run: ModelledRun) -> DynamicsTerms:
+        """Terms of a recording as they were without it, μ ← μ + τ_load."""
+        return replace(terms, mu=handed_over(terms.mu + self.torque(run)))
 
 
 class Weighing(NamedTuple):
