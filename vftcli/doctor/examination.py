@@ -8,6 +8,7 @@ from vftcli.doctor.fit import RobotMatch, profiles
 from vftcli.doctor.lateness import LAGLESS, effort_lag
 from vftcli.doctor.load import controller_findings
 from vftcli.doctor.signals import signal_findings, unusable_findings
+from vftcli.doctor.temperature import temperature_findings
 from vftcli.doctor.velocity import velocity_fit
 from vftcli.robots import Robot
 from vftcli.signals.recording import Recording
@@ -53,6 +54,11 @@ class Examination:
         return tuple(finding for finding in self.warnings if finding.code in codes)
 
     @property
+    def facts(self) -> tuple[Remark, ...]:
+        """What is nothing wrong with the log, and yet part of what its results stand on."""
+        return tuple(finding for finding in self.findings if finding.level == "fact")
+
+    @property
     def warnings(self) -> tuple[Remark, ...]:
         """The findings that can make results wrong."""
         return tuple(finding for finding in self.findings if finding.level == "warning")
@@ -81,5 +87,7 @@ def examine(recording: Recording, robot: Robot | None = None) -> Examination:
     said = {finding.code for finding in findings}
     if best is not None and not (LAGLESS | REFUSING) & said:
         findings += effort_lag(recording, best)
+    if best is not None:
+        findings += temperature_findings(recording, best)
     findings.sort(key=lambda finding: finding.level != "warning")
     return Examination(recording=recording, findings=tuple(findings), robots=fits)
