@@ -29,6 +29,9 @@ REFUSING = NO_FIT | {
 READINGS = frozenset({"current-as-torque", "torque-as-current", "milliamperes", "effort-sign"})
 """Findings that an effort is something else, by which its size is explained."""
 
+ASSUMPTIONS = frozenset({"no-temperature", "temperature-gaps"})
+"""Findings that every command says: nothing is wrong, and results stand on what is assumed."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Examination:
@@ -54,9 +57,9 @@ class Examination:
         return tuple(finding for finding in self.warnings if finding.code in codes)
 
     @property
-    def facts(self) -> tuple[Remark, ...]:
-        """What is nothing wrong with the log, and yet part of what its results stand on."""
-        return tuple(finding for finding in self.findings if finding.level == "fact")
+    def assumptions(self) -> tuple[Remark, ...]:
+        """The findings that tell what the model takes for granted where the log says nothing."""
+        return tuple(finding for finding in self.findings if finding.code in ASSUMPTIONS)
 
     @property
     def warnings(self) -> tuple[Remark, ...]:
