@@ -13,8 +13,10 @@ from vftcli.identification.friction_shapes import (
     Shape,
 )
 from vftcli.identification.least_squares import cross_validated, fit_column
+from vftcli.identification.result import root_mean_square
 from vftcli.robots.friction import falling_speed
 from vftcli.signals.arrays import Array
+from vftcli.signals.filters import low_pass
 
 PLAIN = ("coulomb", "viscous", "offset")
 CURVED = ("coulomb", "logarithmic", "offset")
@@ -32,8 +34,17 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
 )
 """Sets of friction terms that compete, simplest first."""
 
-NEVER_NEGATIVE = ("coulomb", "load_coulomb", "stribeck")
+PRESLIDING_LENGTHS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
+"""Presliding lengths that compete with none, one for the whole arm. [rad]"""
+
+NEVER_NEGATIVE = ("coulomb", "presliding", "load_coulomb", "stribeck")
 """Terms whose negative value would push the joint along."""
+
+SLIDING = 3e-3
+"""Smoothing of the sign where presliding says what happens around rest. [rad/s]"""
+
+LISTENING = 2.0
+"""Band in which the presliding length is judged: observers of 3 … 10 1/s pass .5 … 1.6 Hz. [Hz]"""
 
 MARGIN = 1.01
 """A simpler model within this factor of the best cross-validated error is preferred."""
@@ -56,6 +67,19 @@ class ShapeChoice(NamedTuple):
     shape: Shape
     error: float
     chosen: bool = False
+
+
+class PreslidingChoice(NamedTuple):
+    """The presliding length of an arm.
+
+    Attributes:
+        length: The chosen one, 0 for none. [rad]
+        errors: Cross-validated error of every length over that of none, root of the mean square
+            over the joints.
+    """
+
+    length: float
+    errors: dict[float, float]
 
 
 class JointData(NamedTuple):
@@ -85,13 +109,50 @@ class JointData(NamedTuple):
         """Rows of each log."""
         return tuple(source.motion.samples for source in self.sources)
 
+    def slow(self, signals: Array) -> Array:
+        """Signals in the band in which an observer listens, each log by itself. (M, k)"""
+        parts, start = [], 0
+        for source, length in zip(self.sources, self.lengths, strict=True):
+            part, start = signals[start : start + length], start + length
+            wide = source.motion.processing.cutoff > LISTENING
+            parts.append(low_pass(source.motion.t, part, LISTENING) if wide else part)
+        return np.concatenate(parts)
+
     def columns(self, j: int, shape: Shape) -> Array:
         """Friction columns, then the fixed ones. (M, k + f)"""
         friction = np.concatenate([source.joint(j, shape) for source in self.sources])
         return np.hstack([friction, self.fixed])
 
 
-def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
+def choose_presliding(joints: Sequence[tuple[int, JointData]]) -> PreslidingChoice:
+    """Choose one presliding length for the whole arm by cross-validation, or none.
+
+    It is chosen in the band in which an observer listens: what the play operator leaves at a
+    reversal is a slow step, which a wider band drowns in noise. Of the nearly best the shortest is
+    taken, which forgets soonest that it started undeflected.
+
+    Args:
+        joints: Every joint that moves, from 0, with its equations.
+    """
+    lengths = (0.0, *PRESLIDING_LENGTHS)
+    ratios = np.empty((len(joints), len(lengths)))
+    for i, (j, data) in enumerate(joints):
+        terms, y = tellable_terms(RICHEST, data), data.slow(data.y[:, None])[:, 0]
+        plain = data.slow(data.columns(j, Shape(terms, SLIDING)))
+        # Weights of outliers are held: all lengths must answer for the same samples.
+        weights = fit_column(plain, y, data.weights).weights
+        found = [cross_validated(plain, y, weights, data.lengths)]
+        for length in PRESLIDING_LENGTHS:
+            shape = Shape((*terms, "presliding"), SLIDING, presliding_length=length)
+            columns = data.slow(data.columns(j, shape))
+            found.append(cross_validated(columns, y, weights, data.lengths))
+        ratios[i] = np.array(found) / max(found[0], 1e-300)
+    errors = root_mean_square(ratios)
+    near = np.flatnonzero(errors <= MARGIN * errors.min())
+    return PreslidingChoice(lengths[near[0]], dict(zip(lengths, errors.tolist(), strict=True)))
+
+
+def choose_shape(j: int, data: JointData, length: float) -> tuple[Shape, list[ShapeChoice]]:
     """Choose a joint's friction model by cross-validation, simplest of the nearly best.
 
     First the smoothing is chosen with the richest plain model, then the bend of the logarithm,
@@ -100,6 +161,7 @@ def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
     Args:
         j: Joint, from 0.
         data: Its equations.
+        length: Presliding length of the arm, 0 for none. [rad]
     """
     rich = tellable_terms(RICHEST, data)
     start = fit_column(data.columns(j, Shape(rich)), data.y, data.weights)
@@ -108,14 +170,16 @@ def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
     def error(shape: Shape) -> float:
         return cross_validated(data.columns(j, shape), data.y, start.weights, data.lengths)
 
-    smoothing = min((Shape(rich, s) for s in SMOOTHINGS), key=error).smoothing
-    curved = Shape(tellable_terms((*CURVED, "load_coulomb"), data), smoothing)
+    widths = (SLIDING,) if length else SMOOTHINGS
+    smoothing = min((Shape(rich, s) for s in widths), key=error).smoothing
+    terms = tellable_terms((*CURVED, "load_coulomb"), data)
+    curved = Shape(terms, smoothing, presliding_length=length)
     bends = (curved._replace(logarithmic_velocity=v) for v in LOGARITHMIC_VELOCITIES)
     best = min(bends, key=error)
     choices = []
-    for shape in candidate_shapes(best, data):
-        fit = fit_column(data.columns(j, shape), data.y, data.weights)
-        if is_dissipative(shape, fit.values, data.speed_limit):
+    for candidate in candidate_shapes(best, data):
+        shape, values = non_negative_fit(j, candidate, data)
+        if is_dissipative(shape, values, data.speed_limit):
             choices.append(ShapeChoice(j + 1, shape, error(shape)))
     if not choices:
         return Shape(tellable_terms(PLAIN, data), smoothing), []
@@ -130,6 +194,8 @@ def candidate_shapes(best: Shape, data: JointData) -> Iterator[Shape]:
     shapes: dict[Shape, None] = {}
     for terms in CANDIDATES:
         shape = best._replace(terms=tellable_terms(terms, data))
+        if best.presliding_length and "stribeck" not in terms:
+            shapes[shape._replace(terms=(*shape.terms, "presliding"))] = None
         if "stribeck" not in terms:
             shapes[shape] = None
             continue
@@ -145,6 +211,26 @@ def tellable_terms(terms: tuple[str, ...], data: JointData) -> tuple[str, ...]:
     return out if data.reverses else tuple(t for t in out if t != "offset")
 
 
+def pushing_terms(shape: Shape, values: Array) -> tuple[str, ...]:
+    """The dry terms that come out negative; others may follow the coefficients. (k,)"""
+    own = dict(zip(shape.terms, values, strict=False))
+    return tuple(term for term in NEVER_NEGATIVE if own.get(term, 0.0) < 0.0)
+
+
+def non_negative_fit(j: int, shape: Shape, data: JointData) -> tuple[Shape, Array]:
+    """A shape's fit; with presliding, without the dry terms that come out negative.
+
+    Presliding and the smoothed sign share one dry torque: where one of them takes more than all of
+    it, the other is left out.
+    """
+    fit = fit_column(data.columns(j, shape), data.y, data.weights)
+    pushing = pushing_terms(shape, fit.values)
+    if "presliding" in shape.terms and pushing:
+        shape = shape._replace(terms=tuple(t for t in shape.terms if t not in pushing))
+        fit = fit_column(data.columns(j, shape), data.y, data.weights)
+    return shape, fit.values
+
+
 def is_dissipative(shape: Shape, values: Array, speed_limit: float) -> bool:
     """Whether no dry term is negative and the friction rises all the way to `speed_limit`.
 
@@ -153,7 +239,5 @@ def is_dissipative(shape: Shape, values: Array, speed_limit: float) -> bool:
         values: Its coefficients, others may follow. (k,)
         speed_limit: Speed up to which it may not fall. [rad/s]
     """
-    own = dict(zip(shape.terms, values, strict=False))
-    pushes = any(own.get(term, 0.0) < 0.0 for term in NEVER_NEGATIVE)
     friction = shape.friction(values[: len(shape.terms)])
-    return not pushes and bool(np.isnan(falling_speed(friction, speed_limit)))
+    return not pushing_terms(shape, values) and bool(np.isnan(falling_speed(friction, speed_limit)))

@@ -10,6 +10,7 @@ from vftcli.identification.method_result import (
     friction_numbers,
     friction_source,
     held_joints,
+    presliding_remark,
     profile_friction,
 )
 from vftcli.identification.result import Number, number
@@ -60,7 +61,9 @@ def friction_method(data: Training) -> MethodResult:
     chain = replace(robot.chain, rotor_inertia=rotor)
     new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
     choices = [c for f in fits if f is not None for c in f.choices]
-    return MethodResult(new, numbers, choices, None, [*remarks, *held_joints(data)])
+    return MethodResult(
+        new, numbers, choices, None, [*remarks, *presliding_remark(fits), *held_joints(data)]
+    )
 
 
 def refuse_sign(data: Training, j: int, scale: float) -> None:

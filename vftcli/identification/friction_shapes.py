@@ -10,6 +10,7 @@ import numpy as np
 
 from vftcli.identification.processing import PreparedLog
 from vftcli.robots.friction import SMOOTHING, coulomb_logarithmic
+from vftcli.robots.presliding import play
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
 
@@ -25,19 +26,21 @@ LOGARITHMIC_VELOCITIES = (0.1, 0.2, 0.5, 1.0, 2.0)
 
 
 class Shape(NamedTuple):
-    """The structure of one joint's friction: which terms, and its three nonlinear numbers.
+    """The structure of one joint's friction: which terms, and its four nonlinear numbers.
 
     Attributes:
         terms: Keys of the robot file whose values are coefficients, in order.
         smoothing: Velocity over which the sign is smoothed. [rad/s]
         stribeck_velocity: Velocity over which the Stribeck term fades. [rad/s]
         logarithmic_velocity: Velocity from which the logarithmic term flattens. [rad/s]
+        presliding_length: Way over which the teeth of the gear give before they slide. [rad]
     """
 
     terms: tuple[str, ...]
     smoothing: float = SMOOTHING
     stribeck_velocity: float = 0.05
     logarithmic_velocity: float = 1.0
+    presliding_length: float = 3e-4
 
     @property
     def model(self) -> str:
@@ -56,6 +59,8 @@ class Shape(NamedTuple):
     def words(self) -> str:
         """The terms and the nonlinear numbers, for tables."""
         text = f"{' + '.join(self.terms)}, smoothing {self.smoothing:g} rad/s"
+        if "presliding" in self.terms:
+            text += f", presliding over {1e3 * self.presliding_length:g} mrad"
         if "stribeck" in self.terms:
             text += f", Stribeck velocity {self.stribeck_velocity:g} rad/s"
         if "logarithmic" in self.terms:
@@ -65,11 +70,14 @@ class Shape(NamedTuple):
     def friction(self, values: Array, confidence: str = "") -> JointFriction:
         """The joint's friction with these coefficients, one a term."""
         parameters = {k: round_digits(float(v)) for k, v in zip(self.terms, values, strict=True)}
+        parameters.setdefault("coulomb", 0.0)  # what slides may be all presliding's
         parameters["smoothing"] = self.smoothing
         if "stribeck" in self.terms:
             parameters["stribeck_velocity"] = self.stribeck_velocity
         if "logarithmic" in self.terms:
             parameters["logarithmic_velocity"] = self.logarithmic_velocity
+        if "presliding" in self.terms:
+            parameters["presliding_length"] = self.presliding_length
         return JointFriction(model=self.model, parameters=parameters, confidence=confidence)
 
 
@@ -87,7 +95,7 @@ def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
         dq: Velocities as recorded. [rad/s]
         load: Absolute gravity torque. [N·m]
     """
-    numbers = {k: v for k, v in shape._asdict().items() if k != "terms"}
+    numbers = {k: v for k, v in shape._asdict().items() if k not in ("terms", "presliding_length")}
     return coulomb_logarithmic(
         dq, **{"coulomb": 0.0, "logarithmic": 0.0, term: 1.0}, **numbers, load=load
     )
@@ -113,11 +121,15 @@ class FrictionColumns:
             **dict.fromkeys(("coulomb", "load_coulomb"), (shape.smoothing,)),
             "stribeck": (shape.smoothing, shape.stribeck_velocity),
             "logarithmic": (shape.logarithmic_velocity,),
+            "presliding": (shape.presliding_length,),
         }
         key = (term, j, numbers.get(term, ()))
         if key not in self.cache:
-            dq = self.motion.recording.require("dq")[:, j]
-            values = term_values(term, shape, dq, self.load[:, j])
+            log = self.motion.recording
+            if term == "presliding":
+                values = play(log.q[:, j : j + 1], shape.presliding_length).state[:, 0]
+            else:
+                values = term_values(term, shape, log.require("dq")[:, j], self.load[:, j])
             self.cache[key] = self.motion.filtered(values[:, None])[:, 0]
         return self.cache[key]
 

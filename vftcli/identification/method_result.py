@@ -1,5 +1,6 @@
 """What every method of identification hands back, and the remarks that several of them make."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ from vftcli.identification.friction_fit import ShapeChoice
 from vftcli.identification.friction_shapes import Shape
 from vftcli.identification.least_squares import robust_sd
 from vftcli.identification.result import Number, number
-from vftcli.identification.training import Training
+from vftcli.identification.training import JointFit, Training
 from vftcli.robots.friction import falling_speed, steady_torque
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
@@ -73,6 +74,22 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> list[Rema
     if np.isfinite(falls := falling_speed(friction, limit)):
         values = {"speeds_rad_s": [falls], "limits_rad_s": [limit]}
         return [warning("falling-friction", Where(joints=(j + 1,)), **values)]
+    return []
+
+
+def presliding_remark(fits: Sequence[JointFit | None]) -> list[Remark]:
+    """Which presliding length the arm got, and what every length left of the error without."""
+    for fit in fits:
+        if fit is not None:
+            lengths = [1e3 * length for length in fit.presliding.errors]
+            return [
+                fact(
+                    "presliding-length",
+                    length_mrad=1e3 * fit.presliding.length,
+                    lengths_mrad=lengths,
+                    errors=list(fit.presliding.errors.values()),
+                )
+            ]
     return []
 
 

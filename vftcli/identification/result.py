@@ -58,6 +58,7 @@ UNITS = {
     "quadratic": "N·m·s²/rad²",
     "logarithmic": "N·m",
     "load_coulomb": "1",
+    "presliding": "N·m",
     "stribeck": "N·m",
     "mass": "kg",
     "com_x": "m",

@@ -15,7 +15,14 @@ from vftcli.identification.excitation import (
     outside_contacts,
     unexplained_torque,
 )
-from vftcli.identification.friction_fit import LIGHT, JointData, ShapeChoice, choose_shape
+from vftcli.identification.friction_fit import (
+    LIGHT,
+    JointData,
+    PreslidingChoice,
+    ShapeChoice,
+    choose_presliding,
+    choose_shape,
+)
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.least_squares import ColumnFit, fit_column
 from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
@@ -117,36 +124,41 @@ class JointFit(NamedTuple):
         fit: Friction coefficients, then q̈'s, then the rigid torque's.
         choices: The candidates and their errors.
         constant: Whether the drive constant was fitted too.
+        presliding: The arm's presliding length, which all joints share.
     """
 
     shape: Shape
     fit: ColumnFit
     choices: list[ShapeChoice]
     constant: bool
+    presliding: PreslidingChoice
 
 
 def fit_frictions(data: Training, weights: Sequence[Array]) -> list[JointFit | None]:
     """Fit every joint that moves, the links held at the profile; None for the others."""
-    fits: list[JointFit | None] = []
-    for j in range(data.robot.joints):
-        if not data.excited.moves[j]:
-            fits.append(None)
-            continue
-        found = fit_joint(data, j, weights, data.fit_constants)
+    moving = [j for j in range(data.robot.joints) if data.excited.moves[j]]
+    presliding = choose_presliding(
+        [(j, data_of_joint(data, j, weights, data.fit_constants)) for j in moving]
+    )
+    fits: list[JointFit | None] = [None] * data.robot.joints
+    for j in moving:
+        found = fit_joint(data, j, weights, presliding, data.fit_constants)
         # A joint that carries little cannot tell its constant, the last coefficient, from friction.
         known = found.fit.sd[-1] < CONSTANT_KNOWN * abs(found.fit.values[-1])
         if data.fit_constants and not known:
-            found = fit_joint(data, j, weights, False)
-        fits.append(found)
+            found = fit_joint(data, j, weights, presliding, False)
+        fits[j] = found
     return fits
 
 
-def fit_joint(data: Training, j: int, weights: Sequence[Array], constant: bool) -> JointFit:
+def fit_joint(
+    data: Training, j: int, weights: Sequence[Array], presliding: PreslidingChoice, constant: bool
+) -> JointFit:
     """Choose and fit one joint's model, with its drive constant or without."""
     given = data_of_joint(data, j, weights, constant)
-    shape, choices = choose_shape(j, given)
+    shape, choices = choose_shape(j, given, presliding.length)
     fit = fit_column(given.columns(j, shape), given.y, given.weights)
-    return JointFit(shape, fit, choices, constant)
+    return JointFit(shape, fit, choices, constant, presliding)
 
 
 def data_of_joint(data: Training, j: int, weights: Sequence[Array], constant: bool) -> JointData:

@@ -15,6 +15,7 @@ from vftcli.identification.method_result import (
     friction_numbers,
     friction_source,
     held_joints,
+    presliding_remark,
     profile_friction,
 )
 from vftcli.identification.processing import gravity_torque
@@ -73,7 +74,9 @@ def whole_arm(data: Training, method: str) -> MethodResult:
             remarks += check_friction(j, frictions[j], data)
     robot = with_vector(data.robot, layout, x, tuple(frictions))
     choices = [c for f in fits if f is not None for c in f.choices]
-    return MethodResult(robot, numbers, choices, base, [*remarks, *held_joints(data)])
+    return MethodResult(
+        robot, numbers, choices, base, [*remarks, *presliding_remark(fits), *held_joints(data)]
+    )
 
 
 def base_remark(base: BaseParameters, layout: ParameterColumns) -> Remark:
