@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from vftcli.robots import PROFILES, JointFriction, load_robot
 from vftcli.robots.friction import (
+    bent_line,
     coulomb_logarithmic,
     coulomb_viscous,
     dry_friction,
@@ -15,6 +16,7 @@ from vftcli.robots.friction import (
     falling_speed,
     friction_torque,
     sigmoid,
+    steady_torque,
 )
 from vftcli.signals.errors import ParameterError
 
@@ -32,6 +34,50 @@ def test_coulomb_is_smoothed_through_zero() -> None:
     np.testing.assert_allclose(
         coulomb_viscous(np.array([0.01]), 6.3, 0.0), 6.3 * np.tanh(1.0), rtol=1e-15
     )
+
+
+# Joint test of a UR5e, mean of its size-3 joints [rad/s, N·m].
+SPEEDS, TORQUES = (0.01, 0.5, 1.5, 3.2), (5.73, 9.32, 13.58, 18.72)
+
+
+def test_the_bent_line_runs_through_its_points_and_on() -> None:
+    """Between the points as `numpy.interp`, constant below, the last stretch's slope beyond."""
+    speed = np.concatenate([np.linspace(0.001, 3.2, 400), SPEEDS])
+    for sign in (1.0, -1.0):
+        # the sign is there at .001 rad/s already
+        torque = bent_line(sign * speed, SPEEDS, TORQUES, smoothing=1e-5)
+        # sums of a dozen N·m: rounding
+        np.testing.assert_allclose(torque, sign * np.interp(speed, SPEEDS, TORQUES), atol=1e-13)
+    slope = (18.72 - 13.58) / 1.7
+    beyond = bent_line(np.array([4.0]), SPEEDS, TORQUES)
+    np.testing.assert_allclose(beyond, 18.72 + 0.8 * slope, rtol=1e-14)
+    slow = bent_line(np.array([0.004]), SPEEDS, TORQUES, smoothing=0.01)
+    np.testing.assert_allclose(slow, 5.73 * np.tanh(0.4), rtol=1e-14)
+
+
+def test_joints_of_points_are_taken_together_and_feel_their_load() -> None:
+    one = JointFriction(model="points", speeds=SPEEDS, torques=TORQUES)
+    other = JointFriction(
+        model="points",
+        parameters={"load_coulomb": 0.1, "offset": 0.5},
+        speeds=(0.1, 1.0),
+        torques=(1.0, 2.0),
+    )
+    last = JointFriction(model="points", speeds=SPEEDS, torques=(1.0, 1.0, 1.0, 1.0))
+    torque = friction_torque((one, other, last), np.ones((1, 3)), np.full((1, 3), -30.0))
+    # between the second and third point; 2 + .1·30 + .5; constant (tanh(100) is 1)
+    np.testing.assert_allclose(torque, [[9.32 + 0.5 * 4.26, 5.5, 1.0]], rtol=1e-14)
+    np.testing.assert_array_equal(dry_friction((one, other, last), 3), [5.73, 1.0, 1.0])
+
+
+def test_presliding_friction_holds_and_falls_nowhere() -> None:
+    values = {"coulomb": 2.0, "viscous": 1.0, "presliding": 3.0, "presliding_length": 1e-3}
+    joint = JointFriction(model="coulomb-viscous", parameters=values)
+    np.testing.assert_array_equal(dry_friction((joint,), 1), [5.0])  # a + b
+    np.testing.assert_allclose(steady_torque(joint, np.array([-0.5, 0.5])), [-5.5, 5.5])
+    assert np.isnan(falling_speed(joint, 2.0))
+    falling = JointFriction(model="coulomb-viscous", parameters={**values, "viscous": -1.0})
+    assert np.isfinite(falling_speed(falling, 2.0))
 
 
 def test_sigmoid_is_zero_at_rest_and_spans_its_amplitude() -> None:

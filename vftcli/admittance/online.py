@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from vftcli.observers.kalman import KalmanObserver
-from vftcli.robots.friction import friction_torque
 from vftcli.robots.robot import Robot
+from vftcli.robots.running_friction import RunningFriction
 from vftcli.signals.arrays import Array
 from vftcli.virtual_sensor.solvers import wrench_of
 
@@ -33,6 +33,7 @@ class OnlineKalman:
         n = robot.joints
         self.pin, self.model, self.robot, self.step = pin, robot.model, robot, step
         self.averaged = averaged
+        self.friction = RunningFriction(robot.friction)
         self.data: Any = self.model.createData()
         model = observer.model(step, n)
         self.a12, self.a22 = model.a12, model.a22
@@ -42,13 +43,17 @@ class OnlineKalman:
         self.tau = np.zeros(n)
 
     def terms(self, q: Array, dq: Array) -> tuple[Array, Array]:
-        """P = M q̇ and Cᵀq̇ − g − F_f, μ without the drives. (n,) each [kg·m²/s, N·m]"""
+        """P = M q̇ and Cᵀq̇ − g − F_f of the next sample. (n,) each [kg·m²/s, N·m]
+
+        The second is μ without the drives; presliding friction goes on from the sample before.
+        """
         pin, model, data = self.pin, self.model, self.data
         C = pin.computeCoriolisMatrix(model, data, q, dq)
         p = pin.crba(model, data, q) @ dq
-        rest = C.T @ dq - pin.computeGeneralizedGravity(model, data, q)
+        gravity = pin.computeGeneralizedGravity(model, data, q)
+        rest = C.T @ dq - gravity
         if self.robot.friction:
-            rest = rest - friction_torque(self.robot.friction, dq[None])[0]
+            rest = rest - self.friction.torque(q[None], dq[None], gravity[None])[0]
         return p, rest
 
     def sample(self, q: Array, dq: Array, torque: Array) -> Array:

@@ -9,9 +9,11 @@ from vftcli.identification.least_squares import fit_column
 from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
 from vftcli.identification.result import Trace, root_mean_square
 from vftcli.robots.drive import uses_current
-from vftcli.robots.friction import SMOOTHING, friction_torque
+from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
+from vftcli.robots.running_friction import RunningFriction
+from vftcli.robots.temperature import measured_temperature
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
@@ -56,7 +58,9 @@ def predicted_torque(robot: Robot, motion: PreparedLog) -> Array:
         return torque
     recording = motion.recording
     load = gravity_torque(robot, recording.q)
-    friction = friction_torque(robot.friction, recording.require("dq"), load)
+    friction = RunningFriction(robot.friction).torque(
+        recording.q, recording.require("dq"), load, measured_temperature(recording)
+    )
     total: Array = torque + motion.filtered(friction)
     return total
 

@@ -45,11 +45,15 @@ def joints_grid(robot: "Robot") -> Grid:
 
 def friction_words(robot: "Robot", j: int) -> str:
     """One joint's friction model with its numbers, and how far they are to be trusted."""
-    friction = robot.friction[j] if robot.friction else None
-    if friction is None or friction.model == "none":
+    table = robot.friction[j].table if robot.friction else {}
+    if not table:
         return "none"
-    numbers = ", ".join(f"{k} {v:g}" for k, v in friction.parameters.items())
-    return f"{friction.model} ({numbers}); {friction.confidence or 'no confidence stated'}"
+    model, confidence = table.pop("model"), table.pop("confidence", "no confidence stated")
+    numbers = ", ".join(
+        f"{key} {' '.join(f'{v:g}' for v in (value if isinstance(value, list) else [value]))}"
+        for key, value in table.items()
+    )
+    return f"{model} ({numbers}); {confidence}"
 
 
 def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:

@@ -85,6 +85,12 @@ BOUNDS: dict[str, Bound] = {
     "smoothing": Bound(TINY, 1e3, "rad/s"),
     "stribeck_velocity": Bound(TINY, 1e3, "rad/s"),
     "logarithmic_velocity": Bound(TINY, 1e3, "rad/s"),
+    "presliding": Bound(0.0, 1e6, "N·m"),
+    "presliding_length": Bound(1e-7, 0.1, "rad"),  # a gear yields .1 to 10 mrad before it slides
+    "speeds": Bound(TINY, 1e3, "rad/s"),
+    "torques": TORQUE,
+    "temperature": either_way(1e3, ""),
+    "temperature_at": Bound(1.0, 100.0, "°C"),
     "slope": either_way(1e6, "s/rad"),
     "shift": either_way(1e3, "rad/s"),
 }

@@ -1,4 +1,10 @@
-"""Friction models: torque lost in a joint as a function of its velocity and of its load."""
+"""Friction models: torque lost in a joint, by its velocity, its load and what it did before.
+
+Beside each model stands presliding friction a·s, s the state of the play operator
+(`vftcli.robots.presliding`): a and the Coulomb torque together are the dry friction of steady
+sliding. All but a constant offset follows the joint's temperature where the robot has a law for it
+(`vftcli.robots.temperature`).
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -7,9 +13,13 @@ from typing import Any
 import numpy as np
 
 from vftcli.robots.robot import JointFriction
+from vftcli.robots.temperature import friction_factor
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, Where, warning
+
+PRESLIDING = ("presliding", "presliding_length")
+"""Keys of the presliding friction that may stand beside every model: a [N·m] and s₀ [rad]."""
 
 SMOOTHING = 0.01
 """Velocity at which the smoothed sign tanh(q̇/smoothing) reaches tanh(1), by default. [rad/s]"""
@@ -113,6 +123,38 @@ def sigmoid(
     return rise(dq + shift) - rise(np.asarray(shift))
 
 
+def bent_line(
+    dq: Array,
+    speeds: Sequence[Array] | Array,
+    torques: Sequence[Array] | Array,
+    **others: Any,  # noqa: ANN401
+) -> Array:
+    """A line through points (v_k, f_k), as UR controllers feed friction forward. Like `dq` [N·m]
+
+    f = f_1 tanh(q̇/smoothing) + sign(q̇) Σ_k (m_k − m_{k−1}) max(|q̇| − v_k, 0) + what
+    `coulomb_viscous` makes of the other parameters,
+
+    with m_k the slope from point k to the next, m_0 = 0: constant up to the first speed, linear
+    between the points, the last stretch continued beyond.
+
+    Args:
+        dq: Joint velocities. (T,) or (T, n) [rad/s]
+        speeds: Speeds v_k, rising, at least two; each one number or one a joint. [rad/s]
+        torques: Friction f_k there. [N·m]
+        others: Parameters of `coulomb_viscous`.
+    """
+    torque = coulomb_viscous(dq, torques[0], **others)
+    before: Array | float = 0.0
+    for k in range(len(speeds) - 1):
+        slope = (torques[k + 1] - torques[k]) / (speeds[k + 1] - speeds[k])
+        # sign(v) max(|v| − v_k, 0) is what clipping to ±v_k takes off v.
+        beyond: Array = dq - np.clip(dq, -speeds[k], speeds[k])
+        beyond *= slope - before
+        torque += beyond
+        before = slope
+    return torque
+
+
 MODELS: dict[str, Callable[..., Array]] = {
     "coulomb-viscous": coulomb_viscous,
     "coulomb-viscous-offset": coulomb_viscous,
@@ -120,46 +162,100 @@ MODELS: dict[str, Callable[..., Array]] = {
     "coulomb-viscous-load": coulomb_viscous,
     "coulomb-viscous-stribeck": coulomb_viscous,
     "coulomb-logarithmic": coulomb_logarithmic,
+    "points": bent_line,
     "sigmoid": sigmoid,
 }
 """Name in a robot file → function of velocity and the file's parameters."""
 
 
+LEFT_OUT = {"smoothing": SMOOTHING, "stribeck_velocity": 1.0}
+"""What a key means that a joint leaves out and another of the same model has; else zero."""
+
+
 def friction_torque(
-    friction: Sequence[JointFriction], dq: Array, load: Array | None = None
+    friction: Sequence[JointFriction],
+    dq: Array,
+    load: Array | None = None,
+    *,
+    deflection: Array | None = None,
+    temperature: Array | None = None,
 ) -> Array:
     """Friction torque of every joint at every sample, opposing motion when subtracted. (T, n) [N·m]
 
-    Joints that share a model are evaluated together.
+    Joints that share a model are evaluated together. Along a motion, `RunningFriction` follows the
+    presliding state.
 
     Args:
         friction: One model a joint; empty for a frictionless arm.
         dq: Joint velocities. (T, n) [rad/s]
         load: Gravity torques of the loaded arm, for models whose Coulomb torque grows with the
             load; None for unloaded joints. (T, n) [N·m]
+        deflection: State s of the play operator, for presliding friction; None for undeflected
+            joints. (T, n)
+        temperature: Joint temperatures, NaN where not measured; None for those at which the models
+            were taken. (T, n) [°C]
 
     Raises:
         ParameterError: If a model's name is unknown.
     """
     torque = np.zeros_like(dq)
-    groups: dict[tuple[str, tuple[str, ...]], list[int]] = {}
+    groups: dict[tuple[str, int], list[int]] = {}
     for j, joint in enumerate(friction):
         if joint.model != "none":
-            groups.setdefault((joint.model, tuple(sorted(joint.parameters))), []).append(j)
-    for (model, keys), joints in groups.items():
+            groups.setdefault((joint.model, len(joint.speeds)), []).append(j)
+    for (model, _), joints in groups.items():
         check_known(model, MODELS, f"no friction model {model!r}")
-        values = {key: np.array([friction[j].parameters[key] for j in joints]) for key in keys}
+        values = model_values([friction[j] for j in joints])
         every = len(joints) == dq.shape[1]
         if load is not None and "load_coulomb" in values:
             values["load"] = load if every else load[:, joints]
+        part = MODELS[model](dq if every else dq[:, joints], **values)
         if every:
-            return MODELS[model](dq, **values)
-        torque[:, joints] = MODELS[model](dq[:, joints], **values)
+            torque = part
+        else:
+            torque[:, joints] = part
+    if deflection is not None:
+        for j in presliding_joints(friction)[0]:
+            torque[:, j] += friction[j].parameters["presliding"] * deflection[:, j]
+    if temperature is not None and (factor := friction_factor(friction, temperature)) is not None:
+        offset = np.array([joint.parameters.get("offset", 0.0) for joint in friction])
+        torque -= offset
+        torque *= factor
+        torque += offset
     return torque
 
 
+def model_values(friction: Sequence[JointFriction]) -> dict[str, Any]:
+    """The numbers of joints that share a model, as its function takes them: an array each. (m,)
+
+    Args:
+        friction: The joints' models.
+    """
+    keys = {key for joint in friction for key in joint.parameters} - set(PRESLIDING)
+    values: dict[str, Any] = {
+        key: np.array([joint.parameters.get(key, LEFT_OUT.get(key, 0.0)) for joint in friction])
+        for key in sorted(keys)
+    }
+    if friction[0].speeds:
+        values["speeds"] = np.array([joint.speeds for joint in friction]).T
+        values["torques"] = np.array([joint.torques for joint in friction]).T
+    return values
+
+
+def presliding_joints(friction: Sequence[JointFriction]) -> tuple[list[int], Array]:
+    """The joints (from 0) that have presliding friction, and their presliding lengths. (m,) [rad]
+
+    Args:
+        friction: One model a joint; empty for a frictionless arm.
+    """
+    joints = [j for j, joint in enumerate(friction) if joint.parameters.get("presliding", 0.0) > 0]
+    return joints, np.array([friction[j].parameters["presliding_length"] for j in joints])
+
+
 def steady_torque(friction: JointFriction, dq: Array) -> Array:
-    """One joint's friction without its offset and without the dry torque that fades. (T,) [N·m]
+    """One joint's friction in steady sliding, without offset and the dry torque that fades. [N·m]
+
+    Presliding friction is fully deflected, and what the numbers hold for is the temperature.
 
     Args:
         friction: The joint's model.
@@ -167,7 +263,8 @@ def steady_torque(friction: JointFriction, dq: Array) -> Array:
     """
     absent = {"offset": 0.0, "stribeck": 0.0}
     values = {key: absent.get(key, value) for key, value in friction.parameters.items()}
-    return friction_torque((replace(friction, parameters=values),), dq[:, None])[:, 0]
+    steady, v = (replace(friction, parameters=values),), dq[:, None]
+    return friction_torque(steady, v, deflection=np.sign(v))[:, 0]
 
 
 def falling_speed(friction: JointFriction, limit: float) -> float:
@@ -217,7 +314,9 @@ def dry_friction(friction: Sequence[JointFriction], joints: int) -> Array:
     """
     if not friction:
         return np.zeros(joints)
-    return np.array([float(dry_torque(joint.parameters)) for joint in friction])
+    return np.array(
+        [float(dry_torque(joint.parameters)) + sum(joint.torques[:1]) for joint in friction]
+    )
 
 
 def dry_torque(parameters: Mapping[str, float], load: Array | float = 0.0) -> Array:
@@ -232,6 +331,7 @@ def dry_torque(parameters: Mapping[str, float], load: Array | float = 0.0) -> Ar
         load: Torque the gear carries. [N·m]
     """
     coulomb = parameters.get("coulomb", 0.0) + parameters.get("stribeck", 0.0)
+    coulomb += parameters.get("presliding", 0.0)  # which a joint at rest holds, in full or in part
     # A sigmoid runs from one saturation to the other, which lie one amplitude apart.
     coulomb += 0.5 * abs(parameters.get("amplitude", 0.0))
     return np.asarray(coulomb + parameters.get("load_coulomb", 0.0) * np.abs(load))

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,10 @@ import numpy as np
 from vftcli.robots.bounds import weightless
 from vftcli.robots.chain import Chain, Payload, symmetric, unphysical
 from vftcli.robots.conventions import CONVENTIONS, Kinematics
-from vftcli.robots.friction import falling_friction
+from vftcli.robots.friction import PRESLIDING, falling_friction
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import RobotFile, Section, is_finite
+from vftcli.robots.temperature import REFERENCE, lawless
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import shown
 from vftcli.signals.pose import Pose, rpy_matrix
@@ -38,9 +40,13 @@ FRICTION_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("coulomb", "logarithmic", "logarithmic_velocity"),
         ("viscous", "load_coulomb", "stribeck", "stribeck_velocity", "offset", "smoothing"),
     ),
+    "points": ((), ("load_coulomb", "stribeck", "stribeck_velocity", "offset", "smoothing")),
     "sigmoid": (("amplitude", "slope", "shift"), ()),
 }
-"""Friction model → its required and its optional keys in ``[joints.friction]``."""
+"""Friction model → its required and its optional keys in ``[joints.friction]``.
+
+Beside these every model may have `PRESLIDING` and a temperature law; "points" has lists.
+"""
 
 
 def load_profile(path: Path) -> Robot:
@@ -188,16 +194,42 @@ def checked_friction(joints: Sequence[Section]) -> tuple[JointFriction, ...]:
         if not isinstance(values, dict):
             joint.refuse("friction must be a section [joints.friction]", "friction")
         section = Section(joint.file, values, "joints.friction", joint.joint)
-        name = section.choice("model", (*FRICTION_KEYS, "none"))
-        if name == "none":
-            models.append(JointFriction())
-            continue
-        required, optional = FRICTION_KEYS[name]
-        keys = (*required, *(key for key in optional if key in values))
-        parameters = {key: section.number(key) for key in keys}
-        confidence = section.text("confidence")
-        models.append(JointFriction(model=name, parameters=parameters, confidence=confidence))
+        models.append(checked_joint_friction(section))
     return tuple(models) if any(m.model != "none" for m in models) else ()
+
+
+def checked_joint_friction(section: Section) -> JointFriction:
+    """Return one joint's ``[joints.friction]``, its keys checked."""
+    name = section.choice("model", (*FRICTION_KEYS, "none"))
+    if name == "none":
+        return JointFriction()
+    for pair in (PRESLIDING, ("temperature", "temperature_at")):
+        for key, other in (pair, pair[::-1]):
+            if key in section.values and other not in section.values:
+                section.refuse(f"{other} is missing; {key} needs it beside it", key)
+    required, optional = FRICTION_KEYS[name]
+    keys = (*required, *(key for key in (*optional, *PRESLIDING) if key in section.values))
+    law = section.vector("temperature", 4).tolist() if "temperature" in section.values else ()
+    if why := lawless(law):
+        section.refuse(why, "temperature")
+    return JointFriction(
+        model=name,
+        parameters={key: section.number(key) for key in keys},
+        **(checked_points(section) if name == "points" else {}),
+        temperature=tuple(law),
+        temperature_at=section.number("temperature_at", REFERENCE),
+        confidence=section.text("confidence"),
+    )
+
+
+def checked_points(section: Section) -> dict[str, tuple[float, ...]]:
+    """Return the points of a bent line: rising speeds [rad/s] and a torque [N·m] at each."""
+    speeds, torques = section.numbers("speeds", 2), section.numbers("torques", 2)
+    if len(torques) != len(speeds):
+        section.refuse(f"there are {len(torques)} torques for {len(speeds)} speeds", "torques")
+    if any(fast <= slow for slow, fast in pairwise(speeds)):
+        section.refuse(f"speeds is {shown(list(speeds))}; each lies above the one before", "speeds")
+    return {"speeds": speeds, "torques": torques}
 
 
 def checked_limits(joints: Sequence[Section]) -> Limits:

@@ -21,13 +21,37 @@ class JointFriction:
 
     Attributes:
         model: A name in `vftcli.robots.friction.MODELS`, or "none".
-        parameters: The model's numbers by key, in SI units of torque and rad/s.
+        parameters: The model's numbers by key, in SI units of torque, rad and rad/s; beside those
+            of the model `presliding` [N·m] and `presliding_length` [rad], both or neither.
+        speeds: Speeds of the model "points", rising. [rad/s]
+        torques: Friction at these speeds. [N·m]
+        temperature: p₁ to p₄ of the law that friction follows with the joint's temperature, as in
+            `vftcli.robots.temperature`; none where it is not known to follow one.
+        temperature_at: Joint temperature at which the model's numbers hold. [°C]
         confidence: Where the numbers come from, in words.
     """
 
     model: str = "none"
     parameters: Mapping[str, float] = field(default_factory=dict)
+    speeds: tuple[float, ...] = ()
+    torques: tuple[float, ...] = ()
+    temperature: tuple[float, ...] = ()
+    temperature_at: float = 35.0
     confidence: str = ""
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """The model as ``[joints.friction]`` of a robot file has it; empty for none."""
+        if self.model == "none":
+            return {}
+        lists = {"speeds": self.speeds, "torques": self.torques, "temperature": self.temperature}
+        table = {"model": self.model, **self.parameters}
+        table |= {key: list(values) for key, values in lists.items() if values}
+        if self.temperature:
+            table["temperature_at"] = self.temperature_at
+        if self.confidence:
+            table["confidence"] = self.confidence
+        return table
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -113,6 +113,16 @@ class Section(NamedTuple):
         self.check_bounds(key, found.tolist())
         return found
 
+    def numbers(self, key: str, least: int) -> tuple[float, ...]:
+        """Return a list of at least `least` finite numbers, or complain about its line."""
+        value = self.values.get(key)
+        if not isinstance(value, list) or len(value) < least or not all(map(is_finite, value)):
+            said = f"is {shown(value)}; it" if key in self.values else "is missing; it"
+            self.refuse(f"{key} {said} must be a list of at least {least} finite numbers", key)
+        found = tuple(float(item) for item in value)
+        self.check_bounds(key, found)
+        return found
+
     def text(self, key: str, default: str = "") -> str:
         """Return a word or a sentence, `default` if the key is absent, or complain."""
         value = self.values.get(key, default)

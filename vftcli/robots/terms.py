@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 from vftcli.robots.drive import check_joints, drive_torque, uses_current
-from vftcli.robots.friction import friction_torque
 from vftcli.robots.kernels import momentum_chunks
 from vftcli.robots.robot import Robot
+from vftcli.robots.running_friction import RunningFriction
+from vftcli.robots.temperature import measured_temperature
 from vftcli.signals.arrays import (
     Array,
     check_clock,
@@ -69,6 +70,7 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
     q, dq = recording.q, recording.require("dq")
     effort, scale = effort_of(recording, robot)
     p, mu = empty_series(*q.shape), empty_series(*q.shape)
+    friction, temperature = RunningFriction(robot.friction), measured_temperature(recording)
     chunks = momentum_chunks(robot.loaded_chain, q, dq)
     if literal:
         from vftcli.robots.literal import literal_momentum_terms
@@ -81,7 +83,8 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
         mu[span] *= scale
         mu[span] += chunk.coriolis_transpose_dq - chunk.gravity
         if robot.friction:
-            mu[span] -= friction_torque(robot.friction, velocity, chunk.gravity)
+            warm = None if temperature is None else temperature[span]
+            mu[span] -= friction.torque(q[span], velocity, chunk.gravity, warm)
     return DynamicsTerms(t=recording.t, p=handed_over(p), mu=handed_over(mu))
 
 

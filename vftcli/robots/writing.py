@@ -47,11 +47,8 @@ def robot_document(robot: Robot) -> Table:
         if robot.torque_constant is not None:
             table["torque_constant"] = float(robot.torque_constant[j])
         table.pop("friction", None)
-        if robot.friction and robot.friction[j].model != "none":
-            friction = robot.friction[j]
-            table["friction"] = {"model": friction.model, **friction.parameters}
-            if friction.confidence:
-                table["friction"]["confidence"] = friction.confidence
+        if robot.friction and (friction := robot.friction[j].table):
+            table["friction"] = friction
     document = {**old, "schema": SCHEMA, "name": robot.name, "title": robot.title or robot.name}
     document |= {"torque_source": robot.torque_source, "gravity": robot.chain.gravity.tolist()}
     document |= {"dof": robot.joints, "joints": tables, "payload": payload_tables(robot)}
