@@ -5,14 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.identification.excitation import SLOW
 from vftcli.identification.friction_shapes import (
     LOGARITHMIC_VELOCITIES,
     SMOOTHINGS,
     STRIBECK_VELOCITIES,
     FrictionColumns,
     Shape,
+    bent,
 )
-from vftcli.identification.least_squares import cross_validated, fit_column
+from vftcli.identification.least_squares import cross_validated, fit_column, left_out
 from vftcli.identification.result import root_mean_square
 from vftcli.robots.friction import falling_speed
 from vftcli.signals.arrays import Array
@@ -36,6 +38,9 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
 
 PRESLIDING_LENGTHS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 """Presliding lengths that compete with none, one for the whole arm. [rad]"""
+
+BESIDE_POINTS = (("offset",), ("offset", "load_coulomb"))
+"""What may stand beside the points of a bent line."""
 
 NEVER_NEGATIVE = ("coulomb", "presliding", "load_coulomb", "stribeck")
 """Terms whose negative value would push the joint along."""
@@ -94,6 +99,8 @@ class JointData(NamedTuple):
         load_spread: Spread of the gravity torque. [N·m]
         reverses: Whether the joint moves both ways.
         speed_limit: Speed up to which its friction may not fall. [rad/s]
+        profile: Torque of the profile's friction and rotor; None where they do not compete. (M,)
+            [N·m]
     """
 
     y: Array
@@ -103,11 +110,20 @@ class JointData(NamedTuple):
     load_spread: float
     reverses: bool
     speed_limit: float
+    profile: Array | None = None
 
     @property
     def lengths(self) -> tuple[int, ...]:
         """Rows of each log."""
         return tuple(source.motion.samples for source in self.sources)
+
+    def speeds(self, j: int) -> list[float]:
+        """Speed that joint j (from 0) exceeds in a hundredth of each log. [rad/s]"""
+        return [float(np.quantile(np.abs(source.motion.dq[:, j]), 0.99)) for source in self.sources]
+
+    def parts(self, j: int) -> list[Array]:
+        """The rows that cross-validation of joint j (from 0) leaves out in turn."""
+        return left_out(self.lengths, [speed > SLOW for speed in self.speeds(j)])
 
     def slow(self, signals: Array) -> Array:
         """Signals in the band in which an observer listens, each log by itself. (M, k)"""
@@ -137,15 +153,16 @@ def choose_presliding(joints: Sequence[tuple[int, JointData]]) -> PreslidingChoi
     lengths = (0.0, *PRESLIDING_LENGTHS)
     ratios = np.empty((len(joints), len(lengths)))
     for i, (j, data) in enumerate(joints):
-        terms, y = tellable_terms(RICHEST, data), data.slow(data.y[:, None])[:, 0]
+        terms, parts = tellable_terms(RICHEST, data), data.parts(j)
+        y = data.slow(data.y[:, None])[:, 0]
         plain = data.slow(data.columns(j, Shape(terms, SLIDING)))
         # Weights of outliers are held: all lengths must answer for the same samples.
         weights = fit_column(plain, y, data.weights).weights
-        found = [cross_validated(plain, y, weights, data.lengths)]
+        found = [cross_validated(plain, y, weights, parts)]
         for length in PRESLIDING_LENGTHS:
             shape = Shape((*terms, "presliding"), SLIDING, presliding_length=length)
             columns = data.slow(data.columns(j, shape))
-            found.append(cross_validated(columns, y, weights, data.lengths))
+            found.append(cross_validated(columns, y, weights, parts))
         ratios[i] = np.array(found) / max(found[0], 1e-300)
     errors = root_mean_square(ratios)
     near = np.flatnonzero(errors <= MARGIN * errors.min())
@@ -165,10 +182,11 @@ def choose_shape(j: int, data: JointData, length: float) -> tuple[Shape, list[Sh
     """
     rich = tellable_terms(RICHEST, data)
     start = fit_column(data.columns(j, Shape(rich)), data.y, data.weights)
+    parts = data.parts(j)
 
     # Weights of outliers are held: candidates must answer for the same samples.
     def error(shape: Shape) -> float:
-        return cross_validated(data.columns(j, shape), data.y, start.weights, data.lengths)
+        return cross_validated(data.columns(j, shape), data.y, start.weights, parts)
 
     widths = (SLIDING,) if length else SMOOTHINGS
     smoothing = min((Shape(rich, s) for s in widths), key=error).smoothing
@@ -176,28 +194,37 @@ def choose_shape(j: int, data: JointData, length: float) -> tuple[Shape, list[Sh
     curved = Shape(terms, smoothing, presliding_length=length)
     bends = (curved._replace(logarithmic_velocity=v) for v in LOGARITHMIC_VELOCITIES)
     best = min(bends, key=error)
-    choices = []
-    for candidate in candidate_shapes(best, data):
+    choices: dict[Shape, ShapeChoice] = {}
+    for candidate in candidate_shapes(best, data, max(data.speeds(j))):
         shape, values = non_negative_fit(j, candidate, data)
-        if is_dissipative(shape, values, data.speed_limit):
-            choices.append(ShapeChoice(j + 1, shape, error(shape)))
+        if shape not in choices and is_dissipative(shape, values, data.speed_limit):
+            choices[shape] = ShapeChoice(j + 1, shape, error(shape))
     if not choices:
         return Shape(tellable_terms(PLAIN, data), smoothing), []
-    limit = MARGIN * min(c.error for c in choices)
-    near = [c for c in choices if c.error <= limit]
+    limit = MARGIN * min(c.error for c in choices.values())
+    near = [c for c in choices.values() if c.error <= limit]
     chosen = min(near, key=lambda c: (len(c.shape.terms), c.error))
-    return chosen.shape, [c._replace(chosen=c is chosen) for c in choices]
+    return chosen.shape, [c._replace(chosen=c is chosen) for c in choices.values()]
 
 
-def candidate_shapes(best: Shape, data: JointData) -> Iterator[Shape]:
-    """The friction shapes that compete for a joint, with the smoothing and bend of `best`."""
+def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> Iterator[Shape]:
+    """The friction shapes that compete for a joint, with the smoothing and bend of `best`.
+
+    Args:
+        best: Its smoothing, its bend and its presliding length stay.
+        data: The joint's equations.
+        speed: The joint's highest speed, by which the points of a bent line are told. [rad/s]
+    """
     shapes: dict[Shape, None] = {}
-    for terms in CANDIDATES:
+    line = bent(speed)
+    for terms in (*CANDIDATES, *((*line.terms, *more) for more in BESIDE_POINTS if line)):
         shape = best._replace(terms=tellable_terms(terms, data))
-        if best.presliding_length and "stribeck" not in terms:
-            shapes[shape._replace(terms=(*shape.terms, "presliding"))] = None
+        if line and terms[0] in line.terms:
+            shape = shape._replace(speeds=line.speeds)
         if "stribeck" not in terms:
             shapes[shape] = None
+            if best.presliding_length:
+                shapes[shape._replace(terms=(*shape.terms, "presliding"))] = None
             continue
         for velocity in STRIBECK_VELOCITIES:
             if velocity > 2 * best.smoothing:  # else the sign's own rounding hides it

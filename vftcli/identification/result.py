@@ -59,6 +59,7 @@ UNITS = {
     "logarithmic": "N·m",
     "load_coulomb": "1",
     "presliding": "N·m",
+    **{f"point{k}": "N·m" for k in range(1, 5)},
     "stribeck": "N·m",
     "mass": "kg",
     "com_x": "m",
