@@ -225,10 +225,10 @@ def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> Iterat
             shapes[shape] = None
             if best.presliding_length:
                 shapes[shape._replace(terms=(*shape.terms, "presliding"))] = None
-            continue
-        for velocity in STRIBECK_VELOCITIES:
-            if velocity > 2 * best.smoothing:  # else the sign's own rounding hides it
-                shapes[shape._replace(stribeck_velocity=velocity)] = None
+        elif not best.presliding_length:  # which is the better account of what happens near rest
+            for velocity in STRIBECK_VELOCITIES:
+                if velocity > 2 * best.smoothing:  # else the sign's own rounding hides it
+                    shapes[shape._replace(stribeck_velocity=velocity)] = None
     yield from shapes
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from vftcli.identification.clean_fit import fit_without_contacts
 from vftcli.identification.friction_shapes import round_digits
 from vftcli.identification.method_result import (
     DETERMINED,
@@ -14,7 +15,7 @@ from vftcli.identification.method_result import (
     profile_friction,
 )
 from vftcli.identification.result import Number, number
-from vftcli.identification.training import Training, fit_without_contacts
+from vftcli.identification.training import Training
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.remarks import Where, caution
 

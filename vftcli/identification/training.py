@@ -1,22 +1,17 @@
 """Training data: logs prepared, joints fitted one by one, contacts left out."""
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.identification.excitation import (
-    ContactSpan,
     Excitation,
-    find_contacts,
     find_excitation,
-    outside_contacts,
-    unexplained_torque,
 )
 from vftcli.identification.friction_fit import (
-    LIGHT,
     JointData,
     PreslidingChoice,
     ShapeChoice,
@@ -26,26 +21,15 @@ from vftcli.identification.friction_fit import (
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.least_squares import ColumnFit, fit_column
 from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
-from vftcli.identification.scoring import apparent_load, predicted_torque, rigid_torque
+from vftcli.identification.scoring import rigid_torque
 from vftcli.robots.drive import drive_torque, uses_current
-from vftcli.robots.friction import dry_torque
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, Where, caution, fact, warning
-
-LOAD_EXPLAINS = 0.8
-"""Share of what the profile misses that a load must explain to be suspected."""
-
-UNKNOWN_LOAD = 0.5
-"""Smallest load that is suspected. [kg]"""
 
 CONSTANT_KNOWN = 0.02
 """Relative standard deviation up to which a drive constant is taken from free motion."""
-
-HEAVY = 0.1
-"""A joint carries the arm's weight if its gravity torque varies by this share of the largest."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,88 +179,3 @@ def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array
         if fit is not None:
             whole[:, j] = fit.fit.residual
     return [whole[a:b] for a, b in itertools.pairwise(edges)]
-
-
-def fit_without_contacts(
-    data: Training, strict: bool
-) -> tuple[list[JointFit | None], list[Array], list[Remark]]:
-    """Fit friction, leave out contacts, and fit again without them.
-
-    Args:
-        data: The training logs.
-        strict: Whether links that do not explain the torque are an error, not a remark.
-
-    Returns:
-        The fits, the weights of every sample (M, n) a log, and remarks.
-
-    Raises:
-        IdentificationError: If the model misses most of the torque: another robot.
-    """
-    weights = [m.usable.astype(float) for m in data.motions]
-    fits = fit_frictions(data, weights)
-    left, remarks = all_residuals(data, fits), list[Remark]()
-    for k, (motion, residual) in enumerate(zip(data.motions, left, strict=True)):
-        if found := find_contacts(motion, residual, fitted_dry_friction(data, k, fits)):
-            weights[k] = weights[k] * outside_contacts(motion, found)[:, None]
-            remarks.append(contacts_remark(motion, found))
-    if remarks:
-        fits = fit_frictions(data, weights)
-        left = all_residuals(data, fits)
-    for remark in model_doubts(data, left, weights):
-        if strict:
-            raise IdentificationError(
-                f"{remark}. Choose another --robot, find the load with --find-payload, or let "
-                "--method base identify the links too"
-            )
-        remarks += [remark, fact("absorbed-doubt", Where(remark.where.about))]
-    return fits, weights, remarks
-
-
-def contacts_remark(motion: PreparedLog, found: Sequence[ContactSpan]) -> Remark:
-    """A remark on the stretches of a log that are left out of the fit."""
-    return caution(
-        "suspected-contacts",
-        Where(motion.recording.name),
-        count=len(found),
-        total_s=sum(c.stop - c.start for c in found),
-        starts_s=[c.start for c in found],
-        stops_s=[c.stop for c in found],
-        worst_joints=[c.joint for c in found],
-        residuals_Nm=[c.size for c in found],
-    )
-
-
-def model_doubts(
-    data: Training, left: Sequence[Array], weights: Sequence[Array]
-) -> Iterator[Remark]:
-    """Remarks on logs whose torque the profile's links do not explain.
-
-    Args:
-        data: The training logs.
-        left: What the friction fits leave of each log. (M, n) each [N·m]
-        weights: Weight of every sample, 0 where it tells nothing. (M, n) each
-    """
-    spread = np.std(np.concatenate([c.load for c in data.columns]), axis=0)
-    heavy = (spread > HEAVY * spread.max()) & (spread > LIGHT) & data.excited.moves
-    for motion, residual, w in zip(data.motions, left, weights, strict=True):
-        used, name = np.where(w > 0, residual, 0.0), motion.recording.name
-        # A load is looked for in what the profile leaves before friction is fitted: Coulomb
-        # friction would take some of it up.
-        before = motion.tau - predicted_torque(data.robot, motion)
-        mass, explained = apparent_load(data.robot, motion, before)
-        if explained >= LOAD_EXPLAINS and abs(mass) >= UNKNOWN_LOAD:
-            load = {"mass_kg": mass, "robot": data.robot.name, "share_percent": 100.0 * explained}
-            yield warning("unknown-load", Where(name), **load)
-        if remark := unexplained_torque(name, data.robot.name, motion.tau, used, heavy):
-            yield remark
-
-
-def fitted_dry_friction(data: Training, log: int, fits: Sequence[JointFit | None]) -> Array:
-    """Dry friction of each joint along a log by its fit, load included. (M, n) [N·m]"""
-    motion, columns = data.motions[log], data.columns[log]
-    out = np.zeros(motion.q.shape)
-    for j, fit in enumerate(fits):
-        if fit is not None:
-            values = dict(zip(fit.shape.terms, fit.fit.values, strict=False))
-            out[:, j] = dry_torque(values, columns.load[motion.kept, j])
-    return out

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.identification.base_parameters import BaseParameters, base_parameters
+from vftcli.identification.clean_fit import fit_without_contacts
 from vftcli.identification.consistent import fit_consistent, nearest_physical
 from vftcli.identification.friction_fit import PLAIN, is_dissipative
 from vftcli.identification.friction_shapes import FrictionColumns, Shape, round_digits
@@ -25,7 +26,6 @@ from vftcli.identification.training import (
     JointFit,
     Training,
     fit_frictions,
-    fit_without_contacts,
 )
 from vftcli.robots.regressor import chain_parameters, with_parameters
 from vftcli.robots.robot import JointFriction, Robot
