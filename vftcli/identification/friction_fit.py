@@ -24,6 +24,7 @@ PLAIN = ("coulomb", "viscous", "offset")
 CURVED = ("coulomb", "logarithmic", "offset")
 RICHEST = (*PLAIN, "quadratic", "load_coulomb")
 CANDIDATES: tuple[tuple[str, ...], ...] = (
+    ("coulomb", "offset"),
     PLAIN,
     (*PLAIN, "quadratic"),
     (*PLAIN, "load_coulomb"),
@@ -53,6 +54,9 @@ LISTENING = 2.0
 
 MARGIN = 1.01
 """A simpler model within this factor of the best cross-validated error is preferred."""
+
+LENGTH_MARGIN = 1.02
+"""A shorter presliding length within this factor of the best is preferred, and none to all."""
 
 LIGHT = 1.0
 """Spread of the gravity torque below which growth with load cannot be told. [N·m]"""
@@ -165,7 +169,7 @@ def choose_presliding(joints: Sequence[tuple[int, JointData]]) -> PreslidingChoi
             found.append(cross_validated(columns, y, weights, parts))
         ratios[i] = np.array(found) / max(found[0], 1e-300)
     errors = root_mean_square(ratios)
-    near = np.flatnonzero(errors <= MARGIN * errors.min())
+    near = np.flatnonzero(errors <= LENGTH_MARGIN * errors.min())
     return PreslidingChoice(lengths[near[0]], dict(zip(lengths, errors.tolist(), strict=True)))
 
 
