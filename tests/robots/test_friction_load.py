@@ -67,7 +67,7 @@ def test_the_terms_use_the_gravity_torque_as_load():
 def test_a_file_needs_the_models_keys(tmp_path):
     from vftcli.robots import PROFILES
 
-    text = PROFILES["ur5"].read_text(encoding="utf-8")
+    text = PROFILES["ur10e"].read_text(encoding="utf-8")
     path = tmp_path / "arm.toml"
     model = 'model = "coulomb-logarithmic"'
     path.write_text(text.replace(model, 'model = "coulomb-viscous-load"', 1), encoding="utf-8")

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.robots import load_robot
+from vftcli.robots import JointFriction, load_robot
 from vftcli.robots.friction import friction_torque
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.friction import true_friction
 from vftcli.simulation.scenario import FrictionSpec
 
@@ -51,13 +52,64 @@ def test_a_share_of_the_sigmoid_can_stick():
     assert whole.has_sigmoid
 
 
-def test_warmth_thins_the_rise_alone():
-    friction = true_friction(load_robot("ur5"), FrictionSpec())
-    warm = replace(friction, viscous=np.ones(6)).with_viscous_factor(0.7)
-    np.testing.assert_allclose(warm.viscous, np.full(6, 0.7))
-    np.testing.assert_allclose(warm.logarithmic, 0.7 * friction.logarithmic)
-    assert friction.logarithmic.all()
-    np.testing.assert_array_equal(warm.coulomb, friction.coulomb)
+def test_warmth_changes_all_but_the_offset():
+    friction = true_friction(load_robot("ur10e"), FrictionSpec(presliding=0.5))
+    friction = replace(friction, offset=np.full(6, 0.3))
+    factor = np.linspace(0.7, 1.2, 6)
+    warm, dq = friction.warmed(factor), np.linspace(-1.0, 1.5, 6)
+    np.testing.assert_allclose(warm.smooth(dq)[0] - 0.3, factor * (friction.smooth(dq)[0] - 0.3))
+    np.testing.assert_allclose(warm.dry(dq, 9.0 * dq), factor * friction.dry(dq, 9.0 * dq))
+    np.testing.assert_allclose(warm.presliding, factor * friction.presliding)
+    np.testing.assert_array_equal(warm.offset, friction.offset)
+
+
+LINE = JointFriction(
+    model="points",
+    parameters={"load_coulomb": 0.1, "presliding": 0.5, "presliding_length": 1e-3},
+    speeds=(0.01, 0.5, 1.5, 3.2),
+    torques=(5.73, 9.32, 13.58, 18.72),
+)
+
+
+def test_a_bent_line_is_the_models_and_bends_where_it_does():
+    """The share of the plant's friction by velocity and load, against the model's function."""
+    robot = load_robot("ur5").without_friction()
+    short = JointFriction(model="points", speeds=(0.1, 1.0), torques=(1.0, 3.0))
+    robot = replace(robot, friction=(LINE, short, LINE, short, LINE, JointFriction()))
+    friction = true_friction(robot, FrictionSpec())
+    load = np.array([-30.0, 20.0, 5.0, 0.0, 1.0, 2.0])
+    for speed in (-4.0, -1.0, -0.3, -0.05, 0.05, 0.3, 1.0, 4.0):
+        # five times the smoothing: tanh is 1 to 1e-4 of the Coulomb torque
+        dq = np.full(6, speed)
+        torque = friction.smooth(dq)[0] + np.sign(speed) * friction.dry(dq, load)
+        model = friction_torque(robot.friction, dq[None], load[None])[0]
+        np.testing.assert_allclose(torque, model, rtol=2e-4)
+        h = 1e-6
+        rise = (friction.smooth(dq + h)[0] - friction.smooth(dq - h)[0]) / (2 * h)
+        # differences of 20 N·m over 2e-6 rad/s: rounding
+        np.testing.assert_allclose(friction.smooth(dq)[1], rise, atol=1e-8)
+    np.testing.assert_array_equal(friction.presliding, [0.5, 0, 0.5, 0, 0.5, 0])
+
+
+def test_a_share_of_the_coulomb_torque_gives_before_it_slides():
+    robot = load_robot("ur10e")
+    whole, part = (true_friction(robot, FrictionSpec(presliding=s)) for s in (0.0, 0.6))
+    np.testing.assert_allclose(part.presliding, 0.6 * whole.coulomb)
+    np.testing.assert_allclose(part.coulomb + part.presliding, whole.coulomb)
+    np.testing.assert_array_equal(part.presliding_length, 3e-4)
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        (FrictionSpec(presliding=1.2), "friction.presliding is 1.2; it is a share, 0 to 1"),
+        (FrictionSpec(presliding=-0.1), "friction.presliding is -0.1"),
+        (FrictionSpec(presliding_length=0.0), "friction.presliding_length is 0 rad"),
+    ],
+)
+def test_what_no_joint_has_is_refused(spec, words):
+    with pytest.raises(ParameterError, match=words):
+        true_friction(load_robot("ur5"), spec)
 
 
 def test_a_frictionless_arm_has_none():

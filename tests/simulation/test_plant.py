@@ -1,5 +1,6 @@
 """The plant against inverse dynamics, energy, its own refinement, and another engine."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -117,7 +118,12 @@ def test_joint_below_breakaway_does_not_move_at_all() -> None:
     plant = Plant(robot.model, friction, q, still, 1e-3)
     data = robot.model.createData()
     gravity = pin.computeGeneralizedGravity(robot.model, data, q)
-    breakaway = 1.3 * friction.coulomb
+    breakaway = friction.dry(still, gravity)
+    # the Stribeck peak, and on joint 2 the load that the profile says
+    np.testing.assert_allclose(
+        breakaway, 1.3 * friction.coulomb + friction.load_coulomb * np.abs(gravity)
+    )
+    assert friction.load_coulomb[1] * abs(gravity[1]) > 1.0
     for _ in range(500):
         plant.advance(gravity + 0.999 * breakaway * np.array([1, -1, 1, -1, 1, -1]))
     np.testing.assert_array_equal(plant.v, still)
@@ -196,3 +202,27 @@ def test_follows_another_engine(logs: Path) -> None:
     # two samples of 8 ms, which no interpolation of the log can place
     assert np.median(worst) < 1e-3
     assert np.max(worst) < 3e-3
+
+
+def test_presliding_friction_is_a_spring_that_yields() -> None:
+    """A drive torque below it deflects the joint by torque / stiffness; above it the joint goes."""
+    robot = load_robot("ur5").without_friction()
+    giving, reach, n = 4.0, 1e-3, robot.joints
+    spec = FrictionSpec(presliding_length=reach)
+    # viscous friction to settle in; the spring is 4 kN·m/rad, the lightest inertia .2 kg·m²
+    true = replace(
+        true_friction(robot, spec), presliding=np.full(n, giving), viscous=np.full(n, 50.0)
+    )
+    q = np.array([0.3, -1.2, 1.0, -0.4, 0.5, 0.0])
+    plant = Plant(robot.model, true, q, np.zeros(n), 1e-3)
+    for _ in range(1500):
+        gravity = plant.pin.computeGeneralizedGravity(plant.model, plant.data, plant.q)
+        plant.advance(gravity + 0.5 * giving)
+    # held at half the reach; 1.5 s are 30 time constants of the slowest joint
+    np.testing.assert_allclose(plant.q - q, 0.5 * reach, rtol=1e-3)
+    np.testing.assert_allclose(plant.friction, 0.5 * giving, rtol=1e-3)
+    for _ in range(300):
+        gravity = plant.pin.computeGeneralizedGravity(plant.model, plant.data, plant.q)
+        plant.advance(gravity + 1.5 * giving)
+    assert np.all(plant.q - q > 2.0 * reach)
+    np.testing.assert_allclose(plant.q_mid - plant.centre, reach, rtol=1e-9)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.robots import Robot, load_robot
+from vftcli.robots.temperature import COLDEST, REFERENCE, WARMEST, friction_factor
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.mismatch import TrueArm, build_arm
@@ -102,6 +103,12 @@ class Arm:
         """
         if seed < 0:
             raise ParameterError(f"the seed is {seed}; it must be zero or positive")
+        for name in ("temperature_begin", "temperature_end"):
+            value = getattr(scenario.friction, name)
+            if value is not None and not COLDEST <= value <= WARMEST:
+                raise ParameterError(
+                    f"friction.{name} is {value:g} °C; a joint has {COLDEST:g} to {WARMEST:g} °C"
+                )
         self.scenario, self.seed = scenario, seed
         self.robot: Robot = load_robot(scenario.robot)
         self.seeds: dict[str, Any] = dict(
@@ -161,7 +168,7 @@ class Arm:
         history.q[k], history.v[k], history.tau[k] = plant.q, plant.v, tau
         history.target_q[k], history.target_dq[k], history.target_ddq[k] = q_d, dq_d, ddq_d
         t = (k + 0.5) * plant.step
-        if self.scenario.friction.temperature_coefficient and k % WARMING_STEPS == 0:
+        if k % WARMING_STEPS == 0:
             self.warm_up(t)
         # Contacts cost Jacobians; most steps have none.
         if self.touching.anything(t):
@@ -183,12 +190,26 @@ class Arm:
                 f"of {self.scenario.step:g} s; lower servo.stiffness, a contact's stiffness or step"
             )
 
+    def temperature(self, t: Array) -> Array:
+        """The joints' temperature at some times of the run. (N, n) [°C]
+
+        Args:
+            t: True times. (N,) [s]
+        """
+        spec, friction = self.scenario.friction, self.robot.friction
+        begin = np.array([joint.temperature_at for joint in friction] or [REFERENCE] * len(self.q))
+        if spec.temperature_begin is not None:
+            begin[:] = spec.temperature_begin
+        end = begin if spec.temperature_end is None else np.full_like(begin, spec.temperature_end)
+        share = (t / (self.steps * self.scenario.step))[:, None]
+        found: Array = begin + (end - begin) * share
+        return found
+
     def warm_up(self, t: float) -> None:
-        """Let the viscous friction follow the joints' temperature."""
-        sensing = self.scenario.sensing
-        rise = sensing.warming * (1.0 - np.exp(-t / sensing.warming_time))
-        factor = 1.0 + self.scenario.friction.temperature_coefficient * rise
-        self.plant.true_friction = self.true.friction.with_viscous_factor(max(factor, 0.0))
+        """Let the friction follow the joints' temperature."""
+        factor = friction_factor(self.robot.friction, self.temperature(np.array([t])))
+        if factor is not None:
+            self.plant.true_friction = self.true.friction.warmed(factor[0])
 
     def close(self) -> History:
         """The history so far, with the state after the last step as its closing row.

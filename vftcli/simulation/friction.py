@@ -1,21 +1,31 @@
-"""The true friction of the joints: dry friction that can stick, and a smooth part.
+"""The true friction of the joints: dry friction that can stick, presliding, and a smooth part.
 
-τ_f = λ + smooth(q̇), with λ ∈ F_c(q̇)·Sgn(q̇) set-valued at rest (Coulomb and Stribeck) and
-smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + a ln(1 + |q̇|/b) sign(q̇) + sigmoid(q̇).
+τ_f = λ + a·s(q) + smooth(q̇), with λ ∈ F_c(q̇, g)·Sgn(q̇) set-valued at rest (Coulomb, load and
+Stribeck), s the state of the play operator (`vftcli.robots.presliding`) and
+smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + a ln(1 + |q̇|/b) sign(q̇)
++ sign(q̇) Σ_k m_k max(|q̇| − v_k, 0) + sigmoid(q̇).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vftcli.robots import JointFriction, Robot
+from vftcli.robots.bounds import out_of_bounds
 from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.simulation.scenario import FrictionSpec
 
 SHAPES = (
     *("coulomb", "viscous", "quadratic", "offset", "logarithmic", "logarithmic_velocity"),
-    *("amplitude", "slope", "shift"),
+    *("amplitude", "slope", "shift", "load_coulomb", "presliding", "presliding_length"),
 )
+
+DRY = ("coulomb", "load_coulomb", "presliding", "amplitude")
+"""What does not grow with the speed for ever."""
+WET = ("viscous", "quadratic", "logarithmic", "bend_slopes")
+"""What does: the film of oil."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +42,11 @@ class TrueFriction:
         amplitude: Amplitude of the sigmoid. [N·m]
         slope: Slope of the sigmoid. [s/rad]
         shift: Shift of the sigmoid. [rad/s]
+        load_coulomb: Growth of the dry friction with the gravity torque carried. [1]
+        presliding: Presliding friction at full deflection. [N·m]
+        presliding_length: Deflection s₀ at which it is full. [rad]
+        bends: Speeds v_k at which the rise of a bent line changes. (K, n) [rad/s]
+        bend_slopes: By how much it changes there, m_k. (K, n) [N·m·s/rad]
         stribeck: Excess of the breakaway torque, as a share of `coulomb`.
         stribeck_velocity: Velocity over which it fades. [rad/s]
     """
@@ -45,19 +60,31 @@ class TrueFriction:
     amplitude: Array
     slope: Array
     shift: Array
+    load_coulomb: Array
+    presliding: Array
+    presliding_length: Array
+    bends: Array
+    bend_slopes: Array
     stribeck: float = 0.0
     stribeck_velocity: float = 0.05
 
-    def dry(self, dq: Array) -> Array:
+    def dry(self, dq: Array, load: Array | None = None) -> Array:
         """Largest dry friction torque at velocities `dq` (n,) [rad/s]. (n,) [N·m]
 
         F_c (1 + s exp(−(q̇/v_s)²)), the Stribeck curve of Armstrong-Hélouvry, Dupont and Canudas
-        de Wit, Automatica 30 (1994).
+        de Wit, Automatica 30 (1994), and f_l |load| with the gravity torque that the gears carry.
+
+        Args:
+            dq: Velocities. (n,) [rad/s]
+            load: Gravity torques, None for none. (n,) [N·m]
         """
-        if self.stribeck == 0.0:
-            return self.coulomb
-        fade: Array = np.exp(-((dq / self.stribeck_velocity) ** 2))
-        return self.coulomb * (1.0 + self.stribeck * fade)
+        dry = self.coulomb
+        if self.stribeck != 0.0:
+            fade: Array = np.exp(-((dq / self.stribeck_velocity) ** 2))
+            dry = dry * (1.0 + self.stribeck * fade)
+        if load is not None:
+            dry = dry + self.load_coulomb * np.abs(load)
+        return dry
 
     def smooth(self, dq: Array) -> tuple[Array, Array]:
         """The smooth part and its derivative at `dq` (n,) [rad/s]. (n,) [N·m], (n,) [N·m·s/rad]"""
@@ -68,6 +95,10 @@ class TrueFriction:
             bend = self.logarithmic_velocity
             torque = torque + self.logarithmic * np.log1p(speed / bend) * np.sign(dq)
             slope = slope + self.logarithmic / (bend + speed)
+        if len(self.bends):
+            beyond = np.maximum(speed - self.bends, 0.0)
+            torque = torque + np.sum(self.bend_slopes * beyond, axis=0) * np.sign(dq)
+            slope = slope + np.sum(np.where(beyond > 0.0, self.bend_slopes, 0.0), axis=0)
         if self.has_sigmoid:
             bell = 1.0 / (1.0 + np.exp(-self.slope * (dq + self.shift)))
             rest = 1.0 / (1.0 + np.exp(-self.slope * self.shift))
@@ -77,31 +108,67 @@ class TrueFriction:
         return torque, np.maximum(slope, 0.0)
 
     @property
+    def is_loaded(self) -> bool:
+        """Whether any joint rubs more under load; gravity is left out where none does."""
+        return bool(self.load_coulomb.any())
+
+    @property
     def has_sigmoid(self) -> bool:
         """Whether any joint has sigmoid friction; exponentials are left out where none has."""
         return bool(self.amplitude.any())
 
-    def with_viscous_factor(self, factor: float) -> "TrueFriction":
-        """The friction with its rise multiplied by `factor`; warm oil is thinner."""
-        return replace(self, viscous=self.viscous * factor, logarithmic=self.logarithmic * factor)
+    def warmed(self, factor: Array) -> "TrueFriction":
+        """The friction, its offset apart, multiplied by a factor of each joint. (n,) [1]"""
+        return replace(self, **{name: getattr(self, name) * factor for name in (*DRY, *WET)})
 
 
 def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
     """The profile's friction curve with what it leaves out: stiction and the Stribeck peak.
 
     The profile's tanh(q̇/smoothing) becomes a real dry friction. Of a sigmoid, the share
-    `spec.sticking` becomes dry friction of the same plateau, half the amplitude to each side.
+    `spec.sticking` becomes dry friction of the same plateau, half the amplitude to each side; of
+    the Coulomb torque the share `spec.presliding` becomes presliding friction.
+
+    Raises:
+        ParameterError: If a share or the presliding length is beyond what joints have.
     """
+    if not 0.0 <= spec.presliding <= 1.0:
+        raise ParameterError(f"friction.presliding is {spec.presliding:g}; it is a share, 0 to 1")
+    if why := out_of_bounds("presliding_length", [spec.presliding_length]):
+        raise ParameterError(f"friction.{why}")
     n = robot.joints
     table = {name: np.zeros(n) for name in SHAPES}
     table["logarithmic_velocity"] += 1.0  # where there is no rise, any velocity will do
-    joints = robot.friction or (JointFriction(),) * n
-    if spec.enabled:
-        for j, joint in enumerate(joints):
-            for name, value in joint.parameters.items():
-                if name in table:
-                    table[name][j] = value
+    table["presliding_length"] += spec.presliding_length
+    joints = (robot.friction if spec.enabled else ()) or (JointFriction(),) * n
+    for j, joint in enumerate(joints):
+        for name, value in joint.parameters.items():
+            if name in table:
+                table[name][j] = value
+        table["coulomb"][j] += sum(joint.torques[:1])
     dry = spec.sticking * table["amplitude"]
     table["amplitude"] = table["amplitude"] - dry
     table["coulomb"] = table["coulomb"] + 0.5 * dry
+    giving = spec.presliding * table["coulomb"]
+    table["coulomb"] = table["coulomb"] - giving
+    table["presliding"] = table["presliding"] + giving
+    table["bends"], table["bend_slopes"] = bends_of(joints)
     return TrueFriction(**table, stribeck=spec.stribeck, stribeck_velocity=spec.stribeck_velocity)
+
+
+def bends_of(joints: Sequence[JointFriction]) -> tuple[Array, Array]:
+    """Where bent lines bend, and by how much their slopes change there. (K, n), (K, n)
+
+    Lines of fewer points than others bend by nothing at speed zero.
+
+    Args:
+        joints: One model a joint.
+    """
+    most = max(max(len(joint.speeds) for joint in joints) - 1, 0)
+    bends, changes = np.zeros((2, most, len(joints)))
+    for j, joint in enumerate(joints):
+        if joint.speeds:
+            slopes = np.diff(joint.torques) / np.diff(joint.speeds)
+            bends[: len(slopes), j] = joint.speeds[:-1]
+            changes[: len(slopes), j] = np.diff(slopes, prepend=0.0)
+    return bends, changes

@@ -9,7 +9,7 @@ from vftcli.robots.bounds import out_of_bounds
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.friction import TrueFriction, true_friction
+from vftcli.simulation.friction import DRY, WET, TrueFriction, true_friction
 from vftcli.simulation.scenario import MismatchSpec, PayloadSpec, Scenario
 
 
@@ -116,11 +116,5 @@ def perturbed_friction(
     """Return friction whose dry and viscous levels err independently, joint by joint."""
     n = len(friction.coulomb)
     dry, wet = (1.0 + deviate(rng, sizes.friction, (n,)) for _ in range(2))
-    return replace(
-        friction,
-        coulomb=friction.coulomb * dry,
-        amplitude=friction.amplitude * dry,
-        viscous=friction.viscous * wet,
-        quadratic=friction.quadratic * wet,
-        logarithmic=friction.logarithmic * wet,
-    )
+    levels = {**dict.fromkeys(DRY, dry), **dict.fromkeys(WET, wet)}
+    return replace(friction, **{name: getattr(friction, name) * k for name, k in levels.items()})

@@ -26,7 +26,8 @@ class Plant:
     (M(q_m) + h/2 D) (v⁺ − v) = h (τ + τ_ext − C v_m − g − f_smooth(v)) − λ,   q⁺ = q + h/2 (v + v⁺)
 
     where λ is the impulse of dry friction (`stiction`) and D the slope of the smooth friction. It
-    is of second order in h while no joint changes between sticking and sliding.
+    is of second order in h while no joint changes between sticking and sliding. Presliding
+    friction, a spring that yields, is taken at q_m like gravity.
 
     Attributes:
         q, v: Positions and velocities now. (n,) [rad, rad/s]
@@ -34,6 +35,7 @@ class Plant:
             M a + C v + g = τ + τ_ext − τ_f holds exactly. (n,)
         friction: Friction torque over the last step, against positive motion. (n,) [N·m]
         external: Torque of the contacts over the last step. (n,) [N·m]
+        centre: c of the play operator. (n,) [rad]
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class Plant:
         self.q_mid, self.v_mid = self.q.copy(), self.v.copy()
         self.a = np.zeros_like(self.q)
         self.moved = False
+        self.centre = self.q.copy()
         self.friction = np.zeros_like(self.q)
         self.external = np.zeros_like(self.q)
         self.signs = np.where(friction.coulomb > 0.0, np.sign(self.v), 1.0)
@@ -82,15 +85,26 @@ class Plant:
         v_mid[self.signs == 0.0] = 0.0
         bias = pin.nonLinearEffects(model, data, q_mid, v_mid)
         M = pin.crba(model, data, q_mid)
-        smooth, slope = self.true_friction.smooth(self.v)
+        true = self.true_friction
+        smooth, slope = true.smooth(self.v)
+        smooth = smooth + self.presliding(q_mid)
         torque = tau - bias - smooth
         if external is not None:
             pin.computeJointJacobians(model, data, q_mid)
             self.external = external(model, data, v_mid)
             torque = torque + self.external
         M.flat[:: len(slope) + 1] += 0.5 * h * slope
-        limit = h * self.true_friction.dry(self.v)
+        load = pin.computeGeneralizedGravity(model, data, q_mid) if true.is_loaded else None
+        limit = h * true.dry(self.v, load)
         after, impulse, self.signs = slide_or_stick(M, h * torque, self.v, limit, self.signs)
         self.friction = smooth + 0.5 * slope * (after - self.v) + impulse / h
         self.q_mid, self.v_mid = q_mid, v_mid
         return after
+
+    def presliding(self, q: Array) -> Array:
+        """Presliding friction at positions `q` (n,) [rad], which the play follows. (n,) [N·m]"""
+        true = self.true_friction
+        reach = true.presliding_length
+        self.centre = np.clip(self.centre, q - reach, q + reach)
+        torque: Array = true.presliding * (q - self.centre) / reach
+        return torque

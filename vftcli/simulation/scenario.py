@@ -34,14 +34,22 @@ class FrictionSpec:
         stribeck: Torque at breakaway above the sliding Coulomb torque, as a share of it.
         stribeck_velocity: Velocity over which that excess fades. [rad/s]
         sticking: For sigmoid friction: share of its amplitude that is dry and can stick.
-        temperature_coefficient: Change of the viscous part per degree of warming. [1/K]
+        presliding: Share of the Coulomb torque that is presliding friction.
+        presliding_length: Deflection at which that is full. [rad]
+        temperature_begin: Temperature of the joints at the start; not given, that at which the
+            robot's friction was taken. [°C]
+        temperature_end: Temperature at the end, on a straight line from the start; not given, that
+            at the start. Friction follows it where the robot has a law. [°C]
     """
 
     enabled: bool = True
     stribeck: float = 0.0
     stribeck_velocity: float = 0.05
     sticking: float = 0.0
-    temperature_coefficient: float = 0.0
+    presliding: float = 0.0
+    presliding_length: float = 3e-4
+    temperature_begin: float | None = None
+    temperature_end: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,9 +142,6 @@ class SensingSpec:
         repeated: Share of rows that repeat the row before.
         jitter: Standard deviation of the time stamps. [s]
         clock_drift: Relative rate error of the log's clock (0.003: 0.3 % fast).
-        temperature: Joint temperature at the start. [°C]
-        warming: Rise of the joint temperature at the end of warming up. [K]
-        warming_time: Time constant of that rise. [s]
         vendor_cutoff: Cut-off of the vendor's own external-force estimate. [Hz]
         start: The first time stamp on the controller's clock. [s]
     """
@@ -150,9 +155,6 @@ class SensingSpec:
     repeated: float = 0.0
     jitter: float = 0.0
     clock_drift: float = 0.0
-    temperature: float = 27.0
-    warming: float = 0.0
-    warming_time: float = 600.0
     vendor_cutoff: float = 5.0
     start: float = 100.0
 

@@ -68,10 +68,8 @@ def check_sensing(spec: SensingSpec) -> None:
         raise ParameterError(f"sensing.{bad[0]} is {sizes[bad[0]]:g}; it must not be negative")
     if spec.torque not in {"average", "instant"}:
         raise ParameterError(f"sensing.torque is {spec.torque!r}; it is average or instant")
-    if abs(spec.clock_drift) >= 0.5 or min(spec.warming_time, spec.vendor_cutoff) <= 0:
-        raise ParameterError(
-            "sensing.clock_drift must be below 0.5, warming_time and vendor_cutoff positive"
-        )
+    if abs(spec.clock_drift) >= 0.5 or spec.vendor_cutoff <= 0:
+        raise ParameterError("sensing.clock_drift must be below 0.5, vendor_cutoff positive")
 
 
 def log_rate(spec: SensingSpec, robot: Robot) -> float:
@@ -151,12 +149,16 @@ def measure_run(arm: Arm, samples: Samples) -> Measured:
         torque = current * robot.torque_constant
     else:
         torque = seen + spec.noise * known_noise(robot.noise.tau) * noise
-    warm = spec.warming * (1.0 - np.exp(-samples.time / spec.warming_time))
-    temperature = np.repeat((spec.temperature + warm)[:, None], shape[1], axis=1)
     stamp = with_jitter(samples.stamp, spec.jitter, rng)
     rows = rows_logged(len(stamp), spec, rng)
     return Measured(
-        stamp=stamp, q=q, dq=dq, torque=torque, current=current, temperature=temperature, rows=rows
+        stamp=stamp,
+        q=q,
+        dq=dq,
+        torque=torque,
+        current=current,
+        temperature=arm.temperature(samples.time),
+        rows=rows,
     )
 
 

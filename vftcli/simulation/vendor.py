@@ -9,6 +9,7 @@ import numpy as np
 
 from vftcli.robots import Robot
 from vftcli.robots.friction import friction_torque
+from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.motion import Reference
@@ -33,17 +34,23 @@ class Vendor:
 
 
 def vendor_view(arm: Arm, samples: Samples, measured: Measured) -> Vendor:
-    """Evaluate the controller's nominal model along a run."""
+    """Evaluate the controller's nominal model along a run.
+
+    Its friction knows load and temperature, as the controllers' of Universal Robots do, and no
+    presliding.
+    """
     nominal: Robot = arm.true.nominal
     target = Reference(samples.target_q, samples.target_dq, samples.target_ddq)
+    still, warm = np.zeros_like(samples.target_q), measured.temperature
+    load = momentum_terms(nominal.loaded_chain, samples.target_q, still).gravity
     target_torque = rigid_torque(nominal.model, target)
     target_current = None
     if nominal.torque_constant is not None:
-        full = target_torque + friction_torque(nominal.friction, samples.target_dq)
-        target_current = full / nominal.torque_constant
+        rubs = friction_torque(nominal.friction, samples.target_dq, load, temperature=warm)
+        target_current = (target_torque + rubs) / nominal.torque_constant
     motion = Reference(measured.q, measured.dq, samples.target_ddq)
     model_torque = rigid_torque(nominal.model, motion)
-    model_torque += friction_torque(nominal.friction, measured.dq)
+    model_torque += friction_torque(nominal.friction, measured.dq, load, temperature=warm)
     spec = arm.scenario.sensing
     step = 1.0 / log_rate(spec, arm.robot)
     residual = first_order_low_pass(measured.torque - model_torque, spec.vendor_cutoff, step)
