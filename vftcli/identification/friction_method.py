@@ -11,8 +11,10 @@ from vftcli.identification.method_result import (
     friction_numbers,
     friction_source,
     held_joints,
+    identified_friction,
     presliding_remark,
     profile_friction,
+    temperature_remarks,
 )
 from vftcli.identification.result import Number, number
 from vftcli.identification.training import Training
@@ -56,14 +58,19 @@ def friction_method(data: Training) -> MethodResult:
             else:
                 found_here = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
                 remarks.append(caution("undetermined-rotor-inertia", where, **found_here))
-        frictions[j] = found.shape.friction(values[:count], friction_source(data, "friction", sd))
+        source = friction_source(data, "friction", sd)
+        frictions[j] = identified_friction(data, j, found.shape, values[:count], source)
         numbers += friction_numbers(j, found.shape, values, sd, profile_friction(robot)[j])
         remarks += check_friction(j, frictions[j], data)
     chain = replace(robot.chain, rotor_inertia=rotor)
     new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
     choices = [c for f in fits if f is not None for c in f.choices]
     return MethodResult(
-        new, numbers, choices, None, [*remarks, *presliding_remark(fits), *held_joints(data)]
+        new,
+        numbers,
+        choices,
+        None,
+        [*remarks, *presliding_remark(fits), *temperature_remarks(data), *held_joints(data)],
     )
 
 

@@ -1,6 +1,7 @@
 """What every method of identification hands back, and the remarks that several of them make."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -43,7 +44,9 @@ def friction_numbers(
     j: int, shape: Shape, values: Array, sd: Array, before: JointFriction
 ) -> list[Number]:
     """Friction coefficients of joint j (from 0) beside those of the profile, one a term."""
-    known = before.parameters
+    known = dict(before.parameters)
+    if before.speeds[: len(shape.speeds)] == shape.speeds:
+        known |= dict(zip(shape.points, before.torques, strict=False))
     return [
         number(
             j, term, value, error, known.get(term, np.nan), bool(error < DETERMINED * abs(value))
@@ -109,6 +112,32 @@ def friction_source(data: Training, method: str, sd: Array) -> str:
     """Where a joint's friction comes from, in words for the robot file."""
     errors = ", ".join(f"{value:.2g}" for value in sd)
     return f"identified ({method}) from {data.source}; standard deviations {errors}"
+
+
+def identified_friction(
+    data: Training, j: int, shape: Shape, values: Array, source: str
+) -> JointFriction:
+    """Friction of joint j (from 0) by its fit, at the temperature for which the profile's holds."""
+    before = profile_friction(data.robot)[j]
+    return replace(
+        shape.friction(values, source),
+        temperature=before.temperature,
+        temperature_at=before.temperature_at,
+    )
+
+
+def temperature_remarks(data: Training) -> list[Remark]:
+    """What the logs' joint temperatures were used for, or what was taken without them."""
+    laws = [joint for joint in data.robot.friction if joint.temperature]
+    remarks = []
+    for motion, columns in zip(data.motions, data.columns, strict=True):
+        where = Where(motion.recording.name)
+        if laws and columns.warmth is None:
+            remarks.append(caution("unmeasured-temperature", where, at_C=laws[0].temperature_at))
+        elif columns.warmth is not None:
+            span = np.quantile(columns.warmth, (0.0, 1.0)).tolist()
+            remarks.append(fact("friction-by-temperature", where, factors=span))
+    return remarks
 
 
 def profile_friction(robot: Robot) -> tuple[JointFriction, ...]:

@@ -20,7 +20,13 @@ from vftcli.identification.friction_fit import (
 )
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.least_squares import ColumnFit, fit_column
-from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
+from vftcli.identification.processing import (
+    PreparedLog,
+    Processing,
+    friction_warmth,
+    gravity_torque,
+    prepare,
+)
 from vftcli.identification.scoring import rigid_torque
 from vftcli.robots.drive import drive_torque, uses_current
 from vftcli.robots.robot import Robot
@@ -86,7 +92,7 @@ def prepare_training(
         )
     excited = find_excitation(motions)
     moved = tuple(m for m in motions if m.samples > 1)
-    columns = tuple(FrictionColumns(m, np.abs(gravity_torque(robot, m.recording.q))) for m in moved)
+    columns = tuple(friction_columns(m, robot) for m in moved)
     digests = ", ".join(f"{r.name} (sha256 {r.source.sha256 or 'unknown'})" for r in recordings)
     return Training(
         robot=robot,
@@ -98,6 +104,12 @@ def prepare_training(
         source=digests,
         fit_constants=fit_constants,
     )
+
+
+def friction_columns(motion: PreparedLog, robot: Robot) -> FrictionColumns:
+    """A log's friction columns, by the robot's gravity and its joints' temperatures."""
+    load = np.abs(gravity_torque(robot, motion.recording.q))
+    return FrictionColumns(motion, load, friction_warmth(motion.recording, robot))
 
 
 class JointFit(NamedTuple):

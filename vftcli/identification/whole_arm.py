@@ -9,23 +9,25 @@ from vftcli.identification.base_parameters import BaseParameters, base_parameter
 from vftcli.identification.clean_fit import fit_without_contacts
 from vftcli.identification.consistent import fit_consistent, nearest_physical
 from vftcli.identification.friction_fit import PLAIN, is_dissipative
-from vftcli.identification.friction_shapes import FrictionColumns, Shape, round_digits
+from vftcli.identification.friction_shapes import Shape, round_digits
 from vftcli.identification.method_result import (
     MethodResult,
     check_friction,
     friction_numbers,
     friction_source,
     held_joints,
+    identified_friction,
     presliding_remark,
     profile_friction,
+    temperature_remarks,
 )
-from vftcli.identification.processing import gravity_torque
 from vftcli.identification.scoring import rigid_torque
 from vftcli.identification.stacking import ParameterColumns, Triangles, WeightedLog, stack
 from vftcli.identification.training import (
     JointFit,
     Training,
     fit_frictions,
+    friction_columns,
 )
 from vftcli.robots.regressor import chain_parameters, with_parameters
 from vftcli.robots.robot import JointFriction, Robot
@@ -69,13 +71,19 @@ def whole_arm(data: Training, method: str) -> MethodResult:
             # Beside the links' errors a rise may turn into a fall; the joint's own fit does not.
             if not is_dissipative(shape, values, data.top_speed(j)):
                 values = found.fit.values[: len(shape.terms)]
-            frictions[j] = shape.friction(values, friction_source(data, method, sd))
+            frictions[j] = identified_friction(
+                data, j, shape, values, friction_source(data, method, sd)
+            )
             numbers += friction_numbers(j, shape, values, sd, profile_friction(data.robot)[j])
             remarks += check_friction(j, frictions[j], data)
     robot = with_vector(data.robot, layout, x, tuple(frictions))
     choices = [c for f in fits if f is not None for c in f.choices]
     return MethodResult(
-        robot, numbers, choices, base, [*remarks, *presliding_remark(fits), *held_joints(data)]
+        robot,
+        numbers,
+        choices,
+        base,
+        [*remarks, *presliding_remark(fits), *temperature_remarks(data), *held_joints(data)],
     )
 
 
@@ -104,9 +112,7 @@ def stack_training(
 def with_links(data: Training, layout: ParameterColumns, x: Array) -> Training:
     """The training data with other links: their rigid-body torque, their gravity as load."""
     robot = with_vector(data.robot, layout, x, data.robot.friction)
-    columns = (
-        FrictionColumns(m, np.abs(gravity_torque(robot, m.recording.q))) for m in data.motions
-    )
+    columns = (friction_columns(m, robot) for m in data.motions)
     return replace(
         data,
         columns=tuple(columns),
