@@ -17,7 +17,8 @@ from vftcli.identification.processing import PreparedLog
 from vftcli.identification.scoring import apparent_load, predicted_torque
 from vftcli.identification.stacking import ParameterColumns, WeightedLog, residuals
 from vftcli.identification.training import JointFit, Training, all_residuals, fit_frictions
-from vftcli.robots.friction import dry_torque
+from vftcli.identification.warm_up import warm_up_remarks
+from vftcli.robots.friction import dry_friction
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
@@ -61,6 +62,7 @@ def fit_without_contacts(
     if remarks:
         fits = fit_frictions(data, weights)
         left = all_residuals(data, fits)
+    remarks += warm_up_remarks(data, left, weights, fits)
     doubts = model_doubts(data, left, weights)
     if strict and any(doubt.code == "unexplained-torque" for doubt in doubts):
         shares = links_explain(data, fits, left, weights)
@@ -180,6 +182,7 @@ def fitted_dry_friction(data: Training, log: int, fits: Sequence[JointFit | None
     out = np.zeros(motion.q.shape)
     for j, fit in enumerate(fits):
         if fit is not None:
-            values = dict(zip(fit.shape.terms, fit.fit.values, strict=False))
-            out[:, j] = dry_torque(values, columns.load[motion.kept, j])
+            load = columns.load[motion.kept, j]
+            growth = fit.friction.parameters.get("load_coulomb", 0.0)
+            out[:, j] = dry_friction((fit.friction,), 1) + growth * load
     return out

@@ -36,6 +36,11 @@ def friction_method(data: Training) -> MethodResult:
         if found is None:
             continue
         count, where = len(found.shape.terms), Where(joints=(j + 1,))
+        if found.is_kept:
+            found_rms, profile_rms = found.errors
+            missed = {"found_Nm": found_rms, "profile_Nm": profile_rms}
+            remarks.append(caution("profile-kept", where, **missed))
+            continue
         values, sd = found.fit.values.copy(), found.fit.sd.copy()
         if data.fit_constants and not found.constant:
             remarks.append(caution("unloaded-drive-constant", where))

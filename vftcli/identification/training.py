@@ -27,9 +27,9 @@ from vftcli.identification.processing import (
     gravity_torque,
     prepare,
 )
-from vftcli.identification.scoring import rigid_torque
+from vftcli.identification.scoring import predicted_torque, rigid_torque
 from vftcli.robots.drive import drive_torque, uses_current
-from vftcli.robots.robot import Robot
+from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
@@ -48,6 +48,7 @@ class Training:
         motions: Those that move, filtered and decimated.
         columns: Their friction columns.
         rigid: Torque of the profile's rigid body. (M, n) each [N·m]
+        rubbing: Torque of its rotors and its friction. (M, n) each [N·m]
         excited: Which joints move.
         source: The logs in words, for the robot file.
         fit_constants: Whether drive constants are unknowns of the friction method.
@@ -58,6 +59,7 @@ class Training:
     motions: tuple[PreparedLog, ...]
     columns: tuple[FrictionColumns, ...]
     rigid: tuple[Array, ...]
+    rubbing: tuple[Array, ...]
     excited: Excitation
     source: str
     fit_constants: bool = False
@@ -94,12 +96,14 @@ def prepare_training(
     moved = tuple(m for m in motions if m.samples > 1)
     columns = tuple(friction_columns(m, robot) for m in moved)
     digests = ", ".join(f"{r.name} (sha256 {r.source.sha256 or 'unknown'})" for r in recordings)
+    rigid = tuple(rigid_torque(robot, m) for m in moved)
     return Training(
         robot=robot,
         recordings=tuple(recordings),
         motions=moved,
         columns=columns,
-        rigid=tuple(rigid_torque(robot, m) for m in moved),
+        rigid=rigid,
+        rubbing=tuple(predicted_torque(robot, m) - r for m, r in zip(moved, rigid, strict=True)),
         excited=excited,
         source=digests,
         fit_constants=fit_constants,
@@ -121,6 +125,8 @@ class JointFit(NamedTuple):
         choices: The candidates and their errors.
         constant: Whether the drive constant was fitted too.
         presliding: The arm's presliding length, which all joints share.
+        errors: RMS of what the model misses of stretches left out, and what the profile's friction
+            and rotor miss there; NaN where they were not compared. [N·m]
     """
 
     shape: Shape
@@ -128,6 +134,17 @@ class JointFit(NamedTuple):
     choices: list[ShapeChoice]
     constant: bool
     presliding: PreslidingChoice
+    errors: tuple[float, float] = (np.nan, np.nan)
+
+    @property
+    def friction(self) -> JointFriction:
+        """The joint's friction by this fit."""
+        return self.shape.friction(self.fit.values[: len(self.shape.terms)])
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the profile's friction and rotor predict at least as well."""
+        return self.errors[1] <= self.errors[0]
 
 
 def fit_frictions(data: Training, weights: Sequence[Array]) -> list[JointFit | None]:
@@ -154,7 +171,11 @@ def fit_joint(
     given = data_of_joint(data, j, weights, constant)
     shape, choices = choose_shape(j, given, presliding.length)
     fit = fit_column(given.columns(j, shape), given.y, given.weights)
-    return JointFit(shape, fit, choices, constant, presliding)
+    errors = (np.nan, np.nan)
+    if given.profile is not None and choices:
+        miss = float(np.sum(fit.weights * (given.y - given.profile) ** 2) / np.sum(fit.weights))
+        errors = (next(c.error for c in choices if c.chosen), float(np.sqrt(miss)))
+    return JointFit(shape, fit, choices, constant, presliding, errors)
 
 
 def data_of_joint(data: Training, j: int, weights: Sequence[Array], constant: bool) -> JointData:
@@ -180,6 +201,7 @@ def data_of_joint(data: Training, j: int, weights: Sequence[Array], constant: bo
         load_spread=float(np.std(load)),
         reverses=bool(data.excited.reverses[j]),
         speed_limit=data.top_speed(j),
+        profile=None if constant else np.concatenate([r[:, j] for r in data.rubbing]),
     )
 
 

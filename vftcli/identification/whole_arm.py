@@ -33,7 +33,10 @@ from vftcli.robots.regressor import chain_parameters, with_parameters
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import Remark, caution, fact
+
+NARROW = 0.7
+"""Share of undetermined base parameters from which on a motion tells the links too little."""
 
 
 def whole_arm(data: Training, method: str) -> MethodResult:
@@ -91,7 +94,8 @@ def base_remark(base: BaseParameters, layout: ParameterColumns) -> Remark:
     """How many base parameters the logs leave open; friction coefficients are not counted."""
     count = len(base.values) - (layout.size - layout.inertial - layout.rotors)
     open_ones = sum(not known for known in base.determined[:count])
-    return fact("undetermined-base-parameters", count=count, undetermined=open_ones)
+    level = caution if open_ones > NARROW * count else fact
+    return level("undetermined-base-parameters", count=count, undetermined=open_ones)
 
 
 def stack_training(
