@@ -173,7 +173,7 @@ def choose_presliding(joints: Sequence[tuple[int, JointData]]) -> PreslidingChoi
     return PreslidingChoice(lengths[near[0]], dict(zip(lengths, errors.tolist(), strict=True)))
 
 
-def choose_shape(j: int, data: JointData, length: float) -> tuple[Shape, list[ShapeChoice]]:
+def choose_shape(j: int, data: JointData, length: float = 0.0) -> tuple[Shape, list[ShapeChoice]]:
     """Choose a joint's friction model by cross-validation, simplest of the nearly best.
 
     First the smoothing is chosen with the richest plain model, then the bend of the logarithm,
