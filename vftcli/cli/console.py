@@ -61,6 +61,8 @@ def health_of(library: "Library", *, anyway: bool, fitting: bool = True) -> "Exa
         if codes := dict.fromkeys(f.code for f in examination.refusals(fitting=fitting)):
             say(f"MEANINGLESS unless this is wrong, and made with --anyway: {', '.join(codes)}")
         say(health_line(examination, named=len(library) > 1))
+        for assumption in examination.assumptions:
+            say(f"note: {examination.recording.name}: {assumption}")
 
     return Examiner(anyway=anyway, fitting=fitting, tell=tell)
 

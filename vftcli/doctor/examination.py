@@ -8,6 +8,7 @@ from vftcli.doctor.fit import RobotMatch, profiles
 from vftcli.doctor.lateness import LAGLESS, effort_lag
 from vftcli.doctor.load import controller_findings
 from vftcli.doctor.signals import signal_findings, unusable_findings
+from vftcli.doctor.temperature import temperature_findings
 from vftcli.doctor.velocity import velocity_fit
 from vftcli.robots import Robot
 from vftcli.signals.recording import Recording
@@ -27,6 +28,9 @@ REFUSING = NO_FIT | {
 
 READINGS = frozenset({"current-as-torque", "torque-as-current", "milliamperes", "effort-sign"})
 """Findings that an effort is something else, by which its size is explained."""
+
+ASSUMPTIONS = frozenset({"no-temperature", "temperature-gaps"})
+"""Findings that every command says: nothing is wrong, and results stand on what is assumed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,6 +55,11 @@ class Examination:
         """
         codes = REFUSING if fitting else REFUSING - NO_FIT
         return tuple(finding for finding in self.warnings if finding.code in codes)
+
+    @property
+    def assumptions(self) -> tuple[Remark, ...]:
+        """The findings that tell what the model takes for granted where the log says nothing."""
+        return tuple(finding for finding in self.findings if finding.code in ASSUMPTIONS)
 
     @property
     def warnings(self) -> tuple[Remark, ...]:
@@ -81,5 +90,7 @@ def examine(recording: Recording, robot: Robot | None = None) -> Examination:
     said = {finding.code for finding in findings}
     if best is not None and not (LAGLESS | REFUSING) & said:
         findings += effort_lag(recording, best)
+    if best is not None:
+        findings += temperature_findings(recording, best)
     findings.sort(key=lambda finding: finding.level != "warning")
     return Examination(recording=recording, findings=tuple(findings), robots=fits)

@@ -15,7 +15,9 @@ from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, fact
 
-EXAMINED = frozenset(("dq", *EFFORTS, "target_dq", "target_current", "target_torque", "tau_ext"))
+EXAMINED = frozenset(
+    ("dq", *EFFORTS, "target_dq", "target_current", "target_torque", "tau_ext", "temperature")
+)
 """Signals that an examination looks at beside time and positions."""
 
 

@@ -85,7 +85,7 @@ def examination_text(examination: Examination) -> str:
             f"  {finding.consequence}.",
             f"  {finding.remedy}.",
         ]
-    if not examination.findings:
+    if len(examination.findings) == len(examination.assumptions):
         lines += ["", "nothing suspicious found"]
     return "\n".join(printable(line) for line in lines)
 

@@ -125,8 +125,8 @@ def sigmoid(
 
 def bent_line(
     dq: Array,
-    speeds: Sequence[Array] | Array,
-    torques: Sequence[Array] | Array,
+    speeds: Array | Sequence[float],
+    torques: Array | Sequence[float],
     **others: Any,  # noqa: ANN401
 ) -> Array:
     """A line through points (v_k, f_k), as UR controllers feed friction forward. Like `dq` [N·m]
@@ -139,19 +139,17 @@ def bent_line(
 
     Args:
         dq: Joint velocities. (T,) or (T, n) [rad/s]
-        speeds: Speeds v_k, rising, at least two; each one number or one a joint. [rad/s]
-        torques: Friction f_k there. [N·m]
+        speeds: Speeds v_k, rising, at least two; one column a joint. (K,) or (K, n) [rad/s]
+        torques: Friction f_k there. (K,) or (K, n) [N·m]
         others: Parameters of `coulomb_viscous`.
     """
-    torque = coulomb_viscous(dq, torques[0], **others)
-    before: Array | float = 0.0
-    for k in range(len(speeds) - 1):
-        slope = (torques[k + 1] - torques[k]) / (speeds[k + 1] - speeds[k])
-        # sign(v) max(|v| − v_k, 0) is what clipping to ±v_k takes off v.
-        beyond: Array = dq - np.clip(dq, -speeds[k], speeds[k])
-        beyond *= slope - before
-        torque += beyond
-        before = slope
+    slopes = np.diff(torques, axis=0) / np.diff(speeds, axis=0)
+    # sign(v) max(|v| − v_k, 0) is v − clip(v, ±v_k), and the changes add up to the last slope.
+    torque = coulomb_viscous(dq, torques[0], slopes[-1], **others)
+    for k, change in enumerate(np.diff(slopes, axis=0, prepend=0.0)):
+        within: Array = np.clip(dq, -speeds[k], speeds[k])
+        within *= change
+        torque -= within
     return torque
 
 

@@ -14,7 +14,7 @@ from vftcli.robots.conventions import CONVENTIONS, Kinematics
 from vftcli.robots.friction import PRESLIDING, falling_friction
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import RobotFile, Section, is_finite
-from vftcli.robots.temperature import REFERENCE, lawless
+from vftcli.robots.temperature import lawless
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import shown
 from vftcli.signals.pose import Pose, rpy_matrix
@@ -203,10 +203,9 @@ def checked_joint_friction(section: Section) -> JointFriction:
     name = section.choice("model", (*FRICTION_KEYS, "none"))
     if name == "none":
         return JointFriction()
-    for pair in (PRESLIDING, ("temperature", "temperature_at")):
-        for key, other in (pair, pair[::-1]):
-            if key in section.values and other not in section.values:
-                section.refuse(f"{other} is missing; {key} needs it beside it", key)
+    for key, other in (PRESLIDING, PRESLIDING[::-1], ("temperature", "temperature_at")):
+        if key in section.values and other not in section.values:
+            section.refuse(f"{other} is missing; {key} needs it beside it", key)
     required, optional = FRICTION_KEYS[name]
     keys = (*required, *(key for key in (*optional, *PRESLIDING) if key in section.values))
     law = section.vector("temperature", 4).tolist() if "temperature" in section.values else ()
@@ -217,7 +216,9 @@ def checked_joint_friction(section: Section) -> JointFriction:
         parameters={key: section.number(key) for key in keys},
         **(checked_points(section) if name == "points" else {}),
         temperature=tuple(law),
-        temperature_at=section.number("temperature_at", REFERENCE),
+        temperature_at=section.number("temperature_at")
+        if "temperature_at" in section.values
+        else None,
         confidence=section.text("confidence"),
     )
 

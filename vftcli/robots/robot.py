@@ -12,6 +12,9 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import Pose
 from vftcli.signals.remarks import Remark
 
+REFERENCE = 35.0
+"""Joint temperature that friction is taken for where nobody says one: a warm arm's. [°C]"""
+
 TORQUE_SOURCES = ("current", "link_torque", "joint_torque")
 
 
@@ -27,7 +30,8 @@ class JointFriction:
         torques: Friction at these speeds. [N·m]
         temperature: p₁ to p₄ of the law that friction follows with the joint's temperature, as in
             `vftcli.robots.temperature`; none where it is not known to follow one.
-        temperature_at: Joint temperature at which the model's numbers hold. [°C]
+        temperature_at: Joint temperature at which the model's numbers hold, None where nobody
+            says. [°C]
         confidence: Where the numbers come from, in words.
     """
 
@@ -36,8 +40,13 @@ class JointFriction:
     speeds: tuple[float, ...] = ()
     torques: tuple[float, ...] = ()
     temperature: tuple[float, ...] = ()
-    temperature_at: float = 35.0
+    temperature_at: float | None = None
     confidence: str = ""
+
+    @property
+    def reference_temperature(self) -> float:
+        """Joint temperature at which the numbers hold, `REFERENCE` where nobody says. [°C]"""
+        return REFERENCE if self.temperature_at is None else self.temperature_at
 
     @property
     def table(self) -> dict[str, Any]:
@@ -47,7 +56,7 @@ class JointFriction:
         lists = {"speeds": self.speeds, "torques": self.torques, "temperature": self.temperature}
         table = {"model": self.model, **self.parameters}
         table |= {key: list(values) for key, values in lists.items() if values}
-        if self.temperature:
+        if self.temperature_at is not None:
             table["temperature_at"] = self.temperature_at
         if self.confidence:
             table["confidence"] = self.confidence

@@ -18,9 +18,6 @@ from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 
-REFERENCE = 35.0
-"""Temperature at which friction stands that states a law and no temperature. [°C]"""
-
 COLDEST, WARMEST = 1.0, 100.0
 """Temperatures that a joint can have; a reading beyond them, as a constant zero, is none. [°C]"""
 
@@ -68,7 +65,7 @@ def friction_factor(friction: Sequence[JointFriction], temperature: Array) -> Ar
     for j in joints:
         law = friction[j].temperature
         share = warmth(law, temperature[:, j])
-        share /= warmth(law, friction[j].temperature_at)
+        share /= warmth(law, friction[j].reference_temperature)
         factor[:, j] = np.where(np.isnan(share), 1.0, share)
     return factor
 

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from vftcli.robots import Robot, load_robot
-from vftcli.robots.temperature import COLDEST, REFERENCE, WARMEST, friction_factor
+from vftcli.robots.robot import REFERENCE
+from vftcli.robots.temperature import COLDEST, WARMEST, friction_factor
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.mismatch import TrueArm, build_arm
@@ -197,7 +198,8 @@ class Arm:
             t: True times. (N,) [s]
         """
         spec, friction = self.scenario.friction, self.robot.friction
-        begin = np.array([joint.temperature_at for joint in friction] or [REFERENCE] * len(self.q))
+        references = [joint.reference_temperature for joint in friction]
+        begin = np.array(references or [REFERENCE] * len(self.q))
         if spec.temperature_begin is not None:
             begin[:] = spec.temperature_begin
         end = begin if spec.temperature_end is None else np.full_like(begin, spec.temperature_end)
