@@ -9,6 +9,7 @@ from vftcli.identification.clean_fit import (
     OTHER_LINKS,
     contacts_remark,
     fit_without_contacts,
+    fitted_dry_friction,
     heavy_joints,
     links_explain,
     model_doubts,
@@ -55,6 +56,12 @@ def test_a_push_is_left_out_of_the_fit(recording):
     np.testing.assert_allclose(fits[1].fit.values[:2], clean[0][1].fit.values[:2], rtol=0.05)
 
 
+def test_the_dry_friction_of_a_fit_is_what_a_joint_may_stick_with(data):
+    fits = fit_frictions(data, [m.usable.astype(float) for m in data.motions])
+    # noise of .1 N·m; Coulomb torque and the smoothing of the sign share the reversals
+    np.testing.assert_allclose(fitted_dry_friction(data, 0, fits), 4.0, atol=0.3)
+
+
 def test_contacts_are_counted_and_timed(data):
     spans = [ContactSpan(1.0, 2.5, 3, -8.0), ContactSpan(4.0, 4.5, 1, 5.0)]
     remark = contacts_remark(data.motions[0], spans)
@@ -88,7 +95,7 @@ def test_strict_methods_refuse_what_others_remark_on(recording):
 
 
 def test_links_of_another_arm_are_told_from_an_effort_that_no_links_explain(recording, data):
-    """The same effort through a UR10's links, and its own links under noise of 30 N·m."""
+    """The same effort through a UR10e's links, and its own links under noise of 30 N·m."""
     weights = [m.usable.astype(float) for m in data.motions]
 
     def ratio(training):
@@ -97,7 +104,7 @@ def test_links_of_another_arm_are_told_from_an_effort_that_no_links_explain(reco
 
     # 10 cosines of freedom a link against 2300 equations a joint: a few per cent
     assert ratio(data) == pytest.approx(1.0, abs=0.1)
-    ur10 = replace(load_robot("ur10"), torque_constant=UR5.torque_constant)
+    ur10 = replace(load_robot("ur10e"), torque_constant=UR5.torque_constant)
     other = prepare_training([recording], ur10, Processing(), fit_constants=False)
     assert ratio(other) > OTHER_LINKS
     rng = np.random.default_rng(4)

@@ -107,10 +107,11 @@ def test_points_and_presliding_are_the_robot_files_friction(prepared):
     assert (friction.model, friction.speeds, friction.torques) == ("points", BENDS[:2], (3.0, 5.0))
     assert friction.parameters["presliding_length"] == 1e-3
     warmth = np.linspace(1.2, 0.9, len(t))[:, None]
-    columns = FrictionColumns(prepared(t, q=q, dq=dq), np.zeros_like(q), warmth)
+    motion = prepared(t, q=q, dq=dq)
+    columns = FrictionColumns(motion, np.zeros_like(q), warmth)
     expected = RunningFriction((friction,)).torque(q, dq)[:, 0]
     # all but the offset follows the temperature
-    expected = (expected - 0.4) * warmth[:, 0] + 0.4
+    expected = motion.filtered(((expected - 0.4) * warmth[:, 0] + 0.4)[:, None])[:, 0]
     np.testing.assert_allclose(columns.joint(0, shape) @ values, expected, atol=1e-12)
 
 

@@ -74,8 +74,6 @@ def test_friction_and_rotor_of_every_joint_are_found(data, weights):
         assert pytest.approx(UR5.chain.rotor_inertia[j], abs=0.05) == J
     left = all_residuals(data, fits)
     assert [x.shape for x in left] == [m.tau.shape for m in data.motions]
-    dry = fitted_dry_friction(data, 0, fits)
-    np.testing.assert_allclose(dry, 4.0, atol=0.3)
 
 
 def test_residuals_are_cut_apart_log_by_log(recording):

@@ -155,19 +155,30 @@ def choose_presliding(joints: Sequence[tuple[int, JointData]]) -> PreslidingChoi
         joints: Every joint that moves, from 0, with its equations.
     """
     lengths = (0.0, *PRESLIDING_LENGTHS)
-    ratios = np.empty((len(joints), len(lengths)))
-    for i, (j, data) in enumerate(joints):
+    # Of a joint that goes one way the play operator is a constant.
+    turning = [(j, data) for j, data in joints if data.reverses]
+    if not turning:
+        return PreslidingChoice(0.0, {0.0: 1.0})
+    ratios = np.empty((len(turning), len(lengths)))
+    for i, (j, data) in enumerate(turning):
         terms, parts = tellable_terms(RICHEST, data), data.parts(j)
         y = data.slow(data.y[:, None])[:, 0]
         plain = data.slow(data.columns(j, Shape(terms, SLIDING)))
         # Weights of outliers are held: all lengths must answer for the same samples.
         weights = fit_column(plain, y, data.weights).weights
-        found = [cross_validated(plain, y, weights, parts)]
-        for length in PRESLIDING_LENGTHS:
-            shape = Shape((*terms, "presliding"), SLIDING, presliding_length=length)
-            columns = data.slow(data.columns(j, shape))
-            found.append(cross_validated(columns, y, weights, parts))
-        ratios[i] = np.array(found) / max(found[0], 1e-300)
+        # What a wider sign or a breakaway torque explains as well is not presliding's.
+        rivals = [Shape(terms, smoothing) for smoothing in SMOOTHINGS]
+        rivals += [Shape((*terms, "stribeck"), SLIDING, v) for v in STRIBECK_VELOCITIES]
+        sliding = [
+            Shape((*terms, "presliding"), SLIDING, presliding_length=length)
+            for length in PRESLIDING_LENGTHS
+        ]
+        found = [
+            cross_validated(data.slow(data.columns(j, shape)), y, weights, parts)
+            for shape in (*rivals, *sliding)
+        ]
+        none = min(found[: len(rivals)])
+        ratios[i] = np.array([none, *found[len(rivals) :]]) / max(none, 1e-300)
     errors = root_mean_square(ratios)
     near = np.flatnonzero(errors <= LENGTH_MARGIN * errors.min())
     return PreslidingChoice(lengths[near[0]], dict(zip(lengths, errors.tolist(), strict=True)))
@@ -184,7 +195,10 @@ def choose_shape(j: int, data: JointData, length: float = 0.0) -> tuple[Shape, l
         data: Its equations.
         length: Presliding length of the arm, 0 for none. [rad]
     """
-    rich = tellable_terms(RICHEST, data)
+    length = length if data.reverses else 0.0
+    rich, plain = tellable_terms(RICHEST, data), Shape(tellable_terms(PLAIN, data))
+    if pushes(plain, fit_column(data.columns(j, plain), data.y, data.weights).values):
+        return plain, []  # the positions may still rub the right way where velocities are turned
     start = fit_column(data.columns(j, Shape(rich)), data.y, data.weights)
     parts = data.parts(j)
 
@@ -204,7 +218,7 @@ def choose_shape(j: int, data: JointData, length: float = 0.0) -> tuple[Shape, l
         if shape not in choices and is_dissipative(shape, values, data.speed_limit):
             choices[shape] = ShapeChoice(j + 1, shape, error(shape))
     if not choices:
-        return Shape(tellable_terms(PLAIN, data), smoothing), []
+        return plain._replace(smoothing=smoothing), []
     limit = MARGIN * min(c.error for c in choices.values())
     near = [c for c in choices.values() if c.error <= limit]
     chosen = min(near, key=lambda c: (len(c.shape.terms), c.error))
@@ -229,10 +243,10 @@ def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> Iterat
             shapes[shape] = None
             if best.presliding_length:
                 shapes[shape._replace(terms=(*shape.terms, "presliding"))] = None
-        elif not best.presliding_length:  # which is the better account of what happens near rest
-            for velocity in STRIBECK_VELOCITIES:
-                if velocity > 2 * best.smoothing:  # else the sign's own rounding hides it
-                    shapes[shape._replace(stribeck_velocity=velocity)] = None
+            continue
+        for velocity in STRIBECK_VELOCITIES:
+            if velocity > 2 * best.smoothing:  # else the sign's own rounding hides it
+                shapes[shape._replace(stribeck_velocity=velocity)] = None
     yield from shapes
 
 
@@ -246,6 +260,12 @@ def pushing_terms(shape: Shape, values: Array) -> tuple[str, ...]:
     """The dry terms that come out negative; others may follow the coefficients. (k,)"""
     own = dict(zip(shape.terms, values, strict=False))
     return tuple(term for term in NEVER_NEGATIVE if own.get(term, 0.0) < 0.0)
+
+
+def pushes(shape: Shape, values: Array) -> bool:
+    """Whether Coulomb and viscous friction both come out negative."""
+    own = dict(zip(shape.terms, values, strict=False))
+    return bool(own["coulomb"] < 0.0 and own["viscous"] < 0.0)
 
 
 def non_negative_fit(j: int, shape: Shape, data: JointData) -> tuple[Shape, Array]:

@@ -53,7 +53,7 @@ class Shape(NamedTuple):
     smoothing: float = SMOOTHING
     stribeck_velocity: float = 0.05
     logarithmic_velocity: float = 1.0
-    presliding_length: float = 3e-4
+    presliding_length: float = 0.0
     speeds: tuple[float, ...] = ()
 
     @property
