@@ -127,16 +127,13 @@ def identified_friction(
 
 
 def temperature_remarks(data: Training) -> list[Remark]:
-    """What the logs' joint temperatures were used for, or what was taken without them."""
-    laws = [joint for joint in data.robot.friction if joint.temperature]
+    """By what the joints' temperatures scaled friction, of each log that has them."""
     remarks = []
     for motion, columns in zip(data.motions, data.columns, strict=True):
-        where = Where(motion.recording.name)
-        if laws and columns.warmth is None:
-            remarks.append(caution("unmeasured-temperature", where, at_C=laws[0].temperature_at))
-        elif columns.warmth is not None:
-            span = np.quantile(columns.warmth, (0.0, 1.0)).tolist()
-            remarks.append(fact("friction-by-temperature", where, factors=span))
+        if columns.warmth is not None:
+            factors = [float(columns.warmth.min()), float(columns.warmth.max())]
+            where = Where(motion.recording.name)
+            remarks.append(fact("friction-by-temperature", where, factors=factors))
     return remarks
 
 
