@@ -1,11 +1,16 @@
 """Logs made here, prepared without a filter, so that every number in a test has its origin."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from vftcli.identification.processing import PreparedLog, Processing
+from vftcli.identification.training import Training, prepare_training
+from vftcli.robots import JointFriction, Robot, load_robot
+from vftcli.robots.friction import friction_torque
+from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.signals.recording import Recording
 
 
@@ -51,3 +56,28 @@ def three_sines(seconds=8.0, rate=125.0, joints=6, seed=0, fastest=0.5):
 def sines() -> Callable[..., tuple]:
     """The maker of motions."""
     return three_sines
+
+
+@pytest.fixture(scope="session")
+def rubbing_arm() -> Robot:
+    """A UR5 with one friction in all joints."""
+    parameters = {"coulomb": 4.0, "viscous": 6.0, "offset": 0.5}
+    rubbing = JointFriction(model="coulomb-viscous-offset", parameters=parameters)
+    return replace(load_robot("ur5"), friction=(rubbing,) * 6)
+
+
+@pytest.fixture(scope="session")
+def rubbing_log(rubbing_arm) -> Recording:
+    """12 s of its motion, noise of 0.1 N·m."""
+    arm = rubbing_arm
+    t, q, dq, ddq = three_sines(seconds=12.0, seed=2)
+    torque = torque_regressor(arm.chain, q, dq, ddq) @ chain_parameters(arm.loaded_chain)
+    torque = torque + arm.chain.rotor_inertia * ddq + friction_torque(arm.friction, dq)
+    torque = torque + 0.1 * np.random.default_rng(0).standard_normal(q.shape)
+    return Recording(t=t, q=q, dq=dq, current=torque / arm.torque_constant)
+
+
+@pytest.fixture
+def rubbing_data(rubbing_arm, rubbing_log) -> Training:
+    """That log as training data for its own robot."""
+    return prepare_training([rubbing_log], rubbing_arm, Processing(), fit_constants=False)

@@ -8,8 +8,10 @@ from vftcli.identification.friction_fit import (
     PLAIN,
     JointData,
     candidate_shapes,
+    choose_presliding,
     choose_shape,
     is_dissipative,
+    non_negative_fit,
     tellable_terms,
 )
 from vftcli.identification.friction_shapes import FrictionColumns, Shape, term_values
@@ -134,3 +136,57 @@ def test_fixed_columns_stand_behind_the_friction(prepared):
     A = data._replace(fixed=fixed).columns(0, Shape(("viscous", "offset")))
     np.testing.assert_array_equal(A[:, 2], fixed[:, 0])
     np.testing.assert_allclose(A[:, 1], term_values("offset", Shape(()), fixed[:, 0], None))
+
+
+def reversing(prepared, dry, presliding, length=1e-3, seed=0):
+    """40 s of slow reversals; tanh and play rub beside viscous friction, noise of .05 N·m."""
+    t = np.arange(0, 40, 0.02)
+    q = 0.05 * np.sin(2 * np.pi * 0.2 * t) + 0.01 * np.sin(2 * np.pi * 0.57 * t)
+    motion = prepared(t, q=q[:, None], dq=np.gradient(q, t)[:, None])
+    columns = FrictionColumns(motion, np.zeros((len(t), 1)))
+    shape = Shape(("coulomb", "viscous", "presliding"), 0.003, presliding_length=length)
+    y = columns.joint(0, shape) @ np.array([dry, 5.0, presliding])
+    y = y + 0.05 * np.random.default_rng(seed).standard_normal(len(t))
+    data = JointData(
+        y=y,
+        fixed=np.zeros((len(t), 0)),
+        weights=np.ones(len(t)),
+        sources=[columns],
+        load_spread=0.0,
+        reverses=True,
+        speed_limit=LIMIT,
+    )
+    return data, shape
+
+
+def test_the_arms_presliding_length_is_found_and_only_where_there_is_one(prepared):
+    data, planted = reversing(prepared, dry=1.0, presliding=2.0)
+    other, _ = reversing(prepared, dry=0.5, presliding=1.0, seed=1)
+    found = choose_presliding([(0, data), (0, other)])
+    assert found.length == planted.presliding_length
+    assert found.errors[0.0] == pytest.approx(1.0)
+    assert found.errors[found.length] == min(found.errors.values()) < 0.5
+    shape, _ = choose_shape(0, data, found.length)
+    assert "presliding" in shape.terms
+    none, _ = reversing(prepared, dry=3.0, presliding=0.0)
+    assert choose_presliding([(0, none)]).length == 0.0
+
+
+def test_presliding_and_sign_share_one_dry_torque(prepared):
+    """All of it presliding's, and more: the smoothed sign that came out negative is left out."""
+    data, planted = reversing(prepared, dry=-0.5, presliding=3.0)
+    shape, values = non_negative_fit(0, planted, data)
+    assert shape.terms == ("viscous", "presliding")
+    assert values[1] > 2.0
+    assert is_dissipative(shape, values, LIMIT)
+
+
+def test_whole_logs_are_left_out_where_the_joint_moves_in_several(prepared):
+    data = equations(prepared, {"coulomb": 3.0, "viscous": 5.0})
+    still = prepared(np.arange(0, 2, 0.02), dq=np.zeros((100, 1)))
+    resting = FrictionColumns(still, np.zeros((100, 1)))
+    moving = data.sources[0]
+    samples = moving.motion.samples
+    both = data._replace(sources=[moving, resting, moving])
+    assert [len(part) for part in both.parts(0)] == [samples, samples]
+    assert len(data._replace(sources=[moving, resting]).parts(0)) == 5

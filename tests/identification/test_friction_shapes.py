@@ -3,8 +3,16 @@
 import numpy as np
 import pytest
 
-from vftcli.identification.friction_shapes import FrictionColumns, Shape, round_digits, term_values
+from vftcli.identification.friction_shapes import (
+    BENDS,
+    FrictionColumns,
+    Shape,
+    bent,
+    round_digits,
+    term_values,
+)
 from vftcli.robots.friction import friction_torque
+from vftcli.robots.running_friction import RunningFriction
 
 DQ = np.linspace(-1.0, 1.0, 41)
 LOAD = np.linspace(0.0, 8.0, 41)
@@ -84,3 +92,36 @@ def test_columns_are_filtered_and_made_once(prepared):
 def test_numbers_have_as_many_digits_as_they_mean():
     assert round_digits(1234567.89) == 1234568.0
     assert round_digits(0.000123456789, 3) == 0.000123
+
+
+def test_points_and_presliding_are_the_robot_files_friction(prepared):
+    """All columns of a bent line with presliding, times coefficients, against the robot's own."""
+    t = np.arange(0, 20, 0.01)
+    q = 0.8 * np.sin(2 * np.pi * 0.1 * t)[:, None]
+    dq = np.gradient(q, t, axis=0)
+    line = bent(float(np.abs(dq).max()), ("offset", "presliding"))
+    assert line.terms == ("point1", "point2", "offset", "presliding")
+    shape = line._replace(smoothing=0.003, presliding_length=1e-3)
+    values = np.array([3.0, 5.0, 0.4, 2.0])
+    friction = shape.friction(values)
+    assert (friction.model, friction.speeds, friction.torques) == ("points", BENDS[:2], (3.0, 5.0))
+    assert friction.parameters["presliding_length"] == 1e-3
+    warmth = np.linspace(1.2, 0.9, len(t))[:, None]
+    motion = prepared(t, q=q, dq=dq)
+    columns = FrictionColumns(motion, np.zeros_like(q), warmth)
+    expected = RunningFriction((friction,)).torque(q, dq)[:, 0]
+    # all but the offset follows the temperature
+    expected = motion.filtered(((expected - 0.4) * warmth[:, 0] + 0.4)[:, None])[:, 0]
+    np.testing.assert_allclose(columns.joint(0, shape) @ values, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(("speed", "points"), [(0.1, 0), (0.16, 2), (0.79, 2), (0.81, 3), (2.1, 4)])
+def test_a_point_is_told_by_a_motion_that_goes_a_third_of_the_way_to_it(speed, points):
+    """.01 + .3·.49 = .157, .5 + .3·1 = .8 and 1.5 + .3·1.7 = 2.01 rad/s."""
+    shape = bent(speed)
+    assert (0 if shape is None else len(shape.speeds)) == points
+
+
+def test_dry_friction_may_be_all_presliding():
+    friction = Shape(("viscous", "presliding")).friction(np.array([1.0, 2.0]))
+    assert friction.parameters["coulomb"] == 0.0

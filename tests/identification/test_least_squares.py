@@ -8,6 +8,7 @@ from vftcli.identification.least_squares import (
     cross_validated,
     fit_column,
     folds,
+    left_out,
     robust_sd,
     solve,
 )
@@ -86,7 +87,8 @@ def test_cross_validation_equals_fitting_each_time_anew():
         total += np.sum(weights[out] * (y[out] - A[out] @ x) ** 2)
     expected = np.sqrt(total / weights.sum())
     # normal equations square the condition number, here 1e2: rounding below 1e-11
-    assert cross_validated(A, y, weights) == pytest.approx(expected, rel=1e-9)
+    parts = left_out([len(y)], [True])
+    assert cross_validated(A, y, weights, parts) == pytest.approx(expected, rel=1e-9)
 
 
 def test_the_robust_spread_of_normal_noise():
@@ -96,12 +98,28 @@ def test_the_robust_spread_of_normal_noise():
     )
 
 
-def test_cross_validation_does_not_see_the_order_of_logs() -> None:
-    """Two logs of 103 and 57 rows: a fifth of each is left out, whichever stands first."""
+def test_of_several_logs_each_is_left_out_whole() -> None:
+    """Three logs of 103, 57 and 40 rows, of which the last tells nothing and is always kept."""
     rng = np.random.default_rng(5)
-    A, y, weights = rng.standard_normal((160, 3)), rng.standard_normal(160), np.ones(160)
-    turned = np.r_[103:160, 0:103]
-    one = cross_validated(A, y, weights, (103, 57))
-    other = cross_validated(A[turned], y[turned], weights, (57, 103))
-    assert one == pytest.approx(other, rel=1e-12)
-    assert cross_validated(A, y, weights, (160,)) == cross_validated(A, y, weights)
+    A, y, weights = rng.standard_normal((200, 3)), rng.standard_normal(200), np.ones(200)
+    first, second = left_out([103, 57, 40], [True, True, False])
+    np.testing.assert_array_equal(first, np.arange(103))
+    np.testing.assert_array_equal(second, np.arange(103, 160))
+    total = 0.0
+    for out in (first, second):
+        keep = np.setdiff1d(np.arange(200), out)
+        x = np.linalg.lstsq(A[keep], y[keep], rcond=None)[0]
+        total += np.sum((y[out] - A[out] @ x) ** 2)
+    expected = np.sqrt(total / 160)
+    assert cross_validated(A, y, weights, [first, second]) == pytest.approx(expected, rel=1e-9)
+    # the order of the logs does not matter
+    turned = np.r_[103:160, 0:103, 160:200]
+    parts = left_out([57, 103, 40], [True, True, False])
+    other = cross_validated(A[turned], y[turned], weights, parts)
+    assert other == pytest.approx(expected, rel=1e-9)
+
+
+def test_one_log_is_cut_into_fifths() -> None:
+    parts = left_out([100, 50], [True, False])
+    assert [len(part) for part in parts] == [20] * 5
+    np.testing.assert_array_equal(np.concatenate(parts), np.arange(100))

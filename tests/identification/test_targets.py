@@ -1,9 +1,12 @@
 """What a controller believes, read off targets that were made here."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from vftcli.identification.friction_shapes import FrictionColumns
+from vftcli.identification.friction_shapes import LOGARITHMIC_VELOCITIES, FrictionColumns
 from vftcli.identification.target_method import gravity_remarks, target_numbers, target_remarks
 from vftcli.identification.targets import (
     UNKNOWN,
@@ -15,11 +18,13 @@ from vftcli.identification.targets import (
     constant_in_motion,
     controller_friction,
     controller_models,
+    refuse_guided,
     relative_sd,
     resolution,
     rotor_inertia,
 )
-from vftcli.robots import load_robot
+from vftcli.robots import JointFriction, load_robot
+from vftcli.robots.friction import friction_torque
 from vftcli.signals.errors import IdentificationError
 
 UR5 = load_robot("ur5")
@@ -66,29 +71,58 @@ def test_a_shift_in_time_is_no_inertia(targets):
     assert gravity.value == pytest.approx(GRAVITY, abs=2e-4)
 
 
-def test_friction_is_what_the_current_has_beyond_the_moment(targets):
+def test_friction_is_read_as_the_points_of_the_controllers_line(targets):
     dq = targets.recording.require("dq")
-    law = 4.0 * np.tanh(dq / 0.01) + 6.0 * np.sign(dq) * np.log(1 + np.abs(dq) / 0.5)
+    truth = JointFriction(
+        model="points",
+        parameters={"smoothing": 0.01, "load_coulomb": 0.05},
+        speeds=(0.01, 0.5, 1.5),
+        torques=(4.0, 7.0, 10.0),
+    )
+    law = friction_torque((truth,), dq, targets.gravity)
     bent = targets._replace(current=(targets.moment + targets.motion.filtered(law)) / K)
     shape, values, sd = controller_friction(0, [bent], K)
-    assert shape.logarithmic_velocity == 0.5  # one of the bends that compete
-    np.testing.assert_allclose(values, [4.0, 6.0], rtol=1e-6)
+    assert (shape.model, shape.speeds) == ("points", truth.speeds)
+    np.testing.assert_allclose(values, [4.0, 7.0, 10.0, 0.05], rtol=1e-6)
     assert np.all(sd < 1e-3)
-    slow = targets._replace(motion=slowed(targets, 0.04))
-    assert controller_friction(0, [slow], K) is None
+    # too slow for a second point, a logarithm stands for the line; slower still, nothing does
+    slow = bent._replace(motion=slowed(targets, 0.12))
+    assert controller_friction(0, [slow], K)[0].logarithmic_velocity in LOGARITHMIC_VELOCITIES
+    assert controller_friction(0, [bent._replace(motion=slowed(targets, 0.04))], K) is None
+
+
+def guided_log(targets, share=1.0, asked=None):
+    """The log of a controller that feeds a share of a UR5's first joint's friction forward."""
+    arm = SimpleNamespace(friction=UR5.friction[:1], torque_constant=np.array([K]))
+    law = friction_torque(arm.friction, targets.motion.dq)
+    log = targets._replace(current=(targets.moment + share * law) / K)
+    if asked is not None:
+        log = log._replace(recording=replace(log.recording, target_dq=asked))
+    return log, arm
+
+
+@pytest.mark.parametrize("share", [0.7, 1.0, 1.3])
+def test_a_program_feeds_its_friction_forward(targets, share):
+    refuse_guided(*guided_log(targets, share))
+    # target velocities say more than a share of friction
+    dq = targets.recording.require("dq")
+    refuse_guided(*guided_log(targets, 0.1, asked=dq))
+
+
+def test_a_hand_that_leads_the_arm_is_refused(targets):
+    with pytest.raises(IdentificationError, match="a hand led the arm"):
+        refuse_guided(*guided_log(targets, 0.3))
+    with pytest.raises(IdentificationError, match="a hand led the arm"):
+        refuse_guided(*guided_log(targets, 1.0, asked=0.0 * targets.motion.dq))
 
 
 def slowed(targets, fastest):
     """The motion at other velocities, `fastest` at most."""
-    from dataclasses import replace
-
     dq = targets.motion.dq
     return replace(targets.motion, dq=dq * fastest / np.max(np.abs(dq)))
 
 
 def test_a_joint_that_does_not_accelerate_tells_no_rotor(targets):
-    from dataclasses import replace
-
     still = targets._replace(motion=replace(targets.motion, ddq=0.0 * targets.motion.ddq))
     assert [e.known for e in rotor_inertia(0, [still])] == [False, False]
 

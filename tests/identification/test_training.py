@@ -5,18 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.identification.excitation import ContactSpan
 from vftcli.identification.friction_method import friction_method, refuse_sign, rotor_number
 from vftcli.identification.method_result import check_friction, held_joints
 from vftcli.identification.processing import Processing
 from vftcli.identification.training import (
     all_residuals,
-    contacts_remark,
     data_of_joint,
     fit_frictions,
-    fit_without_contacts,
-    fitted_dry_friction,
-    model_doubts,
     prepare_training,
 )
 from vftcli.identification.whole_arm import (
@@ -28,10 +23,8 @@ from vftcli.identification.whole_arm import (
     with_vector,
 )
 from vftcli.robots import JointFriction, Payload, load_robot
-from vftcli.robots.friction import friction_torque
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.recording import Recording
 
 RUBBING = JointFriction(
     model="coulomb-viscous-offset", parameters={"coulomb": 4.0, "viscous": 6.0, "offset": 0.5}
@@ -41,19 +34,15 @@ UR5 = replace(load_robot("ur5"), friction=(RUBBING,) * 6)
 
 
 @pytest.fixture
-def recording(sines):
-    """12 s of its motion, noise of 0.1 N·m."""
-    t, q, dq, ddq = sines(seconds=12.0, seed=2)
-    torque = torque_regressor(UR5.chain, q, dq, ddq) @ chain_parameters(UR5.loaded_chain)
-    torque = torque + UR5.chain.rotor_inertia * ddq + friction_torque(UR5.friction, dq)
-    torque = torque + 0.1 * np.random.default_rng(0).standard_normal(q.shape)
-    return Recording(t=t, q=q, dq=dq, current=torque / UR5.torque_constant)
+def recording(rubbing_log):
+    """12 s of a UR5 that rubs."""
+    return rubbing_log
 
 
 @pytest.fixture
-def data(recording):
+def data(rubbing_data):
     """That log as training data for its own robot."""
-    return prepare_training([recording], UR5, Processing(), fit_constants=False)
+    return rubbing_data
 
 
 @pytest.fixture
@@ -85,8 +74,6 @@ def test_friction_and_rotor_of_every_joint_are_found(data, weights):
         assert pytest.approx(UR5.chain.rotor_inertia[j], abs=0.05) == J
     left = all_residuals(data, fits)
     assert [x.shape for x in left] == [m.tau.shape for m in data.motions]
-    dry = fitted_dry_friction(data, 0, fits)
-    np.testing.assert_allclose(dry, 4.0, atol=0.3)
 
 
 def test_residuals_are_cut_apart_log_by_log(recording):
@@ -103,54 +90,6 @@ def test_drive_constants_need_currents(recording):
     torque = replace(recording, current=None, torque=recording.q)
     with pytest.raises(IdentificationError, match="--fit-constants needs motor currents"):
         prepare_training([torque], UR5, Processing(), fit_constants=True)
-
-
-def test_a_push_is_left_out_of_the_fit(recording):
-    push = np.where((recording.t > 5) & (recording.t < 6), 40.0, 0.0)[:, None] * np.eye(6)[1]
-    pushed = replace(recording, current=recording.current + push / UR5.torque_constant)
-    data = prepare_training([pushed], UR5, Processing(), fit_constants=False)
-    fits, weights, remarks = fit_without_contacts(data, strict=False)
-    assert [r.code for r in remarks] == ["suspected-contacts"]
-    t = data.motions[0].t
-    np.testing.assert_array_equal(weights[0][(t > 5) & (t < 6)], 0.0)
-    assert weights[0][(t < 4.5) | (t > 6.5)].all()
-    clean = fit_without_contacts(
-        prepare_training([recording], UR5, Processing(), fit_constants=False), strict=False
-    )
-    assert clean[2] == []
-    np.testing.assert_allclose(fits[1].fit.values[:2], clean[0][1].fit.values[:2], rtol=0.05)
-
-
-def test_contacts_are_counted_and_timed(data):
-    spans = [ContactSpan(1.0, 2.5, 3, -8.0), ContactSpan(4.0, 4.5, 1, 5.0)]
-    remark = contacts_remark(data.motions[0], spans)
-    assert remark.values["count"] == 2
-    assert remark.values["total_s"] == 2.0
-    assert (remark.values["starts_s"], remark.values["worst_joints"]) == ([1.0, 4.0], [3, 1])
-
-
-def test_an_unknown_load_is_doubted_from_half_a_kilogram_on(recording, sines):
-    _, q, dq, ddq = sines(seconds=12.0, seed=2)
-    for mass, doubted in ((0.4, False), (1.5, True)):
-        load = Payload(mass=mass, com=np.array([0.0, 0.0, 0.05]), inertia=np.zeros((3, 3)))
-        heavier = chain_parameters(UR5.with_payload(load).loaded_chain)
-        extra = torque_regressor(UR5.chain, q, dq, ddq) @ (heavier - chain_parameters(UR5.chain))
-        log = replace(recording, current=recording.current + extra / UR5.torque_constant)
-        data = prepare_training([log], UR5, Processing(), fit_constants=False)
-        ones = [np.ones(m.tau.shape) for m in data.motions]
-        remarks = list(model_doubts(data, [np.zeros(m.tau.shape) for m in data.motions], ones))
-        assert [r.code for r in remarks] == ["unknown-load"] * doubted
-        if doubted:
-            assert remarks[0].values["mass_kg"] == pytest.approx(mass, rel=0.02)
-
-
-def test_strict_methods_refuse_what_others_remark_on(recording):
-    turned = replace(recording, current=-recording.current)
-    data = prepare_training([turned], UR5, Processing(), fit_constants=False)
-    with pytest.raises(IdentificationError, match="Choose another --robot"):
-        fit_without_contacts(data, strict=True)
-    codes = [r.code for r in fit_without_contacts(data, strict=False)[2]]
-    assert codes[-2:] == ["unexplained-torque", "absorbed-doubt"]
 
 
 def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_told(data):
@@ -271,3 +210,17 @@ def test_too_short_logs_are_refused(data, weights):
         check_size(layout, [log])
     few.ravel()[: 4 * layout.size] = 1.0
     check_size(layout, [log])
+
+
+def test_a_joint_that_the_profile_predicts_as_well_keeps_its_numbers(recording, data, weights):
+    """The log's own arm is its profile: nothing that is fitted predicts better than the truth."""
+    fits = fit_frictions(data, weights)
+    assert all(fit.errors[1] == pytest.approx(fit.errors[0], rel=0.1) for fit in fits)
+    kept = [j for j, fit in enumerate(fits) if fit.is_kept]
+    found = friction_method(data)
+    told = [r.where.joints[0] - 1 for r in found.remarks if r.code == "profile-kept"]
+    assert told == kept != []
+    assert all(found.robot.friction[j] == UR5.friction[j] for j in kept)
+    rubbing = replace(recording, current=1.3 * recording.current)
+    other = prepare_training([rubbing], UR5, Processing(), fit_constants=False)
+    assert not any(fit.is_kept for fit in fit_frictions(other, weights))

@@ -116,8 +116,9 @@ def identify_robot(
     held_out_choice = reading.changed(interval=validation.interval).choice()
     validated, without_load = validation.validate or [], free.logs(asked.find_payload)
     library = Library([*logs, *validated, *without_load])
-    # That the profile is not the arm's is what this command is there to change.
-    examiner = health_of(library, anyway=anyway, fitting=False)
+    # That the profile is not the arm's is what this command is there to change; but the friction
+    # method keeps the profile's links.
+    examiner = health_of(library, anyway=anyway, fitting=task.method == "friction")
     profile = examiner.robot(library.open(logs[0], choice), chosen)
 
     def opened(paths: list[Path] | tuple[Path, ...], how: "ReadChoice") -> list["Recording"]:

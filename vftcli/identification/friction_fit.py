@@ -5,21 +5,26 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.identification.excitation import SLOW
 from vftcli.identification.friction_shapes import (
     LOGARITHMIC_VELOCITIES,
     SMOOTHINGS,
     STRIBECK_VELOCITIES,
     FrictionColumns,
     Shape,
+    bent,
 )
-from vftcli.identification.least_squares import cross_validated, fit_column
+from vftcli.identification.least_squares import cross_validated, fit_column, left_out
+from vftcli.identification.result import root_mean_square
 from vftcli.robots.friction import falling_speed
 from vftcli.signals.arrays import Array
+from vftcli.signals.filters import low_pass
 
 PLAIN = ("coulomb", "viscous", "offset")
 CURVED = ("coulomb", "logarithmic", "offset")
 RICHEST = (*PLAIN, "quadratic", "load_coulomb")
 CANDIDATES: tuple[tuple[str, ...], ...] = (
+    ("coulomb", "offset"),
     PLAIN,
     (*PLAIN, "quadratic"),
     (*PLAIN, "load_coulomb"),
@@ -32,11 +37,26 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
 )
 """Sets of friction terms that compete, simplest first."""
 
-NEVER_NEGATIVE = ("coulomb", "load_coulomb", "stribeck")
+PRESLIDING_LENGTHS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
+"""Presliding lengths that compete with none, one for the whole arm. [rad]"""
+
+BESIDE_POINTS = (("offset",), ("offset", "load_coulomb"))
+"""What may stand beside the points of a bent line."""
+
+NEVER_NEGATIVE = ("coulomb", "presliding", "load_coulomb", "stribeck")
 """Terms whose negative value would push the joint along."""
+
+SLIDING = 3e-3
+"""Smoothing of the sign where presliding says what happens around rest. [rad/s]"""
+
+LISTENING = 2.0
+"""Band in which the presliding length is judged: observers of 3 … 10 1/s pass .5 … 1.6 Hz. [Hz]"""
 
 MARGIN = 1.01
 """A simpler model within this factor of the best cross-validated error is preferred."""
+
+LENGTH_MARGIN = 1.02
+"""A shorter presliding length within this factor of the best is preferred, and none to all."""
 
 LIGHT = 1.0
 """Spread of the gravity torque below which growth with load cannot be told. [N·m]"""
@@ -58,6 +78,19 @@ class ShapeChoice(NamedTuple):
     chosen: bool = False
 
 
+class PreslidingChoice(NamedTuple):
+    """The presliding length of an arm.
+
+    Attributes:
+        length: The chosen one, 0 for none. [rad]
+        errors: Cross-validated error of every length over that of none, root of the mean square
+            over the joints.
+    """
+
+    length: float
+    errors: dict[float, float]
+
+
 class JointData(NamedTuple):
     """What one joint's fit is made from, over all training logs.
 
@@ -70,6 +103,8 @@ class JointData(NamedTuple):
         load_spread: Spread of the gravity torque. [N·m]
         reverses: Whether the joint moves both ways.
         speed_limit: Speed up to which its friction may not fall. [rad/s]
+        profile: Torque of the profile's friction and rotor; None where they do not compete. (M,)
+            [N·m]
     """
 
     y: Array
@@ -79,11 +114,29 @@ class JointData(NamedTuple):
     load_spread: float
     reverses: bool
     speed_limit: float
+    profile: Array | None = None
 
     @property
     def lengths(self) -> tuple[int, ...]:
         """Rows of each log."""
         return tuple(source.motion.samples for source in self.sources)
+
+    def speeds(self, j: int) -> list[float]:
+        """Speed that joint j (from 0) exceeds in a hundredth of each log. [rad/s]"""
+        return [float(np.quantile(np.abs(source.motion.dq[:, j]), 0.99)) for source in self.sources]
+
+    def parts(self, j: int) -> list[Array]:
+        """The rows that cross-validation of joint j (from 0) leaves out in turn."""
+        return left_out(self.lengths, [speed > SLOW for speed in self.speeds(j)])
+
+    def slow(self, signals: Array) -> Array:
+        """Signals in the band in which an observer listens, each log by itself. (M, k)"""
+        parts, start = [], 0
+        for source, length in zip(self.sources, self.lengths, strict=True):
+            part, start = signals[start : start + length], start + length
+            wide = source.motion.processing.cutoff > LISTENING
+            parts.append(low_pass(source.motion.t, part, LISTENING) if wide else part)
+        return np.concatenate(parts)
 
     def columns(self, j: int, shape: Shape) -> Array:
         """Friction columns, then the fixed ones. (M, k + f)"""
@@ -91,7 +144,47 @@ class JointData(NamedTuple):
         return np.hstack([friction, self.fixed])
 
 
-def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
+def choose_presliding(joints: Sequence[tuple[int, JointData]]) -> PreslidingChoice:
+    """Choose one presliding length for the whole arm by cross-validation, or none.
+
+    It is chosen in the band in which an observer listens: what the play operator leaves at a
+    reversal is a slow step, which a wider band drowns in noise. Of the nearly best the shortest is
+    taken, which forgets soonest that it started undeflected.
+
+    Args:
+        joints: Every joint that moves, from 0, with its equations.
+    """
+    lengths = (0.0, *PRESLIDING_LENGTHS)
+    # Of a joint that goes one way the play operator is a constant.
+    turning = [(j, data) for j, data in joints if data.reverses]
+    if not turning:
+        return PreslidingChoice(0.0, {0.0: 1.0})
+    ratios = np.empty((len(turning), len(lengths)))
+    for i, (j, data) in enumerate(turning):
+        terms, parts = tellable_terms(RICHEST, data), data.parts(j)
+        y = data.slow(data.y[:, None])[:, 0]
+        plain = data.slow(data.columns(j, Shape(terms, SLIDING)))
+        # Weights of outliers are held: all lengths must answer for the same samples.
+        weights = fit_column(plain, y, data.weights).weights
+        # What a wider sign or a breakaway torque explains as well is not presliding's.
+        rivals = [Shape(terms, smoothing) for smoothing in SMOOTHINGS]
+        rivals += [Shape((*terms, "stribeck"), SLIDING, v) for v in STRIBECK_VELOCITIES]
+        sliding = [
+            Shape((*terms, "presliding"), SLIDING, presliding_length=length)
+            for length in PRESLIDING_LENGTHS
+        ]
+        found = [
+            cross_validated(data.slow(data.columns(j, shape)), y, weights, parts)
+            for shape in (*rivals, *sliding)
+        ]
+        none = min(found[: len(rivals)])
+        ratios[i] = np.array([none, *found[len(rivals) :]]) / max(none, 1e-300)
+    errors = root_mean_square(ratios)
+    near = np.flatnonzero(errors <= LENGTH_MARGIN * errors.min())
+    return PreslidingChoice(lengths[near[0]], dict(zip(lengths, errors.tolist(), strict=True)))
+
+
+def choose_shape(j: int, data: JointData, length: float = 0.0) -> tuple[Shape, list[ShapeChoice]]:
     """Choose a joint's friction model by cross-validation, simplest of the nearly best.
 
     First the smoothing is chosen with the richest plain model, then the bend of the logarithm,
@@ -100,38 +193,56 @@ def choose_shape(j: int, data: JointData) -> tuple[Shape, list[ShapeChoice]]:
     Args:
         j: Joint, from 0.
         data: Its equations.
+        length: Presliding length of the arm, 0 for none. [rad]
     """
-    rich = tellable_terms(RICHEST, data)
+    length = length if data.reverses else 0.0
+    rich, plain = tellable_terms(RICHEST, data), Shape(tellable_terms(PLAIN, data))
+    if pushes(plain, fit_column(data.columns(j, plain), data.y, data.weights).values):
+        return plain, []  # the positions may still rub the right way where velocities are turned
     start = fit_column(data.columns(j, Shape(rich)), data.y, data.weights)
+    parts = data.parts(j)
 
     # Weights of outliers are held: candidates must answer for the same samples.
     def error(shape: Shape) -> float:
-        return cross_validated(data.columns(j, shape), data.y, start.weights, data.lengths)
+        return cross_validated(data.columns(j, shape), data.y, start.weights, parts)
 
-    smoothing = min((Shape(rich, s) for s in SMOOTHINGS), key=error).smoothing
-    curved = Shape(tellable_terms((*CURVED, "load_coulomb"), data), smoothing)
+    widths = (SLIDING,) if length else SMOOTHINGS
+    smoothing = min((Shape(rich, s) for s in widths), key=error).smoothing
+    terms = tellable_terms((*CURVED, "load_coulomb"), data)
+    curved = Shape(terms, smoothing, presliding_length=length)
     bends = (curved._replace(logarithmic_velocity=v) for v in LOGARITHMIC_VELOCITIES)
     best = min(bends, key=error)
-    choices = []
-    for shape in candidate_shapes(best, data):
-        fit = fit_column(data.columns(j, shape), data.y, data.weights)
-        if is_dissipative(shape, fit.values, data.speed_limit):
-            choices.append(ShapeChoice(j + 1, shape, error(shape)))
+    choices: dict[Shape, ShapeChoice] = {}
+    for candidate in candidate_shapes(best, data, max(data.speeds(j))):
+        shape, values = non_negative_fit(j, candidate, data)
+        if shape not in choices and is_dissipative(shape, values, data.speed_limit):
+            choices[shape] = ShapeChoice(j + 1, shape, error(shape))
     if not choices:
-        return Shape(tellable_terms(PLAIN, data), smoothing), []
-    limit = MARGIN * min(c.error for c in choices)
-    near = [c for c in choices if c.error <= limit]
+        return plain._replace(smoothing=smoothing), []
+    limit = MARGIN * min(c.error for c in choices.values())
+    near = [c for c in choices.values() if c.error <= limit]
     chosen = min(near, key=lambda c: (len(c.shape.terms), c.error))
-    return chosen.shape, [c._replace(chosen=c is chosen) for c in choices]
+    return chosen.shape, [c._replace(chosen=c is chosen) for c in choices.values()]
 
 
-def candidate_shapes(best: Shape, data: JointData) -> Iterator[Shape]:
-    """The friction shapes that compete for a joint, with the smoothing and bend of `best`."""
+def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> Iterator[Shape]:
+    """The friction shapes that compete for a joint, with the smoothing and bend of `best`.
+
+    Args:
+        best: Its smoothing, its bend and its presliding length stay.
+        data: The joint's equations.
+        speed: The joint's highest speed, by which the points of a bent line are told. [rad/s]
+    """
     shapes: dict[Shape, None] = {}
-    for terms in CANDIDATES:
+    line = bent(speed)
+    for terms in (*CANDIDATES, *((*line.terms, *more) for more in BESIDE_POINTS if line)):
         shape = best._replace(terms=tellable_terms(terms, data))
+        if line and terms[0] in line.terms:
+            shape = shape._replace(speeds=line.speeds)
         if "stribeck" not in terms:
             shapes[shape] = None
+            if best.presliding_length:
+                shapes[shape._replace(terms=(*shape.terms, "presliding"))] = None
             continue
         for velocity in STRIBECK_VELOCITIES:
             if velocity > 2 * best.smoothing:  # else the sign's own rounding hides it
@@ -145,6 +256,32 @@ def tellable_terms(terms: tuple[str, ...], data: JointData) -> tuple[str, ...]:
     return out if data.reverses else tuple(t for t in out if t != "offset")
 
 
+def pushing_terms(shape: Shape, values: Array) -> tuple[str, ...]:
+    """The dry terms that come out negative; others may follow the coefficients. (k,)"""
+    own = dict(zip(shape.terms, values, strict=False))
+    return tuple(term for term in NEVER_NEGATIVE if own.get(term, 0.0) < 0.0)
+
+
+def pushes(shape: Shape, values: Array) -> bool:
+    """Whether Coulomb and viscous friction both come out negative."""
+    own = dict(zip(shape.terms, values, strict=False))
+    return bool(own["coulomb"] < 0.0 and own["viscous"] < 0.0)
+
+
+def non_negative_fit(j: int, shape: Shape, data: JointData) -> tuple[Shape, Array]:
+    """A shape's fit; with presliding, without the dry terms that come out negative.
+
+    Presliding and the smoothed sign share one dry torque: where one of them takes more than all of
+    it, the other is left out.
+    """
+    fit = fit_column(data.columns(j, shape), data.y, data.weights)
+    pushing = pushing_terms(shape, fit.values)
+    if "presliding" in shape.terms and pushing:
+        shape = shape._replace(terms=tuple(t for t in shape.terms if t not in pushing))
+        fit = fit_column(data.columns(j, shape), data.y, data.weights)
+    return shape, fit.values
+
+
 def is_dissipative(shape: Shape, values: Array, speed_limit: float) -> bool:
     """Whether no dry term is negative and the friction rises all the way to `speed_limit`.
 
@@ -153,7 +290,5 @@ def is_dissipative(shape: Shape, values: Array, speed_limit: float) -> bool:
         values: Its coefficients, others may follow. (k,)
         speed_limit: Speed up to which it may not fall. [rad/s]
     """
-    own = dict(zip(shape.terms, values, strict=False))
-    pushes = any(own.get(term, 0.0) < 0.0 for term in NEVER_NEGATIVE)
     friction = shape.friction(values[: len(shape.terms)])
-    return not pushes and bool(np.isnan(falling_speed(friction, speed_limit)))
+    return not pushing_terms(shape, values) and bool(np.isnan(falling_speed(friction, speed_limit)))

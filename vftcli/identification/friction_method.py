@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from vftcli.identification.clean_fit import fit_without_contacts
 from vftcli.identification.friction_shapes import round_digits
 from vftcli.identification.method_result import (
     DETERMINED,
@@ -10,10 +11,13 @@ from vftcli.identification.method_result import (
     friction_numbers,
     friction_source,
     held_joints,
+    identified_friction,
+    presliding_remark,
     profile_friction,
+    temperature_remarks,
 )
 from vftcli.identification.result import Number, number
-from vftcli.identification.training import Training, fit_without_contacts
+from vftcli.identification.training import Training
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.remarks import Where, caution
 
@@ -32,6 +36,11 @@ def friction_method(data: Training) -> MethodResult:
         if found is None:
             continue
         count, where = len(found.shape.terms), Where(joints=(j + 1,))
+        if found.is_kept:
+            found_rms, profile_rms = found.errors
+            missed = {"found_Nm": found_rms, "profile_Nm": profile_rms}
+            remarks.append(caution("profile-kept", where, **missed))
+            continue
         values, sd = found.fit.values.copy(), found.fit.sd.copy()
         if data.fit_constants and not found.constant:
             remarks.append(caution("unloaded-drive-constant", where))
@@ -54,13 +63,20 @@ def friction_method(data: Training) -> MethodResult:
             else:
                 found_here = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
                 remarks.append(caution("undetermined-rotor-inertia", where, **found_here))
-        frictions[j] = found.shape.friction(values[:count], friction_source(data, "friction", sd))
+        source = friction_source(data, "friction", sd)
+        frictions[j] = identified_friction(data, j, found.shape, values[:count], source)
         numbers += friction_numbers(j, found.shape, values, sd, profile_friction(robot)[j])
         remarks += check_friction(j, frictions[j], data)
     chain = replace(robot.chain, rotor_inertia=rotor)
     new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
     choices = [c for f in fits if f is not None for c in f.choices]
-    return MethodResult(new, numbers, choices, None, [*remarks, *held_joints(data)])
+    return MethodResult(
+        new,
+        numbers,
+        choices,
+        None,
+        [*remarks, *presliding_remark(fits), *temperature_remarks(data), *held_joints(data)],
+    )
 
 
 def refuse_sign(data: Training, j: int, scale: float) -> None:

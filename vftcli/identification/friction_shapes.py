@@ -4,12 +4,14 @@ The shapes are evaluated on the log as it was recorded and then filtered like th
 reversal is rounded alike on both sides of the equation.
 """
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.identification.processing import PreparedLog
-from vftcli.robots.friction import SMOOTHING, coulomb_logarithmic
+from vftcli.robots.friction import SMOOTHING, bent_line, coulomb_logarithmic
+from vftcli.robots.presliding import play
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
 
@@ -24,24 +26,41 @@ LOGARITHMIC_VELOCITIES = (0.1, 0.2, 0.5, 1.0, 2.0)
 """Velocities from which a logarithmic rise may flatten; UR's gears have .28 to 2.1. [rad/s]"""
 
 
+BENDS = (0.01, 0.5, 1.5, 3.2)
+"""Speeds of the points between which UR's controllers draw friction as a line. [rad/s]"""
+
+SPANNED = 0.3
+"""Share of the way between two points that a motion must cover to tell the faster one."""
+
+POINT = "point"
+"""How the terms of a bent line begin: point1 is the torque at its first speed."""
+
+
 class Shape(NamedTuple):
-    """The structure of one joint's friction: which terms, and its three nonlinear numbers.
+    """The structure of one joint's friction: which terms, and its nonlinear numbers.
 
     Attributes:
-        terms: Keys of the robot file whose values are coefficients, in order.
+        terms: Keys of the robot file whose values are coefficients, in order; those that begin with
+            `POINT` are the torques of a bent line.
         smoothing: Velocity over which the sign is smoothed. [rad/s]
         stribeck_velocity: Velocity over which the Stribeck term fades. [rad/s]
         logarithmic_velocity: Velocity from which the logarithmic term flattens. [rad/s]
+        presliding_length: Way over which the teeth of the gear give before they slide. [rad]
+        speeds: Speeds of the bent line's points. [rad/s]
     """
 
     terms: tuple[str, ...]
     smoothing: float = SMOOTHING
     stribeck_velocity: float = 0.05
     logarithmic_velocity: float = 1.0
+    presliding_length: float = 0.0
+    speeds: tuple[float, ...] = ()
 
     @property
     def model(self) -> str:
         """Name of the friction model that the robot file gets: the simplest that has all terms."""
+        if self.points:
+            return "points"
         if "logarithmic" in self.terms:
             return "coulomb-logarithmic"
         if "stribeck" in self.terms:
@@ -53,9 +72,18 @@ class Shape(NamedTuple):
         return "coulomb-viscous-offset" if "offset" in self.terms else "coulomb-viscous"
 
     @property
+    def points(self) -> tuple[str, ...]:
+        """The terms that are torques of a bent line, in the order of its speeds."""
+        return tuple(term for term in self.terms if term.startswith(POINT))
+
+    @property
     def words(self) -> str:
         """The terms and the nonlinear numbers, for tables."""
-        text = f"{' + '.join(self.terms)}, smoothing {self.smoothing:g} rad/s"
+        line = ["points at " + ", ".join(f"{v:g}" for v in self.speeds)] if self.points else []
+        others = [term for term in self.terms if term not in self.points]
+        text = f"{' + '.join([*line, *others])}, smoothing {self.smoothing:g} rad/s"
+        if "presliding" in self.terms:
+            text += f", presliding over {1e3 * self.presliding_length:g} mrad"
         if "stribeck" in self.terms:
             text += f", Stribeck velocity {self.stribeck_velocity:g} rad/s"
         if "logarithmic" in self.terms:
@@ -65,12 +93,40 @@ class Shape(NamedTuple):
     def friction(self, values: Array, confidence: str = "") -> JointFriction:
         """The joint's friction with these coefficients, one a term."""
         parameters = {k: round_digits(float(v)) for k, v in zip(self.terms, values, strict=True)}
+        torques = tuple(parameters.pop(term) for term in self.points)
+        if not torques:
+            parameters.setdefault("coulomb", 0.0)  # what slides may be all presliding's
         parameters["smoothing"] = self.smoothing
-        if "stribeck" in self.terms:
-            parameters["stribeck_velocity"] = self.stribeck_velocity
-        if "logarithmic" in self.terms:
-            parameters["logarithmic_velocity"] = self.logarithmic_velocity
-        return JointFriction(model=self.model, parameters=parameters, confidence=confidence)
+        for term in ("stribeck", "logarithmic"):
+            if term in self.terms:
+                parameters[f"{term}_velocity"] = float(getattr(self, f"{term}_velocity"))
+        if "presliding" in self.terms:
+            parameters["presliding_length"] = self.presliding_length
+        return JointFriction(
+            model=self.model,
+            parameters=parameters,
+            speeds=self.speeds if torques else (),
+            torques=torques,
+            confidence=confidence,
+        )
+
+
+def bent(speed: float, others: tuple[str, ...] = ()) -> Shape | None:
+    """The bent line whose points a motion up to a speed [rad/s] tells, None if fewer than two.
+
+    Between its points the line is straight, so that a motion well beyond one of them tells the
+    next one too; behind its last point it goes on as it came.
+
+    Args:
+        speed: The motion's highest speed. [rad/s]
+        others: Terms beside the line.
+    """
+    reached = [speed >= low + SPANNED * (high - low) for low, high in itertools.pairwise(BENDS)]
+    count = 1 + int(np.argmin([*reached, False]))
+    if count < 2:
+        return None
+    points = tuple(f"{POINT}{k}" for k in range(1, count + 1))
+    return Shape((*points, *others), speeds=BENDS[:count])
 
 
 def round_digits(value: float, digits: int = 7) -> float:
@@ -87,7 +143,11 @@ def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
         dq: Velocities as recorded. [rad/s]
         load: Absolute gravity torque. [N·m]
     """
-    numbers = {k: v for k, v in shape._asdict().items() if k != "terms"}
+    if term in shape.points:
+        torques = np.eye(len(shape.speeds))[shape.points.index(term)]
+        return bent_line(dq, np.array(shape.speeds), torques, smoothing=shape.smoothing)
+    own = ("smoothing", "stribeck_velocity", "logarithmic_velocity")
+    numbers = {name: getattr(shape, name) for name in own}
     return coulomb_logarithmic(
         dq, **{"coulomb": 0.0, "logarithmic": 0.0, term: 1.0}, **numbers, load=load
     )
@@ -99,11 +159,14 @@ class FrictionColumns:
     Args:
         motion: The prepared log.
         load: Absolute gravity torques along the whole log. (T, n) [N·m]
+        warmth: What each joint's friction is multiplied with by its temperature; None where that is
+            not known. (T, n) [1]
     """
 
-    def __init__(self, motion: PreparedLog, load: Array) -> None:
+    def __init__(self, motion: PreparedLog, load: Array, warmth: Array | None = None) -> None:
         self.motion = motion
         self.load = load
+        self.warmth = warmth
         self.cache: dict[tuple[str, int, tuple[float, ...]], Array] = {}
 
     def column(self, term: str, j: int, shape: Shape) -> Array:
@@ -113,11 +176,18 @@ class FrictionColumns:
             **dict.fromkeys(("coulomb", "load_coulomb"), (shape.smoothing,)),
             "stribeck": (shape.smoothing, shape.stribeck_velocity),
             "logarithmic": (shape.logarithmic_velocity,),
+            "presliding": (shape.presliding_length,),
+            **dict.fromkeys(shape.points, (shape.smoothing, *shape.speeds)),
         }
         key = (term, j, numbers.get(term, ()))
         if key not in self.cache:
-            dq = self.motion.recording.require("dq")[:, j]
-            values = term_values(term, shape, dq, self.load[:, j])
+            log = self.motion.recording
+            if term == "presliding":
+                values = play(log.q[:, j : j + 1], shape.presliding_length).state[:, 0]
+            else:
+                values = term_values(term, shape, log.require("dq")[:, j], self.load[:, j])
+            if self.warmth is not None and term != "offset":
+                values = values * self.warmth[:, j]
             self.cache[key] = self.motion.filtered(values[:, None])[:, 0]
         return self.cache[key]
 

@@ -151,28 +151,38 @@ def folds(samples: int, count: int = FOLDS) -> list[slice]:
     return [slice(a, b) for a, b in itertools.pairwise(edges)]
 
 
-def cross_validated(A: Array, y: Array, weights: Array, lengths: Sequence[int] = ()) -> float:
-    """RMS of what fits on four fifths of every log miss on the fifth left out, weighted.
+def left_out(lengths: Sequence[int], told: Sequence[bool]) -> list[Array]:
+    """The rows that cross-validation leaves out in turn, of logs that stand one after the other.
+
+    Of several logs that tell something each is left out whole: another log is what a model is for.
+    A single one is cut into fifths. Rows of logs that tell nothing are never left out.
+
+    Args:
+        lengths: Rows of each log.
+        told: Whether a log tells something.
+    """
+    edges = np.cumsum([0, *lengths])
+    rows = [
+        np.arange(a, b) for (a, b), use in zip(itertools.pairwise(edges), told, strict=True) if use
+    ]
+    if len(rows) > 1:
+        return rows
+    return [one[fold] for one in rows for fold in folds(len(one))]
+
+
+def cross_validated(A: Array, y: Array, weights: Array, parts: Sequence[Array]) -> float:
+    """RMS of what fits on all rows but one part's miss on that part, weighted.
 
     Args:
         A: Columns. (M, k)
         y: What they shall explain. (M,)
         weights: Of the rows. (M,)
-        lengths: Rows of each log, one log after the other; none for one log.
+        parts: Rows of each part.
     """
-    # A fifth of each log, not of their sequence: else a fold's motion would hang on their order.
-    starts = np.cumsum([0, *lengths])
-    each = [folds(length) for length in lengths or (len(y),)]
-    parts = []
-    for fold in zip(*each, strict=True):
-        rows = [np.arange(s.start, s.stop) + start for s, start in zip(fold, starts, strict=False)]
-        here = np.concatenate(rows)
-        parts.append(normal(A[here], y[here], weights[here]))
-    whole = Normal(
-        np.sum([p.gram for p in parts], axis=0),
-        np.sum([p.right for p in parts], axis=0),
-        float(sum(p.square for p in parts)),
-    )
-    total = sum(part.misfit(whole.minus(part).solution()) for part in parts)
-    count = float(np.sum(weights))
+    whole = normal(A, y, weights)
+    total, count = 0.0, 0.0
+    for rows in parts:
+        part = normal(A[rows], y[rows], weights[rows])
+        total += part.misfit(whole.minus(part).solution())
+        count += float(np.sum(weights[rows]))
     return float(np.sqrt(total / count)) if count > 0 else float("nan")

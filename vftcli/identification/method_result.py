@@ -1,5 +1,7 @@
 """What every method of identification hands back, and the remarks that several of them make."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +11,7 @@ from vftcli.identification.friction_fit import ShapeChoice
 from vftcli.identification.friction_shapes import Shape
 from vftcli.identification.least_squares import robust_sd
 from vftcli.identification.result import Number, number
-from vftcli.identification.training import Training
+from vftcli.identification.training import JointFit, Training
 from vftcli.robots.friction import falling_speed, steady_torque
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
@@ -42,7 +44,9 @@ def friction_numbers(
     j: int, shape: Shape, values: Array, sd: Array, before: JointFriction
 ) -> list[Number]:
     """Friction coefficients of joint j (from 0) beside those of the profile, one a term."""
-    known = before.parameters
+    known = dict(before.parameters)
+    if before.speeds[: len(shape.speeds)] == shape.speeds:
+        known |= dict(zip(shape.points, before.torques, strict=False))
     return [
         number(
             j, term, value, error, known.get(term, np.nan), bool(error < DETERMINED * abs(value))
@@ -76,6 +80,22 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> list[Rema
     return []
 
 
+def presliding_remark(fits: Sequence[JointFit | None]) -> list[Remark]:
+    """Which presliding length the arm got, and what every length left of the error without."""
+    for fit in fits:
+        if fit is not None:
+            lengths = [1e3 * length for length in fit.presliding.errors]
+            return [
+                fact(
+                    "presliding-length",
+                    length_mrad=1e3 * fit.presliding.length,
+                    lengths_mrad=lengths,
+                    errors=list(fit.presliding.errors.values()),
+                )
+            ]
+    return []
+
+
 def held_joints(data: Training) -> list[Remark]:
     """Remarks on joints that do not move, or never both ways."""
     remarks = []
@@ -92,6 +112,29 @@ def friction_source(data: Training, method: str, sd: Array) -> str:
     """Where a joint's friction comes from, in words for the robot file."""
     errors = ", ".join(f"{value:.2g}" for value in sd)
     return f"identified ({method}) from {data.source}; standard deviations {errors}"
+
+
+def identified_friction(
+    data: Training, j: int, shape: Shape, values: Array, source: str
+) -> JointFriction:
+    """Friction of joint j (from 0) by its fit, at the temperature for which the profile's holds."""
+    before = profile_friction(data.robot)[j]
+    return replace(
+        shape.friction(values, source),
+        temperature=before.temperature,
+        temperature_at=before.temperature_at,
+    )
+
+
+def temperature_remarks(data: Training) -> list[Remark]:
+    """By what the joints' temperatures scaled friction, of each log that has them."""
+    remarks = []
+    for motion, columns in zip(data.motions, data.columns, strict=True):
+        if columns.warmth is not None:
+            factors = [float(columns.warmth.min()), float(columns.warmth.max())]
+            where = Where(motion.recording.name)
+            remarks.append(fact("friction-by-temperature", where, factors=factors))
+    return remarks
 
 
 def profile_friction(robot: Robot) -> tuple[JointFriction, ...]:

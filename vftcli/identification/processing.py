@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from vftcli.robots.drive import drive_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
 from vftcli.robots.robot import Robot
+from vftcli.robots.temperature import friction_factor, measured_temperature
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
@@ -151,6 +152,15 @@ def usable_samples(t: Array, dq: Array, processing: Processing) -> Mask:
     for k in gaps_of(t, processing.gap):
         usable[(t > t[k] - margin) & (t < t[k + 1] + margin)] = False
     return usable
+
+
+def friction_warmth(recording: Recording, robot: Robot) -> Array | None:
+    """What a log's joint temperatures make of the robot's friction. (T, n) [1]
+
+    None where the log has no temperatures, or the robot no law for them.
+    """
+    temperature = measured_temperature(recording)
+    return None if temperature is None else friction_factor(robot.friction, temperature)
 
 
 def gravity_torque(robot: Robot, q: Array) -> Array:

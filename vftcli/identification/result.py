@@ -58,6 +58,8 @@ UNITS = {
     "quadratic": "N·m·s²/rad²",
     "logarithmic": "N·m",
     "load_coulomb": "1",
+    "presliding": "N·m",
+    **{f"point{k}": "N·m" for k in range(1, 5)},
     "stribeck": "N·m",
     "mass": "kg",
     "com_x": "m",

@@ -10,7 +10,9 @@ from vftcli.identification.method_result import (
     MethodResult,
     friction_numbers,
     friction_source,
+    identified_friction,
     profile_friction,
+    temperature_remarks,
 )
 from vftcli.identification.result import Number, number
 from vftcli.identification.targets import ControllerModel, controller_models
@@ -39,8 +41,9 @@ def targets_method(data: Training) -> MethodResult:
             rotor[j] = round_digits(model.rotor.value)
         if model.friction is not None:
             shape, values, sd = model.friction
-            frictions[j] = shape.friction(values, friction_source(data, "targets", sd))
-    remarks += gravity_remarks(models)
+            source = friction_source(data, "targets", sd)
+            frictions[j] = identified_friction(data, j, shape, values, source)
+    remarks += [*gravity_remarks(models), *temperature_remarks(data)]
     chain = replace(robot.chain, rotor_inertia=rotor)
     new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
     return MethodResult(new, numbers, [], None, remarks)

@@ -11,15 +11,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.friction_shapes import LOGARITHMIC_VELOCITIES, FrictionColumns, Shape
+from vftcli.identification.friction_fit import LIGHT, is_dissipative
+from vftcli.identification.friction_shapes import (
+    LOGARITHMIC_VELOCITIES,
+    FrictionColumns,
+    Shape,
+    bent,
+)
 from vftcli.identification.least_squares import fit_column, solve
 from vftcli.identification.processing import (
     PreparedLog,
     Processing,
+    friction_warmth,
     gravity_torque,
     prepare,
 )
 from vftcli.identification.scoring import rigid_torque
+from vftcli.robots.friction import friction_torque
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
@@ -45,7 +53,17 @@ SHAPES = (
 WRITTEN = tuple(
     Shape(("coulomb", "logarithmic"), logarithmic_velocity=bend) for bend in LOGARITHMIC_VELOCITIES
 )
-"""Friction shapes of which the best is written: none of them falls beyond the log's speeds."""
+"""Friction shapes of which the best is written where too few points of the law are reached."""
+
+MOVING = 0.05
+"""Speed from which a joint moves enough to show its friction. [rad/s]"""
+
+UNASKED = 0.5
+"""Share of the motion with a target velocity below which a hand led the arm."""
+
+GUIDED = 0.4
+"""Share of the law that a joint's friction has at most when a hand leads the arm; programs feed .8
+to 1.3 of it forward, by temperature and load."""
 
 SPEEDS = (0.0, 0.05, 0.1, 0.2)
 """Lowest speeds of the samples used, which must agree too. [rad/s]"""
@@ -122,7 +140,7 @@ def read_targets(recording: Recording, robot: Robot) -> Targets:
     return Targets(
         recording=recording,
         motion=motion,
-        columns=FrictionColumns(motion, np.abs(load)),
+        columns=FrictionColumns(motion, np.abs(load), friction_warmth(recording, robot)),
         current=motion.filtered(wanted),
         moment=smooth[motion.kept],
         lead=derivative(recording.t, smooth)[motion.kept],
@@ -139,7 +157,7 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[Co
         robot: The profile, whose rigid body is the maker's; its K stands in where none is found.
 
     Raises:
-        IdentificationError: If the robot has no drive constants.
+        IdentificationError: If the robot has no drive constants, or a hand led the arm.
         MissingSignalError: If the targets are missing.
     """
     if robot.torque_constant is None:
@@ -148,6 +166,8 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[Co
             "read a model off; use --method friction, base or consistent"
         )
     logs = [read_targets(recording, robot) for recording in recordings]
+    for log in logs:
+        refuse_guided(log, robot)
     return tuple(joint_model(j, logs, float(robot.torque_constant[j])) for j in range(robot.joints))
 
 
@@ -257,19 +277,55 @@ def controller_friction(
 ) -> tuple[Shape, Array, Array] | None:
     """The shape that K·target_current − target_moment fits best, its coefficients and their sd.
 
-    The controller's own law is a bent line through four points; None where the joint does not move.
+    The controller's own law is a bent line, whose points are read where the motion spans them;
+    elsewhere a logarithm stands for it. None where the joint does not move.
     """
     speed = np.abs(np.concatenate([log.motion.dq[:, j] for log in logs]))
-    if np.quantile(speed, 0.9) < 0.05:
+    fast = float(np.quantile(speed, 0.9))
+    if fast < MOVING:
         return None
     y = np.concatenate([constant * log.current[:, j] - log.moment[:, j] for log in logs])
+    load = np.concatenate([log.columns.load[log.motion.kept, j] for log in logs])
+    line = bent(float(speed.max()))
+    shapes = WRITTEN if line is None else (line,)
+    if np.std(load) >= LIGHT:
+        shapes = (*shapes, *(s._replace(terms=(*s.terms, "load_coulomb")) for s in shapes))
     fits = {}
-    for shape in WRITTEN:
+    for shape in shapes:
         A = np.concatenate([log.columns.joint(j, shape) for log in logs])
-        fits[shape] = fit_column(A, y, np.ones(len(y)))
+        fit = fit_column(A, y, np.ones(len(y)))
+        if is_dissipative(shape, fit.values, fast):
+            fits[shape] = fit
 
     def misfit(shape: Shape) -> float:
         return float(fits[shape].weights @ fits[shape].residual ** 2)
 
-    best = min(WRITTEN, key=misfit)
-    return best, fits[best].values, fits[best].sd
+    best = min(fits, key=misfit, default=None)
+    return None if best is None else (best, fits[best].values, fits[best].sd)
+
+
+def refuse_guided(log: Targets, robot: Robot) -> None:
+    """Raise an IdentificationError if a hand led the arm: the controller then uses less friction.
+
+    Where the log has target velocities, they are zero while the arm moves; elsewhere the friction
+    fed forward is a fraction of the law, .1 to 1.1 of it as the joint may be: one joint far below
+    the law tells.
+    """
+    recording, dq = log.recording, log.recording.require("dq")
+    moves = np.abs(dq) > MOVING
+    guided = False
+    if recording.target_dq is not None:
+        asked = np.any(recording.target_dq != 0.0, axis=1)
+        guided = bool(np.mean(asked[moves.any(axis=1)]) < UNASKED) if moves.any() else False
+    elif robot.torque_constant is not None and robot.friction:
+        law = friction_torque(robot.friction, log.motion.dq)
+        fed = robot.torque_constant * log.current - log.moment
+        used = np.where(np.abs(log.motion.dq) > MOVING, law, 0.0)
+        size = np.sum(used**2, axis=0)
+        shares = np.sum(used * fed, axis=0)[size > 0] / size[size > 0]
+        guided = bool(np.min(shares, initial=1.0) < GUIDED)
+    if guided:
+        raise IdentificationError(
+            f"{recording.name}: a hand led the arm, and the controller feeds less friction forward "
+            "then; read its model off a log in which a program moves the arm"
+        )

@@ -1,44 +1,41 @@
 """Training data: logs prepared, joints fitted one by one, contacts left out."""
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.identification.excitation import (
-    ContactSpan,
     Excitation,
-    find_contacts,
     find_excitation,
-    outside_contacts,
-    unexplained_torque,
 )
-from vftcli.identification.friction_fit import LIGHT, JointData, ShapeChoice, choose_shape
+from vftcli.identification.friction_fit import (
+    JointData,
+    PreslidingChoice,
+    ShapeChoice,
+    choose_presliding,
+    choose_shape,
+)
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.least_squares import ColumnFit, fit_column
-from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
-from vftcli.identification.scoring import apparent_load, predicted_torque, rigid_torque
+from vftcli.identification.processing import (
+    PreparedLog,
+    Processing,
+    friction_warmth,
+    gravity_torque,
+    prepare,
+)
+from vftcli.identification.scoring import predicted_torque, rigid_torque
 from vftcli.robots.drive import drive_torque, uses_current
-from vftcli.robots.friction import dry_torque
-from vftcli.robots.robot import Robot
+from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, Where, caution, fact, warning
-
-LOAD_EXPLAINS = 0.8
-"""Share of what the profile misses that a load must explain to be suspected."""
-
-UNKNOWN_LOAD = 0.5
-"""Smallest load that is suspected. [kg]"""
 
 CONSTANT_KNOWN = 0.02
 """Relative standard deviation up to which a drive constant is taken from free motion."""
-
-HEAVY = 0.1
-"""A joint carries the arm's weight if its gravity torque varies by this share of the largest."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +48,7 @@ class Training:
         motions: Those that move, filtered and decimated.
         columns: Their friction columns.
         rigid: Torque of the profile's rigid body. (M, n) each [N·m]
+        rubbing: Torque of its rotors and its friction. (M, n) each [N·m]
         excited: Which joints move.
         source: The logs in words, for the robot file.
         fit_constants: Whether drive constants are unknowns of the friction method.
@@ -61,6 +59,7 @@ class Training:
     motions: tuple[PreparedLog, ...]
     columns: tuple[FrictionColumns, ...]
     rigid: tuple[Array, ...]
+    rubbing: tuple[Array, ...]
     excited: Excitation
     source: str
     fit_constants: bool = False
@@ -95,18 +94,26 @@ def prepare_training(
         )
     excited = find_excitation(motions)
     moved = tuple(m for m in motions if m.samples > 1)
-    columns = tuple(FrictionColumns(m, np.abs(gravity_torque(robot, m.recording.q))) for m in moved)
+    columns = tuple(friction_columns(m, robot) for m in moved)
     digests = ", ".join(f"{r.name} (sha256 {r.source.sha256 or 'unknown'})" for r in recordings)
+    rigid = tuple(rigid_torque(robot, m) for m in moved)
     return Training(
         robot=robot,
         recordings=tuple(recordings),
         motions=moved,
         columns=columns,
-        rigid=tuple(rigid_torque(robot, m) for m in moved),
+        rigid=rigid,
+        rubbing=tuple(predicted_torque(robot, m) - r for m, r in zip(moved, rigid, strict=True)),
         excited=excited,
         source=digests,
         fit_constants=fit_constants,
     )
+
+
+def friction_columns(motion: PreparedLog, robot: Robot) -> FrictionColumns:
+    """A log's friction columns, by the robot's gravity and its joints' temperatures."""
+    load = np.abs(gravity_torque(robot, motion.recording.q))
+    return FrictionColumns(motion, load, friction_warmth(motion.recording, robot))
 
 
 class JointFit(NamedTuple):
@@ -117,36 +124,58 @@ class JointFit(NamedTuple):
         fit: Friction coefficients, then q̈'s, then the rigid torque's.
         choices: The candidates and their errors.
         constant: Whether the drive constant was fitted too.
+        presliding: The arm's presliding length, which all joints share.
+        errors: RMS of what the model misses of stretches left out, and what the profile's friction
+            and rotor miss there; NaN where they were not compared. [N·m]
     """
 
     shape: Shape
     fit: ColumnFit
     choices: list[ShapeChoice]
     constant: bool
+    presliding: PreslidingChoice
+    errors: tuple[float, float] = (np.nan, np.nan)
+
+    @property
+    def friction(self) -> JointFriction:
+        """The joint's friction by this fit."""
+        return self.shape.friction(self.fit.values[: len(self.shape.terms)])
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the profile's friction and rotor predict at least as well."""
+        return self.errors[1] <= self.errors[0]
 
 
 def fit_frictions(data: Training, weights: Sequence[Array]) -> list[JointFit | None]:
     """Fit every joint that moves, the links held at the profile; None for the others."""
-    fits: list[JointFit | None] = []
-    for j in range(data.robot.joints):
-        if not data.excited.moves[j]:
-            fits.append(None)
-            continue
-        found = fit_joint(data, j, weights, data.fit_constants)
+    moving = [j for j in range(data.robot.joints) if data.excited.moves[j]]
+    presliding = choose_presliding(
+        [(j, data_of_joint(data, j, weights, data.fit_constants)) for j in moving]
+    )
+    fits: list[JointFit | None] = [None] * data.robot.joints
+    for j in moving:
+        found = fit_joint(data, j, weights, presliding, data.fit_constants)
         # A joint that carries little cannot tell its constant, the last coefficient, from friction.
         known = found.fit.sd[-1] < CONSTANT_KNOWN * abs(found.fit.values[-1])
         if data.fit_constants and not known:
-            found = fit_joint(data, j, weights, False)
-        fits.append(found)
+            found = fit_joint(data, j, weights, presliding, False)
+        fits[j] = found
     return fits
 
 
-def fit_joint(data: Training, j: int, weights: Sequence[Array], constant: bool) -> JointFit:
+def fit_joint(
+    data: Training, j: int, weights: Sequence[Array], presliding: PreslidingChoice, constant: bool
+) -> JointFit:
     """Choose and fit one joint's model, with its drive constant or without."""
     given = data_of_joint(data, j, weights, constant)
-    shape, choices = choose_shape(j, given)
+    shape, choices = choose_shape(j, given, presliding.length)
     fit = fit_column(given.columns(j, shape), given.y, given.weights)
-    return JointFit(shape, fit, choices, constant)
+    errors = (np.nan, np.nan)
+    if given.profile is not None and choices:
+        miss = float(np.sum(fit.weights * (given.y - given.profile) ** 2) / np.sum(fit.weights))
+        errors = (next(c.error for c in choices if c.chosen), float(np.sqrt(miss)))
+    return JointFit(shape, fit, choices, constant, presliding, errors)
 
 
 def data_of_joint(data: Training, j: int, weights: Sequence[Array], constant: bool) -> JointData:
@@ -172,6 +201,7 @@ def data_of_joint(data: Training, j: int, weights: Sequence[Array], constant: bo
         load_spread=float(np.std(load)),
         reverses=bool(data.excited.reverses[j]),
         speed_limit=data.top_speed(j),
+        profile=None if constant else np.concatenate([r[:, j] for r in data.rubbing]),
     )
 
 
@@ -183,88 +213,3 @@ def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array
         if fit is not None:
             whole[:, j] = fit.fit.residual
     return [whole[a:b] for a, b in itertools.pairwise(edges)]
-
-
-def fit_without_contacts(
-    data: Training, strict: bool
-) -> tuple[list[JointFit | None], list[Array], list[Remark]]:
-    """Fit friction, leave out contacts, and fit again without them.
-
-    Args:
-        data: The training logs.
-        strict: Whether links that do not explain the torque are an error, not a remark.
-
-    Returns:
-        The fits, the weights of every sample (M, n) a log, and remarks.
-
-    Raises:
-        IdentificationError: If the model misses most of the torque: another robot.
-    """
-    weights = [m.usable.astype(float) for m in data.motions]
-    fits = fit_frictions(data, weights)
-    left, remarks = all_residuals(data, fits), list[Remark]()
-    for k, (motion, residual) in enumerate(zip(data.motions, left, strict=True)):
-        if found := find_contacts(motion, residual, fitted_dry_friction(data, k, fits)):
-            weights[k] = weights[k] * outside_contacts(motion, found)[:, None]
-            remarks.append(contacts_remark(motion, found))
-    if remarks:
-        fits = fit_frictions(data, weights)
-        left = all_residuals(data, fits)
-    for remark in model_doubts(data, left, weights):
-        if strict:
-            raise IdentificationError(
-                f"{remark}. Choose another --robot, find the load with --find-payload, or let "
-                "--method base identify the links too"
-            )
-        remarks += [remark, fact("absorbed-doubt", Where(remark.where.about))]
-    return fits, weights, remarks
-
-
-def contacts_remark(motion: PreparedLog, found: Sequence[ContactSpan]) -> Remark:
-    """A remark on the stretches of a log that are left out of the fit."""
-    return caution(
-        "suspected-contacts",
-        Where(motion.recording.name),
-        count=len(found),
-        total_s=sum(c.stop - c.start for c in found),
-        starts_s=[c.start for c in found],
-        stops_s=[c.stop for c in found],
-        worst_joints=[c.joint for c in found],
-        residuals_Nm=[c.size for c in found],
-    )
-
-
-def model_doubts(
-    data: Training, left: Sequence[Array], weights: Sequence[Array]
-) -> Iterator[Remark]:
-    """Remarks on logs whose torque the profile's links do not explain.
-
-    Args:
-        data: The training logs.
-        left: What the friction fits leave of each log. (M, n) each [N·m]
-        weights: Weight of every sample, 0 where it tells nothing. (M, n) each
-    """
-    spread = np.std(np.concatenate([c.load for c in data.columns]), axis=0)
-    heavy = (spread > HEAVY * spread.max()) & (spread > LIGHT) & data.excited.moves
-    for motion, residual, w in zip(data.motions, left, weights, strict=True):
-        used, name = np.where(w > 0, residual, 0.0), motion.recording.name
-        # A load is looked for in what the profile leaves before friction is fitted: Coulomb
-        # friction would take some of it up.
-        before = motion.tau - predicted_torque(data.robot, motion)
-        mass, explained = apparent_load(data.robot, motion, before)
-        if explained >= LOAD_EXPLAINS and abs(mass) >= UNKNOWN_LOAD:
-            load = {"mass_kg": mass, "robot": data.robot.name, "share_percent": 100.0 * explained}
-            yield warning("unknown-load", Where(name), **load)
-        if remark := unexplained_torque(name, data.robot.name, motion.tau, used, heavy):
-            yield remark
-
-
-def fitted_dry_friction(data: Training, log: int, fits: Sequence[JointFit | None]) -> Array:
-    """Dry friction of each joint along a log by its fit, load included. (M, n) [N·m]"""
-    motion, columns = data.motions[log], data.columns[log]
-    out = np.zeros(motion.q.shape)
-    for j, fit in enumerate(fits):
-        if fit is not None:
-            values = dict(zip(fit.shape.terms, fit.fit.values, strict=False))
-            out[:, j] = dry_torque(values, columns.load[motion.kept, j])
-    return out

@@ -6,31 +6,37 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.identification.base_parameters import BaseParameters, base_parameters
+from vftcli.identification.clean_fit import fit_without_contacts
 from vftcli.identification.consistent import fit_consistent, nearest_physical
 from vftcli.identification.friction_fit import PLAIN, is_dissipative
-from vftcli.identification.friction_shapes import FrictionColumns, Shape, round_digits
+from vftcli.identification.friction_shapes import Shape, round_digits
 from vftcli.identification.method_result import (
     MethodResult,
     check_friction,
     friction_numbers,
     friction_source,
     held_joints,
+    identified_friction,
+    presliding_remark,
     profile_friction,
+    temperature_remarks,
 )
-from vftcli.identification.processing import gravity_torque
 from vftcli.identification.scoring import rigid_torque
 from vftcli.identification.stacking import ParameterColumns, Triangles, WeightedLog, stack
 from vftcli.identification.training import (
     JointFit,
     Training,
     fit_frictions,
-    fit_without_contacts,
+    friction_columns,
 )
 from vftcli.robots.regressor import chain_parameters, with_parameters
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import Remark, caution, fact
+
+NARROW = 0.7
+"""Share of undetermined base parameters from which on a motion tells the links too little."""
 
 
 def whole_arm(data: Training, method: str) -> MethodResult:
@@ -68,19 +74,28 @@ def whole_arm(data: Training, method: str) -> MethodResult:
             # Beside the links' errors a rise may turn into a fall; the joint's own fit does not.
             if not is_dissipative(shape, values, data.top_speed(j)):
                 values = found.fit.values[: len(shape.terms)]
-            frictions[j] = shape.friction(values, friction_source(data, method, sd))
+            frictions[j] = identified_friction(
+                data, j, shape, values, friction_source(data, method, sd)
+            )
             numbers += friction_numbers(j, shape, values, sd, profile_friction(data.robot)[j])
             remarks += check_friction(j, frictions[j], data)
     robot = with_vector(data.robot, layout, x, tuple(frictions))
     choices = [c for f in fits if f is not None for c in f.choices]
-    return MethodResult(robot, numbers, choices, base, [*remarks, *held_joints(data)])
+    return MethodResult(
+        robot,
+        numbers,
+        choices,
+        base,
+        [*remarks, *presliding_remark(fits), *temperature_remarks(data), *held_joints(data)],
+    )
 
 
 def base_remark(base: BaseParameters, layout: ParameterColumns) -> Remark:
     """How many base parameters the logs leave open; friction coefficients are not counted."""
     count = len(base.values) - (layout.size - layout.inertial - layout.rotors)
     open_ones = sum(not known for known in base.determined[:count])
-    return fact("undetermined-base-parameters", count=count, undetermined=open_ones)
+    level = caution if open_ones > NARROW * count else fact
+    return level("undetermined-base-parameters", count=count, undetermined=open_ones)
 
 
 def stack_training(
@@ -101,9 +116,7 @@ def stack_training(
 def with_links(data: Training, layout: ParameterColumns, x: Array) -> Training:
     """The training data with other links: their rigid-body torque, their gravity as load."""
     robot = with_vector(data.robot, layout, x, data.robot.friction)
-    columns = (
-        FrictionColumns(m, np.abs(gravity_torque(robot, m.recording.q))) for m in data.motions
-    )
+    columns = (friction_columns(m, robot) for m in data.motions)
     return replace(
         data,
         columns=tuple(columns),
