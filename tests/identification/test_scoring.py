@@ -51,12 +51,10 @@ def test_prediction_adds_rotors_and_filtered_friction(motion):
     bare = predicted_torque(UR5.without_friction(), motion)
     np.testing.assert_allclose(bare, rigid_torque(UR5, motion) + rotors, atol=1e-12)
     friction = predicted_torque(UR5, motion) - bare
-    values = UR5.friction[0].parameters
-    dq = motion.dq[:, 0]
-    law = values["coulomb"] * np.tanh(dq / values.get("smoothing", 0.01))
-    law += (
-        values["logarithmic"] * np.sign(dq) * np.log(1 + abs(dq) / values["logarithmic_velocity"])
-    )
+    joint, dq = UR5.friction[0], motion.dq[:, 0]
+    first = joint.torques[0]
+    law = first * np.tanh(dq / joint.parameters["smoothing"])
+    law += np.sign(dq) * (np.interp(np.abs(dq), joint.speeds, joint.torques) - first)
     expected = motion.filtered(law[:, None])[:, 0]
     np.testing.assert_allclose(friction[:, 0], expected, atol=1e-9)
 
