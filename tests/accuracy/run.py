@@ -148,9 +148,9 @@ def best_line(case) -> dict[str, object]:
         return line
     rests = standing(case.recording.t, case.recording.dq)
     inside = np.abs(error) <= 1.96 * estimate.error_sd
-    half = 1.96 * np.sqrt(np.mean(estimate.error_sd**2, axis=0))
-    line["half width/rmse"] = float(half.mean() / line["best"])
-    for name, where in (("moving", ~rests), ("rest", rests)):
+    line["half width/rmse"] = float(1.96 * estimate.error_sd.mean() / line["best"])
+    everywhere = np.ones_like(rests)
+    for name, where in (("moving", ~rests), ("rest", rests), ("all", everywhere)):
         shares = [inside[w, j].mean() if w.any() else np.nan for j, w in enumerate(where.T)]
         line[f"held {name}"] = np.round(shares, 2).tolist()
     return line
