@@ -10,7 +10,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.disturbance import Blocks
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.virtual_sensor.smoother.noise import (
-    ASSUMED_SHARES,
+    ASSUMED_SHARE,
     NEAR_REST,
     REST_SHARE,
     UNSEEN_SHARE,
@@ -128,8 +128,8 @@ def test_without_free_motion_the_dry_friction_is_taken_and_said() -> None:
         found = torque_noise(noisy, free, UR5, SECONDS)
         assert found.free_seconds == 0.0
         dry = dry_torques(UR5)
-        np.testing.assert_allclose(found.moving, np.maximum(ASSUMED_SHARES[0] * dry, 0.3) ** 2)
-        np.testing.assert_allclose(found.resting, np.maximum(ASSUMED_SHARES[1] * dry, 0.3) ** 2)
+        np.testing.assert_allclose(found.moving, np.maximum(ASSUMED_SHARE * dry, 0.3) ** 2)
+        np.testing.assert_allclose(found.resting, np.maximum(REST_SHARE * dry, 0.3) ** 2)
         # a median over 48 bends of three blocks each
         np.testing.assert_allclose(found.white, 0.04, rtol=0.7)
 

@@ -1,11 +1,10 @@
 """The prior of the wrench: what the gate pins, and what the log's likelihood chooses."""
 
 import numpy as np
-import pytest
 
 from vftcli.robots.disturbance import Blocks
 from vftcli.virtual_sensor.smoother.noise import TorqueNoise
-from vftcli.virtual_sensor.smoother.prior import LEVER, WrenchPrior, evolution, gated
+from vftcli.virtual_sensor.smoother.prior import GRID, LEVER, WrenchPrior, evolution, gated
 
 COUNT, SECONDS = 30, 0.1
 T = SECONDS * (np.arange(COUNT) + 0.5)
@@ -59,6 +58,7 @@ def test_a_gap_lets_both_decay_by_its_own_length() -> None:
     np.testing.assert_allclose(decay[10, 6:], np.exp(-3.1 / 0.5))
 
 
-@pytest.mark.parametrize(("time", "steady"), [(10.0, False), (30.0, True), (300.0, True)])
-def test_what_keeps_for_half_a_minute_is_a_load(time: float, steady: bool) -> None:
-    assert WrenchPrior(time, 30.0).is_steady is steady
+def test_what_keeps_for_half_a_minute_and_hardly_changes_in_a_second_is_a_load() -> None:
+    """σ_f √(2/τ_w) is 15 N for (30 s, 60 N), pushes in a row, and 5 N for (300 s, 60 N)."""
+    steady = [(prior.time, prior.force) for prior in GRID if prior.is_steady]
+    assert steady == [(30, 10), (100, 10), (100, 30), (300, 10), (300, 30), (300, 60)]

@@ -33,8 +33,10 @@ class WrenchPrior(NamedTuple):
 
     @property
     def is_steady(self) -> bool:
-        """Whether it is the prior of a load rather than of contacts."""
-        return self.time >= STEADY
+        """Whether it is the prior of a load rather than of contacts that come and go."""
+        # What the force changes by in a second, where that is short against τ_w.
+        change = self.force * np.sqrt(2.0 / self.time)
+        return bool(self.time >= STEADY and change <= LOAD_CHANGE)
 
     @property
     def variance(self) -> Array:
@@ -43,7 +45,10 @@ class WrenchPrior(NamedTuple):
 
 
 STEADY = 30.0
-"""A wrench that keeps for at least this long is a load. [s]"""
+"""A wrench that keeps for at least this long is a load, … [s]"""
+
+LOAD_CHANGE = 5.0
+"""… if it changes by no more than this (one standard deviation) in a second. [N]"""
 
 GRID = tuple(WrenchPrior(time, force) for time in TIMES for force in FORCES)
 """The priors that are tried."""
