@@ -148,7 +148,7 @@ def test_an_output_that_is_a_file_is_one_line(tmp_path: Path, run: Run) -> None:
     ("words", "expected"),
     [
         (("--robot", "ur9"), "Did you mean"),
-        (("--robot", "ur5", "--observer", "kalman"), "there is fdo, gmo"),
+        (("--robot", "ur5", "--observer", "kalman"), "there is best, fdo, gmo"),
         (("--robot", "ur5", "--set", "gmo.gain=-3"), "must be positive"),
         (("--robot", "ur5", "--set", "gmo.gain=1,2"), "one for each of 6"),
         (("--robot", "ur5", "--set", "kfo.noise_convention=white"), "there is density"),

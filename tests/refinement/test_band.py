@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from vftcli.observers import MomentumObserver
+from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.readers import read
 from vftcli.refinement.band import band_remarks, with_band
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading, rests_in
@@ -74,3 +75,23 @@ def test_samples_that_a_fit_calls_free_take_the_place_of_the_free_part(found: Ba
     np.testing.assert_array_equal(
         with_band(found, reading, quiet=few).error_sd, with_band(found, reading).error_sd
     )
+
+
+def test_the_band_holds_on_a_real_arm_with_planted_pushes(
+    logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every joint at least .88 of its samples, and no wider than 2.6 × the RMSE; seed 1."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "accuracy"))
+    from planted_pushes import planted
+
+    columns = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+    robot = load_robot("ur10e")
+    pushed = planted(read(logs / "ur10e" / "free_12harm_40s.csv.gz", columns=columns), robot, 1)
+    run = ModelledRun(recording=pushed.recording, robot=robot)
+    base = baseline_of(FreeMotion(log=run, choice=FreeChoice(spans=((0.0, 8.0),))))
+    assert base.load is None
+    observer = tune_to_spectra("rts-auto", base.spectra)
+    estimate = with_band(base, free_reading(base, observer, observer.estimate(base.terms)))
+    error, half = estimate.tau - pushed.torque, 1.96 * estimate.error_sd
+    assert np.all(np.mean(np.abs(error) <= half, axis=0) >= 0.88)
+    assert half.mean() <= 2.6 * np.sqrt(np.mean(error**2, axis=0)).mean()

@@ -125,13 +125,12 @@ class Baseline:
 
         A load that they carry is no noise, and is off too.
         """
-        parts = []
-        for piece in self.pieces:
-            terms = self.terms_of(piece.run)
-            if self.load is not None:
-                terms = self.load.off(piece.run, terms)
-            parts.append(Part(terms, piece.inside))
-        return parts
+        return [Part(self.without_load(piece.run), piece.inside) for piece in self.pieces]
+
+    def without_load(self, run: ModelledRun) -> DynamicsTerms:
+        """The terms of a free piece's recording, less a load that it carries."""
+        terms = self.terms_of(run)
+        return terms if self.load is None else self.load.off(terms, run)
 
     @property
     def pieces(self) -> tuple[FreePiece, ...]:

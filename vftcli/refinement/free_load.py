@@ -88,8 +88,8 @@ class FreeLoad:
         weights = np.concatenate([[self.mass], self.moment])
         return handed_over(load_regressor(run.robot.chain, run.recording.q) @ weights)
 
-    def off(self, run: ModelledRun, terms: DynamicsTerms) -> DynamicsTerms:
-        """A recording's terms, corrected or not, as they were without it, μ ← μ + τ_load."""
+    def off(self, terms: DynamicsTerms, run: ModelledRun) -> DynamicsTerms:
+        """Terms of a recording as they were without it, μ ← μ + τ_load."""
         return replace(terms, mu=handed_over(terms.mu + self.torque(run)))
 
 
