@@ -5,9 +5,9 @@ import pytest
 
 from vftcli.identification.payload import (
     REACH,
+    STRETCHES,
     LoadSolution,
     NotSameMotionError,
-    STRETCHES,
     find_time_shift,
     fit_all_joints,
     gain_covariance,

@@ -8,7 +8,7 @@ from vftcli.identification.consistent import is_physical
 from vftcli.identification.processing import gravity_torque, prepare
 from vftcli.identification.result import root_mean_square
 from vftcli.identification.scoring import predicted_torque
-from vftcli.robots import JointFriction, load_robot
+from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.regressor import chain_parameters
 from vftcli.robots.robot import Robot
@@ -46,21 +46,23 @@ def truth() -> Robot:
 
     arm, _ = build(load_scenario("free-excitation"), SEED)
     profile, true = load_robot("ur5"), arm.true
-    names = ("coulomb", "viscous", "logarithmic", "logarithmic_velocity", "offset")
-    friction = tuple(
-        JointFriction(
-            model="coulomb-logarithmic",
-            parameters={
-                **{name: float(getattr(true.friction, name)[j]) for name in names},
-                "stribeck": true.friction.stribeck * float(true.friction.coulomb[j]),
-                "stribeck_velocity": true.friction.stribeck_velocity,
-                "smoothing": 0.003,
-            },
+    friction = []
+    for j, joint in enumerate(profile.friction):
+        # the plant's own numbers: the torque of the first point stands beside the slopes' bends
+        dry = float(true.friction.coulomb[j])
+        rise = np.cumsum(
+            np.r_[dry, np.diff(joint.speeds) * np.cumsum(true.friction.bend_slopes[:, j])]
         )
-        for j in range(6)
-    )
+        parameters = {
+            "offset": float(true.friction.offset[j]),
+            "load_coulomb": float(true.friction.load_coulomb[j]),
+            "stribeck": true.friction.stribeck * dry,
+            "stribeck_velocity": true.friction.stribeck_velocity,
+            "smoothing": 0.003,
+        }
+        friction.append(replace(joint, parameters=parameters, torques=tuple(rise.tolist())))
     constant = profile.torque_constant * true.gain
-    return replace(profile, chain=true.chain, friction=friction, torque_constant=constant)
+    return replace(profile, chain=true.chain, friction=tuple(friction), torque_constant=constant)
 
 
 def rubbing(robot, speeds, load):
