@@ -48,19 +48,16 @@ def truth() -> Robot:
     profile, true = load_robot("ur5"), arm.true
     friction = []
     for j, joint in enumerate(profile.friction):
-        # the plant's own numbers: the torque of the first point stands beside the slopes' bends
-        dry = float(true.friction.coulomb[j])
-        rise = np.cumsum(
-            np.r_[dry, np.diff(joint.speeds) * np.cumsum(true.friction.bend_slopes[:, j])]
-        )
+        rises = np.cumsum(true.friction.bend_slopes[:, j]) * np.diff(joint.speeds)
+        coulomb = float(true.friction.coulomb[j])
         parameters = {
-            "offset": float(true.friction.offset[j]),
             "load_coulomb": float(true.friction.load_coulomb[j]),
-            "stribeck": true.friction.stribeck * dry,
+            "stribeck": true.friction.stribeck * coulomb,
             "stribeck_velocity": true.friction.stribeck_velocity,
             "smoothing": 0.003,
         }
-        friction.append(replace(joint, parameters=parameters, torques=tuple(rise.tolist())))
+        torques = tuple(coulomb + np.concatenate([[0.0], np.cumsum(rises)]))
+        friction.append(replace(joint, parameters=parameters, torques=torques))
     constant = profile.torque_constant * true.gain
     return replace(profile, chain=true.chain, friction=tuple(friction), torque_constant=constant)
 

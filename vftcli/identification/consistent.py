@@ -26,13 +26,13 @@ WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
 MARGIN = 1.01
 """The strongest pull within this factor of the best cross-validated misfit is taken."""
 
-NARROW_MARGIN = 1.03
+NARROW_MARGIN = 1.05
 """The same where the motion tells the links too little. One that repeats itself is predicted a
 little better without any pull, and others ten times worse: of five rounds of one circle each knows
 the other four."""
 
-TABLE = 10.0
-"""Pull of a maker's table whose masses have a standard deviation of 16 %: the distance of
+TABLE = 100.0
+"""Pull of a maker's table whose masses have a standard deviation of 5 %: the distance of
 P = (1 + δ) P₀ is 2 δ² for small δ."""
 
 STEPS = 100
