@@ -16,7 +16,7 @@ from vftcli.identification.scoring import (
     rigid_torque,
     score_remarks,
 )
-from vftcli.robots import JointFriction, Payload, load_robot
+from vftcli.robots import Payload, load_robot
 
 UR5 = load_robot("ur5")
 
@@ -50,11 +50,12 @@ def test_prediction_adds_rotors_and_filtered_friction(motion):
     rotors = UR5.chain.rotor_inertia * motion.ddq
     bare = predicted_torque(UR5.without_friction(), motion)
     np.testing.assert_allclose(bare, rigid_torque(UR5, motion) + rotors, atol=1e-12)
-    values = {"coulomb": 4.0, "viscous": 6.0, "smoothing": 0.02}
-    rubbing = JointFriction(model="coulomb-viscous", parameters=values)
-    friction = predicted_torque(replace(UR5, friction=(rubbing,) * 6), motion) - bare
-    dq = motion.recording.require("dq")[:, 0]
-    expected = motion.filtered((4.0 * np.tanh(dq / 0.02) + 6.0 * dq)[:, None])[:, 0]
+    friction = predicted_torque(UR5, motion) - bare
+    joint, dq = UR5.friction[0], motion.dq[:, 0]
+    first = joint.torques[0]
+    law = first * np.tanh(dq / joint.parameters["smoothing"])
+    law += np.sign(dq) * (np.interp(np.abs(dq), joint.speeds, joint.torques) - first)
+    expected = motion.filtered(law[:, None])[:, 0]
     np.testing.assert_allclose(friction[:, 0], expected, atol=1e-9)
 
 

@@ -23,13 +23,16 @@ from vftcli.signals.errors import IdentificationError
 WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
 """Weights of the distance to the profile that cross-validation chooses from."""
 
-MARGIN = 1.03
-"""The strongest pull within this factor of the best cross-validated misfit is taken. A motion that
-repeats itself is predicted a little better without any pull, and others ten times worse: of five
-rounds of one circle each knows the other four."""
+MARGIN = 1.01
+"""The strongest pull within this factor of the best cross-validated misfit is taken."""
 
-TABLE = 10.0
-"""Pull of a maker's table whose masses have a standard deviation of 16 %: the distance of
+NARROW_MARGIN = 1.05
+"""The same where the motion tells the links too little. One that repeats itself is predicted a
+little better without any pull, and others ten times worse: of five rounds of one circle each knows
+the other four."""
+
+TABLE = 100.0
+"""Pull of a maker's table whose masses have a standard deviation of 5 %: the distance of
 P = (1 + δ) P₀ is 2 δ² for small δ."""
 
 STEPS = 100
@@ -194,12 +197,15 @@ def fit_at(
     return solve(Problem(R * shrink, z * shrink, start, triangles.layout, weight), x)
 
 
-def fit_consistent(triangles: Triangles, profile: Array) -> tuple[Array, float, dict[float, float]]:
+def fit_consistent(
+    triangles: Triangles, profile: Array, margin: float = MARGIN
+) -> tuple[Array, float, dict[float, float]]:
     """Fit a physical model, its pull to the profile chosen by cross-validation.
 
     Args:
         triangles: The stacked equations.
         profile: The profile's parameters with fitted friction. (size,)
+        margin: Factor of the best misfit within which the strongest pull is taken.
 
     Returns:
         All unknowns (size,), the weight of the distance, and the cross-validated misfit of every
@@ -216,15 +222,12 @@ def fit_consistent(triangles: Triangles, profile: Array) -> tuple[Array, float, 
     rows = triangles.samples * triangles.correlation
     errors = {weight: float(np.sqrt(total / rows)) for weight, total in totals.items()}
     best = min(errors.values())
-    weight = max(w for w, error in errors.items() if error <= MARGIN * best)
+    weight = max(w for w, error in errors.items() if error <= margin * best)
     return fit_at(triangles, start, weight, start), weight, errors
 
 
-def nearest_physical(triangles: Triangles, profile: Array, weight: float = TABLE) -> Array:
-    """The physical model that predicts nearly what least squares predicts. (size,)
-
-    What the data does not tell stays near the profile.
-    """
+def nearest_physical(triangles: Triangles, profile: Array, weight: float = WEIGHTS[0]) -> Array:
+    """The physical model that predicts nearly what least squares predicts. (size,)"""
     start = starting_point(triangles.layout, profile)
     # From the strongest pull on, each optimum is a good start for the next, weaker one.
     x = start

@@ -16,7 +16,7 @@ from vftcli.identification.friction_shapes import (
 )
 from vftcli.identification.least_squares import cross_validated, fit_column, left_out
 from vftcli.identification.result import root_mean_square
-from vftcli.robots.friction import falling_speed
+from vftcli.robots.friction import SMOOTHING, falling_speed
 from vftcli.signals.arrays import Array
 from vftcli.signals.filters import low_pass
 
@@ -166,9 +166,9 @@ def choose_presliding(joints: Sequence[tuple[int, JointData]]) -> PreslidingChoi
         plain = data.slow(data.columns(j, Shape(terms, SLIDING)))
         # Weights of outliers are held: all lengths must answer for the same samples.
         weights = fit_column(plain, y, data.weights).weights
-        # What a wider sign or a breakaway torque explains as well is not presliding's.
-        rivals = [Shape(terms, smoothing) for smoothing in SMOOTHINGS]
-        rivals += [Shape((*terms, "stribeck"), SLIDING, v) for v in STRIBECK_VELOCITIES]
+        # What a smoother sign explains as well is not presliding's; one smoother than that is
+        # presliding in the velocity's guise.
+        rivals = [Shape(terms, smoothing) for smoothing in (SLIDING, SMOOTHING)]
         sliding = [
             Shape((*terms, "presliding"), SLIDING, presliding_length=length)
             for length in PRESLIDING_LENGTHS

@@ -34,6 +34,9 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
 
+KEPT = 0.85
+"""Share of a fit's cross-validated error from which down on the profile's friction is kept."""
+
 CONSTANT_KNOWN = 0.02
 """Relative standard deviation up to which a drive constant is taken from free motion."""
 
@@ -143,8 +146,8 @@ class JointFit(NamedTuple):
 
     @property
     def is_kept(self) -> bool:
-        """Whether the profile's friction and rotor predict at least as well."""
-        return self.errors[1] <= self.errors[0]
+        """Whether the profile's friction and rotor predict clearly better."""
+        return self.errors[1] < KEPT * self.errors[0]
 
 
 def fit_frictions(data: Training, weights: Sequence[Array]) -> list[JointFit | None]:

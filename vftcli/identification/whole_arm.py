@@ -7,7 +7,14 @@ import numpy as np
 
 from vftcli.identification.base_parameters import BaseParameters, base_parameters
 from vftcli.identification.clean_fit import fit_without_contacts
-from vftcli.identification.consistent import fit_consistent, nearest_physical
+from vftcli.identification.consistent import (
+    MARGIN,
+    NARROW_MARGIN,
+    TABLE,
+    WEIGHTS,
+    fit_consistent,
+    nearest_physical,
+)
 from vftcli.identification.friction_fit import PLAIN, is_dissipative
 from vftcli.identification.friction_shapes import Shape, round_digits
 from vftcli.identification.method_result import (
@@ -56,13 +63,16 @@ def whole_arm(data: Training, method: str) -> MethodResult:
     layout, start = initial_columns(data, fits)
     triangles = stack_training(refined, layout, start, weights)
     base = base_parameters(triangles, start)
+    remark = base_remark(base, layout)
+    narrow = remark.level == "caution"
     if method == "base":
-        x = nearest_physical(triangles, start)
+        x = nearest_physical(triangles, start, TABLE if narrow else WEIGHTS[0])
         remarks.append(fact("nearest-physical-model"))
     else:
-        x, weight, errors = fit_consistent(triangles, start)
+        margin = NARROW_MARGIN if narrow else MARGIN
+        x, weight, errors = fit_consistent(triangles, start, margin)
         remarks.append(fact("profile-pull", weight=weight, weights=sorted(errors)))
-    remarks.append(base_remark(base, layout))
+    remarks.append(remark)
     if data.robot.payload is not None:
         remarks.append(fact("payload-in-link"))
     numbers = []
