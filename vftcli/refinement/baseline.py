@@ -115,9 +115,16 @@ class Baseline:
 
     @property
     def correction_sd(self) -> Array | None:
-        """Standard deviation of the correction where it is off, None without one. (T, n) [N·m]"""
-        off = self.correction
-        return None if off is None else np.where(off.applied, off.sd, 0.0)
+        """Standard deviation of the model's error as the correction has it, None without one.
+
+        On joints left alone too: what could not be predicted there is not known either. (T, n) [N·m]
+        """
+        return None if self.correction is None else self.correction.sd
+
+    @property
+    def quiet(self) -> Mask | None:
+        """Samples that the fit of the correction calls free of contact, None without one. (T,)"""
+        return None if self.correction is None else self.correction.free
 
     @property
     def samples(self) -> list[Part]:
