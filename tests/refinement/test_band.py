@@ -11,6 +11,7 @@ from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.readers import read
 from vftcli.refinement.band import band_remarks, with_band
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading, rests_in
+from vftcli.refinement.whole_log import WholeLogBias
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import ModelledRun
@@ -26,13 +27,25 @@ def found() -> Baseline:
     return baseline_of(FreeMotion(log=log, choice=FreeChoice(cycles=(1,))))
 
 
+def corrected(found: Baseline, free, sd: float = 0.0, load: float = 0.0) -> Baseline:
+    """The baseline with a correction off that changes nothing but says this of the log."""
+    shape = found.terms.p.shape
+    off = WholeLogBias(
+        applied=np.zeros(6, dtype=bool),
+        bias=np.zeros(shape),
+        sd=np.full(shape, sd),
+        free=free,
+        load=np.full(shape, load),
+        remarks=(),
+    )
+    return replace(found, correction=off)
+
+
 def test_a_correction_adds_its_own_variance(found: Baseline) -> None:
     reading = free_reading(found, GMO, GMO.estimate(found.terms))
-    plain = with_band(found, reading).error_sd
-    sd = np.full(plain.shape, 0.7)
-    np.testing.assert_allclose(
-        with_band(found, reading, sd).error_sd, np.hypot(plain, 0.7), rtol=1e-12
-    )
+    known = found.part.own
+    plain, wider = (with_band(corrected(found, known, sd), reading).error_sd for sd in (0.0, 0.7))
+    np.testing.assert_allclose(wider, np.hypot(plain, 0.7), rtol=1e-12)
 
 
 def test_rest_and_motion_have_bands_of_their_own(found: Baseline) -> None:
@@ -65,7 +78,7 @@ def test_samples_that_a_fit_calls_free_take_the_place_of_the_free_part(found: Ba
     reading = free_reading(found, GMO, GMO.estimate(found.terms))
     quiet = np.arange(found.terms.samples) % 7 == 0
     rests = rests_in(found.motion.log)
-    sd = with_band(found, reading, quiet=quiet).error_sd
+    sd = with_band(corrected(found, quiet), reading).error_sd
     there = with_band(
         found, reading._replace(samples=reading.estimate.tau[quiet], resting=rests[quiet])
     )
@@ -73,7 +86,18 @@ def test_samples_that_a_fit_calls_free_take_the_place_of_the_free_part(found: Ba
     # too few to speak for anything
     few = np.arange(found.terms.samples) < 20
     np.testing.assert_array_equal(
-        with_band(found, reading, quiet=few).error_sd, with_band(found, reading).error_sd
+        with_band(corrected(found, few), reading).error_sd, with_band(found, reading).error_sd
+    )
+
+
+def test_a_slow_load_that_the_fit_believes_in_is_no_error(found: Baseline) -> None:
+    reading = free_reading(found, GMO, GMO.estimate(found.terms))
+    pushed = reading._replace(estimate=replace(reading.estimate, tau=reading.estimate.tau + 5.0))
+    known = found.part.own
+    np.testing.assert_allclose(
+        with_band(corrected(found, known, load=5.0), pushed).error_sd,
+        with_band(corrected(found, known), reading).error_sd,
+        rtol=1e-9,  # 5 is added and taken off again, at errors down to .05
     )
 
 

@@ -6,48 +6,51 @@ import numpy as np
 
 from vftcli.observers.error_band import ENOUGH, error_band, free_error
 from vftcli.refinement.baseline import Baseline, FreeReading, rests_in
+from vftcli.refinement.whole_log import WholeLogBias
 from vftcli.robots.friction import dry_friction
-from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.arrays import handed_over
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact
 
 
-def with_band(
-    found: Baseline,
-    reading: FreeReading,
-    correction_sd: Array | None = None,
-    quiet: Mask | None = None,
-) -> ExternalTorque:
+def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
     """The estimate with its band, and marked where joints move; itself where nothing is known.
 
     The band is how far the estimate may be off, as the log itself shows it: see
     `vftcli.observers.error_band`. A Kalman filter's own covariance knows neither model error nor
-    lag: it is the filter's own account, and stands apart (`sd`).
+    lag: it is the filter's own account, and stands apart (`sd`). Where the bias of the whole log is
+    off, all samples that its fit calls free of contact count as free: a stated free part is short,
+    and often at rest.
 
     Args:
         found: The log's baseline, of the terms that the estimate was made from.
         reading: The estimate, and what it reads where nothing touches the arm.
-        correction_sd: Standard deviation of what was taken off the terms before. (T, n) [N·m]
-        quiet: Samples that the fit of what was taken off calls free of contact. They take the place
-            of the free part, which is short and often at rest; None to keep that. (T,)
     """
-    if quiet is not None and np.count_nonzero(quiet) >= ENOUGH:
-        reading = read_in(found, reading, quiet)
+    off = found.correction
+    if off is not None and np.count_nonzero(off.free) >= ENOUGH:
+        reading = read_where_free(found, reading, off)
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
     friction = dry_friction(run.robot.friction, run.robot.joints)
     if spectra is None or not len(reading.samples):
         return estimate
     free = free_error(reading.samples, reading.resting, friction)
     response = reading.observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
-    sd = error_band(free, spectra.missed(response), rests_in(run), correction_sd)
+    sd = error_band(free, spectra.missed(response), rests_in(run), found.correction_sd)
     return replace(estimate, error_sd=handed_over(sd), moving=~found.standing)
 
 
-def read_in(found: Baseline, reading: FreeReading, quiet: Mask) -> FreeReading:
-    """A reading whose free samples are others of the log. (T,)"""
+def read_where_free(found: Baseline, reading: FreeReading, off: WholeLogBias) -> FreeReading:
+    """A reading whose free samples are those that the fit of a correction calls free.
+
+    Slow loads that the fit believes in are no error of who reads them, nor is a load that the free
+    part carries where it believes in none.
+    """
     run, tau = found.motion.log, reading.estimate.tau
-    left = tau if found.load is None else tau - found.load.torque(run)
-    return reading._replace(samples=left[quiet], resting=rests_in(run)[quiet])
+    if off.load.any():
+        tau = tau - off.load
+    elif found.load is not None:
+        tau = tau - found.load.torque(run)
+    return reading._replace(samples=tau[off.free], resting=rests_in(run)[off.free])
 
 
 def band_remarks(found: Baseline) -> tuple[Remark, ...]:

@@ -115,16 +115,12 @@ class Baseline:
 
     @property
     def correction_sd(self) -> Array | None:
-        """Standard deviation of the model's error as the correction has it, None without one.
+        """Standard deviation of the model's error as the correction has it. (T, n) [N·m]
 
-        On joints left alone too: what could not be predicted there is not known either. (T, n) [N·m]
+        On joints left alone too: what could not be predicted there is not known either. None
+        without a correction.
         """
         return None if self.correction is None else self.correction.sd
-
-    @property
-    def quiet(self) -> Mask | None:
-        """Samples that the fit of the correction calls free of contact, None without one. (T,)"""
-        return None if self.correction is None else self.correction.free
 
     @property
     def samples(self) -> list[Part]:

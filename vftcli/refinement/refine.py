@@ -73,8 +73,7 @@ def refine(
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
     checks = [consistency(on, *pair) for on, pair in zip(under, pairs, strict=True)]
     shown = tuple(
-        with_band(on, reading, on.correction_sd, on.quiet)
-        for on, reading in zip(under, finished.readings, strict=True)
+        with_band(on, reading) for on, reading in zip(under, finished.readings, strict=True)
     )
     gap = expected_gap(found, shown, gains_of_file=gains_of_file)
     return Refinement(

@@ -63,6 +63,8 @@ class WholeLogBias:
         bias: Torque by which the model is wrong, zero on joints left alone. (T, n) [N·m]
         sd: Standard deviation of the model's error as it was fitted. (T, n) [N·m]
         free: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
+        load: External torque of the slow loads that the fit believes in, which stays in the
+            estimates; zero where it believes in none. (T, n) [N·m]
         remarks: What was applied, and what was not and why.
         error: The model's error on the joints left alone too, None where nothing was fitted.
     """
@@ -71,11 +73,12 @@ class WholeLogBias:
     bias: Array
     sd: Array
     free: Mask
+    load: Array
     remarks: tuple[Remark, ...]
     error: ModelError | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        seal(self, "bias", "sd")
+        seal(self, "bias", "sd", "load")
         for name in ("applied", "free"):
             object.__setattr__(self, name, frozen_mask(getattr(self, name)))
 
@@ -161,6 +164,7 @@ def untouched(terms: DynamicsTerms, why: Remark) -> WholeLogBias:
         bias=none,
         sd=none,
         free=np.ones(terms.samples, dtype=bool),
+        load=none,
         remarks=(why,),
     )
 
@@ -180,11 +184,13 @@ def bias_of(
     error = error_of(sds * found.solution.model, n)
     bias = np.where(found.applied, error.torque(run, motion), 0.0)
     spread = fit.rows.spread(found.solution.covariance)
+    load = -fit.rows.loads.made_by(found.solution.loads)
     return WholeLogBias(
         applied=found.applied,
         bias=handed_over(bias),
         sd=handed_over(resample_columns(t, t[::stride], spread)),
         free=free,
+        load=handed_over(resample_columns(t, t[::stride], load)),
         remarks=remarks_of(found, np.sqrt(np.mean(bias**2, axis=0)), float(fit.free.mean())),
         error=error,
     )
