@@ -49,7 +49,8 @@ class Baseline:
         standing: Where a joint stands still. (T, n)
         missing: Why there is no free part, or are no spectra; None where there are both.
         load: A load that the free part carries and the model lacks, None where none shows.
-        correction: The bias of the whole log that is off the terms, None where none is.
+        correction: The bias of the whole log, off the terms where its guards apply it; None where
+            none was fitted.
         by_fit: Whether the free part is what the fit of that bias takes for free: no contact that
             comes and goes, though a load that stays may be in it.
         on_correction: What was applied of it and what was not, and what stands in for a free part.

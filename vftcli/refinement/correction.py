@@ -42,7 +42,7 @@ def baseline_for(motion: FreeMotion, choice: RefinementChoice, *, best: bool) ->
     except (VftError, np.linalg.LinAlgError) as error:
         failed = caution("whole-log-bias-failed", reason=str(error))
         return replace(found, on_correction=(failed,))
-    if found.spectra is None:
+    if found.spectra is None and bias.fitted:
         found = on_quiet_samples(found, bias.free)
     made = corrected(found, bias)
     return made if choice.corrects_all else replace(found, best=made)
@@ -66,11 +66,12 @@ def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
 
 
 def corrected(found: Baseline, bias: WholeLogBias) -> Baseline:
-    """A baseline with the bias of the whole log off, where its guards apply any of it."""
-    made = replace(found, on_correction=bias.remarks)
-    if not bias.applied.any():
-        return made
-    made = replace(made, correction=bias)
-    if made.part is None or made.spectra is None:
+    """A baseline with the bias of the whole log off, where its guards apply any of it.
+
+    What its fit says of contact and of slow loads holds also where none of it is applied.
+    """
+    fitted = bias if bias.fitted else None
+    made = replace(found, on_correction=bias.remarks, correction=fitted)
+    if not bias.applied.any() or made.part is None or made.spectra is None:
         return made
     return replace(made, spectra=spectra_of(Part(made.terms, ~made.part.own), made.samples))

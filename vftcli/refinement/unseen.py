@@ -36,11 +36,13 @@ class Guarded(NamedTuple):
         solution: From all free samples, held back as far as predicts best; None if not at all.
         share: Unseen error with it over that without. (n,)
         applied: Joints on which it is worth having. (n,)
+        loads: Slow loads that are believed beside it, in standard deviations. (L,)
     """
 
     solution: FittedError | None
     share: Array
     applied: Mask
+    loads: Array
 
 
 def guarded(fit: WholeLogFit) -> Guarded:
@@ -62,8 +64,10 @@ def guarded(fit: WholeLogFit) -> Guarded:
     best = int(np.argmin(squares.mean(axis=1)))
     share = np.sqrt(squares[best] / np.maximum(squares[0], np.finfo(float).tiny))
     if not SCALES[best]:
-        return Guarded(None, share, np.zeros(fit.rows.joints, dtype=bool))
-    return Guarded(fit.solved(whole, SCALES[best]), share, share <= WORTH)
+        none = np.zeros(fit.rows.joints, dtype=bool)
+        return Guarded(None, share, none, fit.solved(whole).loads)
+    solution = fit.solved(whole, SCALES[best])
+    return Guarded(solution, share, share <= WORTH, solution.loads)
 
 
 def fold_spans(free: NDArray[np.intp], margin: int) -> list[tuple[slice, slice]]:

@@ -66,6 +66,7 @@ class WholeLogBias:
         load: External torque of the slow loads that the fit believes in, which stays in the
             estimates; zero where it believes in none. (T, n) [N·m]
         remarks: What was applied, and what was not and why.
+        fitted: Whether there was a fit; else `free` and `load` say nothing of the log.
         error: The model's error on the joints left alone too, None where nothing was fitted.
     """
 
@@ -75,6 +76,7 @@ class WholeLogBias:
     free: Mask
     load: Array
     remarks: tuple[Remark, ...]
+    fitted: bool = True
     error: ModelError | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
@@ -166,6 +168,7 @@ def untouched(terms: DynamicsTerms, why: Remark) -> WholeLogBias:
         free=np.ones(terms.samples, dtype=bool),
         load=none,
         remarks=(why,),
+        fitted=False,
     )
 
 
@@ -175,22 +178,23 @@ def bias_of(
     """The bias on the log's own clock, with its uncertainty and what is said of it."""
     t, n = run.recording.t, run.robot.joints
     free = fit.free[np.minimum((np.arange(len(t)) + stride // 2) // stride, len(fit.free) - 1)]
+    load = handed_over(resample_columns(t, t[::stride], -fit.rows.loads.made_by(found.loads)))
     if found.solution is None:
         said = remarks_of(found, np.zeros(n), float(fit.free.mean()))
-        return replace(untouched(run.terms, said[0]), free=free, remarks=said)
+        bare = untouched(run.terms, said[0])
+        return replace(bare, free=free, load=load, remarks=said, fitted=True)
     sds, expected = np.zeros(fit.rows.unknowns), expected_error(run.robot)
     for j in range(n):
         sds[column_numbers(j, n)] = expected.own(j)
     error = error_of(sds * found.solution.model, n)
     bias = np.where(found.applied, error.torque(run, motion), 0.0)
     spread = fit.rows.spread(found.solution.covariance)
-    load = -fit.rows.loads.made_by(found.solution.loads)
     return WholeLogBias(
         applied=found.applied,
         bias=handed_over(bias),
         sd=handed_over(resample_columns(t, t[::stride], spread)),
         free=free,
-        load=handed_over(resample_columns(t, t[::stride], load)),
+        load=load,
         remarks=remarks_of(found, np.sqrt(np.mean(bias**2, axis=0)), float(fit.free.mean())),
         error=error,
     )

@@ -286,7 +286,7 @@ def best_record(analysis: Analysis) -> dict[str, Any] | None:
         "omega_n_rad_s": analysis.tunings[BEST].omega_n,
         "free_part": list(under.part.remarks) if under.part is not None else None,
         "whole_log_bias": None
-        if corrected is None
+        if corrected is None or not corrected.applied.any()
         else {
             "joints": [j + 1 for j in np.flatnonzero(corrected.applied)],
             "rms_Nm": np.sqrt(np.mean(corrected.bias**2, axis=0)),
