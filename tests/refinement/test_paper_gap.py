@@ -65,6 +65,15 @@ def test_nothing_is_said_where_a_side_is_not_known(analysis: Analysis) -> None:
     }
 
 
+def test_gains_that_do_as_well_are_not_called_off_the_best() -> None:
+    delay = {"gmo": np.array([0.1, 0.2])}
+    for error, code in ((1.1, "paper-gains-expected"), (0.7, "paper-gains-expected-level")):
+        said = gap_remark("paper-gains-expected", {"best": 1.0, "gmo": error}, delay)
+        assert said is not None
+        assert said.code == code
+        assert str(said)
+
+
 def test_what_is_measured_takes_the_place_of_what_was_expected(analysis: Analysis) -> None:
     import polars as pl
 

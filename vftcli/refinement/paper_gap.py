@@ -21,6 +21,12 @@ from vftcli.signals.remarks import Remark, fact
 EXPECTED = "paper-gains-expected"
 """Code of the remark that holds what the bands let expect."""
 
+LEVEL = "-level"
+"""What its code ends in where the paper's gains do as well as the best."""
+
+AHEAD = 1.05
+"""The best is ahead where the paper's gains make this many times its error."""
+
 
 def expected_gap(
     found: Baseline, estimates: Sequence[ExternalTorque], *, gains_of_file: bool
@@ -64,7 +70,8 @@ def gap_remark(
     """How far the paper's gains are off the best; None where an error is not known, or is none.
 
     Args:
-        code: The remark's code: whether it was measured or is expected.
+        code: The remark's code: whether it was measured or is expected; with `LEVEL` behind it
+            where the paper's gains do as well.
         errors: Observer → error, `best` among them. [N·m]
         delays: Observer of the paper → delay of each joint. (n,) [s]
     """
@@ -74,7 +81,7 @@ def gap_remark(
         return None
     spread = np.concatenate([*delays.values()])
     return fact(
-        code,
+        code if ratio >= AHEAD else code + LEVEL,
         ratio=ratio,
         ratios=ratios,
         least_delay_ms=1e3 * float(spread.min()),
