@@ -1,0 +1,119 @@
+"""How hard: the wrench of every contact by the gated smoother, its prior learned from the contacts.
+
+Outside its contact a wrench is pinned to zero, so that the model error is learned from the quiet
+blocks on both sides of a contact, and the contact is measured against that. What other contacts
+load says nothing of it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vftcli.contacts.windows import (
+    ContactPrior,
+    Lane,
+    Run,
+    BlockLog,
+    WindowWrench,
+    gate_of,
+    likelihoods,
+    smooth_lanes,
+    window_of,
+)
+from vftcli.signals.arrays import Array
+
+START = ContactPrior(0.3, 30.0, 3.0)
+"""The prior that learning starts from."""
+
+TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0
+"""Correlation times that are tried. [s]"""
+
+FORCES, MOMENTS = (3.0, 300.0), (0.1, 50.0)
+"""Smallest and largest standard deviation. [N], [N·m]"""
+
+RELEASED, RELEASE_TIME, RELEASE_SHARE = 1.5, 0.08, 0.25
+"""A contact is split where the force is below so many standard deviations for so long [s], and
+below this share of the peaks on both sides."""
+
+
+def smooth_contacts(
+    log: BlockLog, jacobians: Sequence[Array], runs: Sequence[Run], prior: ContactPrior
+) -> list[WindowWrench]:
+    """The wrench in the window of every contact.
+
+    Args:
+        log: The log.
+        jacobians: J of each contact's point along the log. (K, 6, n) each
+        runs: The blocks of every contact.
+        prior: How the wrench may move.
+    """
+    return smooth_lanes(log, contact_lanes(log, jacobians, runs, prior))
+
+
+def contact_lanes(
+    log: BlockLog, jacobians: Sequence[Array], runs: Sequence[Run], prior: ContactPrior
+) -> list[Lane]:
+    """A lane for every contact, the others hidden."""
+    count = len(log.blocks.t)
+    every, lanes = gate_of(count, runs), []
+    for run, jacobian in zip(runs, jacobians, strict=True):
+        gate = gate_of(count, [run])
+        lanes.append(Lane(window_of(log.blocks.t, run), gate, every & ~gate, jacobian, prior))
+    return lanes
+
+
+def learn_prior(
+    log: BlockLog, jacobian: Array, runs: Sequence[Run], prior: ContactPrior, rounds: int
+) -> ContactPrior:
+    """The prior by expectation and maximisation: τ_w by likelihood, then σ_f and σ_m by the mean.
+
+    Args:
+        log: The log.
+        jacobian: J of the flange. (K, 6, n)
+        runs: The blocks of every contact.
+        prior: Where to start.
+        rounds: How often.
+    """
+    each = [jacobian] * len(runs)
+    for _ in range(rounds):
+        tried = [prior._replace(time=time) for time in TIMES]
+        lanes = [lane for p in tried for lane in contact_lanes(log, each, runs, p)]
+        nats = likelihoods(log, lanes).reshape(len(tried), len(runs)).sum(axis=1)
+        time = tried[int(np.argmax(nats))].time
+        courses = smooth_contacts(log, each, runs, prior._replace(time=time))
+        inside = [course.within(run) for course, run in zip(courses, runs, strict=True)]
+        values = np.concatenate([course.values for course in inside])
+        covariance = np.concatenate([course.covariance for course in inside])
+        power = (values**2 + np.diagonal(covariance, axis1=1, axis2=2)).mean(axis=0)
+        force, moment = np.sqrt(power[:3].mean()), np.sqrt(power[3:].mean())
+        prior = ContactPrior(
+            time, float(np.clip(force, *FORCES)), float(np.clip(moment, *MOMENTS))
+        )
+    return prior
+
+
+def split_run(t: Array, course: WindowWrench, run: Run) -> list[Run]:
+    """A contact's blocks, split where the force is gone for a while between two peaks."""
+    inside = course.within(run)
+    size = inside.size
+    sd = np.sqrt(np.trace(inside.covariance[:, :3, :3], axis1=1, axis2=2))
+    low, at = size < RELEASED * sd, t[run[0] : run[1]]
+    pieces, begin = [], 0
+    for k, end in quiet_pauses(low, at):
+        before, after = size[begin:k].max(), size[end:].max()
+        if size[k:end].min() < RELEASE_SHARE * min(before, after):
+            pieces.append((run[0] + begin, run[0] + k))
+            begin = end
+    return [*pieces, (run[0] + begin, run[1])]
+
+
+def quiet_pauses(low: Array, t: Array) -> list[tuple[int, int]]:
+    """Runs of low blocks within a contact that last at least `RELEASE_TIME`."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], low, [False]]).astype(int)))
+    pairs = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    usual = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    return [
+        (start, stop)
+        for start, stop in pairs
+        if start > 0 and stop < len(low) and t[stop - 1] - t[start] + usual >= RELEASE_TIME
+    ]
