@@ -26,8 +26,11 @@ from vftcli.virtual_sensor.smoother.noise import steps
 PUSH = np.repeat([30.0, 3.0], 3)
 """A push as it may be: standard deviation of force and moment at the flange. [N, N·m]"""
 
-TAPS, LEANS = (0.3, 0.5), (2.0, 3.0)
-"""Correlation time of a contact's torque and how long a contact lasts, of either search. [s]"""
+SEARCHES = (0.3, 0.5), (2.0, 3.0)
+"""Correlation time of a contact's torque and how long a contact lasts: for taps, for leans. [s]"""
+
+WARM_UP, STRETCH = 5.0, 10.0
+"""Stretches in which a long log is searched, and what of the log before each is taken along. [s]"""
 
 BETWEEN = 30.0
 """Mean time from one contact to the next. [s]"""
@@ -114,43 +117,77 @@ def two_state_odds(
 ) -> list[tuple[Array, Array]]:
     """Log odds of contact of the search for taps and of that for leans, forward and backward.
 
+    A long log is searched in stretches side by side, each after `WARM_UP` seconds of the log before
+    it, in which the filter forgets that it has just begun.
+
     Args:
         blocks: The log.
         courses: How b goes forward and backward.
         size: Standard deviation of each joint's torque in contact. (K, n) [N·m]
     """
-    ahead, back = courses
-    d = np.stack([blocks.d, blocks.d, blocks.d[::-1], blocks.d[::-1]], axis=1)
-    decay, added, white, spikes = (
-        np.stack([a, a, b, b], axis=1) for a, b in zip(ahead, back, strict=True)
-    )
-    variance = np.stack([size, size, size[::-1], size[::-1]], axis=1) ** 2
     step = steps(blocks)
     step[0] = float(np.median(blocks.length))
-    other = np.concatenate([step[:1], step[:0:-1]])
-    dt = np.stack([step, step, other, other], axis=1)
-    time = np.array([TAPS[0], LEANS[0]] * 2)
-    lasts = np.array([TAPS[1], LEANS[1]] * 2)
-    kept = np.exp(-dt / time)
-    begins, ends = 1.0 - np.exp(-dt / BETWEEN), 1.0 - np.exp(-dt / lasts)
-    often = np.log(spikes), np.log1p(-spikes)
-    odds = np.empty((len(d), 4))
-    n = d.shape[2]
-    nought = np.zeros((4, n))
-    state = Search(
-        np.zeros((2, 4, n)),
-        nought,
-        np.zeros((2, 4, n)),
-        nought,
-        variance[0].copy(),
-        np.full(4, np.log(AT_FIRST / (1.0 - AT_FIRST))),
-    )
-    for k in range(len(d)):
+    back = np.concatenate([step[:1], step[:0:-1]])
+    ahead = (blocks.d, *courses[0], size**2, step[:, None])
+    turned = (blocks.d[::-1], *courses[1], size[::-1] ** 2, back[:, None])
+    usual = float(np.median(blocks.length))
+    begins, warm, length = stretches_of(len(step), usual)
+    inputs = [
+        np.stack([stretch(series, k, length) for series in pair for k in begins for _ in SEARCHES])
+        for pair in zip(ahead, turned, strict=True)
+    ]
+    odds = filtered_odds(*(np.moveaxis(series, 0, 1) for series in inputs))
+    table = odds.reshape(length, 2, len(begins), len(SEARCHES))
+    joined = np.concatenate([table[(warm if k else 0) :, :, i] for i, k in enumerate(begins)])
+    found = joined[: len(step)]
+    return [(found[:, 0, s], found[::-1, 1, s]) for s in range(len(SEARCHES))]
+
+
+def stretches_of(count: int, step: float) -> tuple[list[int], int, int]:
+    """First blocks of the stretches that are searched, their warm-up and their length. [blocks]"""
+    warm, own = max(round(WARM_UP / step), 1), max(round(STRETCH / step), 2)
+    if count <= warm + 2 * own:
+        return [0], 0, count
+    begins = [0, *range(own, count - warm, own)]
+    return begins, warm, warm + own
+
+
+def stretch(series: Array, first: int, length: int) -> Array:
+    """So many blocks of a series from one on, its last one repeated beyond the end."""
+    return series[np.minimum(np.arange(first, first + length), len(series) - 1)]
+
+
+def filtered_odds(
+    d: Array, decay: Array, added: Array, white: Array, spikes: Array, variance: Array, dt: Array
+) -> Array:
+    """ln P(contact)/P(free) along S searches side by side. (K, S)
+
+    Args:
+        d: Mean disturbance. (K, S, n) [N·m]
+        decay: Share of b that is kept. (K, S, n)
+        added: Variance that b is given. (K, S, n)
+        white: R. (K, S, n)
+        spikes: How often an innovation is a spike. (K, S, n)
+        variance: Variance of a contact's torque. (K, S, n) [(N·m)²]
+        dt: Time from the block before. (K, S, 1) [s]
+    """
+    blocks, count, n = d.shape
+    time, lasts = (np.tile(each, count // len(SEARCHES)) for each in zip(*SEARCHES, strict=True))
+    kept = np.exp(-dt[..., 0] / time)[..., None]
+    begins, ends = 1.0 - np.exp(-dt[..., 0] / BETWEEN), 1.0 - np.exp(-dt[..., 0] / lasts)
+    often = np.log(spikes) - 0.5 * np.log(SPIKE), np.log1p(-spikes)
+    # A stretch begins with what b is like anywhere.
+    added[0] /= np.maximum(1.0 - decay[0] ** 2, 1e-9)
+    nought, first = np.zeros((count, n)), np.full(count, np.log(AT_FIRST / (1.0 - AT_FIRST)))
+    both = np.zeros((2, count, n))
+    state = Search(both, nought, both, nought, variance[0].copy(), first)
+    odds = np.empty((blocks, count))
+    for k in range(blocks):
         mixed = mix(state, begins[k], ends[k], variance[k])
-        predicted = predict(mixed, decay[k], added[k], kept[k][:, None], variance[k])
+        predicted = predict(mixed, decay[k], added[k], kept[k], variance[k])
         state = correct(predicted, d[k], white[k], (often[0][k], often[1][k]))
         odds[k] = state.odds
-    return [(odds[:, 0], odds[::-1, 2]), (odds[:, 1], odds[::-1, 3])]
+    return odds
 
 
 def mix(state: Search, begins: Array, ends: Array, variance: Array) -> Search:
@@ -192,7 +229,7 @@ def correct(state: Search, d: Array, white: Array, often: tuple[Array, Array]) -
     nu = np.stack([d - state.b[0], d - state.b[1] - state.x])
     square = nu * nu / S
     usual = often[1] - 0.5 * square
-    spiked = often[0] - 0.5 * square / SPIKE - 0.5 * np.log(SPIKE)
+    spiked = often[0] - 0.5 * square / SPIKE
     likely = np.logaddexp(usual, spiked) - 0.5 * np.log(S)
     odds = state.odds + (likely[1] - likely[0]).sum(axis=1)
     S = np.where(spiked > usual, SPIKE * S, S)

@@ -94,7 +94,9 @@ def is_stop(run: ModelledRun, found: Found, number: int, seconds: float) -> bool
     """Whether a candidate follows an abrupt stop of the arm."""
     first, last = found.runs[number]
     t, half = found.log.blocks.t, 0.5 * found.log.blocks.length
-    return follows_stop(run.recording, t[first] - half[first], t[last - 1] + half[last - 1], seconds)
+    return follows_stop(
+        run.recording, t[first] - half[first], t[last - 1] + half[last - 1], seconds
+    )
 
 
 def false_rows(free: Untouched, seconds: float) -> int:

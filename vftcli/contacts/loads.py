@@ -6,8 +6,9 @@ import numpy as np
 
 from vftcli.contacts.contact_list import Contact
 from vftcli.contacts.rows import DRIVES, NORMAL
+from vftcli.contacts.untouched import free_part
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.smoothing import SmoothedWrench, smooth_wrench
@@ -33,10 +34,8 @@ def is_load(recording: Recording, contacts: tuple[Contact, ...]) -> bool:
 
 def free_terms(motion: FreeMotion) -> list[FreeTerms]:
     """The free part as the wrench smoother takes it."""
-    try:
-        pieces = motion.part.pieces
-    except ReferenceTorqueError:
-        return []
+    part = free_part(motion)
+    pieces = () if part is None else part.pieces
     return [FreeTerms(p.run.terms, p.run.recording.q, p.inside) for p in pieces]
 
 
@@ -67,9 +66,7 @@ def load_row(motion: FreeMotion, contacts: tuple[Contact, ...]) -> Contact:
     )
 
 
-def mean_and_spread(
-    wrench: SmoothedWrench, start: float, stop: float
-) -> tuple["np.ndarray", "np.ndarray"]:
+def mean_and_spread(wrench: SmoothedWrench, start: float, stop: float) -> tuple[Array, Array]:
     """Mean over a span, and √(s²/m + (3 % of the mean)²), s the spread of m means over 5 s. (6,)"""
     inside = (wrench.t >= start) & (wrench.t <= stop)
     values, t = wrench.values[inside], wrench.t[inside]

@@ -121,7 +121,7 @@ class Measurer:
         chain = self.run.robot.loaded_chain
         fits = those_that_fit(point_fits(chain, blocks.q[peak], torque, sd))
         jacobian = self.found.places[0].jacobian
-        return Site(fits, arm_parts(chain.joints), jacobian, torque, sd)
+        return Site(fits, arm_parts(chain.joints), jacobian)
 
     def row(self, number: int, course: WindowWrench, site: "Site") -> Contact:
         """One row of the list."""
@@ -161,7 +161,9 @@ class Measurer:
             joint_torque=J.T @ values,
             joint_torque_sd=torque_sd,
             at_rest=bool(resting(blocks)[peak].all()),
-            vendor_force=vendor_force(self.run, self.found.places[0].jacobian[peak], peak, blocks.t),
+            vendor_force=vendor_force(
+                self.run, self.found.places[0].jacobian[peak], peak, blocks.t
+            ),
             sensor_force=sensor_force(self.run, float(blocks.t[peak])),
         )
 
@@ -185,15 +187,11 @@ class Site(NamedTuple):
         fits: Points that fit, the best first.
         names: Link → part of the arm.
         jacobian: J of the point whose wrench is measured, along the log. (K, 6, n)
-        torque: The contact's joint torque. (n,) [N·m]
-        torque_sd: Its standard deviation. (n,) [N·m]
     """
 
     fits: list[PointFit]
     names: dict[int, ArmPart]
     jacobian: Array
-    torque: Array
-    torque_sd: Array
 
     @property
     def parts(self) -> list[ArmPart]:
@@ -287,13 +285,3 @@ def sensor_force(run: ModelledRun, at: float) -> float | None:
     force = [np.interp(at, run.recording.t, column) for column in own[:, :3].T]
     found = float(np.linalg.norm(force))
     return found if np.isfinite(found) else None
-
-
-def chosen_runs(found: Found, least: float) -> list[int]:
-    """Numbers of the candidates whose evidence is above a threshold."""
-    return [int(i) for i in np.flatnonzero(found.best > least)]
-
-
-def without(found: Found, dropped: Sequence[Run]) -> Found:
-    """What was found less some runs."""
-    return found.kept([i for i, run in enumerate(found.runs) if run not in dropped])

@@ -86,9 +86,7 @@ def learn_prior(
         covariance = np.concatenate([course.covariance for course in inside])
         power = (values**2 + np.diagonal(covariance, axis1=1, axis2=2)).mean(axis=0)
         force, moment = np.sqrt(power[:3].mean()), np.sqrt(power[3:].mean())
-        prior = ContactPrior(
-            time, float(np.clip(force, *FORCES)), float(np.clip(moment, *MOMENTS))
-        )
+        prior = ContactPrior(time, float(np.clip(force, *FORCES)), float(np.clip(moment, *MOMENTS)))
     return prior
 
 

@@ -10,7 +10,7 @@ SHORT = 0.3
 BEFORE, AFTER = (-0.25, 0.1), (0.12, 0.35)
 """When the arm must have moved and when it must rest, about the beginning of a row. [s]"""
 
-MOVED, RESTS, LEFT = 0.02, 0.012, 0.05
+MOVED, RESTS, LEFT = 0.02, 0.02, 0.05
 """A speed that counts as motion and one that counts as rest [rad/s]; and what may be left of the
 speed before, while the arm rings."""
 

@@ -6,7 +6,7 @@ is the one at the point that fits best, or the flange's where no point does.
 
 import numpy as np
 
-from vftcli.contacts.candidates import NEAR, close_gaps, threshold_contacts
+from vftcli.contacts.candidates import LEVEL, threshold_contacts
 from vftcli.contacts.contact_list import Contact
 from vftcli.contacts.places import MORE_THAN_A_FORCE, arm_parts, point_fits, those_that_fit
 from vftcli.contacts.rows import (
@@ -32,8 +32,8 @@ PRIOR = np.repeat([100.0, 10.0], 3)
 SPLIT = 0.5
 """A contact is split where |F| falls below this share of the peaks on both sides."""
 
-LEVEL = 4.0
-"""Standard deviations of a joint's torque that tell a contact."""
+APART = 0.1
+"""Shortest piece of a contact that is split. [s]"""
 
 
 def flange_forces(J: Array, torque: Array, sd: Array) -> tuple[Array, Array]:
@@ -55,38 +55,33 @@ def threshold_rows(run: ModelledRun) -> tuple[Contact, ...]:
     t = run.recording.t
     torque, sd = observed(run), expected_torque(run, None)
     above = threshold_contacts(t, torque, sd) & (t >= t[0] + SETTLED)
-    above = close_gaps(t, above, NEAR)
     J = flange_jacobian(run.robot.loaded_chain, run.recording.q)
+    least = max(round(APART / median_step(t)), 1)
     rows: list[Contact] = []
     for start, stop in runs_of(above):
         span = slice(start, stop)
         size = np.linalg.norm(flange_forces(J[span], torque[span], sd[span])[0][:, :3], axis=1)
-        for first, last in split_at_valleys(size):
+        for first, last in split_at_valleys(size, least):
             peak = start + first + int(np.argmax(size[first:last]))
             rows.append(peak_row(run, (start + first, start + last), peak, torque, sd))
     return tuple(rows[i].numbered(i + 1) for i in range(len(rows)))
 
 
-def split_at_valleys(size: Array) -> list[tuple[int, int]]:
-    """Stretches between which |F| falls below `SPLIT` of the peaks on both sides."""
-    first, pieces = 0, []
-    while True:
-        rest = size[first:]
-        # From the left: the lowest point so far behind the highest, and what comes after.
-        high = np.maximum.accumulate(rest)
-        deep = np.flatnonzero(rest < SPLIT * high)
-        found = 0
-        for k in deep:
-            low = int(k)
-            ahead = rest[low:]
-            if ahead.max() > rest[low] / SPLIT:
-                rise = low + int(np.argmax(ahead > rest[low] / SPLIT))
-                found = low + int(np.argmin(rest[low:rise])) if rise > low else low
-                break
-        if not found:
-            break
-        pieces.append((first, first + found))
-        first += found
+def split_at_valleys(size: Array, least: int) -> list[tuple[int, int]]:
+    """Stretches between which |F| falls below `SPLIT` of the peaks on both sides.
+
+    Args:
+        size: |F| along a contact. (k,) [N]
+        least: Fewest samples of a stretch.
+    """
+    before = np.maximum.accumulate(size)
+    after = np.maximum.accumulate(size[::-1])[::-1]
+    pieces, first = [], 0
+    for start, stop in runs_of(size < SPLIT * np.minimum(before, after)):
+        valley = start + int(np.argmin(size[start:stop]))
+        if valley - first >= least and len(size) - valley >= least:
+            pieces.append((first, valley))
+            first = valley
     return [*pieces, (first, len(size))]
 
 
@@ -103,7 +98,7 @@ def peak_row(
     values, covariance = (x[0] for x in flange_forces(J, tau[None], spread[None]))
     fits = those_that_fit(point_fits(chain, q, tau, spread))
     best = fits[0]
-    site = Site(fits, arm_parts(n), J, tau, spread)
+    site = Site(fits, arm_parts(n), J)
     if best.misfit > MORE_THAN_A_FORCE:
         covariance = covariance * best.misfit / max(n - 3, 1)
         wrench, size = values, float(np.linalg.norm(values[:3]))
@@ -118,9 +113,9 @@ def peak_row(
         )
     band = float(np.hypot(band, NORMAL * DRIVES * size))
     inside = slice(*span)
-    force = flange_forces(
-        flange_jacobian(chain, recording.q[inside]), torque[inside], sd[inside]
-    )[0][:, :3]
+    force = flange_forces(flange_jacobian(chain, recording.q[inside]), torque[inside], sd[inside])[
+        0
+    ][:, :3]
     parts = site.parts
     quiet = float(np.sum((tau / spread) ** 2))
     return Contact(

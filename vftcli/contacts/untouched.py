@@ -17,17 +17,17 @@ from vftcli.contacts.windows import (
     window_of,
 )
 from vftcli.observers import MomentumObserver
-from vftcli.repetition.free_motion import FreeMotion, FreePiece
+from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.series import median_step
 from vftcli.virtual_sensor.smoother.noise import dry_torques
 
-BLOCK, UNEVEN, SAMPLES = 0.024, 0.2, 5
+BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
 """Length of a block [s]; on a clock whose steps differ by this share it holds so many samples."""
 
 GAIN = 30.0
@@ -91,11 +91,8 @@ def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
         ReferenceTorqueError: If what the user names does not exist.
         ParameterError: If a given span holds no samples, or the whole log.
     """
-    try:
-        part = motion.part
-    except ReferenceTorqueError:
-        if motion.choice.is_given:
-            raise
+    part = free_part(motion)
+    if part is None:
         return None
     robot = motion.log.robot
     blocks = tuple(
@@ -105,11 +102,41 @@ def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
     noise = learn_noise(blocks, dry_torques(robot), seconds)
     if noise is None:
         return None
-    others = tuple(piece.run for piece in part.pieces if piece.run is not motion.log)
-    level = torque_level(part.pieces)
     return Untouched(
-        noise=noise, level=level, own=part.own, runs=others, pieces=blocks, remarks=part.remarks
+        noise=noise,
+        level=torque_level(part.pieces),
+        own=part.own,
+        runs=tuple(piece.run for piece in part.pieces if piece.run is not motion.log),
+        pieces=blocks,
+        remarks=part.remarks,
     )
+
+
+def free_part(motion: FreeMotion) -> FreePart | None:
+    """What is free of contact, None where nothing is known to be.
+
+    Free runs are taken as they are: where in them the log's own motion lies does not matter here.
+
+    Raises:
+        ReferenceTorqueError: If what the user names does not exist.
+        ParameterError: If a given span holds no samples, or the whole log.
+    """
+    if motion.runs:
+        own = motion.within_spans
+        remarks = [
+            fact("free-span", begin_s=begin, end_s=end) for begin, end in motion.choice.spans
+        ]
+        pieces = [FreePiece(motion.log, own, ())] if own.any() else []
+        for run in motion.runs:
+            pieces.append(FreePiece(run.run, np.ones(run.recording.samples, dtype=bool), ()))
+            remarks.append(fact("free-log", Where(about=run.recording.name)))
+        return FreePart(tuple(pieces), own, tuple(remarks))
+    try:
+        return motion.part
+    except ReferenceTorqueError:
+        if motion.choice.is_given:
+            raise
+        return None
 
 
 def observed(run: ModelledRun) -> Array:
@@ -170,24 +197,22 @@ def self_test(free: Untouched, robot: Robot, prior: ContactPrior) -> SelfTest:
     shares, forces = [], []
     each = max(MOST_PSEUDO // max(len(free.pieces), 1), 4)
     for blocks in free.pieces:
-        for run_blocks in (blocks,):
-            found = pseudo_contacts(run_blocks, each)
-            if not found:
-                continue
-            count = len(run_blocks.t)
-            pushed = gate_of(count, found)
-            log = BlockLog.of(run_blocks, error_course(free.noise, run_blocks, pushed))
-            J = places(robot.loaded_chain, run_blocks.q)[0].jacobian
-            nowhere = np.zeros(count, dtype=bool)
-            lanes = [
-                Lane(window_of(run_blocks.t, run), gate_of(count, [run]), nowhere, J, prior)
-                for run in found
-            ]
-            for run, course in zip(found, smooth_lanes(log, lanes), strict=True):
-                inside = course.within(run)
-                sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))
-                shares.append(np.abs(inside.values) / np.maximum(sd, 1e-12))
-                forces.append(inside.size)
+        made_up, count = pseudo_contacts(blocks, each), len(blocks.t)
+        if not made_up:
+            continue
+        course = error_course(free.noise, blocks, gate_of(count, made_up))
+        J = places(robot.loaded_chain, blocks.q)[0].jacobian
+        nowhere = np.zeros(count, dtype=bool)
+        lanes = [
+            Lane(window_of(blocks.t, run), gate_of(count, [run]), nowhere, J, prior)
+            for run in made_up
+        ]
+        measured = smooth_lanes(BlockLog.of(blocks, course), lanes)
+        for run, wrench in zip(made_up, measured, strict=True):
+            inside = wrench.within(run)
+            sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))
+            shares.append(np.abs(inside.values) / np.maximum(sd, 1e-12))
+            forces.append(inside.size)
     if not forces:
         return SelfTest(np.ones(6), float("nan"))
     widening = np.maximum(np.quantile(np.concatenate(shares), 0.95, axis=0) / 1.96, 1.0)
