@@ -35,6 +35,8 @@ def test_a_stored_torque_is_turned_into_its_wrench_and_zeroed() -> None:
     assert [remark.code for remark in found.remarks] == ["zero-removed"]
     with pytest.raises(MissingSignalError):
         stored_force(Recording(t=T, q=Q), UR5, choice(), "kfo-fe")
+    with pytest.raises(ParameterError, match="takes the log itself"):
+        stored_force(log, UR5, WrenchChoice(frame="base", solver="smoother"), "kfo-fe")
 
 
 def test_the_logs_sensor_drives_as_the_log_states_it() -> None:

@@ -8,6 +8,7 @@ import pytest
 from vftcli.observers import OBSERVERS, Setup, build_observers
 from vftcli.observers.auto_tuning import (
     KINDS,
+    bound_remarks,
     error_curve,
     expected_error,
     kalman_filter,
@@ -15,7 +16,7 @@ from vftcli.observers.auto_tuning import (
     noise_level,
     tune_to_spectra,
 )
-from vftcli.observers.spectra import Part, spectra_of
+from vftcli.observers.spectra import Part, Spectra, spectra_of
 from vftcli.robots.terms import DynamicsTerms
 
 STEP = 0.008
@@ -25,12 +26,14 @@ Pushed = Callable[..., tuple[Part, Part]]
 
 
 def low_passed_noise(samples: int, corner: float, seed: int) -> np.ndarray:
-    """A first-order random torque with a corner frequency [rad/s], standard deviation 1."""
+    """A random torque without jumps, two poles at a corner [rad/s], standard deviation 1."""
     from scipy.signal import lfilter
 
     a = np.exp(-corner * STEP)
-    white = np.random.default_rng(seed).normal(0.0, np.sqrt(1 - a * a), (samples, 2))
-    return lfilter([1.0], [1.0, -a], white, axis=0)
+    # variance of white noise behind 1/(1 − a z⁻¹)²
+    gain = np.sqrt((1 - a * a) ** 3 / (1 + a * a))
+    white = np.random.default_rng(seed).normal(0.0, gain, (samples, 2))
+    return lfilter([1.0], [1.0, -2.0 * a, a * a], white, axis=0)
 
 
 @pytest.fixture
@@ -120,3 +123,34 @@ def test_tuned_observers_have_nothing_left_to_tune(pushed: Pushed) -> None:
     assert remarks == ()
     assert observer.tuning(STEP, 2).parameter_count == 0
     np.testing.assert_allclose(observer.tuning(STEP, 2).zeta, np.sqrt(0.5))
+
+
+def with_chatter(level: float) -> Spectra:
+    """A push that fades above 1 Hz and white noise; the drives chatter at 10 to 50 Hz under it."""
+    f = np.linspace(0.0, 62.5, 251)
+    noise = np.full((251, 1), 0.01)
+    push = (10.0 / (1.0 + (f / 1.0) ** 4))[:, None]
+    chatter = np.where((f > 10.0) & (f < 50.0), level, 0.0)[:, None]
+    return Spectra(
+        frequency=f, free=noise, loaded=noise + push + chatter, step=STEP, segments=(9, 9)
+    )
+
+
+def test_chatter_under_load_does_not_run_the_gains_up() -> None:
+    """Without the cap the smoother follows a chatter of ten times the noise up to its bound."""
+    quiet, loud = (error_curve(kalman_smoother, with_chatter(level)) for level in (0.0, 0.1))
+    # it is noise: the gains become slower, not faster
+    assert loud.best[0] <= quiet.best[0]
+    assert bound_remarks("rts-auto", loud.best, loud.omega_n) == ()
+
+
+def test_a_bound_is_never_reached_in_silence() -> None:
+    grid = np.array([1.0, 10.0, 250.0])
+    slow, fast = bound_remarks("kfo-auto", np.array([1.0, 10.0, 250.0, 1.0]), grid)
+    assert [(r.code, r.level) for r in (slow, fast)] == [
+        ("gain-at-slowest", "warning"),
+        ("gain-at-fastest", "warning"),
+    ]
+    assert (slow.where.joints, fast.where.joints) == ((1, 4), (3,))
+    assert (slow.values["rate_rad_s"], fast.values["rate_rad_s"]) == (1.0, 250.0)
+    assert str(fast).startswith("kfo-auto: tuning ran to the fastest it tries, 250 rad/s, on J3")

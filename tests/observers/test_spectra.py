@@ -80,20 +80,18 @@ def test_no_segment_reaches_across_a_gap(terms_of: TermsOf) -> None:
 
 
 def test_the_spectra_predict_the_error_of_a_perfect_and_of_a_dead_observer() -> None:
-    f = np.linspace(0.0, 10.0, 11)
-    noise, both = np.ones((11, 1)), np.full((11, 1), 3.0)
-    spectra = Spectra(frequency=f, free=noise, loaded=both, step=0.05, segments=(1, 1))
+    spectra = flat_spectra()
     one, none = np.ones((11, 1), complex), np.zeros((11, 1), complex)
     assert spectra.missed(one)[0] == 0.0
     assert spectra.passed(none)[0] == 0.0
-    # 11 bins of 1 Hz, S_τ = 2 and S_n = 1
-    assert spectra.missed(none)[0] == pytest.approx(22.0)
-    assert spectra.passed(one)[0] == pytest.approx(11.0)
+    # 11 bins of .5 Hz, S_τ = 2 and S_n = 1
+    assert spectra.missed(none)[0] == pytest.approx(11.0)
+    assert spectra.passed(one)[0] == pytest.approx(5.5)
 
 
 def flat_spectra(free: float = 1.0, loaded: float = 3.0) -> Spectra:
-    """Eleven bins of 1 Hz, of one density each."""
-    f = np.linspace(0.0, 10.0, 11)
+    """Eleven bins of .5 Hz, of one density each: so slow that nothing is capped."""
+    f = np.linspace(0.0, 5.0, 11)
     return Spectra(
         frequency=f,
         free=np.full((11, 1), free),
@@ -110,14 +108,51 @@ def flat_spectra(free: float = 1.0, loaded: float = 3.0) -> Spectra:
 def test_power_goes_with_the_square_of_the_complex_response(
     response: complex, missed: float, passed: float
 ) -> None:
-    """|1 − H|² of S_τ = 2 and |H|² of S_n = 1 over 11 Hz; a delay turns H without changing |H|."""
+    """|1 − H|² of S_τ = 2 and |H|² of S_n = 1 over 5.5 Hz; a delay turns H without changing |H|."""
     spectra, H = flat_spectra(), np.full((11, 1), response, complex)
-    assert spectra.missed(H)[0] == pytest.approx(22.0 * missed)
-    assert spectra.passed(H)[0] == pytest.approx(11.0 * passed)
+    assert spectra.missed(H)[0] == pytest.approx(11.0 * missed)
+    assert spectra.passed(H)[0] == pytest.approx(5.5 * passed)
 
 
 def test_less_than_the_free_part_is_no_external_torque() -> None:
     assert not flat_spectra(free=3.0, loaded=1.0).external.any()
+
+
+def chattering() -> Spectra:
+    """S_n = 1; the loaded part has 2 more, at all frequencies up to 50 Hz."""
+    f = np.linspace(0.0, 50.0, 201)[:, None]
+    free = np.ones_like(f)
+    return Spectra(frequency=f[:, 0], free=free, loaded=free + 2.0, step=0.01, segments=(1, 1))
+
+
+def test_above_five_hertz_an_external_torque_s_spectrum_falls() -> None:
+    """c = 2 · mean of f^2.5 over the twenty bins from .25 to 5 Hz; up to there nothing changes."""
+    spectra, f = chattering(), np.linspace(0.0, 50.0, 201)
+    np.testing.assert_allclose(spectra.external[f <= 5.0], 2.0)
+    level = 2.0 * np.mean((0.25 * np.arange(1, 21)) ** 2.5)
+    above = f > 5.0
+    # the cap lies below the plateau from the first bin on: the mean is below the last bin's value
+    np.testing.assert_allclose(spectra.external[above, 0], level / f[above] ** 2.5)
+
+
+def test_what_is_cut_off_the_external_torque_is_noise() -> None:
+    """Nothing is lost, so what an observer that passes everything reads stays the same."""
+    spectra = chattering()
+    np.testing.assert_allclose(spectra.noise + spectra.external, spectra.loaded)
+    assert np.all(spectra.noise >= spectra.free)
+    one = np.ones((201, 1), complex)
+    # a bin is .25 Hz wide
+    assert spectra.passed(one)[0] == pytest.approx(0.25 * spectra.noise.sum())
+
+
+def test_a_spectrum_that_falls_by_itself_is_left_as_it_is() -> None:
+    """1/f³ lies below c/f^2.5 everywhere above 5 Hz, as c is a mean over slower frequencies."""
+    f = np.linspace(0.0, 50.0, 201)
+    torque = (1.0 / np.maximum(f, 0.25) ** 3)[:, None]
+    free = np.full((201, 1), 1e-9)
+    spectra = Spectra(frequency=f, free=free, loaded=free + torque, step=0.01, segments=(1, 1))
+    np.testing.assert_array_equal(spectra.external, spectra.excess)
+    np.testing.assert_allclose(spectra.noise, free)
 
 
 def test_the_floor_is_the_quietest_octave_s_level_below_it() -> None:

@@ -1,9 +1,16 @@
 """The raw disturbance: the torque that made p and μ, and its density on clocks with gaps."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
-from vftcli.robots.disturbance import disturbance_stretches, raw_disturbance
+from vftcli.robots.disturbance import (
+    disturbance_blocks,
+    disturbance_impulse,
+    disturbance_stretches,
+    raw_disturbance,
+)
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.spectrum import welch
 
@@ -72,3 +79,60 @@ def test_white_noise_has_the_density_of_white_noise_on_any_clock(clock: str) -> 
     assert segments > 500
     # 600 segments and 18 bins, half of them overlapping: 1.5 %
     assert np.mean(low) == pytest.approx(expected, rel=0.05)
+
+
+def test_the_impulse_is_what_the_torque_gave() -> None:
+    t = np.cumsum(np.random.default_rng(5).uniform(0.002, 0.006, 300))
+    torque = np.random.default_rng(6).standard_normal((299, 2))
+    found = disturbance_impulse(terms_of(t, torque))
+    assert not found[0].any()
+    # sums of 300 numbers up to 1 N·m·s
+    np.testing.assert_allclose(
+        found[1:], np.cumsum(torque * np.diff(t)[:, None], axis=0), atol=1e-12
+    )
+
+
+def test_blocks_follow_one_another_and_hold_the_mean_torque() -> None:
+    """On an uneven clock too a block holds whole samples, and d is the impulse over its time."""
+    rng = np.random.default_rng(7)
+    t = np.cumsum(rng.uniform(0.8 * STEP, 1.2 * STEP, 103))
+    torque, q = rng.standard_normal((102, 2)), np.column_stack([t, 2.0 * t])
+    blocks = disturbance_blocks(terms_of(t, torque), q, 10.2 * STEP)
+    # 102 steps make ten blocks of ten; the two that are left over join the last
+    edges = np.array([*range(0, 100, 10), 102])
+    np.testing.assert_allclose(blocks.length, np.diff(t[edges]))
+    np.testing.assert_allclose(blocks.t, 0.5 * (t[edges[1:]] + t[edges[:-1]]))
+    expected = [
+        np.average(torque[a:b], axis=0, weights=np.diff(t)[a:b]) for a, b in pairwise(edges)
+    ]
+    np.testing.assert_allclose(blocks.d, expected, atol=1e-11)  # as of the raw disturbance
+    np.testing.assert_allclose(blocks.q, np.column_stack([blocks.t, 2.0 * blocks.t]))
+    np.testing.assert_allclose(blocks.velocity, np.tile([1.0, 2.0], (10, 1)))
+    assert blocks.known.all()
+    few = blocks.part(slice(2, 5))
+    np.testing.assert_array_equal(few.d, blocks.d[2:5])
+    np.testing.assert_array_equal(few.t, blocks.t[2:5])
+
+
+def test_a_gap_and_what_is_left_out_are_blocks_of_which_nothing_is_known() -> None:
+    t = STEP * np.arange(100.0)
+    t[60:] += 1.0
+    terms, q = terms_of(t, np.ones((99, 1))), np.zeros((100, 1))
+    gap = disturbance_blocks(terms, q, 20 * STEP)
+    np.testing.assert_array_equal(gap.known, [True, True, True, False, True, True])
+    assert gap.length[3] == pytest.approx(1.0 + STEP)
+    assert gap.length.sum() == pytest.approx(t[-1] - t[0])
+    inside = np.ones(100, dtype=bool)
+    inside[[0, 30, 99]] = False
+    part = disturbance_blocks(terms, q, 20 * STEP, inside)
+    # 0 and 99 leave a step each at the ends, 30 the two beside it
+    np.testing.assert_array_equal(part.known, [0, 1, 0, 1, 0, 1, 1, 0])
+    np.testing.assert_allclose(part.d[part.known], 1.0, atol=1e-11)
+
+
+@pytest.mark.parametrize("inside", [None, np.zeros(1, dtype=bool)])
+def test_one_sample_is_a_block_of_which_nothing_is_known(inside: np.ndarray | None) -> None:
+    one = DynamicsTerms(t=np.zeros(1), p=np.ones((1, 2)), mu=np.ones((1, 2)))
+    found = disturbance_blocks(one, np.ones((1, 2)), 0.1, inside)
+    assert (len(found.t), found.known.tolist()) == (1, [False])
+    np.testing.assert_array_equal(found.q, [[1.0, 1.0]])

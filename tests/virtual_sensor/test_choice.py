@@ -31,8 +31,21 @@ def test_no_option_asks_for_none() -> None:
     assert WrenchChoice.parsed(zero=[]) is None
 
 
-def test_what_is_not_chosen_is_the_flange_by_the_pseudo_inverse() -> None:
-    assert WrenchChoice.parsed(wrench=True) == WrenchChoice(frame="flange", solver="pinv")
+def test_what_is_not_chosen_is_the_flange_smoothed_for_best_by_least_squares_for_others() -> None:
+    choice = WrenchChoice.parsed(wrench=True)
+    assert choice == WrenchChoice(frame="flange", solver=None)
+    assert choice is not None
+    assert choice.by_pose == "pinv"
+    assert choice.smooths("best")
+    assert not choice.smooths("kfo-fe")
+
+
+@pytest.mark.parametrize("name", ["best", "kfo-fe"])
+def test_a_named_solver_is_every_observers(name: str) -> None:
+    assert WrenchChoice(solver="smoother").smooths(name)
+    assert WrenchChoice(solver="smoother").by_pose == "pinv"  # σ_min, null space and mask
+    assert not WrenchChoice(solver="map").smooths(name)
+    assert WrenchChoice(solver="map").by_pose == "map"
 
 
 def test_a_zero_is_spans_the_start_or_a_log(tmp_path: Path) -> None:

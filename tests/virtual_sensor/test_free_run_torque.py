@@ -39,3 +39,11 @@ def test_an_observer_that_did_not_run_over_it_is_no_guess() -> None:
     read = FreeRunTorque(there={}, mean={}, rms={}, remark=REMARK)
     with pytest.raises(KeyError):
         less_free_run([torque("gmo", 2.0)], read)
+
+
+def test_where_the_free_run_does_not_reach_its_mean_stands() -> None:
+    there = np.array([[0.5, 1.0], [np.nan, 2.0]])
+    mean = {"gmo": np.array([9.0, 8.0]), "fdo": np.array([0.25, -1.0])}
+    read = FreeRunTorque(there={"gmo": there}, mean=mean, rms={}, remark=REMARK)
+    np.testing.assert_array_equal(read.everywhere("gmo"), [[0.5, 1.0], [9.0, 2.0]])
+    np.testing.assert_array_equal(read.everywhere("fdo"), [0.25, -1.0])

@@ -66,3 +66,15 @@ def test_what_is_masked_and_zeroed_can_be_asked() -> None:
     assert reading(True).masked_share == pytest.approx(0.05, abs=0.001)
     assert reading(False, True).zero_span == SPAN
     assert reading(False).zero_span is None
+
+
+def test_which_solver_made_which_wrench() -> None:
+    found = reading()
+    assert (found.solver, found.hides) == ("pinv", True)
+    one = found.wrenches[0]
+    best = replace(one, name="best", masked=None)
+    smoothed = {"best": object()}  # its numbers are not asked for here
+    both = replace(found, wrenches=(best, one), smoothed=smoothed)  # type: ignore[arg-type]
+    assert (both.solver, both.hides) == ("smoother for best, pinv for the others", True)
+    alone = replace(both, wrenches=(best,))
+    assert (alone.solver, alone.hides) == ("smoother", False)

@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.robots.robot import Robot
-from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.virtual_sensor.choice import SMOOTHER, WrenchChoice
 from vftcli.virtual_sensor.log_wrench import logged_wrench
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
@@ -45,11 +45,17 @@ def stored_force(
 
     Raises:
         MissingSignalError: If the file holds no torque.
+        ParameterError: If the smoother is asked for, which needs the log itself.
     """
+    if choice.solver == SMOOTHER:
+        raise ParameterError(
+            "--solver smoother takes the log itself, not the torques of a file of estimates; "
+            "give the log, or leave --solver away"
+        )
     tau = recording.require("tau_ext")
     estimate = ExternalTorque(name=observer, t=recording.t, tau=tau)
     sensor = VirtualSensor(
-        solver=choice.solver, frame=choice.frame, mounting=choice.mounting(robot)
+        solver=choice.by_pose, frame=choice.frame, mounting=choice.mounting(robot)
     )
     # The band of a torque whose covariance nobody kept says nothing of the replay.
     seen = replace(sensor.wrench(estimate, recording.q, robot.chain), remarks=())

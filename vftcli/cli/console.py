@@ -82,7 +82,7 @@ def say_wrenches(sensed: "SensorReading") -> None:
     from vftcli.outputs.log.wrench_tables import drift_grid
     from vftcli.virtual_sensor.frames import FRAMES
 
-    say(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.sensor.solver}")
+    say(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.solver}")
     if sensed.drifts:
         say(terminal(drift_grid(sensed.drifts)).rstrip())
     for remark in sensed.remarks:

@@ -189,9 +189,10 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
     )
     solver: str | None = option(
         "--solver",
-        "pinv|damped|map",
-        "How torques become a wrench: least squares (default), damped, or with a prior of 50 N and "
-        "10 N·m. Implies --wrench.",
+        "smoother|pinv|damped|map",
+        "How torques become a wrench: smoothed over the whole log with a band in every pose "
+        "(default for best), least squares (default for the others), damped, or with a prior of "
+        "50 N and 10 N·m. Implies --wrench.",
     )
     tool: str | None = option(
         "--tool",

@@ -54,7 +54,7 @@ def tune_gains(
     from vftcli.outputs.log.run_record import jsonable
     from vftcli.pipeline import AnalysisChoice, examine, model, prepared, read
     from vftcli.readers.library import Library
-    from vftcli.refinement.tuning import parse_goal, tune_all
+    from vftcli.refinement.tuning import bounds_reached, parse_goal, tune_all
     from vftcli.repetition.free_run import Models
     from vftcli.robots.writing import lines_of
     from vftcli.signals.errors import ParameterError
@@ -76,8 +76,9 @@ def tune_gains(
     found = model(motion, choice)
     if found is None or found.spectra is None:
         raise ParameterError(f"nothing to tune on: {found.missing if found else 'no free part'}")
-    notes = [str(remark) for remark in found.remarks]
     tuned = tune_all(found.spectra, wanted)
+    reached = bounds_reached(tuned, found.spectra, wanted)
+    notes = [str(remark) for remark in (*found.remarks, *reached)]
     doubts = overridden_lines(examinations)
     heading = [*doubts, command_line(), f"goal: {goal}", f"robot: {arm.name}", *notes]
     comments = "".join(f"# {line}\n" for line in heading)

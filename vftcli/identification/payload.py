@@ -11,7 +11,6 @@ from vftcli.identification.processing import (
     Processing,
     gravity_torque,
     prepare,
-    zero_phase,
 )
 from vftcli.identification.result import root_mean_square
 from vftcli.robots.chain import Payload
@@ -21,6 +20,7 @@ from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.filters import zero_phase
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import resample_columns, runs_of

@@ -10,13 +10,10 @@ from vftcli.robots.drive import drive_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.errors import ClockError, ParameterError
-from vftcli.signals.filters import low_pass
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.filters import STEEP, derivative, zero_phase
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import gaps_of, median_step, runs_of
-
-FILTER_ORDER = 4
-"""Order of one pass: steep, because what is differentiated carries its noise above the cutoff."""
+from vftcli.signals.series import gaps_of, runs_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +46,7 @@ class Processing:
             step: Median step of the log. [s]
         """
         return {
-            "filter": f"Butterworth order {FILTER_ORDER}, forwards and backwards (zero phase)",
+            "filter": f"Butterworth order {STEEP}, forwards and backwards (zero phase)",
             "cutoff_hz": self.cutoff,
             "band_hz": f"0 to {self.cutoff:g}",
             "differentiation": "central differences of the filtered velocity on the log's clock; "
@@ -109,34 +106,6 @@ class PreparedLog:
         """Spans of at most `size` samples: a regressor of a whole log would not fit into memory."""
         for start in range(0, self.samples, size):
             yield slice(start, min(start + size, self.samples))
-
-
-def zero_phase(t: Array, signals: Array, cutoff: float) -> Array:
-    """The signals low-passed as every signal of an identification is, without delay. (T, m)
-
-    A clock too slow for the cutoff leaves them as they are.
-
-    Args:
-        t: Time. (T,) [s]
-        signals: One column a signal. (T, m)
-        cutoff: Frequency at which one pass loses 3 dB. [Hz]
-
-    Raises:
-        ClockError: If the log is shorter than two periods of the cutoff.
-    """
-    if t[-1] - t[0] < 2.0 / cutoff:
-        raise ClockError(
-            f"{t[-1] - t[0]:.2f} s of log are too short for a {cutoff:g} Hz filter; "
-            f"use a longer interval than {2.0 / cutoff:g} s"
-        )
-    if cutoff >= 0.45 / median_step(t):
-        return signals
-    return low_pass(t, signals, cutoff, order=FILTER_ORDER, settling=3.0 / cutoff)
-
-
-def derivative(t: Array, signals: Array) -> Array:
-    """Central differences on the clock as it is, second order also where it is uneven. (T, m)"""
-    return np.asarray(np.gradient(signals, t, axis=0, edge_order=2))
 
 
 def prepare(recording: Recording, robot: Robot, processing: Processing) -> PreparedLog:

@@ -16,15 +16,14 @@ from vftcli.identification.least_squares import fit_column, solve
 from vftcli.identification.processing import (
     PreparedLog,
     Processing,
-    derivative,
     gravity_torque,
     prepare,
-    zero_phase,
 )
 from vftcli.identification.scoring import rigid_torque
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import runs_of
 

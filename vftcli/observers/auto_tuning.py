@@ -22,6 +22,7 @@ from vftcli.observers.spectra import Spectra
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, frozen
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.remarks import Remark, Where, warning
 
 SLOWEST = 1.0
 """Smallest natural frequency that is tried. [rad/s]"""
@@ -82,7 +83,7 @@ def expected_error(kind: Kind, omega_n: Array, spectra: Spectra) -> Array:
     # Every natural frequency is a joint of one observer: one call gives all responses.
     response = kind(omega_n).frequency_response(spectra.frequency, spectra.step, len(omega_n))
     missed = (np.abs(1.0 - response) ** 2).T @ spectra.external
-    passed = (np.abs(response) ** 2).T @ spectra.free
+    passed = (np.abs(response) ** 2).T @ spectra.noise
     return np.asarray(np.sqrt((missed + passed) * spectra.width))
 
 
@@ -91,6 +92,32 @@ def error_curve(kind: Kind, spectra: Spectra) -> Curve:
     omega_n = natural_frequencies(spectra.step)
     rmse = expected_error(kind, omega_n, spectra)
     return Curve(omega_n, rmse, omega_n[np.argmin(rmse, axis=0)])
+
+
+def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
+    """A warning on the joints whose natural frequency ran to a bound of what is tried, if any.
+
+    At the slowest the spectra tell no external torque from the noise there; at the fastest, no
+    noise from the external torque.
+
+    Args:
+        name: The observer.
+        rate: What was chosen of the grid. (n,) [rad/s]
+        grid: What was tried, as by `natural_frequencies`. (G,) [rad/s]
+    """
+    reached = {
+        "gain-at-slowest": (rate <= grid[0], grid[0]),
+        "gain-at-fastest": (rate >= grid[-1], grid[-1]),
+    }
+    return tuple(
+        warning(
+            code,
+            Where(name, tuple(int(j) + 1 for j in np.flatnonzero(joints))),
+            rate_rad_s=float(bound),
+        )
+        for code, (joints, bound) in reached.items()
+        if joints.any()
+    )
 
 
 def noise_level(omega_n: Array, spectra: Spectra) -> Array:

@@ -3,7 +3,9 @@
 The raw disturbance d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) is the external torque, averaged over a
 sample, plus everything else: noise, friction and model error. Its spectrum over the free part, S_n,
 is the error's; what the loaded part has beyond it, S_τ = (S_d − S_n)₊, is the external torque's.
-From the two follows the error of every linear estimator with frequency response H:
+Above 5 Hz it is so only as far as contacts reach: their spectra fall, and a drive that chatters
+under load makes a plateau there, which counts as noise. From the two follows the error of every
+linear estimator with frequency response H:
 
     rms² = ∫ |1 − H|² S_τ + |H|² S_n df
 
@@ -13,6 +15,7 @@ an error too.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +36,13 @@ LEAST_SEGMENT = 32
 
 NEIGHBOURS = 0.2
 """How far the average of neighbouring frequencies reaches, as a share of the frequency."""
+
+SLOW = 5.0
+"""Up to here the spectrum of the external torque is taken as it is measured. [Hz]"""
+
+FALL = 2.5
+"""Beyond, it is held to fall at least as f to the minus this: between the 2 of a torque that jumps
+and the 4 of one that has no jumps and no corners."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,15 +76,36 @@ class Spectra:
         """Distance of two frequencies. [Hz]"""
         return float(self.frequency[1] - self.frequency[0])
 
-    @property
-    def external(self) -> Array:
-        """S_τ = (S_d − S_n)₊, the spectrum of the external torque. (F, n) [(N·m)²/Hz]
+    @cached_property
+    def excess(self) -> Array:
+        """(S_d − S_n)₊, what the loaded part has beyond the free one. (F, n) [(N·m)²/Hz]
 
         The difference is averaged over neighbouring frequencies before it is cut at zero: bin by
         bin, chance would count where it is positive and not where it is negative.
         """
-        excess = neighbour_mean(self.loaded - self.free)
-        return np.maximum(excess, 0.0)
+        return handed_over(np.maximum(neighbour_mean(self.loaded - self.free), 0.0))
+
+    @cached_property
+    def external(self) -> Array:
+        """S_τ, the spectrum of the external torque. (F, n) [(N·m)²/Hz]
+
+        It is the excess, above `SLOW` at most c/f^`FALL`, c the mean of f^`FALL` times the excess
+        up to there.
+        """
+        f = self.frequency[:, None]
+        slow = (self.frequency > 0.0) & (self.frequency <= SLOW)
+        fast = self.frequency > SLOW
+        if not (slow.any() and fast.any()):
+            return self.excess
+        level = np.mean(f[slow] ** FALL * self.excess[slow], axis=0)
+        capped = self.excess.copy()
+        capped[fast] = np.minimum(capped[fast], level / f[fast] ** FALL)
+        return handed_over(capped)
+
+    @cached_property
+    def noise(self) -> Array:
+        """S_n, and what of the excess is no external torque. (F, n) [(N·m)²/Hz]"""
+        return handed_over(self.free + (self.excess - self.external))
 
     @property
     def floor(self) -> Array:
@@ -102,9 +133,9 @@ class Spectra:
         return np.asarray(np.sum(share * self.external, axis=0) * self.width)
 
     def passed(self, response: NDArray[np.complex128]) -> Array:
-        """∫|H|² S_n df, what of the error comes through. (n,) [(N·m)²]"""
+        """∫|H|² S_n df, what of the noise comes through. (n,) [(N·m)²]"""
         share: Array = np.abs(response) ** 2
-        return np.asarray(np.sum(share * self.free, axis=0) * self.width)
+        return np.asarray(np.sum(share * self.noise, axis=0) * self.width)
 
 
 def neighbour_mean(spectrum: Array) -> Array:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vftcli.observers.auto_tuning import AutoTuned, Curve
+from vftcli.observers.auto_tuning import AutoTuned, Curve, bound_remarks
 from vftcli.observers.observer import Observer
 from vftcli.refinement.baseline import Baseline, FreeReading, free_reading
 from vftcli.refinement.bias import REMOVALS
@@ -81,6 +81,11 @@ def refine(
                     expected_rmse_Nm=curve.least.tolist(),
                 )
                 for name, curve in curves.items()
+            ),
+            *(
+                remark
+                for name, curve in curves.items()
+                for remark in bound_remarks(name, curve.best, curve.omega_n)
             ),
             *band_remarks(found),
             *finished.remarks,

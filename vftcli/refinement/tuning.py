@@ -1,6 +1,6 @@
 """Gains for a stated goal: smallest error, one delay or bandwidth, or few false alarms."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from vftcli.observers import FilteredDynamicsObserver, MomentumObserver, Observer, Setup
 from vftcli.observers.auto_tuning import (
     Kind,
+    bound_remarks,
     expected_error,
     kalman_filter,
     kalman_smoother,
@@ -20,6 +21,7 @@ from vftcli.observers.spectra import Spectra
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import numbers
+from vftcli.signals.remarks import Remark
 
 GOALS = ("rmse", "delay", "bandwidth", "false-alarms")
 """The smallest expected error, a delay behind a slow ramp [s], a −3 dB bandwidth [Hz], or at most
@@ -149,6 +151,22 @@ def tune_all(spectra: Spectra, goal: TuningGoal) -> tuple[Tuned, ...]:
     return tuple(tuned)
 
 
+def bounds_reached(
+    tuned: Sequence[Tuned], spectra: Spectra, goal: TuningGoal
+) -> tuple[Remark, ...]:
+    """A warning on every gain that ran to a bound of what is tried; a delay or bandwidth has none.
+
+    Args:
+        tuned: What `tune_all` made.
+        spectra: Of these spectra.
+        goal: For this goal.
+    """
+    if goal.name not in {"rmse", "false-alarms"}:
+        return ()
+    grid = natural_frequencies(spectra.step)
+    return tuple(r for line in tuned for r in bound_remarks(line.observer, line.rate, grid))
+
+
 def densities(omega_n: Array, spectra: Spectra) -> dict[str, Any]:
     """R, Q_p and Q_τ of natural frequencies, under ``density``, R to the log's scale."""
     r = noise_level(omega_n, spectra)
@@ -191,7 +209,7 @@ def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most
     few = np.array([alarms(response[:, [g]], spectra, threshold) <= most for g in columns])
     never = np.flatnonzero(~np.any(few, axis=0))
     if len(never):
-        read = np.sqrt(np.sum(spectra.free, axis=0) * spectra.width)
+        read = np.sqrt(np.sum(spectra.noise, axis=0) * spectra.width)
         listed = ", ".join(f"J{j + 1} ({read[j]:.2g} N·m rms)" for j in never)
         raise ParameterError(
             f"no gain keeps the false alarms at {most:g} an hour: the free part itself is "
@@ -208,7 +226,7 @@ def alarms(response: Complex, spectra: Spectra, threshold: Array) -> Array:
         spectra: What the log shows.
         threshold: Torque beyond which there is an alarm. (n,) or (1,) [N·m]
     """
-    power = np.abs(response) ** 2 * spectra.free * spectra.width
+    power = np.abs(response) ** 2 * spectra.noise * spectra.width
     return crossings(power, spectra.frequency, threshold)
 
 

@@ -54,7 +54,10 @@ class Blocks(NamedTuple):
 
     def part(self, chosen: slice) -> "Blocks":
         """Some of the blocks."""
-        return Blocks(*(field[chosen] for field in self))
+        t, length, d, q, velocity, known = self
+        return Blocks(
+            t[chosen], length[chosen], d[chosen], q[chosen], velocity[chosen], known[chosen]
+        )
 
 
 def disturbance_blocks(
@@ -74,7 +77,8 @@ def disturbance_blocks(
     """
     t, joints = terms.t, terms.joints
     if len(t) < 2:
-        return Blocks(t, np.zeros(1), np.zeros((1, joints)), q, np.zeros((1, joints)), t != t)
+        nothing, never = np.zeros((1, joints)), np.zeros(1, dtype=bool)
+        return Blocks(t, np.zeros(1), nothing, q, nothing, never)
     size = max(round(seconds / median_step(t)), 1)
     whole = np.ones(len(t) - 1, dtype=bool)
     whole[gaps_of(t, GAP)] = False

@@ -5,11 +5,15 @@ from typing import Literal
 import numpy as np
 
 from vftcli.signals.arrays import Array, is_uniform
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.errors import ClockError, ParameterError
 from vftcli.signals.series import median_step, resample_columns
 
 ORDER = 2
 """Order of the Butterworth filter; run forwards and backwards it attenuates twice as much."""
+
+STEEP = 4
+"""Order of one pass where what is behind the filter is differentiated: its noise above the cutoff
+has to be gone."""
 
 Kind = Literal["lowpass", "bandpass"]
 """What a filter lets pass."""
@@ -40,6 +44,34 @@ def low_pass(
         ParameterError: If the cutoff is not below half the sample rate.
     """
     return filter_columns(t, x, butterworth(median_step(t), cutoff, "lowpass", order), settling)
+
+
+def zero_phase(t: Array, signals: Array, cutoff: float) -> Array:
+    """The signals low-passed steeply and without delay, fit to be differentiated. (T, m)
+
+    A clock too slow for the cutoff leaves them as they are.
+
+    Args:
+        t: Time. (T,) [s]
+        signals: One column a signal. (T, m)
+        cutoff: Frequency at which one pass loses 3 dB. [Hz]
+
+    Raises:
+        ClockError: If the log is shorter than two periods of the cutoff.
+    """
+    if t[-1] - t[0] < 2.0 / cutoff:
+        raise ClockError(
+            f"{t[-1] - t[0]:.2f} s of log are too short for a {cutoff:g} Hz filter; "
+            f"use a longer interval than {2.0 / cutoff:g} s"
+        )
+    if cutoff >= 0.45 / median_step(t):
+        return signals
+    return low_pass(t, signals, cutoff, order=STEEP, settling=3.0 / cutoff)
+
+
+def derivative(t: Array, signals: Array) -> Array:
+    """Central differences on the clock as it is, second order also where it is uneven. (T, m)"""
+    return np.asarray(np.gradient(signals, t, axis=0, edge_order=2))
 
 
 def band_pass(t: Array, x: Array, low: float, high: float) -> Array:

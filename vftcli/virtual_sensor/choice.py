@@ -6,15 +6,21 @@ from pathlib import Path
 
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import interval
+from vftcli.signals.parsing import check_known, interval
 from vftcli.virtual_sensor.frames import Mounting, check_frame, read_pose
-from vftcli.virtual_sensor.solvers import check_solver
+from vftcli.virtual_sensor.solvers import LEAST_SQUARES, SOLVERS
 
 FIT = "fit"
 """The word for a sensor pose that is to be estimated from the log."""
 
 START = "start"
 """The word for the unloaded start of the log."""
+
+SMOOTHER = "smoother"
+"""The word for the solver that takes the whole log at once, and needs no observer before it."""
+
+SMOOTHED = ("best",)
+"""Observers whose wrench is the smoother's where no other solver is named."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +75,8 @@ class WrenchChoice:
 
     Attributes:
         frame: Frame of the answer, a key of `vftcli.virtual_sensor.frames.FRAMES`.
-        solver: A key of `vftcli.virtual_sensor.solvers.SOLVERS`.
+        solver: A key of `vftcli.virtual_sensor.solvers.SOLVERS`, or `SMOOTHER`; None for the
+            smoother where it is the observer's own, and least squares for the others.
         tool: The tool's pose as text or a name in the robot file, None for the file's own.
         sensor_pose: The sensor's pose likewise, or "fit".
         zero: What is taken as the zero.
@@ -82,7 +89,7 @@ class WrenchChoice:
     """
 
     frame: str = "flange"
-    solver: str = "pinv"
+    solver: str | None = None
     tool: str | None = None
     sensor_pose: str | None = None
     zero: ZeroChoice = field(default_factory=ZeroChoice)
@@ -91,7 +98,18 @@ class WrenchChoice:
 
     def __post_init__(self) -> None:
         check_frame(self.frame)
-        check_solver(self.solver)
+        if self.solver is not None:
+            there = (SMOOTHER, *SOLVERS)
+            check_known(self.solver, there, f"no solver {self.solver!r} for a wrench")
+
+    @property
+    def by_pose(self) -> str:
+        """The solver that takes each pose by itself: the one asked for, else least squares."""
+        return LEAST_SQUARES if self.solver in {None, SMOOTHER} else str(self.solver)
+
+    def smooths(self, name: str) -> bool:
+        """Whether the wrench of the observer of this name is the smoother's."""
+        return self.solver == SMOOTHER or (self.solver is None and name in SMOOTHED)
 
     def mounting(self, robot: Robot) -> Mounting:
         """Where tool and sensor sit: as asked, else as the robot file says.
@@ -124,7 +142,7 @@ class WrenchChoice:
         Args:
             wrench: Whether ``--wrench`` was given; any other option of the sensor asks as well.
             frame: Frame of the answer, None for the flange's.
-            solver: The solver, None for the pseudo-inverse.
+            solver: See the attribute.
             tool: See the attribute, as the next.
             sensor_pose: See the attribute.
             zero: The words of every ``--zero``.
@@ -139,7 +157,7 @@ class WrenchChoice:
             return None
         return cls(
             frame=frame or "flange",
-            solver=solver or "pinv",
+            solver=solver,
             tool=tool,
             sensor_pose=sensor_pose,
             zero=ZeroChoice.parsed(zero or ()),

@@ -31,6 +31,16 @@ class FreeRunTorque:
     rms: Mapping[str, Array]
     remark: Remark
 
+    def everywhere(self, name: str) -> Array:
+        """One observer's torque in every sample, its mean where the free run does not reach.
+
+        Returns:
+            (T, n), or (n,) where the free run is of another trajectory. [N·m]
+        """
+        mean = self.mean[name]
+        there = self.there.get(name, mean)
+        return np.where(np.isnan(there), mean, there)
+
 
 def free_run_torque(run: FreeRun, observers: Sequence[Observer]) -> FreeRunTorque:
     """What a free run reads, at the same place of the trajectory where it is the log's.

@@ -1,6 +1,6 @@
 """From a log, its free motion and the estimates to what the virtual sensor says of it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain as chained
@@ -19,10 +19,16 @@ from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.free_run_torque import FreeRunTorque, free_run_torque, less_free_run
 from vftcli.virtual_sensor.log_wrench import logged_wrench
-from vftcli.virtual_sensor.mean_disturbance import mean_disturbance
+from vftcli.virtual_sensor.mean_disturbance import DISTURBANCE, mean_disturbance
 from vftcli.virtual_sensor.mounting import find_mounting, without_tool_weight
 from vftcli.virtual_sensor.null_space import contact_elsewhere
 from vftcli.virtual_sensor.sensor_reading import SensorReading
+from vftcli.virtual_sensor.smoother.observer_wrench import (
+    Gate,
+    InputOf,
+    smooth_all,
+    smoothed_wrench,
+)
 from vftcli.virtual_sensor.torque_error import (
     TorqueError,
     from_band,
@@ -50,6 +56,8 @@ def sense(
     observers: Sequence[Observer],
     estimates: Sequence[ExternalTorque],
     choice: WrenchChoice,
+    input_of: InputOf | None = None,
+    gate: Gate | None = None,
 ) -> SensorReading:
     """Turn estimates into wrenches, remove the zero, and judge them.
 
@@ -62,6 +70,10 @@ def sense(
         observers: The observers, whose lag widens the band.
         estimates: Their torques, in the same order.
         choice: What is asked of the virtual sensor.
+        input_of: What the smoother takes for an observer whose wrench it makes, by name; None for
+            the log and its free part as they are.
+        gate: The contacts, outside of which the smoother's wrench is zero; None where the whole log
+            is one.
 
     Raises:
         ParameterError: If a pose or zero interval cannot be used, or cannot be found in the log.
@@ -75,14 +87,26 @@ def sense(
     raw = VirtualSensor(frame="base").wrench(disturbance, recording.q, chain)
     mounting, found = find_mounting(recording, robot, disturbance, choice)
     # The disturbance was solved in base axes, so that --frame moves no zero.
-    sensor = VirtualSensor(solver=choice.solver, frame=choice.frame, mounting=mounting)
+    sensor = VirtualSensor(solver=choice.by_pose, frame=choice.frame, mounting=mounting)
     torques = less_free_run(estimates, free_run)
     zero = zero_spans(choice.zero, raw)
     quiet = motion.zero.run.terms if motion.zero is not None else None
     lag = partial(lag_sd, terms, observers, quiet)
     error = torque_error(choice, torques, zero.chosen(t), free_run, lag)
     wrenches = sensor.wrenches(torques, recording.q, chain, dict(error.sd))
-    bands = (error.remark,) if error.remark else tuple(r for w in wrenches for r in w.remarks)
+    smoothed = smooth_all(
+        motion,
+        [wrench.name for wrench in wrenches if choice.smooths(wrench.name)],
+        input_of,
+        unloaded=zero.chosen(t),
+        torque=None if free_run is None else free_run.everywhere(DISTURBANCE),
+        gate=gate,
+    )
+    wrenches = tuple(
+        smoothed_wrench(smoothed[w.name], w, sensor, motion) if w.name in smoothed else w
+        for w in wrenches
+    )
+    bands = band_remarks(error, wrenches, smoothed)
     # Drifts span by span: the first of each observer is its zero.
     drifts = [[zero_drift(wrench, span) for wrench in wrenches] for span in zero.spans]
     warnings = tuple(
@@ -116,12 +140,13 @@ def sense(
         free=free,
         logged=logged,
         vendor=vendor,
+        smoothed=smoothed,
         elsewhere=elsewhere,
         remarks=(
             *warnings,
             *found,
             *payload_remark(recording, robot),
-            *mask_remark(raw),
+            *(mask_remark(raw) if any(w.hidden.any() for w in wrenches) else ()),
             *moved,
             *bands,
             *(() if free_run is None else (free_run.remark,)),
@@ -129,6 +154,15 @@ def sense(
             *(remark for e in elsewhere for remark in e.remarks),
         ),
     )
+
+
+def band_remarks(
+    error: TorqueError, wrenches: Sequence[Wrench], smoothed: Collection[str]
+) -> tuple[Remark, ...]:
+    """Where the wrenches' bands come from: the error of the torques, and each smoother's own."""
+    own = [r for w in wrenches if error.remark is None or w.name in smoothed for r in w.remarks]
+    common = error.remark if len(smoothed) < len(wrenches) else None
+    return tuple(own) if common is None else (common, *own)
 
 
 def torque_error(
@@ -155,7 +189,7 @@ def torque_error(
         return from_free_part(torques, free, rms, lag(free))
     if torques and all(torque.error_sd is not None for torque in torques):
         return from_band(torques)
-    return from_default(torques, choice.solver)
+    return from_default(torques, choice.by_pose)
 
 
 def payload_remark(recording: Recording, robot: Robot) -> tuple[Remark, ...]:

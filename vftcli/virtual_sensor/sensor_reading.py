@@ -1,6 +1,7 @@
 """What a log's virtual sensor measured: wrenches, zero drift, masks, contacts, and remarks."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -8,7 +9,9 @@ from vftcli.signals.arrays import Mask
 from vftcli.signals.lag import time_offset
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.wrench import Wrench
+from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.null_space import NullSpaceVerdict
+from vftcli.virtual_sensor.smoother.smoothing import SmoothedWrench
 from vftcli.virtual_sensor.solvers import SCALE
 from vftcli.virtual_sensor.vendor import VendorCheck
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
@@ -28,6 +31,7 @@ class SensorReading:
         drifts: Zero drift, one an unloaded span and observer.
         free: Samples known to be unloaded: those of the zero spans, or of the unloaded start. (T,)
         vendor: What convention the log's own wrench is in, None if it has none.
+        smoothed: What the smoother found, by the observer whose wrench it is.
         elsewhere: The null-space channel's verdicts, for arms of more than six joints.
         reference: The wrench the others are judged by, in the same frame, or None.
         remarks: What the reader of the numbers should know.
@@ -40,6 +44,7 @@ class SensorReading:
     free: Mask
     logged: Wrench | None = None
     vendor: VendorCheck | None = None
+    smoothed: Mapping[str, SmoothedWrench] = field(default_factory=dict)
     elsewhere: tuple[NullSpaceVerdict, ...] = ()
     reference: Wrench | None = None
     remarks: tuple[Remark, ...] = ()
@@ -48,6 +53,21 @@ class SensorReading:
     def masked_share(self) -> float:
         """Share of the samples in which the pose cannot tell the wrench."""
         return float(np.mean(self.masked))
+
+    @property
+    def hides(self) -> bool:
+        """Whether there are samples in which a wrench is not told for the pose."""
+        return any(bool(wrench.hidden.any()) for wrench in self.wrenches)
+
+    @property
+    def solver(self) -> str:
+        """Which solver made which wrench."""
+        names = [wrench.name for wrench in self.wrenches if wrench.name in self.smoothed]
+        if not names:
+            return self.sensor.solver
+        if len(names) == len(self.wrenches):
+            return SMOOTHER
+        return f"{SMOOTHER} for {', '.join(names)}, {self.sensor.solver} for the others"
 
     @property
     def zero_span(self) -> tuple[float, float] | None:

@@ -140,6 +140,10 @@ SOLVERS: dict[str, Callable[[Decomposition, Array], Solution]] = {
 """Name at the command line → what turns a decomposed Jacobian and torque sd (T, n) into A and B."""
 
 
+LEAST_SQUARES = "pinv"
+"""The solver where none is asked for."""
+
+
 def check_solver(name: str) -> None:
     """Raise a ParameterError that lists the solvers if there is none of that name."""
     check_known(name, SOLVERS, f"no solver {name!r} for a wrench")

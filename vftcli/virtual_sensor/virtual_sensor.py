@@ -16,6 +16,7 @@ from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import Mounting, check_frame, frame_pose, from_base
 from vftcli.virtual_sensor.solvers import (
     LEAST_SIGMA,
+    LEAST_SQUARES,
     SOLVERS,
     TORQUE_SD,
     Decomposition,
@@ -42,7 +43,7 @@ class VirtualSensor:
         ParameterError: If there is no such solver or frame, or the frame's pose is not known.
     """
 
-    solver: str = "pinv"
+    solver: str = LEAST_SQUARES
     frame: str = "flange"
     mounting: Mounting = field(default_factory=Mounting)
     least_sigma: float = LEAST_SIGMA

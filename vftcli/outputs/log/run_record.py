@@ -235,7 +235,8 @@ def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
     return {
         "frame": sensed.sensor.frame,
         "meaning": f"force and moment ON the robot; {FRAMES[sensed.sensor.frame]}",
-        "solver": sensed.sensor.solver,
+        "solver": sensed.solver,
+        "smoothed": {name: found.record for name, found in sensed.smoothed.items()},
         "least_sigma_m": sensed.sensor.least_sigma,
         "masked_share": sensed.masked_share,
         "tool": sensed.sensor.mounting.tool,

@@ -31,10 +31,11 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
         least = np.array([sensed.sensor.least_sigma])
         sigma = (ChartLine("σ_min of J", column(first.sigma_min)),)
         yield Chart("sigma_min", "What the pose can tell: σ_min", "m", sigma, least, "masked below")
-    if first.hidden.any():
+    if sensed.hides:
         blown = tuple(
             ChartLine(w.name, masked_force(w.values, w.hidden), *styles[w.name])
             for w in sensed.wrenches
+            if w.hidden.any()
         )
         title = f"|force| by {sensed.sensor.solver} in the masked samples, not to be believed"
         yield Chart("blow-up", title, "N", blown)
@@ -69,7 +70,7 @@ def wrench_section(analysis: Analysis) -> str:
     grids = [drift_grid(sensed.drifts, spans=True)] if sensed.drifts else []
     if analysis.contacts:
         grids += [contact_grid(analysis.contacts), trade_off_grid(analysis.contacts)]
-    axes, solver = FRAMES[sensed.sensor.frame], sensed.sensor.solver
+    axes, solver = FRAMES[sensed.sensor.frame], sensed.solver
     return "".join(
         (
             "<h2>Wrench over time</h2>",
@@ -87,7 +88,7 @@ def wrench_section(analysis: Analysis) -> str:
 
 def masked_words(sensed: SensorReading) -> str:
     """How much is masked and why the line breaks there."""
-    if not sensed.masked_share:
+    if not sensed.hides:
         return ""
     return (
         f"<p>{sensed.masked_share:.1%} of the samples are masked: near a singularity some "

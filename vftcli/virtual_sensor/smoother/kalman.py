@@ -177,7 +177,7 @@ def backward_gains(decay: Array, forward: Filtered) -> Array:
 
 
 def likelihoods(evolution: Evolution, measured: Measurement) -> Array:
-    """ln p(d) of each of G settings, less the constant −½ ln 2π a number. (G,) [nats]
+    """Log-likelihood of each of G settings, less −½ ln 2π a number. (G,) [nats]
 
     The settings go through the log side by side.
 

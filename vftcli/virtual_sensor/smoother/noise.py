@@ -21,7 +21,7 @@ from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.friction import dry_torque
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, median
 from vftcli.signals.series import runs_of
 from vftcli.virtual_sensor.solvers import TORQUE_SD
 
@@ -51,8 +51,8 @@ LEAST_BLOCKS = 20
 NEAR_REST = 0.3
 """Where no free part tells, stiction counts this long before and after a rest too. [s]"""
 
-ASSUMED_SHARES = 0.2, 0.6 / 1.96
-"""Where no free part tells: the model error of motion and of rest, as shares of F_c."""
+ASSUMED_SHARE = 0.2
+"""Where no free part tells: the model error of motion, as a share of F_c."""
 
 
 class FreeTerms(NamedTuple):
@@ -122,7 +122,7 @@ def resting(blocks: Blocks) -> Mask:
 
 
 def dry_torques(robot: Robot) -> Array:
-    """F_c of each joint: Coulomb torque, or a sigmoid's whole amplitude; 0 if unknown. (n,) [N·m]"""
+    """F_c of each joint: Coulomb torque or a sigmoid's whole amplitude, 0 if unknown. (n,) [N·m]"""
     if not robot.friction:
         return np.zeros(robot.joints)
     each = (joint.parameters for joint in robot.friction)
@@ -147,7 +147,7 @@ def torque_noise(
     stretches = [s for piece in free for s in free_stretches(piece, seconds)]
     if not stretches:
         return assumed_noise(log, dry)
-    white, variance, time = (np.array(v) for v in zip(*fit_joints(stretches, seconds), strict=True))
+    white, variance, time = (np.array(v) for v in zip(*fit_joints(stretches), strict=True))
     # An offset is an error too.
     every = np.concatenate([s.d for s in stretches])
     variance += every.mean(axis=0) ** 2
@@ -170,7 +170,7 @@ def assumed_noise(log: Blocks, dry: Array) -> TorqueNoise:
         log: The blocks to be smoothed.
         dry: F_c; a joint without is taken for `TORQUE_SD`. (n,) [N·m]
     """
-    moving, resting_sd = (np.maximum(share * dry, TORQUE_SD) for share in ASSUMED_SHARES)
+    moving, rest = (np.maximum(share * dry, TORQUE_SD) for share in (ASSUMED_SHARE, REST_SHARE))
     bend = log.d[1:-1] - 0.5 * (log.d[2:] + log.d[:-2])
     white = np.full(len(dry), TORQUE_SD**2)
     if len(bend):
@@ -180,7 +180,7 @@ def assumed_noise(log: Blocks, dry: Array) -> TorqueNoise:
         white=np.maximum(white, LEAST_NOISE),
         moving=moving**2,
         moving_time=np.full(len(dry), USUAL_TIME),
-        resting=resting_sd**2,
+        resting=rest**2,
         resting_time=np.full(len(dry), REST_TIME),
         near=NEAR_REST,
     )
@@ -200,7 +200,7 @@ def free_stretches(piece: FreeTerms, seconds: float) -> list[Blocks]:
     return [blocks.part(slice(*run)) for run in runs]
 
 
-class JointFit(NamedTuple):
+class FittedNoise(NamedTuple):
     """What one joint's spectrum gives.
 
     Attributes:
@@ -214,8 +214,10 @@ class JointFit(NamedTuple):
     time: float
 
 
-def fit_joints(stretches: Sequence[Blocks], seconds: float) -> list[JointFit]:
+def fit_joints(stretches: Sequence[Blocks]) -> list[FittedNoise]:
     """R, s² and T of every joint, by Whittle's likelihood over all stretches together."""
+    # A block holds whole samples, so that it is not quite as long as was asked.
+    seconds = median(np.concatenate([s.length for s in stretches]))
     f = np.concatenate([np.fft.rfftfreq(len(s.d), seconds)[1:] for s in stretches])
     P = np.concatenate([periodogram(s.d, seconds) for s in stretches])
     longest = max(float(s.length.sum()) for s in stretches)
@@ -229,7 +231,7 @@ def periodogram(d: Array, seconds: float) -> Array:
     return power
 
 
-def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> JointFit:
+def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> FittedNoise:
     """R, s² and T of one joint: the best of a grid over ln T and ln s²/R that narrows five times.
 
     The level follows in closed form, so that two numbers are left to search.
@@ -257,4 +259,4 @@ def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> JointFit
         low, high = np.maximum(low, best - reach), np.minimum(high, best + reach)
         count = 5
     time, ratio = np.exp(best)
-    return JointFit(max(level, LEAST_NOISE), float(level * ratio), float(time))
+    return FittedNoise(max(level, LEAST_NOISE), float(level * ratio), float(time))

@@ -1,4 +1,4 @@
-"""How a wrench may move: its prior, the gate outside of which it is zero, and its choice by the log."""
+"""How a wrench may move: its prior, chosen by the log, and the gate outside of which it is zero."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from vftcli.virtual_sensor.smoother.kalman import Evolution, Measurement, likeli
 from vftcli.virtual_sensor.smoother.noise import TorqueNoise, steps
 
 LEVER = 0.1
-"""Lever that a moment's prior takes for the force's: sd of the moment over that of the force. [m]"""
+"""Standard deviation of a moment over that of the force. [m]"""
 
 TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Correlation times of a wrench that are tried. [s]"""
@@ -32,10 +32,23 @@ class WrenchPrior(NamedTuple):
     force: float
 
     @property
+    def is_steady(self) -> bool:
+        """Whether it is the prior of a load rather than of contacts that come and go."""
+        # What the force changes by in a second, where that is short against τ_w.
+        change = self.force * np.sqrt(2.0 / self.time)
+        return bool(self.time >= STEADY and change <= LOAD_CHANGE)
+
+    @property
     def variance(self) -> Array:
         """Stationary variance of force and moment. (6,) [N², (N·m)²]"""
         return np.repeat([self.force**2, (LEVER * self.force) ** 2], 3)
 
+
+STEADY = 30.0
+"""A wrench that keeps for at least this long is a load, … [s]"""
+
+LOAD_CHANGE = 5.0
+"""… if it changes by no more than this (one standard deviation) in a second. [N]"""
 
 GRID = tuple(WrenchPrior(time, force) for time in TIMES for force in FORCES)
 """The priors that are tried."""

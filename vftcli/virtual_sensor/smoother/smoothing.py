@@ -34,8 +34,8 @@ COARSE = 0.1
 FINE, JITTERED = 0.024, 5
 """Length of a block where the wrench moves [s]; on an uneven clock it holds so many samples."""
 
-STEADY = 30.0
-"""A wrench whose correlation time is at least this is a load. [s]"""
+MOST_BLOCKS = 30_000
+"""Blocks are longer in a log that would make more: each takes some 6 kB and .1 ms."""
 
 WIDENED = np.repeat([1.5, 2.0], 3)
 """What the model's own standard deviations of force and moment are multiplied by. The error of the
@@ -57,6 +57,7 @@ class SmoothedWrench:
         prior: How the wrench may move.
         noise: What counts as noise.
         gate: Whether contacts were listed; else the whole log is one.
+        uncorrected: Whether a correction of the model's error was left out; see `InputOf`.
     """
 
     t: Array
@@ -69,6 +70,7 @@ class SmoothedWrench:
     prior: WrenchPrior
     noise: TorqueNoise
     gate: bool
+    uncorrected: bool = False
 
     def __post_init__(self) -> None:
         seal(self, "t", "values", "covariance", "model_error", "model_error_sd")
@@ -76,8 +78,7 @@ class SmoothedWrench:
     @property
     def sd(self) -> Array:
         """Standard deviation in base axes. (K, 6) [N, N·m]"""
-        variances: Array = np.sqrt(np.einsum("kii->ki", self.covariance))
-        return variances
+        return deviations(self.covariance)
 
     def at(self, t: Array) -> "MovedWrench":
         """Values and covariance at other times, straight between blocks. (T, 6), (T, 6, 6)"""
@@ -86,6 +87,23 @@ class SmoothedWrench:
             resample_columns(t, self.t, self.values),
             resample_columns(t, self.t, flat).reshape(-1, 6, 6),
         )
+
+    @property
+    def record(self) -> dict[str, object]:
+        """The model's numbers, as `run.json` holds them."""
+        noise = self.noise
+        return {
+            "block_s": self.seconds,
+            "force_time_s": self.prior.time,
+            "force_sd_N": self.prior.force,
+            "noise_sd_Nm": np.sqrt(noise.white).tolist(),
+            "model_error_sd_Nm": np.sqrt(noise.moving).tolist(),
+            "model_error_time_s": noise.moving_time.tolist(),
+            "model_error_at_rest_sd_Nm": np.sqrt(noise.resting).tolist(),
+            "free_s": noise.free_seconds,
+            "gated": self.gate,
+            "correction_left_out": self.uncorrected,
+        }
 
     def remarks(self, name: str) -> tuple[Remark, ...]:
         """What a reader of the wrench should know.
@@ -105,6 +123,8 @@ class SmoothedWrench:
             found.append(fact("wrench-noise-learned", where, free_s=noise.free_seconds))
         else:
             found.append(caution("wrench-noise-assumed", where))
+        if self.uncorrected:
+            found.append(fact("wrench-uncorrected", where))
         return tuple(found)
 
 
@@ -127,8 +147,14 @@ class MovedWrench(NamedTuple):
     @property
     def sd(self) -> Array:
         """Standard deviation. (T, 6) [N, N·m]"""
-        # A pinned wrench's variance is zero, which rounding may leave on either side.
-        return np.sqrt(np.maximum(np.einsum("tii->ti", self.covariance), 0.0))
+        return deviations(self.covariance)
+
+
+def deviations(covariance: Array) -> Array:
+    """Standard deviations of covariances. (T, k)"""
+    # A pinned state's variance is zero, which rounding may leave on either side.
+    variances = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)
+    return np.asarray(np.sqrt(variances))
 
 
 def smooth_wrench(
@@ -159,24 +185,19 @@ def smooth_wrench(
             f"an arm of {terms.joints} joints cannot tell the six components of a wrench; "
             "leave --wrench out and use the joint torques"
         )
-    seconds = COARSE
-    model = blocks_of(terms, q, robot, free, gate, seconds)
     if prior is None:
-        prior = choose_prior(model.blocks, model.measured, model.noise, model.inside)
-    if prior.time < STEADY and (fine := fine_blocks(terms.t)) < COARSE:
-        seconds = fine
-        model = blocks_of(terms, q, robot, free, gate, seconds)
-    blocks, measured, noise, inside = model
+        prior = prior_of(terms, q, robot, free, gate)
+    seconds = block_length(terms.t, fine=not prior.is_steady)
+    blocks, measured, noise, inside = blocks_of(terms, q, robot, free, gate, seconds)
     steps = evolution(blocks, noise, [prior], inside)
     single = Evolution(steps.decay[:, 0], steps.variance[:, 0])
     mean, covariance = smooth_backward(single, filter_forward(single, measured))
-    errors = np.sqrt(np.maximum(np.einsum("kii->ki", covariance[:, 6:, 6:]), 0.0))
     return SmoothedWrench(
         t=blocks.t,
         values=mean[:, :6],
         covariance=covariance[:, :6, :6] * np.outer(WIDENED, WIDENED),
         model_error=mean[:, 6:],
-        model_error_sd=errors,
+        model_error_sd=deviations(covariance[:, 6:, 6:]),
         inside=inside,
         seconds=seconds,
         prior=prior,
@@ -185,12 +206,26 @@ def smooth_wrench(
     )
 
 
-def fine_blocks(t: Array) -> float:
-    """Length of a block where the wrench moves. [s]"""
+def prior_of(
+    terms: DynamicsTerms,
+    q: Array,
+    robot: Robot,
+    free: Sequence[FreeTerms] = (),
+    gate: Sequence[tuple[float, float]] | None = None,
+) -> WrenchPrior:
+    """The prior under which a log is most likely; the arguments as of `smooth_wrench`."""
+    model = blocks_of(terms, q, robot, free, gate, block_length(terms.t, fine=False))
+    return choose_prior(model.blocks, model.measured, model.noise, model.inside)
+
+
+def block_length(t: Array, *, fine: bool) -> float:
+    """Length of a block, fine where the wrench moves and coarse where it is a load. [s]"""
     if len(t) < 2:
         return COARSE
-    step = median_step(t)
-    return max(FINE, step if is_uniform(t) else JITTERED * step)
+    step, length = median_step(t), COARSE
+    if fine:
+        length = min(COARSE, max(FINE, step if is_uniform(t) else JITTERED * step))
+    return max(length, float(t[-1] - t[0]) / MOST_BLOCKS)
 
 
 class BlockModel(NamedTuple):

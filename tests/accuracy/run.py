@@ -1,0 +1,175 @@
+"""Accuracy on logs whose external torque is known: python tests/accuracy/run.py planted circle …
+
+For every log the RMSE, mean of the joints [N·m], of the smoother with gains tuned
+
+- today: on the spectra as they are measured (as before the cap of S_τ),
+- capped: with what is faster than 5 Hz capped,
+- whole: the same on terms corrected by the whole log,
+- oracle: with the fixed natural frequencies that are best against the truth (--oracle),
+
+the joints that were corrected, and, where the pipeline has an observer `best` (--best), its RMSE,
+the share of samples its 95 % band holds, joints moving and at rest apart, and the band's half
+width over the RMSE. `steady` prints slopes and ratios of the smoother with the robot's own gains.
+Real logs are those of VFT_LOGS. Nothing here is timed.
+"""
+
+import argparse
+import math
+import os
+import sys
+from collections import defaultdict
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[2])]
+
+import scenarios  # noqa: E402
+
+from vftcli.observers import Setup, build_observers, spectra  # noqa: E402
+from vftcli.observers.auto_tuning import (  # noqa: E402
+    kalman_smoother,
+    natural_frequencies,
+    tune_to_spectra,
+)
+from vftcli.observers.choice import ObserverChoice  # noqa: E402
+from vftcli.refinement.whole_log import whole_log_bias  # noqa: E402
+from vftcli.repetition.free_motion import FreeMotion  # noqa: E402
+from vftcli.repetition.free_run import ModelledRun  # noqa: E402
+from vftcli.repetition.standstill import standing  # noqa: E402
+
+GROUPS = ("planted", "pieces", "steady", *scenarios.SIMULATED, "bullet")
+
+
+def main() -> None:
+    """Print a line a log, and the mean of every group."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("groups", nargs="*", default=GROUPS, help=f"of {', '.join(GROUPS)}")
+    parser.add_argument("--robot", help="robot file for the real UR10e logs instead of the profile")
+    parser.add_argument("--oracle", action="store_true", help="the best fixed gains too")
+    parser.add_argument("--best", action="store_true", help="the pipeline's observer `best` too")
+    parser.add_argument("--length", type=float, default=10.0, help="of the pieces [s]")
+    chosen = parser.parse_args()
+    lines = defaultdict(list)
+    for group in chosen.groups:
+        for case in cases_of(group, chosen):
+            line = steady_line(case) if group == "steady" else tuned_line(case, chosen)
+            lines[group].append(line)
+            show(f"{group} {case.name}", line)
+    for group, found in lines.items():
+        columns = [key for key in found[0] if isinstance(found[0][key], float)]
+        show(f"{group} mean", {key: float(np.mean([x[key] for x in found])) for key in columns})
+        for key in columns:
+            if key.endswith(("/today", "/without")):
+                show(f"{group} worst {key}", {key: max(x[key] for x in found)})
+
+
+def show(name: str, line: dict[str, object]) -> None:
+    """One line of the table."""
+    words = (f"{k} {v:.3f}" if isinstance(v, float) else f"{k} {v}" for k, v in line.items())
+    print(f"{name:34}", "  ".join(words), flush=True)
+
+
+def cases_of(group: str, chosen):
+    """The logs of a group."""
+    logs = Path(os.environ.get("VFT_LOGS", ""))
+    if group in scenarios.SIMULATED:
+        return scenarios.simulated_cases(group)
+    if group == "bullet":
+        return scenarios.bullet_cases(logs)
+    if group == "pieces":
+        return scenarios.piece_cases(logs, chosen.robot, chosen.length)
+    make = scenarios.planted_cases if group == "planted" else scenarios.steady_cases
+    return make(logs, chosen.robot)
+
+
+def rmse(estimate, truth) -> np.ndarray:
+    """Root mean square error of each joint over every sample. (n,) [N·m]"""
+    return np.sqrt(np.mean((estimate - truth) ** 2, axis=0))
+
+
+@contextmanager
+def uncapped():
+    """Tuning as it was before the spectrum of the external torque was capped."""
+    slow = spectra.SLOW
+    spectra.SLOW = math.inf
+    try:
+        yield
+    finally:
+        spectra.SLOW = slow
+
+
+def tuned(terms, free):
+    """The smoother tuned on the spectra of the free part and the rest."""
+    part = spectra.Part(terms, free)
+    return tune_to_spectra("rts-auto", spectra.spectra_of(spectra.Part(terms, ~free), [part]))
+
+
+def tuned_line(case, chosen) -> dict[str, object]:
+    """What the tuned smoothers reach on one log."""
+    run = ModelledRun(recording=case.recording, robot=case.robot)
+    free = FreeMotion(log=run, choice=case.free).part.own
+    with uncapped():
+        today = rmse(tuned(run.terms, free).estimate(run.terms).tau, case.truth)
+    capped = rmse(tuned(run.terms, free).estimate(run.terms).tau, case.truth)
+    bias = whole_log_bias(run)
+    terms = bias.corrected(run.terms)
+    whole = rmse(tuned(terms, free).estimate(terms).tau, case.truth)
+    line = {name: float(x.mean()) for name, x in
+            (("today", today), ("capped", capped), ("whole", whole))}  # fmt: skip
+    line["whole/today"] = line["whole"] / line["today"]
+    line["whole/capped"] = line["whole"] / line["capped"]
+    if chosen.oracle:
+        best = oracle(run.terms, case.truth)
+        line |= {"oracle": float(best.mean()), "capped/oracle": float(capped.mean() / best.mean())}
+        line["single joints"] = np.round(capped / best, 2).tolist()
+    line["applied"] = "".join(str(int(x)) for x in bias.applied)
+    line["free"] = round(float(bias.free.mean()), 2)
+    return line | (best_line(case) if chosen.best else {})
+
+
+def oracle(terms, truth) -> np.ndarray:
+    """The least error of each joint with one fixed natural frequency of the tuner's grid. (n,)"""
+    grid = natural_frequencies(float(np.median(np.diff(terms.t))))
+    tried = (kalman_smoother(np.full(truth.shape[1], omega)) for omega in grid)
+    return np.min([rmse(one.estimate(terms).tau, truth) for one in tried], axis=0)
+
+
+def best_line(case) -> dict[str, object]:
+    """The pipeline's own best estimate, and how its band holds."""
+    from vftcli.pipeline import AnalysisChoice, analyse
+
+    choice = AnalysisChoice(observers=ObserverChoice(names=("best",)), free=case.free)
+    estimate = analyse(case.recording, case.robot, choice).estimates[0]
+    error = estimate.tau - case.truth
+    line = {"best": float(rmse(estimate.tau, case.truth).mean())}
+    if estimate.error_sd is None:
+        return line
+    rests = standing(case.recording.t, case.recording.dq)
+    inside = np.abs(error) <= 1.96 * estimate.error_sd
+    half = 1.96 * np.sqrt(np.mean(estimate.error_sd**2, axis=0))
+    line["half width/rmse"] = float(half.mean() / line["best"])
+    for name, where in (("moving", ~rests), ("rest", rests)):
+        shares = [inside[w, j].mean() if w.any() else np.nan for j, w in enumerate(where.T)]
+        line[f"held {name}"] = np.round(shares, 2).tolist()
+    return line
+
+
+def steady_line(case) -> dict[str, object]:
+    """Slope of the estimate on the truth and RMSE, with the correction and without it."""
+    run = ModelledRun(recording=case.recording, robot=case.robot)
+    bias = whole_log_bias(run)
+    setup = Setup(gains=case.robot.gains, settings={}, joints=case.robot.joints,
+                  step=case.recording.median_step, as_printed=False)  # fmt: skip
+    (observer,), _ = build_observers(("kfo-rts",), setup)
+    taus = [observer.estimate(terms).tau for terms in (run.terms, bias.corrected(run.terms))]
+    slopes = [float(np.sum(tau * case.truth) / np.sum(case.truth**2)) for tau in taus]
+    errors = [float(rmse(tau, case.truth).mean()) for tau in taus]
+    line = {"slope without": slopes[0], "slope": slopes[1], "change": abs(slopes[1] - slopes[0])}
+    line |= {"without": errors[0], "with": errors[1], "with/without": errors[1] / errors[0]}
+    return line | {"applied": "".join(str(int(x)) for x in bias.applied)}
+
+
+if __name__ == "__main__":
+    main()

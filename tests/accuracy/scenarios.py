@@ -1,0 +1,163 @@
+"""Logs whose external torque is known, and what the harness needs to know of each.
+
+Real logs of a UR10e with planted pushes, cut into pieces too; the same under steady pushes; what
+the built-in scenarios simulate; and a log of a third simulator (Bullet), whose arm is identified.
+"""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import numpy as np
+from planted_pushes import joint_torque, moving_window, planted, with_torque
+
+from vftcli.readers.library import Library
+from vftcli.readers.reader import ReadChoice
+from vftcli.repetition.choice import FreeChoice
+from vftcli.robots import load_robot
+from vftcli.robots.kinematics import link_poses
+from vftcli.simulation import load_scenario
+from vftcli.simulation.experiment import simulate
+
+UR10E = ("free_12harm.csv", "free_12harm_40s.csv.gz", "free_10harm.csv.gz")
+COLUMNS = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+BULLET = "t=t,q=q{i},dq=dq{i},-tau=tau{i}"
+TRUTH = "t=t,q=q{i},dq=dq{i},-tau=tau{i},-tau_ext=tau_ext{i}"
+
+SIMULATED = {
+    "circle": ("ur5-circle", None, (1, 2, 3, 4)),
+    "table1": ("ur5-table1", None, (1, 2, 3, 4)),
+    "drag": ("ur5-drag", "0:2", (1, 2, 3)),
+    "panda-bearing": ("panda-bearing", "0:4", (1, 2, 3)),
+}
+"""Name → the built-in scenario, its free part if one is stated, and the seeds."""
+
+STEADY = (
+    ((0, 0, -20), 0.0, None),
+    ((15, -10, 0), 0.0, None),
+    ((0, 0, 60), 0.0, None),
+    ((20, 0, -20), 12.0, None),
+    ((0, 0, -30), 0.0, 3),
+    ((20, -20, 0), 0.0, 3),
+)
+"""Steady pushes: force in world axes [N], from when on [s], at the flange or at a joint's origin,
+from 0, on the link before it."""
+
+
+class Case(NamedTuple):
+    """One log whose external torque is known.
+
+    Attributes:
+        group: What it is averaged with.
+        name: What tells it from the others of its group.
+        recording: The log.
+        robot: The arm as the estimators know it.
+        free: What is said to be free of contact.
+        truth: The external torque. (T, n) [N·m]
+    """
+
+    group: str
+    name: str
+    recording: object
+    robot: object
+    free: FreeChoice
+    truth: np.ndarray
+
+
+def read(path, columns):
+    """A log by a column description."""
+    return Library([path]).open(path, ReadChoice.parsed(columns=columns))
+
+
+def planted_cases(logs, robot=None, seeds=(1, 2, 3)) -> Iterator[Case]:
+    """The three free logs with random pushes; the robot of the estimators may be another."""
+    profile = load_robot("ur10e")
+    arm = profile if robot is None else load_robot(robot)
+    for log in UR10E:
+        recording = read(logs / "ur10e" / log, COLUMNS)
+        for seed in seeds:
+            made = planted(recording, profile, seed)
+            free = FreeChoice.parsed(free_part="0:8")
+            name = f"{log.split('.')[0]} {seed}"
+            yield Case("planted", name, made.recording, arm, free, made.torque)
+
+
+def piece_cases(logs, robot=None, length=10.0) -> Iterator[Case]:
+    """Pieces of the planted logs, pushes from 1 s on."""
+    profile = load_robot("ur10e")
+    arm = profile if robot is None else load_robot(robot)
+    for log in UR10E:
+        window = moving_window(read(logs / "ur10e" / log, COLUMNS))
+        for number in range(int(window.t[-1] / length)):
+            cut = window.between(number * length, (number + 1) * length)
+            # the recipe leaves the first 8 s alone: the piece is laid at 7 s
+            late = replace(cut, t=cut.t - cut.t[0] + 7.0)
+            torque = planted_from(late, profile, number + 1)
+            piece = with_torque(replace(cut, t=cut.t - cut.t[0]), profile, torque)
+            free = FreeChoice.parsed(free_part="0:1")
+            yield Case("pieces", f"{log.split('.')[0]} {number}", piece, arm, free, torque)
+
+
+def planted_from(recording, profile, seed):
+    """Torque of random pushes on a log, by its own clock. (T, n) [N·m]"""
+    from planted_pushes import pushes
+
+    return joint_torque(pushes(recording.t, seed), recording, profile)
+
+
+def steady_cases(logs, robot=None) -> Iterator[Case]:
+    """The three free logs under pushes that last, each alone."""
+    profile = load_robot("ur10e")
+    arm = profile if robot is None else load_robot(robot)
+    for log in UR10E:
+        window = moving_window(read(logs / "ur10e" / log, COLUMNS))
+        for force, begin, joint in STEADY:
+            levels = np.where(window.t[:, None] >= begin, np.array(force, dtype=float), 0.0)
+            if joint is None:
+                torque = joint_torque(levels, window, profile)
+            else:
+                torque = torque_at_joint(levels, window, profile, joint)
+            name = f"{force} {'flange' if joint is None else 'wrist'} {log.split('.')[0]}"
+            pushed = with_torque(window, profile, torque)
+            yield Case("steady", name, pushed, arm, FreeChoice(), torque)
+
+
+def torque_at_joint(force, recording, robot, joint):
+    """Joint torques of a force at a joint's origin on the link before it. (T, n) [N·m]"""
+    poses = link_poses(robot.chain, recording.q)
+    torque = np.zeros(recording.q.shape)
+    for j in range(joint):
+        lever = poses.translation[:, joint] - poses.translation[:, j]
+        torque[:, j] = np.sum(poses.rotation[:, j, :, 2] * np.cross(lever, force), axis=1)
+    return torque
+
+
+def simulated_cases(name) -> Iterator[Case]:
+    """A built-in scenario with several seeds; the estimators know the profile."""
+    scenario, part, seeds = SIMULATED[name]
+    for seed in seeds:
+        run = simulate(load_scenario(scenario, ()), seed)
+        free = FreeChoice() if part is None else FreeChoice.parsed(free_part=part)
+        recording = run.recording
+        truth = run.truth.tau_ext[np.unique(run.measured.rows)]
+        yield Case(name, str(seed), recording, run.nominal, free, truth)
+
+
+def bullet_cases(logs) -> Iterator[Case]:
+    """Bullet's file 7 with its two torques; the arm is identified from files 5 and 6."""
+    folder = logs / "bullet_ur5"
+    with TemporaryDirectory() as place:
+        robot = Path(place) / "arm.toml"
+        words = ["identify", *(str(folder / f"free_{k}.csv.gz") for k in (5, 6))]
+        words += ["--robot", "ur5", "--method", "base", "--columns", BULLET, "-o", str(robot)]
+        program = "from vftcli.cli import launch; launch()"
+        subprocess.run([sys.executable, "-c", program, *words], check=True, capture_output=True)
+        arm = load_robot(str(robot))
+    for kind in ("const", "vary"):
+        recording = read(folder / f"pushed_7_{kind}.csv.gz", TRUTH)
+        free = FreeChoice.parsed(free_part="0:8")
+        yield Case("bullet", kind, recording, arm, free, recording.tau_ext)

@@ -1,0 +1,84 @@
+"""Slow external loads: their columns against Pinocchio, their knots against a dense sum."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from known_errors import motion
+
+from vftcli.refinement.slow_load import (
+    FORCE,
+    MOMENT,
+    force_torque,
+    points_along,
+    slow_loads,
+)
+from vftcli.robots import load_robot
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+@pytest.mark.parametrize("joint", [2, 3])
+def test_a_force_along_the_arm_is_felt_by_the_joints_before_it(name, joint):
+    """J of the point on the link before, by Pinocchio: a frame there, in world axes."""
+    robot = load_robot(name)
+    model = robot.model.copy()
+    point = pin.SE3(np.eye(3), robot.chain.translation[joint])
+    frame = model.addFrame(pin.Frame("point", joint, point, pin.FrameType.OP_FRAME))
+    data = model.createData()
+    q = np.random.default_rng(1).uniform(-2.0, 2.0, (5, robot.joints))
+    for row, found in zip(q, force_torque(robot.chain, q, joint), strict=True):
+        J = pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
+        np.testing.assert_allclose(found, J.T, atol=1e-12)
+
+
+def test_the_points_are_elbow_and_wrist():
+    """Joints 3 and 4 of six; of seven 4 and, as its axis passes there, 5 for 6; counted from 0."""
+    assert points_along(6) == (2, 3)
+    assert points_along(7) == (3, 4)
+    panda = load_robot("panda").chain
+    q = motion(np.arange(5.0), 7)[0]
+    at_five, at_six = force_torque(panda, q, 4), force_torque(panda, q, 5)
+    np.testing.assert_allclose(at_five, at_six, atol=1e-12)
+    assert [points_along(n) for n in (1, 2, 3, 4, 5)] == [(), (), (1,), (1,), (2,)]
+
+
+@pytest.mark.parametrize(("seconds", "knots"), [(14.0, 1), (16.0, 3), (55.0, 7), (3600.0, 61)])
+def test_knots_lie_ten_seconds_apart(seconds, knots):
+    t = np.linspace(0.0, seconds, 40)
+    loads = slow_loads(load_robot("ur5").chain, t, np.zeros((40, 6)))
+    assert loads.knots == knots
+    assert loads.sizes == (0, 6 * knots, 12 * knots)
+    np.testing.assert_allclose(loads.knot + loads.share, t / seconds * (knots - 1), atol=1e-9)
+    assert loads.knot.max() <= max(knots - 2, 0)
+
+
+def test_a_load_runs_straight_from_knot_to_knot():
+    """Against the sum over all knots of hat functions, component by component."""
+    robot = load_robot("ur5")
+    t = np.linspace(0.0, 25.0, 60)
+    q = motion(t, 6)[0]
+    loads = slow_loads(robot.chain, t, q)
+    values = np.random.default_rng(3).normal(size=loads.sizes[-1])
+    at = np.linspace(0.0, 25.0, loads.knots)
+    expected = np.zeros((60, 6))
+    for k in range(loads.knots):
+        hat = np.interp(t, at, np.eye(loads.knots)[k])
+        for c in range(loads.components):
+            value = values[loads.numbers[k, c]]
+            expected += value * hat[:, None] * loads.torque[:, :, c]
+    np.testing.assert_allclose(loads.made_by(values), expected, atol=1e-10)
+    flange = loads.made_by(values[: loads.sizes[1]])
+    np.testing.assert_allclose(
+        flange, loads.made_by(np.append(values[: loads.sizes[1]], np.zeros(6 * loads.knots)))
+    )
+
+
+def test_columns_are_the_torque_with_its_sign_turned_of_one_standard_deviation():
+    robot = load_robot("ur5")
+    q = motion(np.arange(4.0), 6)[0]
+    loads = slow_loads(robot.chain, np.arange(4.0), q)
+    data = robot.model.createData()
+    frame = robot.model.getFrameId("flange")
+    for row, torque in zip(q, loads.torque, strict=True):
+        J = pin.computeFrameJacobian(robot.model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)
+        sd = np.array([FORCE] * 3 + [MOMENT] * 3)
+        np.testing.assert_allclose(torque[:, :6], -J.T * sd, atol=1e-10)

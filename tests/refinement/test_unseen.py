@@ -1,0 +1,114 @@
+"""The guard: what does not predict is not used."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from known_errors import STEP, drawn_error, shortened, ur10e, wrong_run
+
+from vftcli.refinement.model_error import (
+    column_numbers,
+    error_columns,
+    expected_error,
+    smooth_motion,
+)
+from vftcli.refinement.normal_equations import Rows
+from vftcli.refinement.robust_fit import fit_robustly
+from vftcli.refinement.slow_load import slow_loads
+from vftcli.refinement.unseen import FOLDS, LARGEST, SCALES, fold_spans, guarded, mask_of
+
+STRIDE = 3
+
+
+def fit_of(size, noise=0.3):
+    robot = shortened(ur10e(), 3)
+    run = wrong_run(robot, drawn_error(robot, size=size), noise=noise)
+    motion = smooth_motion(run)
+    d = np.gradient(run.terms.p, motion.t, axis=0) - run.terms.mu
+    rows = Rows(
+        columns=error_columns(run, motion, expected_error(robot), STRIDE),
+        loads=slow_loads(robot.chain, motion.t[::STRIDE], motion.q[::STRIDE]),
+        d=d[::STRIDE],
+    )
+    return fit_robustly(rows, STRIDE * STEP, np.array([17.0, 16.0, 6.0]))
+
+
+@pytest.fixture(scope="module")
+def wrong():
+    return fit_of(1.0)
+
+
+def test_an_error_that_is_there_is_applied(wrong):
+    found = guarded(wrong)
+    assert found.applied.all()
+    assert np.all(found.share < 0.5)
+
+
+def test_noise_is_left_alone():
+    """White noise of .3 N·m and no error: nothing is predicted."""
+    found = guarded(fit_of(0.0))
+    assert not found.applied.any()
+    assert np.all(found.share > 0.9)
+
+
+def test_the_unseen_share_is_that_of_dense_fits(wrong):
+    """Every fold, scale and choice of loads by dense matrices; the guard's own words by hand."""
+    rows, P, sizes = wrong.rows, wrong.rows.unknowns, wrong.rows.loads.sizes
+    samples = len(rows.d)
+    A = np.zeros((samples, 3, P + sizes[-1]))
+    for j, column in enumerate(rows.columns):
+        A[:, j, column_numbers(j, 3)] = column
+    for k in range(sizes[-1]):
+        A[:, :, P + k] = rows.loads.made_by(np.eye(sizes[-1])[k])
+    squares = np.zeros((len(SCALES), 3))
+    free = np.flatnonzero(wrong.free)
+    for fold in np.array_split(free, FOLDS):
+        near = (np.arange(samples) >= fold[0] - 17) & (np.arange(samples) <= fold[-1] + 17)
+        rest = wrong.free & ~near
+        flat, w = A[rest].reshape(-1, A.shape[-1]), wrong.weight[rest].ravel()
+        d = rows.d[rest].ravel()
+        for k, scale in enumerate(SCALES):
+            u = np.zeros(P)
+            if scale:
+                costs = []
+                for size in sizes:
+                    sd = np.concatenate([np.full(P, scale), np.ones(size)])
+                    X = flat[:, : P + size]
+                    one = -np.linalg.solve(
+                        X.T @ (X * w[:, None]) + np.diag(sd**-2.0), X.T @ (w * d)
+                    )
+                    cost = np.sum(w * (d + X @ one) ** 2) + np.sum((one / sd) ** 2) + 2 * size
+                    costs.append((cost, one[:P]))
+                u = min(costs, key=lambda pair: pair[0])[1]
+            left = np.abs(rows.d[fold] + A[fold][:, :, :P] @ u) / wrong.scale
+            squares[k] += np.sum(np.minimum(left, LARGEST) ** 2, axis=0)
+    best = int(np.argmin(squares.mean(axis=1)))
+    expected = np.sqrt(squares[best] / squares[0])
+    found = guarded(wrong)
+    # condition numbers of up to 1e8 leave seven digits
+    np.testing.assert_allclose(found.share, expected, rtol=1e-5)
+    assert found.solution.scale == SCALES[best]
+
+
+def test_a_joint_that_gains_too_little_is_left_alone(wrong):
+    """The third joint's signal replaced by noise: the others are corrected."""
+    d = wrong.rows.d.copy()
+    d[:, 2] = np.random.default_rng(3).normal(0.0, 0.3, len(d))
+    fit = replace(wrong, rows=replace(wrong.rows, d=d))
+    found = guarded(fit)
+    assert found.applied.tolist()[2] is False
+    assert found.applied[:2].any()
+
+
+def test_folds_are_contiguous_and_apart():
+    free = np.concatenate([np.arange(5, 40), np.arange(60, 100)])
+    spans = fold_spans(free, 3)
+    assert len(spans) == FOLDS
+    assert spans[0][0].start == 5
+    assert spans[-1][0].stop == 100
+    for inner, outer in spans:
+        assert outer.start == max(inner.start - 3, 0)
+        assert outer.stop == inner.stop + 3
+    held = [np.count_nonzero(np.isin(np.arange(100), free)[inner]) for inner, _ in spans]
+    assert held == [15] * 5
+    assert np.flatnonzero(mask_of(10, slice(2, 5))).tolist() == [2, 3, 4]

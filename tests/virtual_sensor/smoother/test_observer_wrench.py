@@ -1,0 +1,192 @@
+"""The smoother as a solver beside the others: what it is fed, and what its wrench looks like."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.observers.choice import ObserverChoice
+from vftcli.pipeline import AnalysisChoice, analyse_log, prepared, read
+from vftcli.readers.reader import ReadChoice
+from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.free_motion import FreeMotion
+from vftcli.repetition.free_run import ModelledRun, Models
+from vftcli.robots.choice import RobotChoice
+from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
+from vftcli.virtual_sensor.sensing import sense
+from vftcli.virtual_sensor.sensor_reading import SensorReading
+from vftcli.virtual_sensor.smoother.noise import FreeTerms
+from vftcli.virtual_sensor.smoother.observer_wrench import (
+    SmootherInput,
+    corrected_input,
+    known_free,
+    less_torque,
+    plain_input,
+    smooth_all,
+)
+from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
+
+CIRCLE = Path(__file__).parents[3] / "fixtures" / "ur5_circle.csv"
+FREE = FreeChoice.parsed(free_part="0.3:4")
+
+
+def choice(*names: str, free: FreeChoice = FREE, **wrench: object) -> AnalysisChoice:
+    return AnalysisChoice(
+        read=ReadChoice(interval=(0.0, 8.0)),
+        robot=RobotChoice(name="ur5"),
+        observers=ObserverChoice(names=names),
+        free=free,
+        wrench=WrenchChoice(**wrench),  # type: ignore[arg-type]
+    )
+
+
+@pytest.fixture(scope="module")
+def motion() -> FreeMotion:
+    """8 s of the circle, free until 4 s."""
+    asked = choice("gmo")
+    recording = asked.library.open(CIRCLE, asked.read)
+    return read(*prepared(recording, asked), asked, Models())
+
+
+def reading(*names: str, **wrench: object) -> SensorReading:
+    sensed = analyse_log(CIRCLE, choice(*names, **wrench)).virtual_sensor  # type: ignore[arg-type]
+    assert sensed is not None
+    assert all(str(remark) for remark in sensed.remarks)  # the catalogue has words for each
+    return sensed
+
+
+def test_asked_for_it_is_every_observers_wrench_and_hides_nothing(motion: FreeMotion) -> None:
+    sensed = reading("gmo", "fdo", solver="smoother", frame="base")
+    assert sensed.solver == "smoother"
+    log, (piece,) = motion.log, motion.part.pieces
+    free = FreeTerms(log.terms, log.recording.q, piece.inside)
+    expected = smooth_wrench(log.terms, log.recording.q, log.robot, [free]).at(log.recording.t)
+    for wrench in sensed.wrenches:
+        np.testing.assert_allclose(wrench.values, expected.values, atol=1e-12)
+        np.testing.assert_allclose(wrench.sd, expected.sd, atol=1e-12)
+        assert not wrench.hidden.any()
+        assert wrench.sigma_min is not None
+    assert sensed.smoothed["gmo"] is sensed.smoothed["fdo"]  # the log's, whoever observes it
+    codes = [remark.code for remark in sensed.remarks if remark.where.about == "gmo"]
+    assert codes == ["wrench-smoothed", "wrench-noise-learned"]
+    assert not {"pose-hides-wrench", "band-from-torques"} & {r.code for r in sensed.remarks}
+
+
+def test_in_another_frame_it_is_the_same_wrench_turned() -> None:
+    base, flange = (
+        reading("gmo", solver="smoother", frame=f).wrenches[0] for f in ("base", "flange")
+    )
+    for part in (slice(0, 3), slice(3, 6)):
+        lengths = [np.linalg.norm(wrench.values[:, part], axis=1) for wrench in (base, flange)]
+        np.testing.assert_allclose(*lengths, atol=1e-9)
+        # a rotation keeps the trace of a covariance
+        sums = [np.sum(wrench.sd[:, part] ** 2, axis=1) for wrench in (base, flange)]  # type: ignore[index]
+        np.testing.assert_allclose(*sums, rtol=1e-9)
+
+
+def test_unasked_it_is_nobodys_here() -> None:
+    sensed = reading("gmo")
+    assert sensed.solver == "pinv"
+    assert not sensed.smoothed
+
+
+def test_a_span_that_is_its_zero_is_free_motion_where_there_is_no_other(motion: FreeMotion) -> None:
+    terms, q = motion.log.terms, motion.log.recording.q
+    unloaded = motion.log.recording.t < 4.0
+    none = SmootherInput(terms, ())
+    (found,) = known_free(motion, none, unloaded)
+    assert found.inside is unloaded
+    assert known_free(motion, none, unloaded & False) == ()
+    given = FreeTerms(terms, q, ~unloaded)
+    assert known_free(motion, SmootherInput(terms, (given,)), unloaded) == (given,)
+
+
+def test_a_zero_takes_its_mean_off_the_smoothed_wrench_too() -> None:
+    sensed = reading("gmo", solver="smoother", zero=ZeroChoice(spans=((0.3, 4.0),)))
+    (wrench,) = sensed.wrenches
+    np.testing.assert_allclose(wrench.values[sensed.free].mean(axis=0), 0.0, atol=1e-9)
+
+
+def test_a_torque_is_taken_off_the_terms(motion: FreeMotion) -> None:
+    log = motion.log
+    torque = np.broadcast_to(np.arange(6.0), log.recording.q.shape)
+    more = DynamicsTerms(t=log.terms.t, p=log.terms.p, mu=log.terms.mu - torque)
+    found = less_torque(more, torque)
+    np.testing.assert_allclose(found.mu, log.terms.mu, atol=1e-12)
+    assert less_torque(more, None) is more
+
+
+@pytest.mark.parametrize("newtons", [0.0, 40.0])
+def test_a_correction_is_left_out_where_the_log_shows_one_load(
+    motion: FreeMotion, newtons: float
+) -> None:
+    """Under 40 N down all the time the uncorrected terms are used, under pushes the corrected."""
+    J = flange_jacobian(motion.log.robot.chain, motion.log.recording.q)
+    plain = plain_input(motion)
+    if newtons:
+        quiet = np.broadcast_to(motion.log.recording.t[:, None] < 4.0, (len(J), 6))
+        pushes = smooth_all(motion, ["best"], unloaded=quiet[:, 0])["best"].at(
+            motion.log.recording.t
+        )
+        taken = np.einsum("tij,ti->tj", J, pushes.values)
+        free = tuple(piece._replace(terms=less_torque(piece.terms, taken)) for piece in plain.free)
+        plain = SmootherInput(less_torque(plain.terms, taken + newtons * J[:, 2]), free)
+    corrected = plain._replace(
+        terms=less_torque(plain.terms, np.ones_like(J[:, 0])), uncorrected=plain
+    )
+    nothing = np.zeros(len(J), dtype=bool)
+    found = smooth_all(motion, ["best"], lambda _: corrected, unloaded=nothing)["best"]
+    assert found.uncorrected is (newtons > 0.0)
+    codes = {remark.code for remark in found.remarks("best")}
+    assert ("wrench-uncorrected" in codes) is (newtons > 0.0)
+    if newtons:
+        assert found.values[:, 2].mean() == pytest.approx(-newtons, abs=4.0)
+
+
+def test_a_list_of_contacts_is_its_gate(motion: FreeMotion) -> None:
+    log = motion.log
+    estimates = [
+        observer.estimate(log.terms)
+        for observer in ObserverChoice(names=("gmo",)).build(log.robot, log.recording.median_step)[
+            0
+        ]
+    ]
+    asked = WrenchChoice(solver="smoother", frame="base")
+    sensed = sense(motion, (), estimates, asked, gate=[(4.5, 5.0)])
+    (wrench,) = sensed.wrenches
+    t = log.recording.t
+    away = (t < 4.4) | (t > 5.1)
+    assert not wrench.values[away].any()
+    assert wrench.sd is not None
+    assert not wrench.sd[away].any()
+    assert wrench.values[(t > 4.5) & (t < 5.0)].any()
+
+
+def test_an_observers_own_terms_go_with_the_uncorrected_ones(motion: FreeMotion) -> None:
+    pieces = motion.part.pieces
+    shifted = less_torque(motion.log.terms, np.ones_like(motion.log.terms.mu))
+
+    def terms_of(name: str, run: ModelledRun) -> DynamicsTerms:
+        return shifted if name == "best" and run is motion.log else run.terms
+
+    best, gmo = (corrected_input(motion, pieces, terms_of, name) for name in ("best", "gmo"))
+    assert gmo.uncorrected is None
+    assert gmo.terms is motion.log.terms
+    assert best.terms is shifted
+    assert best.free[0].terms is shifted
+    assert best.uncorrected is not None
+    assert best.uncorrected.terms is motion.log.terms
+
+
+def test_a_free_run_takes_the_place_of_a_correction(motion: FreeMotion) -> None:
+    plain = plain_input(motion)
+    shape = motion.log.terms.mu.shape
+    other = plain._replace(terms=less_torque(plain.terms, np.ones(shape)), uncorrected=plain)
+    nothing, torque = np.zeros(shape[0], dtype=bool), np.full(shape, 0.5)
+    both = [
+        smooth_all(motion, ["best"], lambda _, x=x: x, unloaded=nothing, torque=torque)["best"]
+        for x in (other, plain)
+    ]
+    np.testing.assert_array_equal(both[0].values, both[1].values)

@@ -1,0 +1,264 @@
+"""What may be wrong with a robot's model: columns, how wrong each may be, and the torque they make.
+
+The raw disturbance d is the external torque less the model's error, d = τ_ext − A δx. The columns A
+are the inertial parameters of every link, the rotor inertias, the drive constants and the friction
+of every joint. Each δx has mean zero and a standard deviation that follows from the robot's own
+numbers: a maker's table is good to some percent, friction to a fifth.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.chain import Chain
+from vftcli.robots.friction import dry_friction, steady_torque
+from vftcli.robots.kernels import CHUNK, momentum_terms
+from vftcli.robots.presliding import play
+from vftcli.robots.regressor import (
+    LINK,
+    TENSOR,
+    chain_parameters,
+    torque_regressor,
+    with_parameters,
+)
+from vftcli.robots.robot import JointFriction, Robot
+from vftcli.signals.arrays import Array, seal
+from vftcli.signals.filters import derivative, zero_phase
+
+CUTOFF = 6.0
+"""What is faster is noise, or contact: the model's error follows the motion. [Hz]"""
+
+PLAY = 0.3e-3
+"""Presliding length of the friction that may be missing. [rad]"""
+
+SMOOTHING = 0.003
+"""Velocity over which its sign turns. [rad/s]"""
+
+SHAPES = 5
+"""Columns of friction a joint beside its offset."""
+
+USUAL_SPEED = np.pi
+"""Speed up to which a joint's friction is looked at where its limit is unknown. [rad/s]"""
+
+
+class SmoothMotion(NamedTuple):
+    """A log's motion without what is faster than `CUTOFF`, and the rigid body's torque of it.
+
+    Attributes:
+        t: Clock. (T,) [s]
+        q: Positions. (T, n) [rad]
+        dq: Velocities. (T, n) [rad/s]
+        ddq: Accelerations. (T, n) [rad/s²]
+        gravity: Gravity torque. (T, n) [N·m]
+        rigid: Torque of the rigid body and its rotors, without friction. (T, n) [N·m]
+    """
+
+    t: Array
+    q: Array
+    dq: Array
+    ddq: Array
+    gravity: Array
+    rigid: Array
+
+
+def smooth_motion(run: ModelledRun) -> SmoothMotion:
+    """The smooth motion of a recording.
+
+    Raises:
+        ClockError: If the recording is shorter than two periods of `CUTOFF`.
+    """
+    t, n = run.recording.t, run.recording.joints
+    both = zero_phase(t, np.hstack([run.recording.q, run.recording.require("dq")]), CUTOFF)
+    q, dq = both[:, :n], both[:, n:]
+    rigid, gravity = rigid_torque(run.robot.loaded_chain, t, q, dq)
+    return SmoothMotion(t, q, dq, derivative(t, dq), gravity, rigid)
+
+
+def rigid_torque(chain: Chain, t: Array, q: Array, dq: Array) -> tuple[Array, Array]:
+    """Torque of a chain's motion with its rotors, ṗ − Cᵀq̇ + g, and g alone. (T, n) each [N·m]"""
+    found = momentum_terms(chain, q, dq)
+    return derivative(t, found.p) - found.coriolis_transpose_dq + found.gravity, found.gravity
+
+
+def friction_shapes(run: ModelledRun, gravity: Array) -> list[Array]:
+    """What each joint's friction may be wrong by, from the motion as it was measured.
+
+    The smoothed sign, how far the presliding deflection is from it, the sign times the load, the
+    velocity and its signed square. (T, n) each
+    """
+    q, dq = run.recording.q, run.recording.require("dq")
+    sign = np.tanh(dq / SMOOTHING)
+    return [sign, play(q, PLAY).state - sign, np.abs(gravity) * sign, dq, dq * np.abs(dq)]
+
+
+class UsualFriction(NamedTuple):
+    """The friction that a robot's model states, by which its error is judged.
+
+    Attributes:
+        dry: Torque of steady sliding at low speed. (n,) [N·m]
+        viscous: Growth with the speed. (n,) [N·m·s/rad]
+        quadratic: Signed growth with its square. (n,) [N·m·s²/rad²]
+    """
+
+    dry: Array
+    viscous: Array
+    quadratic: Array
+
+
+def usual_friction(robot: Robot) -> UsualFriction:
+    """Dry, viscous and quadratic friction of a robot; of another model's curve, as fitted to it.
+
+    A sigmoid has neither slope nor bend of its own: seven tenths of its amplitude count as dry.
+    """
+    found = np.zeros((robot.joints, 3))
+    dry = dry_friction(robot.friction, robot.joints)
+    for j, joint in enumerate(robot.friction):
+        if "amplitude" in joint.parameters:
+            found[j, 0] = 0.7 * abs(float(joint.parameters["amplitude"]))
+        elif joint.model != "none":
+            found[j] = fitted_curve(joint, float(robot.limits.qd_max[j]))
+            found[j, 0] = abs(dry[j] or found[j, 0])
+    return UsualFriction(*found.T)
+
+
+def fitted_curve(joint: JointFriction, limit: float) -> Array:
+    """Constant, slope and bend of a friction between low speed and a joint's limit. (3,)"""
+    fastest = limit if np.isfinite(limit) and limit > 0.0 else USUAL_SPEED
+    speed = np.linspace(0.05, 1.0, 40) * fastest
+    torque = steady_torque(joint, speed)
+    fit, *_ = np.linalg.lstsq(np.column_stack([speed**0, speed, speed**2]), torque, rcond=None)
+    return np.asarray(fit)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelError:
+    """One value for each column: an error of the model, or how large each is expected to be.
+
+    Attributes:
+        inertial: Of the links' inertial parameters, in the regressor's order. (10n,)
+        rotor: Of the reflected rotor inertias. (n,) [kg·m²]
+        drive: Of the drive constants, as a share. (n,)
+        friction: Of the friction's shapes. (5, n)
+        offset: Of a constant torque. (n,) [N·m]
+    """
+
+    inertial: Array
+    rotor: Array
+    drive: Array
+    friction: Array
+    offset: Array
+
+    def __post_init__(self) -> None:
+        seal(self, *vars(self))
+
+    def own(self, joint: int) -> Array:
+        """The values of the columns that one joint's row has: links from it on, then its own."""
+        drives = [self.rotor[joint], self.drive[joint]]
+        mine = [*drives, *self.friction[:, joint], self.offset[joint]]
+        return np.concatenate([self.inertial[LINK * joint :], mine])
+
+    def torque(self, run: ModelledRun, motion: SmoothMotion) -> Array:
+        """The torque A δx that a model with this error asks for too little. (T, n) [N·m]
+
+        The rigid body's part is the difference of two inverse dynamics, that of the chain with
+        these errors and that of the robot's own, which costs a fiftieth of the regressor.
+
+        Args:
+            run: A recording of the arm.
+            motion: Its smooth motion.
+        """
+        chain = run.robot.loaded_chain
+        wrong = with_parameters(
+            chain, chain_parameters(chain) + self.inertial, chain.rotor_inertia + self.rotor
+        )
+        torque, _ = rigid_torque(wrong, motion.t, motion.q, motion.dq)
+        torque += (self.drive - 1.0) * motion.rigid + self.offset
+        for shape, value in zip(friction_shapes(run, motion.gravity), self.friction, strict=True):
+            torque += value * shape
+        return torque
+
+
+def error_of(values: Array, joints: int) -> ModelError:
+    """The model error whose columns have these values, in the order of `column_numbers`."""
+    inertial, own = values[: LINK * joints], values[LINK * joints :].reshape(joints, -1)
+    return ModelError(
+        inertial=inertial,
+        rotor=own[:, 0],
+        drive=own[:, 1],
+        friction=own[:, 2 : 2 + SHAPES].T,
+        offset=own[:, -1],
+    )
+
+
+def column_numbers(joint: int, joints: int) -> NDArray[np.intp]:
+    """Which of all columns the row of one joint has, as `ModelError.own` gives them."""
+    own = LINK * joints + (SHAPES + 3) * joint
+    return np.concatenate(
+        [np.arange(LINK * joint, LINK * joints), np.arange(own, own + SHAPES + 3)]
+    ).astype(np.intp)
+
+
+def expected_error(robot: Robot) -> ModelError:
+    """Standard deviation of the model's error in every column, from the robot's own numbers.
+
+    An arm that measures behind its gears has no rotor in its torque.
+    """
+    chain, friction = robot.loaded_chain, usual_friction(robot)
+    inertial = np.empty((chain.joints, LINK))
+    for j, (m, c) in enumerate(zip(chain.mass, chain.com, strict=True)):
+        reach = float(np.dot(c, c))
+        tensor = 0.2 * (np.trace(chain.inertia[j]) + m * reach) + 0.02 * m * np.sqrt(reach) + 1e-4
+        inertial[j] = [0.05 * m, *(0.01 * m + 0.05 * m * np.abs(c)), *[tensor] * len(TENSOR)]
+    rotor = 0.2 * chain.rotor_inertia
+    ones = np.ones(chain.joints)
+    return ModelError(
+        inertial=inertial.ravel(),
+        rotor=0.0 * rotor if robot.torque_source == "link_torque" else rotor,
+        drive=0.02 * ones,
+        friction=np.array(
+            [
+                0.2 * friction.dry + 0.05,
+                0.7 * friction.dry + 0.05,
+                0.03 * ones,
+                0.4 * np.abs(friction.viscous) + 0.1,
+                0.4 * np.abs(friction.quadratic) + 0.05,
+            ]
+        ),
+        offset=0.15 * friction.dry + 0.02,
+    )
+
+
+def error_columns(
+    run: ModelledRun, motion: SmoothMotion, expected: ModelError, stride: int
+) -> list[Array]:
+    """The rows of A of every joint, each column times its standard deviation.
+
+    Args:
+        run: The log.
+        motion: Its smooth motion.
+        expected: The standard deviations.
+        stride: Every how many samples are taken.
+
+    Returns:
+        One array a joint, its columns as in `column_numbers`. (S, p)
+    """
+    n, kept = run.robot.joints, slice(None, None, stride)
+    shapes = [
+        motion.dq[kept] if k == SHAPES - 2 else zero_phase(motion.t, shape, CUTOFF)[kept]
+        for k, shape in enumerate(friction_shapes(run, motion.gravity))
+    ]
+    q, dq, ddq, rigid = (x[kept] for x in (motion.q, motion.dq, motion.ddq, motion.rigid))
+    columns = [np.empty((len(q), len(column_numbers(j, n)))) for j in range(n)]
+    for start in range(0, len(q), CHUNK):
+        span = slice(start, start + CHUNK)
+        rows = torque_regressor(run.robot.loaded_chain, q[span], dq[span], ddq[span])
+        for j in range(n):
+            columns[j][span, : LINK * (n - j)] = rows[:, j, LINK * j :]
+    for j in range(n):
+        mine = [ddq[:, j], rigid[:, j], *(shape[:, j] for shape in shapes), np.ones(len(q))]
+        columns[j][:, LINK * (n - j) :] = np.column_stack(mine)
+        columns[j] *= expected.own(j)
+    return columns

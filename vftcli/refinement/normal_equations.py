@@ -1,0 +1,198 @@
+"""Weighted normal equations of a model's error and slow loads, and their solution.
+
+All columns are times their standard deviations, so the prior is the unit matrix: the solution
+minimises Σ w (d + A u)² + Σ u². Each joint's row has columns of its own, and a slow load only those
+of the two knots about a sample, so the matrix is summed block by block.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.refinement.model_error import column_numbers
+from vftcli.refinement.slow_load import SlowLoads
+from vftcli.signals.arrays import Array, Mask
+
+PENALTY = 2.0
+"""What a column of a load has to gain before it is believed (Akaike's criterion)."""
+
+
+class Sums(NamedTuple):
+    """Sums over rows, of which others can be taken off.
+
+    Attributes:
+        matrix: AᵀWA. (P, P)
+        vector: AᵀWd. (P,)
+        constant: dᵀWd.
+    """
+
+    matrix: Array
+    vector: Array
+    constant: float
+
+    def without(self, other: "Sums") -> "Sums":
+        """The sums over the rows that are left."""
+        constant = self.constant - other.constant
+        return Sums(self.matrix - other.matrix, self.vector - other.vector, constant)
+
+
+class FittedError(NamedTuple):
+    """What the rows say of the unknowns.
+
+    Attributes:
+        model: Of the model's error, in standard deviations. (P,)
+        loads: Of the slow loads that are believed, in standard deviations. (L,)
+        scale: What the model's standard deviations were multiplied with.
+        factor: Lower Cholesky factor of the matrix of both. (P + L, P + L)
+    """
+
+    model: Array
+    loads: Array
+    scale: float
+    factor: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the model's error, in squared standard deviations. (P, P)"""
+        from scipy.linalg import solve_triangular
+
+        unit = np.eye(len(self.factor), len(self.model))
+        half = solve_triangular(self.factor, unit, lower=True, check_finite=False)
+        return np.asarray(self.scale**2 * (half.T @ half))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rows:
+    """The rows of a fit: one a sample and joint.
+
+    Attributes:
+        columns: The model's columns of every joint, as in `column_numbers`. (S, p) each
+        loads: The columns of slow loads.
+        d: What is fitted. (S, n) [N·m]
+    """
+
+    columns: Sequence[Array]
+    loads: SlowLoads
+    d: Array
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return len(self.columns)
+
+    @property
+    def unknowns(self) -> int:
+        """Number P of columns of the model's error."""
+        return int(column_numbers(self.joints - 1, self.joints)[-1]) + 1
+
+    def modelled(self, values: Array, span: slice = slice(None)) -> Array:
+        """A u of the model's columns. (S, n) [N·m]"""
+        n = self.joints
+        torque = [c[span] @ values[column_numbers(j, n)] for j, c in enumerate(self.columns)]
+        return np.column_stack(torque)
+
+    def spread(self, covariance: Array) -> Array:
+        """Standard deviation of A u. (S, n) [N·m]"""
+        variance = []
+        for j, column in enumerate(self.columns):
+            numbers = column_numbers(j, self.joints)
+            part = column @ covariance[np.ix_(numbers, numbers)]
+            variance.append(np.einsum("ij,ij->i", part, column))
+        return np.asarray(np.sqrt(np.maximum(np.column_stack(variance), 0.0)))
+
+    def model_sums(self, weight: Array) -> Sums:
+        """Sums over all rows of the model's columns alone.
+
+        Args:
+            weight: Of every row. (S, n)
+        """
+        sums = self._empty(0)
+        for j, column in enumerate(self.columns):
+            X = np.column_stack([column, self.d[:, j]])
+            add(sums, X * np.sqrt(weight[:, j, None]), column_numbers(j, self.joints))
+        return finished(sums)
+
+    def all_sums(self, weight: Array, taken: Mask, parts: Sequence[Mask]) -> list[Sums]:
+        """Sums of all columns, of the model's and of the loads', over some samples.
+
+        Args:
+            weight: Of every row. (S, n)
+            taken: The samples. (S,)
+            parts: Some of them, which may overlap. (S,) each
+
+        Returns:
+            The sums over all that are taken, then over each part.
+        """
+        sums = [self._empty(self.loads.sizes[-1]) for _ in range(1 + len(parts))]
+        for block, member in self._blocks(taken, parts):
+            knot = int(self.loads.knot[block[0]])
+            following = self.loads.numbers[knot : knot + 2].ravel() + self.unknowns
+            share = self.loads.share[block, None]
+            for j, column in enumerate(self.columns):
+                torque = self.loads.torque[block, j]
+                hats = [(1.0 - share) * torque, share * torque][: self.loads.knots]
+                X = np.hstack([column[block], *hats, self.d[block, j, None]])
+                X *= np.sqrt(weight[block, j, None])
+                numbers = np.concatenate([column_numbers(j, self.joints), following])
+                add(sums[0], X, numbers, [s for s, m in zip(sums[1:], member, strict=True) if m])
+        return [finished(one) for one in sums]
+
+    def _blocks(
+        self, taken: Mask, parts: Sequence[Mask]
+    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.bool_]]]:
+        """The samples in blocks that lie between two knots and in the same parts, and in which."""
+        kind = np.column_stack([self.loads.knot, *parts])[taken]
+        where = np.flatnonzero(taken)
+        edges = np.flatnonzero(np.any(np.diff(kind, axis=0) != 0, axis=1)) + 1
+        for block in np.split(where, edges):
+            if len(block):
+                yield block, np.array([part[block[0]] for part in parts], dtype=bool)
+
+    def _empty(self, loads: int) -> Array:
+        """Room for the sums, those with d in the last row and column."""
+        size = self.unknowns + loads + 1
+        return np.zeros((size, size))
+
+
+def add(total: Array, X: Array, numbers: NDArray[np.intp], also: Sequence[Array] = ()) -> None:
+    """Add the products of some rows' columns, d the last, to sums at these columns' places."""
+    product = X.T @ X
+    places = np.append(numbers, len(total) - 1)
+    for sums in (total, *also):
+        sums[np.ix_(places, places)] += product
+
+
+def finished(total: Array) -> Sums:
+    """The sums in a matrix that has those with d in its last row and column."""
+    return Sums(total[:-1, :-1], total[:-1, -1], float(total[-1, -1]))
+
+
+def solve(sums: Sums, unknowns: int, sizes: Sequence[int], scale: float = 1.0) -> FittedError:
+    """The most likely model error, with the slow loads that make the rows likely enough.
+
+    The loads' groups are nested, and so are the Cholesky factors with and without them: one factor
+    gives the objective of every group, c − Σ z² over its columns, z = L⁻¹AᵀWd.
+
+    Args:
+        sums: Over the rows.
+        unknowns: Number P of the model's columns.
+        sizes: Columns of the loads' groups, each with those before it.
+        scale: What the model's standard deviations are multiplied with.
+    """
+    from scipy.linalg import cholesky, solve_triangular
+
+    scales = np.ones(len(sums.vector))
+    scales[:unknowns] = scale
+    matrix = sums.matrix * scales * scales[:, None]
+    matrix.flat[:: len(matrix) + 1] += 1.0
+    factor = cholesky(matrix, lower=True, check_finite=False)
+    z = solve_triangular(factor, scales * sums.vector, lower=True, check_finite=False)
+    gained = np.concatenate([[0.0], np.cumsum(z**2)])
+    loads = min(sizes, key=lambda size: PENALTY * size - gained[unknowns + size])
+    size = unknowns + loads
+    factor, z = factor[:size, :size], z[:size]
+    values = -solve_triangular(factor, z, lower=True, trans="T", check_finite=False)
+    return FittedError(scale * values[:unknowns], values[unknowns:], scale, factor)

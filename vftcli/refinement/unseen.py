@@ -1,0 +1,87 @@
+"""Whether a fitted model error predicts motion that it has not seen, joint by joint.
+
+A correction is worth having where it predicts; what only fits is left alone. The free samples are
+cut into contiguous folds; each is predicted from the others, with the model held back more or less.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.refinement.normal_equations import FittedError
+from vftcli.refinement.robust_fit import WholeLogFit
+from vftcli.signals.arrays import Array, Mask
+
+FOLDS = 5
+"""Contiguous parts of the free samples, each predicted from the others."""
+
+MARGIN = 0.5
+"""Left out at both ends of a fold: neighbours in time know each other. [s]"""
+
+SCALES = (0.0, 0.1, 0.3, 1.0)
+"""How far the model is let go: factors on its standard deviations."""
+
+LARGEST = 6.0
+"""A residual counts at most so many scales."""
+
+WORTH = 0.9
+"""A joint is corrected if at most this share of its unseen error is left."""
+
+
+class Guarded(NamedTuple):
+    """A model error that has been tried on what it had not seen.
+
+    Attributes:
+        solution: From all free samples, held back as far as predicts best; None if not at all.
+        share: Unseen error with it over that without. (n,)
+        applied: Joints on which it is worth having. (n,)
+    """
+
+    solution: FittedError | None
+    share: Array
+    applied: Mask
+
+
+def guarded(fit: WholeLogFit) -> Guarded:
+    """Try a fit on folds of its free samples, and keep what predicts."""
+    folds = fold_spans(np.flatnonzero(fit.free), round(MARGIN / fit.step))
+    left_out = [mask_of(len(fit.free), outer) for _, outer in folds]
+    whole, *parts = fit.rows.all_sums(fit.weight, fit.free, left_out)
+    squares = np.zeros((len(SCALES), fit.rows.joints))
+    for (inner, _), part in zip(folds, parts, strict=True):
+        free = fit.free[inner]
+        rest = whole.without(part)
+        for k, scale in enumerate(SCALES):
+            residual = fit.rows.d[inner]
+            if scale:
+                found = fit.solved(rest, scale).model
+                residual = residual + fit.rows.modelled(found, inner)
+            held = np.minimum(np.abs(residual[free]) / fit.scale, LARGEST)
+            squares[k] += np.sum(held**2, axis=0)
+    best = int(np.argmin(squares.mean(axis=1)))
+    share = np.sqrt(squares[best] / np.maximum(squares[0], np.finfo(float).tiny))
+    if not SCALES[best]:
+        return Guarded(None, share, np.zeros(fit.rows.joints, dtype=bool))
+    return Guarded(fit.solved(whole, SCALES[best]), share, share <= WORTH)
+
+
+def fold_spans(free: NDArray[np.intp], margin: int) -> list[tuple[slice, slice]]:
+    """Contiguous folds of the free samples, and each with the margin around it.
+
+    Args:
+        free: The free samples' numbers. (F,)
+        margin: Samples left out at either end.
+    """
+    spans = []
+    for fold in np.array_split(free, FOLDS):
+        first, last = int(fold[0]), int(fold[-1]) + 1
+        spans.append((slice(first, last), slice(max(first - margin, 0), last + margin)))
+    return spans
+
+
+def mask_of(samples: int, span: slice) -> Mask:
+    """A span as a mask. (S,)"""
+    inside = np.zeros(samples, dtype=bool)
+    inside[span] = True
+    return inside

@@ -1,0 +1,210 @@
+"""The bias of the model from the whole log: what repeats with the motion is no contact.
+
+No free part is needed. The model's error δx is fitted to the raw disturbance d = τ_ext − A δx of
+all of the log, with contacts rejected and slow external loads left in; where it predicts motion
+that it has not seen, b = A δx is taken off μ, μ ← μ − b, and any observer runs on what is left.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from vftcli.refinement.model_error import (
+    CUTOFF,
+    ModelError,
+    SmoothMotion,
+    column_numbers,
+    error_columns,
+    error_of,
+    expected_error,
+    smooth_motion,
+    usual_friction,
+)
+from vftcli.refinement.normal_equations import Rows
+from vftcli.refinement.robust_fit import WholeLogFit, fit_robustly
+from vftcli.refinement.slow_load import slow_loads
+from vftcli.refinement.unseen import Guarded, guarded
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, Mask, frozen_mask, handed_over, seal
+from vftcli.signals.filters import derivative, zero_phase
+from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.series import median_step, resample_columns
+
+MOVES = 0.02
+"""The arm moves where a joint is faster than this. [rad/s]"""
+
+LEAST_MOTION = 10.0
+"""From its first to its last motion a log has to take this long: a shorter one tells friction and
+inertia from a push no more. [s]"""
+
+LEAST_SHARE = 0.1
+"""An arm that moves less of the time, and less than `LEAST_MOTION` in all, is held in a pose."""
+
+RATE = 30.0
+"""Samples a second that are fitted, …"""
+
+LONG = 60.0
+"""… up to a log of this length [s], …"""
+
+LONG_RATE = 10.0
+"""… and in a longer one."""
+
+MOST_SAMPLES = 36_000
+"""Samples that are fitted at most: an hour's."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WholeLogBias:
+    """The model's bias along a log.
+
+    Attributes:
+        applied: Joints on which the correction is used. (n,)
+        bias: Torque by which the model is wrong, zero on joints left alone. (T, n) [N·m]
+        sd: Standard deviation of the model's error as it was fitted. (T, n) [N·m]
+        free: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
+        remarks: What was applied, and what was not and why.
+        error: The model's error on the joints left alone too, None where nothing was fitted.
+    """
+
+    applied: Mask
+    bias: Array
+    sd: Array
+    free: Mask
+    remarks: tuple[Remark, ...]
+    error: ModelError | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        seal(self, "bias", "sd")
+        for name in ("applied", "free"):
+            object.__setattr__(self, name, frozen_mask(getattr(self, name)))
+
+    def corrected(self, terms: DynamicsTerms) -> DynamicsTerms:
+        """The log's own terms without the bias, μ ← μ − b."""
+        if not self.applied.any():
+            return terms
+        return replace(terms, mu=handed_over(terms.mu - self.bias))
+
+    def of(self, other: ModelledRun) -> DynamicsTerms:
+        """The terms of another recording of the arm without the same model error."""
+        if self.error is None or not self.applied.any():
+            return other.terms
+        bias = np.where(self.applied, self.error.torque(other, smooth_motion(other)), 0.0)
+        return replace(other.terms, mu=handed_over(other.terms.mu - bias))
+
+
+def whole_log_bias(run: ModelledRun) -> WholeLogBias:
+    """Find the model's bias along a log, joint by joint where that predicts what it has not seen.
+
+    Raises:
+        MissingSignalError: If velocities, or both currents and torques, are missing.
+        RobotError: If the number of joints differs.
+    """
+    terms, t = run.terms, run.recording.t
+    if (refused := refusal(run)) is not None:
+        return untouched(terms, refused)
+    # What no arm does overflows, and is refused.
+    with np.errstate(all="ignore"):
+        try:
+            motion, stride = smooth_motion(run), stride_of(t)
+            fit = fit_robustly(
+                rows_of(run, motion, stride),
+                stride * median_step(t),
+                usual_friction(run.robot).dry,
+            )
+            found = bias_of(run, motion, fit, guarded(fit), stride)
+        except np.linalg.LinAlgError:
+            return untouched(terms, caution("whole-log-without-solution"))
+    known = np.all(np.isfinite(found.bias)) and np.all(np.isfinite(found.sd))
+    return found if known else untouched(terms, caution("whole-log-without-solution"))
+
+
+def rows_of(run: ModelledRun, motion: SmoothMotion, stride: int) -> Rows:
+    """What is fitted: every so many samples of the log."""
+    t, terms = run.recording.t, run.terms
+    d = zero_phase(t, derivative(t, terms.p) - terms.mu, CUTOFF)
+    return Rows(
+        columns=error_columns(run, motion, expected_error(run.robot), stride),
+        loads=slow_loads(run.robot.loaded_chain, t[::stride], motion.q[::stride]),
+        d=d[::stride],
+    )
+
+
+def refusal(run: ModelledRun) -> Remark | None:
+    """Why a log does not tell the model's error from a push, None where it may."""
+    t, span, moving = run.recording.t, 0.0, 0.0
+    if t[-1] - t[0] >= LEAST_MOTION:
+        # noise is no motion
+        dq = zero_phase(t, run.recording.require("dq"), CUTOFF)
+        moves = np.any(np.abs(dq) > MOVES, axis=1)
+        moving = float(np.count_nonzero(moves) * median_step(t))
+        span = float(np.ptp(t[moves])) if moves.any() else 0.0
+    if span < LEAST_MOTION:
+        return caution("whole-log-too-short", motion_s=span, least_s=LEAST_MOTION)
+    share = moving / float(t[-1] - t[0])
+    if moving < LEAST_MOTION and share < LEAST_SHARE:
+        return caution("whole-log-at-rest", motion_s=moving, share=share)
+    return None
+
+
+def stride_of(t: Array) -> int:
+    """Every how many samples are fitted."""
+    rate = RATE if t[-1] - t[0] <= LONG else LONG_RATE
+    return max(1, int(1.0 / (rate * median_step(t)) + 1e-9), -(-len(t) // MOST_SAMPLES))
+
+
+def untouched(terms: DynamicsTerms, why: Remark) -> WholeLogBias:
+    """No correction, and why."""
+    none = np.zeros((terms.samples, terms.joints))
+    return WholeLogBias(
+        applied=np.zeros(terms.joints, dtype=bool),
+        bias=none,
+        sd=none,
+        free=np.ones(terms.samples, dtype=bool),
+        remarks=(why,),
+    )
+
+
+def bias_of(
+    run: ModelledRun, motion: SmoothMotion, fit: WholeLogFit, found: Guarded, stride: int
+) -> WholeLogBias:
+    """The bias on the log's own clock, with its uncertainty and what is said of it."""
+    t, n = run.recording.t, run.robot.joints
+    free = fit.free[np.minimum((np.arange(len(t)) + stride // 2) // stride, len(fit.free) - 1)]
+    if found.solution is None:
+        said = remarks_of(found, np.zeros(n), float(fit.free.mean()))
+        return replace(untouched(run.terms, said[0]), free=free, remarks=said)
+    sds, expected = np.zeros(fit.rows.unknowns), expected_error(run.robot)
+    for j in range(n):
+        sds[column_numbers(j, n)] = expected.own(j)
+    error = error_of(sds * found.solution.model, n)
+    bias = np.where(found.applied, error.torque(run, motion), 0.0)
+    spread = fit.rows.spread(found.solution.covariance)
+    return WholeLogBias(
+        applied=found.applied,
+        bias=handed_over(bias),
+        sd=handed_over(resample_columns(t, t[::stride], spread)),
+        free=free,
+        remarks=remarks_of(found, np.sqrt(np.mean(bias**2, axis=0)), float(fit.free.mean())),
+        error=error,
+    )
+
+
+def remarks_of(found: Guarded, changed: Array, free_share: float) -> tuple[Remark, ...]:
+    """Which joints were corrected and by how much, and which were left alone.
+
+    Args:
+        found: What the guard says.
+        changed: Root mean square of the correction. (n,) [N·m]
+        free_share: Share of the log that the fit calls free of contact.
+    """
+    groups = {"whole-log-applied": found.applied, "whole-log-left-alone": ~found.applied}
+    remarks = []
+    for code, joints in groups.items():
+        values: dict[str, object] = {"unseen_share": found.share[joints].tolist()}
+        if code == "whole-log-applied":
+            values |= {"changed_Nm": changed[joints].tolist(), "free_share": free_share}
+        if joints.any():
+            where = Where(joints=tuple(int(j) + 1 for j in np.flatnonzero(joints)))
+            remarks.append(fact(code, where, **values))
+    return tuple(remarks)

@@ -1,0 +1,196 @@
+"""The smoother as a solver beside the others: from a log and its free motion to a `Wrench`."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.repetition.free_motion import FreeMotion, FreePiece
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.kinematics import link_poses
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.wrench import Wrench
+from vftcli.virtual_sensor.frames import from_base
+from vftcli.virtual_sensor.smoother.noise import FreeTerms
+from vftcli.virtual_sensor.smoother.smoothing import SmoothedWrench, prior_of, smooth_wrench
+from vftcli.virtual_sensor.virtual_sensor import CHUNK, VirtualSensor
+
+Gate = Sequence[tuple[float, float]]
+"""From and to of every contact. [s]"""
+
+
+class SmootherInput(NamedTuple):
+    """What one observer's wrench is smoothed from.
+
+    Attributes:
+        terms: p and μ along the log, corrected as the observer's are.
+        free: Motion that nobody touched, corrected likewise; none where nothing is known of it.
+        uncorrected: The same as the robot's model alone gives it, None where nothing is corrected.
+    """
+
+    terms: DynamicsTerms
+    free: tuple[FreeTerms, ...]
+    uncorrected: "SmootherInput | None" = None
+
+
+InputOf = Callable[[str], SmootherInput]
+"""From an observer's name to what its wrench is smoothed from.
+
+A correction of the model's error is used where the wrench comes and goes. Where the uncorrected
+log calls for one steady load it is left out, since a load and an error of the model look alike.
+"""
+
+
+def plain_input(motion: FreeMotion, name: str = "") -> SmootherInput:  # noqa: ARG001
+    """The log as the robot's model explains it, with its free part; the same for every name."""
+    pieces = motion.part.pieces if has_part(motion) else ()
+    return input_under(motion, pieces, lambda run: run.terms)
+
+
+def corrected_input(
+    motion: FreeMotion,
+    pieces: Sequence[FreePiece],
+    terms_of: Callable[[str, ModelledRun], DynamicsTerms],
+    name: str,
+) -> SmootherInput:
+    """The log and its free pieces as one observer has them, and as the robot's model does.
+
+    Args:
+        motion: The log.
+        pieces: What of it, and of free runs, is believed to be free.
+        terms_of: An observer's p and μ of a recording; the run's own where nothing is corrected.
+        name: The observer.
+    """
+    plain = input_under(motion, pieces, lambda run: run.terms)
+    own = input_under(motion, pieces, partial(terms_of, name))
+    return plain if own.terms is plain.terms else own._replace(uncorrected=plain)
+
+
+def input_under(
+    motion: FreeMotion,
+    pieces: Sequence[FreePiece],
+    terms_of: Callable[[ModelledRun], DynamicsTerms],
+) -> SmootherInput:
+    """The log and its free pieces under one correction."""
+    free = (FreeTerms(terms_of(piece.run), piece.run.recording.q, piece.inside) for piece in pieces)
+    return SmootherInput(terms_of(motion.log), tuple(free))
+
+
+def has_part(motion: FreeMotion) -> bool:
+    """Whether a free part is given or found."""
+    try:
+        return bool(motion.part.pieces)
+    except ReferenceTorqueError:
+        return False
+
+
+def known_free(motion: FreeMotion, found: SmootherInput, unloaded: Mask) -> tuple[FreeTerms, ...]:
+    """The free motion of an input, what a zero says is free where there is no other.
+
+    Args:
+        motion: The log and the free run of its zero.
+        found: The input.
+        unloaded: Samples of the log that its zero says are unloaded. (T,)
+    """
+    if found.free:
+        return found.free
+    free = []
+    if np.count_nonzero(unloaded) > 1:
+        free.append(FreeTerms(found.terms, motion.log.recording.q, unloaded))
+    if motion.zero is not None:
+        run = motion.zero.run
+        whole = np.ones(run.recording.samples, dtype=bool)
+        free.append(FreeTerms(run.terms, run.recording.q, whole))
+    return tuple(free)
+
+
+def less_torque(terms: DynamicsTerms, torque: Array | None) -> DynamicsTerms:
+    """Terms whose disturbance is less by a torque; None for nothing. (T, n) [N·m]"""
+    return terms if torque is None else replace(terms, mu=handed_over(terms.mu + torque))
+
+
+def smoothed_wrench(
+    found: SmoothedWrench, wrench: Wrench, sensor: VirtualSensor, motion: FreeMotion
+) -> Wrench:
+    """A wrench with the smoother's values and band in place of its own, nothing of it masked.
+
+    Args:
+        found: What the smoother found.
+        wrench: An observer's wrench, whose name, pose and null space stay.
+        sensor: Its frame and mounting are the answer's.
+        motion: The log and its arm.
+    """
+    chain, q, t = motion.log.robot.chain, motion.log.recording.q, wrench.t
+    values, sd = np.empty((len(t), 6)), np.empty((len(t), 6))
+    for start in range(0, len(t), CHUNK):
+        span = slice(start, min(start + CHUNK, len(t)))
+        flange = link_poses(chain, q[span]).rotation[:, -1]
+        X = from_base(sensor.frame, flange, sensor.mounting)
+        moved = found.at(t[span]).seen_in(X)
+        values[span], sd[span] = moved.values, moved.sd
+    return replace(
+        wrench,
+        values=handed_over(values),
+        sd=handed_over(sd),
+        masked=None,
+        remarks=found.remarks(wrench.name),
+    )
+
+
+def smooth_all(
+    motion: FreeMotion,
+    names: Sequence[str],
+    input_of: InputOf | None = None,
+    *,
+    unloaded: Mask,
+    torque: Array | None = None,
+    gate: Gate | None = None,
+) -> dict[str, SmoothedWrench]:
+    """What the smoother finds for each observer, once for all that rest on the same terms.
+
+    Args:
+        motion: The log and its arm.
+        names: The observers.
+        input_of: What each one's wrench is smoothed from; None for `plain_input`.
+        unloaded: Samples of the log that its zero says are unloaded. (T,)
+        torque: What a free run reads at the same place, to be removed; None for nothing. (T, n)
+        gate: The contacts, outside of which there is no wrench; None where the log is one.
+
+    Raises:
+        RobotError: If the arm has fewer than six joints.
+    """
+    made: list[tuple[DynamicsTerms, SmoothedWrench]] = []
+    found: dict[str, SmoothedWrench] = {}
+    take = input_of or partial(plain_input, motion)
+    for name in names:
+        given = take(name)
+        same = next((smoothed for terms, smoothed in made if terms is given.terms), None)
+        found[name] = same or smooth_input(motion, given, unloaded, torque, gate)
+        made.append((given.terms, found[name]))
+    return found
+
+
+def smooth_input(
+    motion: FreeMotion,
+    given: SmootherInput,
+    unloaded: Mask,
+    torque: Array | None,
+    gate: Gate | None,
+) -> SmoothedWrench:
+    """What the smoother finds from one input; the other arguments as of `smooth_all`."""
+    q, robot, plain = motion.log.recording.q, motion.log.robot, given.uncorrected
+    if plain is not None and torque is not None:
+        # A free run takes the model's error off by itself; the correction would do it again.
+        given, plain = plain, None
+    if plain is not None:
+        free = known_free(motion, plain, unloaded)
+        prior = prior_of(plain.terms, q, robot, free, gate)
+        if prior.is_steady:
+            found = smooth_wrench(plain.terms, q, robot, free, gate, prior)
+            return replace(found, uncorrected=True)
+    free = known_free(motion, given, unloaded)
+    return smooth_wrench(less_torque(given.terms, torque), q, robot, free, gate)
