@@ -21,4 +21,5 @@ class ContactsRoom(ModuleType):
         return contacts_of_log(*words, **options)
 
 
-sys.modules[__name__].__class__ = ContactsRoom
+contacts = sys.modules[__name__]
+contacts.__class__ = ContactsRoom

@@ -1,9 +1,10 @@
 """Where a contact may be: two searches in joint space, for any arm and any place of contact.
 
 The first is an interacting two-state filter (IMM). Its mode "free" says d = b + n, its mode
-"contact" d = b + x + n with x of every joint an Ornstein–Uhlenbeck process as large as a push of 30 N
-and 3 N·m at the flange makes; the mode is shared by all joints, the states are each joint's own. It
-runs forward and backward in time, so that ends are as sharp as beginnings, for taps and for leans.
+"contact" d = b + x + n with x of every joint an Ornstein–Uhlenbeck process, as large as a push of
+30 N and 3 N·m at the flange makes; the mode is shared by all joints, the states are each joint's
+own. It runs forward and backward in time, so that ends are as sharp as beginnings, for taps and for
+leans.
 
 The second is a threshold on a momentum observer. It finds what rises slowly or loads one joint
 alone, which the first takes for friction.
@@ -13,6 +14,7 @@ References:
     Markovian switching coefficients", IEEE Trans. Automatic Control 33(8), 1988.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -91,7 +93,7 @@ def filtered_contacts(blocks: Blocks, courses: tuple[ErrorCourse, ErrorCourse], 
 
 
 def sure_runs(blocks: Blocks, forward: Array, backward: Array) -> Mask:
-    """Blocks of the runs in which the mean of two log odds is positive and one of them sure. (K,)"""
+    """Blocks of the runs in which the mean of two log odds is positive, one of them sure. (K,)"""
     above = close_gaps(blocks.t, 0.5 * (forward + backward) > 0.0, GAP)
     sure, likely = (np.log(p / (1.0 - p)) for p in (SURE, LIKELY))
     high, low = np.maximum(forward, backward), np.minimum(forward, backward)
@@ -106,7 +108,7 @@ def close_gaps(t: Array, taken: Mask, gap: float) -> Mask:
     """The mask with pauses shorter than `gap` filled. (K,)"""
     closed = taken.copy()
     runs = runs_of(taken)
-    for (_, stop), (start, _) in zip(runs, runs[1:], strict=False):
+    for (_, stop), (start, _) in pairwise(runs):
         if t[start] - t[stop - 1] < gap:
             closed[stop:start] = True
     return closed
@@ -160,7 +162,7 @@ def stretch(series: Array, first: int, length: int) -> Array:
 def filtered_odds(
     d: Array, decay: Array, added: Array, white: Array, spikes: Array, variance: Array, dt: Array
 ) -> Array:
-    """ln P(contact)/P(free) along S searches side by side. (K, S)
+    """Log odds ln P(contact)/P(free) along S searches side by side. (K, S)
 
     Args:
         d: Mean disturbance. (K, S, n) [N·m]

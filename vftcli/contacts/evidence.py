@@ -13,10 +13,10 @@ import numpy as np
 from vftcli.contacts.model_error import SPIKE, UNKNOWN
 from vftcli.contacts.places import ContactPlace
 from vftcli.contacts.windows import (
-    Lane,
-    Run,
     BlockLog,
     ContactPrior,
+    Lane,
+    Run,
     assembled,
     batches,
     gate_of,
@@ -42,7 +42,7 @@ SIZES = 1.0, 3.0
 def evidence(
     log: BlockLog, places: Sequence[ContactPlace], runs: Sequence[Run], prior: ContactPrior
 ) -> Array:
-    """ln p(d | contact at a place) − ln p(d | nothing), the best size of each. (C, places) [nats]
+    """Evidence ln p(d | contact there) − ln p(d | nothing) of the best size. (C, places) [nats]
 
     Args:
         log: The log, b strict: a contact does not free it.
@@ -68,7 +68,7 @@ def evidence(
 
 
 def untouched(log: BlockLog, lanes: Sequence[Lane]) -> Array:
-    """ln p(d | nothing) of every lane, in whose gate an innovation may be a spike. (L,) [nats]"""
+    """Log likelihood ln p(d | nothing), an innovation in the gate may be a spike. (L,) [nats]"""
     found = np.empty(len(lanes))
     for batch in batches(lanes):
         some = [lanes[i] for i in batch]

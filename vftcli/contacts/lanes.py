@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 
 LEAST_VARIANCE = 1e-14
 """A state whose predicted variance is no larger is certain: nothing is carried back to it."""
@@ -79,7 +79,7 @@ def step_ahead(x: Array, P: Array, f: Array, added: Array) -> tuple[Array, Array
 
 
 def nats(lanes: Lanes) -> Array:
-    """ln p(d) of each lane, less the constant −½ ln 2π a number. (L,) [nats]"""
+    """Log likelihood ln p(d) of each lane, less the constant −½ ln 2π a number. (L,) [nats]"""
     blocks, count, size = lanes.decay.shape
     x, P = np.zeros((count, size)), np.zeros((count, size, size))
     squares, total = [], []
@@ -127,10 +127,10 @@ def backward_gains(decay: Array, passed: Passed) -> Array:
     """C = P F (P⁻)⁻¹ of every block but the last, on the states that are uncertain."""
     size = decay.shape[-1]
     ahead = passed.predicted[1:]
-    uncertain = np.diagonal(ahead, axis1=-2, axis2=-1) > LEAST_VARIANCE
+    uncertain: Mask = np.diagonal(ahead, axis1=-2, axis2=-1) > LEAST_VARIANCE
     both = uncertain[..., :, None] & uncertain[..., None, :]
     certain = np.where(uncertain, 0.0, 1.0)[..., None] * np.eye(size)
     # F P, without what leads to a certain state: (P⁻)⁻¹ F P is C turned round.
     led = (decay * uncertain)[..., None] * passed.covariance[:-1]
-    gains: Array = np.linalg.solve(np.where(both, ahead, 0.0) + certain, led).swapaxes(-1, -2)
-    return gains
+    solved = np.linalg.solve(np.where(both, ahead, 0.0) + certain, led)
+    return np.asarray(solved.swapaxes(-1, -2))

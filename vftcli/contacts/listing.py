@@ -1,4 +1,4 @@
-"""The list of a log's contacts: the smoother's where free motion is known, a threshold's elsewhere."""
+"""A log's contacts: the smoother's list where free motion is known, else a threshold's."""
 
 from dataclasses import replace
 
@@ -104,15 +104,15 @@ def false_rows(free: Untouched, seconds: float) -> int:
     count = 0
     for run in free.runs:
         found = search(run, free.noise, free.level, seconds)
-        strong = np.flatnonzero(found.best > LEAST_EVIDENCE)
-        count += sum(not is_stop(run, found, int(k), seconds) for k in strong)
+        strong = np.flatnonzero(found.best > LEAST_EVIDENCE).tolist()
+        count += sum(not is_stop(run, found, k, seconds) for k in strong)
     return count
 
 
 def limits(run: ModelledRun, free: Untouched, stops: tuple[float, ...]) -> list[Remark]:
     """What limits the list as a whole."""
     found = [caution("arm-stopped-abruptly", Where(span=(at, at)), at_s=at) for at in stops]
-    unseen = [j + 1 for j in np.flatnonzero(free.noise.seen < 0.5)]
+    unseen = [j + 1 for j in np.flatnonzero(free.noise.seen < 0.5).tolist()]
     if len(unseen) == run.robot.joints:
         found.append(caution("free-part-rests"))
     elif unseen:
@@ -142,7 +142,7 @@ def by_threshold(motion: FreeMotion) -> ContactList:
             error_time=np.full(len(dry), np.nan),
             block=float(run.recording.median_step),
         ),
-        remarks=(caution("no-free-part"),),
+        remarks=(caution("contacts-without-free-part"),),
     )
 
 

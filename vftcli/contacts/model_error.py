@@ -7,7 +7,7 @@ misses of the tails inflates it, and a joint that comes to rest draws its sticti
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +34,7 @@ REST_SHARE, REST_TIME = 0.3, 2.0
 """A resting joint errs by so much of F_c beyond what was learned, for at least so long [s]."""
 
 STOP_SHARE, STOP_DECAY = 0.7, float(np.exp(-5.0))
-"""The block in which a joint comes to rest draws b anew: with so much of F_c, and this share left."""
+"""The block in which a joint comes to rest draws b anew: so much of F_c, and this share left."""
 
 RECENT = 0.1
 """What a joint has just done: it stops if it moved for more than half of this time before, and for
@@ -100,13 +100,12 @@ class ErrorCourse(NamedTuple):
         return ErrorCourse(*(field[chosen] for field in self))
 
 
-def learn_noise(free: Sequence[Blocks], dry: Array, seconds: float) -> ErrorNoise | None:
+def learn_noise(free: Sequence[Blocks], dry: Array) -> ErrorNoise | None:
     """The noise of a free part, None where no stretch of it is long enough.
 
     Args:
         free: Blocks of every free piece.
         dry: F_c of each joint. (n,) [N·m]
-        seconds: Length of a block. [s]
     """
     pieces = [piece.part(slice(*run)) for piece in free for run in stretches(piece)]
     if not pieces:
@@ -114,7 +113,7 @@ def learn_noise(free: Sequence[Blocks], dry: Array, seconds: float) -> ErrorNois
     moving = ~np.concatenate([resting(piece) for piece in pieces])
     share = moving.mean(axis=0)
     bridged = [without_reversals(piece, share > MOVES) for piece in pieces]
-    each = fit_joints(bridged, seconds)
+    each = fit_joints(bridged)
     white, variance, time = (np.array(v) for v in zip(*each, strict=True))
     # An offset is an error too.
     variance += np.concatenate([piece.d for piece in bridged]).mean(axis=0) ** 2
@@ -127,14 +126,7 @@ def learn_noise(free: Sequence[Blocks], dry: Array, seconds: float) -> ErrorNois
         free_seconds=float(sum(piece.length.sum() for piece in pieces)),
     )
     factor = inflation(found, pieces)
-    return ErrorNoise(
-        white=found.white * factor,
-        variance=found.variance * factor,
-        time=found.time,
-        dry=found.dry,
-        seen=found.seen,
-        free_seconds=found.free_seconds,
-    )
+    return replace(found, white=white * factor, variance=variance * factor)
 
 
 def stretches(piece: Blocks) -> list[tuple[int, int]]:
@@ -153,14 +145,15 @@ def without_reversals(piece: Blocks, joints: Mask) -> Blocks:
 
 
 def inflation(noise: ErrorNoise, pieces: Sequence[Blocks]) -> Array:
-    """What the tails of the free part's innovations ask for beyond the spectrum, at least 1. (n,)"""
+    """What the tails of the innovations ask for beyond the spectrum, at least 1. (n,)"""
     squares = []
     for piece in pieces:
         course = error_course(noise, piece)
         squares.append(innovations(piece.d, course)[0])
     together = np.concatenate(squares)
     each = [np.quantile(together, share, axis=0) / value for share, value in QUANTILES]
-    return np.maximum(np.max(each, axis=0), 1.0)
+    factor: Array = np.maximum(np.max(each, axis=0), 1.0)
+    return factor
 
 
 def innovations(d: Array, course: ErrorCourse) -> tuple[Array, Array]:

@@ -158,8 +158,15 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
     u = forces / sizes[:, None]
     bands = 1.96 * np.sqrt(np.einsum("pi,pij,pj->p", u, covariance, u))
     fits = [
-        PointFit(int(links[i]), float(along[i]), *map(float, numbers), forces[i], float(bands[i]))
-        for i, numbers in enumerate(zip(misfit, score, strict=True))
+        PointFit(
+            link=int(links[i]),
+            share=float(along[i]),
+            misfit=float(misfit[i]),
+            score=float(score[i]),
+            force=forces[i],
+            band=float(bands[i]),
+        )
+        for i in range(len(links))
     ]
     return sorted(fits, key=lambda fit: fit.score)
 

@@ -1,6 +1,5 @@
 """From what was found to the rows of the list: peak, band, place, torques, and what others say."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -20,10 +19,10 @@ from vftcli.contacts.places import (
 from vftcli.contacts.search import Found
 from vftcli.contacts.sizes import learn_prior, smooth_contacts
 from vftcli.contacts.untouched import Untouched, self_test
-from vftcli.contacts.windows import BlockLog, ContactPrior, Run, WindowWrench, gate_of
+from vftcli.contacts.windows import BlockLog, ContactPrior, WindowWrench, gate_of
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.kinematics import link_poses
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.virtual_sensor.smoother.noise import resting
 
 WIDENED = np.repeat([1.4, 2.0], 3)
@@ -227,7 +226,7 @@ class QuietError(NamedTuple):
     variance: Array
 
     @classmethod
-    def across(cls, d: Array, course: ErrorCourse, hidden: Array) -> "QuietError":
+    def across(cls, d: Array, course: ErrorCourse, hidden: Mask) -> "QuietError":
         """Filter and smooth b alone, without the hidden blocks.
 
         Args:

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from vftcli.contacts.windows import (
+    BlockLog,
     ContactPrior,
     Lane,
     Run,
-    BlockLog,
     WindowWrench,
     gate_of,
     likelihoods,

@@ -8,7 +8,8 @@ SHORT = 0.3
 """Longest row that a stop explains. [s]"""
 
 BEFORE, AFTER = (-0.25, 0.1), (0.12, 0.35)
-"""When the arm must have moved and when it must rest, about the beginning of a row. [s]"""
+"""When the arm must have moved and when it must rest, about the beginning of a row, which is known
+to a block. [s]"""
 
 MOVED, RESTS, LEFT = 0.02, 0.02, 0.05
 """A speed that counts as motion and one that counts as rest [rad/s]; and what may be left of the
@@ -28,7 +29,7 @@ def follows_stop(recording: Recording, start: float, stop: float, block: float) 
         return False
     t, dq = recording.t, np.abs(recording.require("dq"))
     before = dq[(t >= start + BEFORE[0]) & (t <= start + BEFORE[1])]
-    after = dq[(t >= start + AFTER[0]) & (t <= start + AFTER[1])]
+    after = dq[(t >= start + AFTER[0] + block) & (t <= start + AFTER[1])]
     if not len(before) or not len(after):
         return False
     speed = before.max(axis=0)

@@ -45,7 +45,9 @@ def flange_forces(J: Array, torque: Array, sd: Array) -> tuple[Array, Array]:
         sd: Its standard deviation. (T, n) [N·m]
     """
     A = J.swapaxes(1, 2) / sd[:, :, None]
-    covariance = np.linalg.inv(A.swapaxes(1, 2) @ A + np.diag(1.0 / PRIOR**2))
+    covariance: Array = np.asarray(
+        np.linalg.inv(A.swapaxes(1, 2) @ A + np.diag(1.0 / PRIOR**2)), dtype=np.float64
+    )
     values: Array = (covariance @ (A.swapaxes(1, 2) @ (torque / sd)[..., None]))[..., 0]
     return values, covariance
 
@@ -128,7 +130,7 @@ def peak_row(
         wrench=wrench,
         wrench_sd=np.sqrt(np.diag(covariance)),
         mean_force=force.mean(axis=0),
-        impulse=np.trapezoid(force, t[inside], axis=0),
+        impulse=np.asarray(np.trapezoid(force, t[inside], axis=0)),
         anywhere=site.sizes(size, band),
         where=parts[0] if len(parts) == 1 else "cannot tell",
         lead=None,

@@ -1,4 +1,4 @@
-"""What motion that nobody touched tells: the noise, the level of a threshold, the smallest force."""
+"""What motion that nobody touched tells: noise, the level of a threshold, the smallest force."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -99,7 +99,7 @@ def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
         disturbance_blocks(piece.run.terms, piece.run.recording.q, seconds, piece.inside)
         for piece in part.pieces
     )
-    noise = learn_noise(blocks, dry_torques(robot), seconds)
+    noise = learn_noise(blocks, dry_torques(robot))
     if noise is None:
         return None
     return Untouched(

@@ -134,7 +134,7 @@ def assembled(log: BlockLog, lanes: Sequence[Lane]) -> Lanes:
 
 
 def likelihoods(log: BlockLog, lanes: Sequence[Lane]) -> Array:
-    """ln p(d) of every lane; only lanes of one window may be compared. [nats]"""
+    """Log likelihood ln p(d) of every lane; only lanes of one window may be compared. [nats]"""
     found = np.empty(len(lanes))
     for batch in batches(lanes):
         found[batch] = nats(assembled(log, [lanes[i] for i in batch]))
