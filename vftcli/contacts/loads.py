@@ -16,6 +16,10 @@ from vftcli.virtual_sensor.smoother.smoothing import SmoothedWrench, smooth_wren
 SHARE = 0.5
 """Share of the time since the first motion that contacts must fill together to be a load."""
 
+ALIKE = 0.95
+"""Several contacts are one load if their forces add up to more than this share of their sizes:
+pushes that follow one another come from different sides."""
+
 MOVES = 0.01
 """A joint that is faster moves. [rad/s]"""
 
@@ -24,12 +28,16 @@ PIECE = 5.0
 
 
 def is_load(recording: Recording, contacts: tuple[Contact, ...]) -> bool:
-    """Whether contacts fill more than half of the time since the first motion."""
+    """Whether contacts fill more than half of the time since the first motion, with one force."""
     moving = np.any(np.abs(recording.require("dq")) > MOVES, axis=1)
     t = recording.t
     first = float(t[np.argmax(moving)]) if moving.any() else float(t[0])
-    filled = sum(contact.stop - contact.start for contact in contacts)
-    return filled > SHARE * (float(t[-1]) - first)
+    lasts = np.array([contact.stop - contact.start for contact in contacts])
+    if lasts.sum() <= SHARE * (float(t[-1]) - first):
+        return False
+    forces = np.array([contact.mean_force for contact in contacts]) * lasts[:, None]
+    sizes = np.linalg.norm(forces, axis=1).sum()
+    return len(contacts) == 1 or float(np.linalg.norm(forces.sum(axis=0))) > ALIKE * sizes
 
 
 def free_terms(motion: FreeMotion) -> list[FreeTerms]:

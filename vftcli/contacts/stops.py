@@ -7,9 +7,9 @@ from vftcli.signals.recording import Recording
 SHORT = 0.3
 """Longest row that a stop explains. [s]"""
 
-BEFORE, AFTER = (-0.25, 0.1), (0.12, 0.35)
-"""When the arm must have moved and when it must rest, about the beginning of a row, which is known
-to a block. [s]"""
+BEFORE, AROUND, AFTER = (-0.25, -0.05), (-0.25, 0.1), (0.12, 0.35)
+"""When the arm must have moved, how fast it was, and when it must rest: about the beginning of a
+row, which is known to a block. A knock on an arm that stood still is none of this. [s]"""
 
 MOVED, RESTS, LEFT = 0.02, 0.02, 0.05
 """A speed that counts as motion and one that counts as rest [rad/s]; and what may be left of the
@@ -23,15 +23,17 @@ def follows_stop(recording: Recording, start: float, stop: float, block: float) 
         recording: The log.
         start: When the row begins. [s]
         stop: When it ends. [s]
-        block: Length of a block, to which both are known. [s]
+        block: Length of a block. [s]
     """
     if stop - start > SHORT + block:
         return False
-    t, dq = recording.t, np.abs(recording.require("dq"))
-    before = dq[(t >= start + BEFORE[0]) & (t <= start + BEFORE[1])]
-    after = dq[(t >= start + AFTER[0] + block) & (t <= start + AFTER[1])]
+    t, speed = recording.t - start, np.abs(recording.require("dq"))
+    before, around, after = (
+        speed[(t >= first) & (t <= last)]
+        for first, last in (BEFORE, AROUND, (AFTER[0] + block, AFTER[1]))
+    )
     if not len(before) or not len(after):
         return False
-    speed = before.max(axis=0)
-    rests = after.max(axis=0) < np.maximum(RESTS, LEFT * speed)
-    return bool(speed.max() > MOVED and rests.all())
+    rests = after.max(axis=0) < np.maximum(RESTS, LEFT * around.max(axis=0))
+    # A median, since noise must not pass for motion.
+    return bool(np.median(before, axis=0).max() > MOVED and rests.all())
