@@ -19,6 +19,7 @@ from vftcli.contacts.untouched import (
 )
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import ModelledRun
+from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.virtual_sensor.smoother.noise import dry_torques
 
@@ -33,8 +34,10 @@ def list_contacts(motion: FreeMotion) -> ContactList:
         motion: The log, its robot, and what is known of its free motion.
 
     Raises:
-        VftError: If a free part that the user names does not exist or holds no samples.
+        VftError: If a free part that the user names does not exist or holds no samples, or the log
+            holds numbers that are not finite.
     """
+    check_finite(motion.log)
     seconds = block_length(motion.log.recording.t)
     free = untouched_motion(motion, seconds)
     made = by_threshold(motion) if free is None else by_smoother(motion, free, seconds)
@@ -42,6 +45,20 @@ def list_contacts(motion: FreeMotion) -> ContactList:
         row = load_row(motion, made.contacts)
         made = replace(made, contacts=(row,), remarks=(*made.remarks, caution("contact-is-load")))
     return made if has_wrench(motion.log) else without_forces(made)
+
+
+def check_finite(run: ModelledRun) -> None:
+    """Raise unless momentum and torque are known at every sample.
+
+    Raises:
+        ParameterError: If they are not.
+    """
+    known = np.isfinite(run.terms.p).all(axis=1) & np.isfinite(run.terms.mu).all(axis=1)
+    if not known.all():
+        raise ParameterError(
+            f"{run.recording.name}: {np.count_nonzero(~known)} of its {len(known)} samples are not "
+            "finite; leave them out with --interval"
+        )
 
 
 def has_wrench(run: ModelledRun) -> bool:
