@@ -115,28 +115,28 @@ def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
 def free_part(motion: FreeMotion) -> FreePart | None:
     """What is free of contact, None where nothing is known to be.
 
-    Free runs are taken as they are: where in them the log's own motion lies does not matter here.
+    Where in a free run or cycle the log's own motion lies does not matter here: nothing is paired.
 
     Raises:
         ReferenceTorqueError: If what the user names does not exist.
         ParameterError: If a given span holds no samples, or the whole log.
     """
-    if motion.runs:
-        own = motion.within_spans
-        remarks = [
-            fact("free-span", begin_s=begin, end_s=end) for begin, end in motion.choice.spans
-        ]
-        pieces = [FreePiece(motion.log, own, ())] if own.any() else []
-        for run in motion.runs:
-            pieces.append(FreePiece(run.run, np.ones(run.recording.samples, dtype=bool), ()))
-            remarks.append(fact("free-log", Where(about=run.recording.name)))
-        return FreePart(tuple(pieces), own, tuple(remarks))
-    try:
-        return motion.part
-    except ReferenceTorqueError:
-        if motion.choice.is_given:
-            raise
-        return None
+    own, log, choice = motion.within_spans, motion.log, motion.choice
+    remarks = [fact("free-span", begin_s=begin, end_s=end) for begin, end in choice.spans]
+    if choice.cycles or not (choice.is_given or motion.runs):
+        try:
+            found = motion.free_cycles
+        except ReferenceTorqueError:
+            if choice.cycles:
+                raise
+            return None
+        own = own | np.isin(motion.cycles.number(log.recording.t), found.numbers)
+        remarks.append(found.remark(motion.cycles.whole))
+    pieces = [FreePiece(log, own, ())] if own.any() else []
+    for run in motion.runs:
+        pieces.append(FreePiece(run.run, np.ones(run.recording.samples, dtype=bool), ()))
+        remarks.append(fact("free-log", Where(about=run.recording.name)))
+    return FreePart(tuple(pieces), own, tuple(remarks))
 
 
 def observed(run: ModelledRun) -> Array:
