@@ -19,6 +19,7 @@ from vftcli.contacts.untouched import (
 )
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import ModelledRun
+from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.virtual_sensor.smoother.noise import dry_torques
@@ -53,7 +54,7 @@ def check_finite(run: ModelledRun) -> None:
     Raises:
         ParameterError: If they are not.
     """
-    known = np.isfinite(run.terms.p).all(axis=1) & np.isfinite(run.terms.mu).all(axis=1)
+    known: Mask = np.isfinite(run.terms.p + run.terms.mu).all(axis=1)
     if not known.all():
         raise ParameterError(
             f"{run.recording.name}: {np.count_nonzero(~known)} of its {len(known)} samples are not "

@@ -37,7 +37,8 @@ def is_load(recording: Recording, contacts: tuple[Contact, ...]) -> bool:
         return False
     forces = np.array([contact.mean_force for contact in contacts]) * lasts[:, None]
     sizes = np.linalg.norm(forces, axis=1).sum()
-    return len(contacts) == 1 or float(np.linalg.norm(forces.sum(axis=0))) > ALIKE * sizes
+    together = float(np.linalg.norm(forces.sum(axis=0)))
+    return len(contacts) == 1 or together > ALIKE * float(sizes)
 
 
 def free_terms(motion: FreeMotion) -> list[FreeTerms]:

@@ -46,6 +46,9 @@ a rest."""
 LEAST_LEVEL = 0.1
 """Smallest standard deviation of a joint's torque where no free motion is known. [N·m]"""
 
+LEAST_CYCLES = 2
+"""Fewest whole cycles of which free ones can be found: one alone cannot be compared."""
+
 PSEUDO, MOST_PSEUDO = 0.6, 48
 """Length of the contacts that are made up in free motion [s], and how many at most."""
 
@@ -124,12 +127,9 @@ def free_part(motion: FreeMotion) -> FreePart | None:
     own, log, choice = motion.within_spans, motion.log, motion.choice
     remarks = [fact("free-span", begin_s=begin, end_s=end) for begin, end in choice.spans]
     if choice.cycles or not (choice.is_given or motion.runs):
-        try:
-            found = motion.free_cycles
-        except ReferenceTorqueError:
-            if choice.cycles:
-                raise
+        if not choice.cycles and not repeats(motion):
             return None
+        found = motion.free_cycles
         own = own | np.isin(motion.cycles.number(log.recording.t), found.numbers)
         remarks.append(found.remark(motion.cycles.whole))
     pieces = [FreePiece(log, own, ())] if own.any() else []
@@ -137,6 +137,14 @@ def free_part(motion: FreeMotion) -> FreePart | None:
         pieces.append(FreePiece(run.run, np.ones(run.recording.samples, dtype=bool), ()))
         remarks.append(fact("free-log", Where(about=run.recording.name)))
     return FreePart(tuple(pieces), own, tuple(remarks))
+
+
+def repeats(motion: FreeMotion) -> bool:
+    """Whether the log has two cycles at least, of which the quieter may be free."""
+    try:
+        return motion.cycles.whole >= LEAST_CYCLES
+    except ReferenceTorqueError:
+        return False
 
 
 def observed(run: ModelledRun) -> Array:
