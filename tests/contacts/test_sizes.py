@@ -18,20 +18,29 @@ def wrench(size: list[float], sd: float) -> WindowWrench:
 
 T = B * np.arange(40)
 
+FELT = np.tile(np.eye(6), (40, 1, 1))
+"""A Jacobian by which joint 1 feels the force along x, and so on."""
+
 
 def test_two_pushes_in_one_candidate_are_split() -> None:
     size = [30.0] * 10 + [0.5] * 6 + [40.0] * 10
-    assert split_run(T, wrench(size, 2.0), (0, 26)) == [(0, 10), (16, 26)]
+    assert split_run(T, wrench(size, 2.0), (0, 26), FELT) == [(0, 10), (16, 26)]
 
 
 def test_a_hand_that_slips_for_a_moment_has_not_let_go() -> None:
     size = [30.0] * 10 + [0.5] * 2 + [40.0] * 10
-    assert split_run(T, wrench(size, 2.0), (0, 22)) == [(0, 22)]
+    assert split_run(T, wrench(size, 2.0), (0, 22), FELT) == [(0, 22)]
+
+
+def test_a_force_that_turns_while_the_joints_feel_it_is_one_contact() -> None:
+    made = wrench([30.0] * 10 + [0.5] * 6 + [40.0] * 10, 2.0)
+    made.values[:, 3] = 20.0
+    assert split_run(T, made, (0, 26), FELT) == [(0, 26)]
 
 
 def test_noise_that_hides_the_force_splits_nothing() -> None:
     size = [30.0] * 10 + [10.0] * 6 + [40.0] * 10
-    assert split_run(T, wrench(size, 20.0), (0, 26)) == [(0, 26)]
+    assert split_run(T, wrench(size, 20.0), (0, 26), FELT) == [(0, 26)]
 
 
 def test_pauses_lie_between_loaded_blocks() -> None:

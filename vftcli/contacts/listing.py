@@ -54,7 +54,7 @@ def check_finite(run: ModelledRun) -> None:
     Raises:
         ParameterError: If they are not.
     """
-    known: Mask = np.isfinite(run.terms.p + run.terms.mu).all(axis=1)
+    known: Mask = np.asarray(np.all(np.isfinite(run.terms.p + run.terms.mu), axis=1))
     if not known.all():
         raise ParameterError(
             f"{run.recording.name}: {np.count_nonzero(~known)} of its {len(known)} samples are not "

@@ -76,7 +76,7 @@ def search(run: ModelledRun, noise: ErrorNoise, level: Array, seconds: float) ->
     prior = learn_prior(log, J, runs, START, rounds=1)
     courses = smooth_contacts(log, [J] * len(runs), runs, prior)
     pairs = zip(courses, runs, strict=True)
-    pieces = [piece for course, run in pairs for piece in split_run(blocks.t, course, run)]
+    pieces = [piece for course, run in pairs for piece in split_run(blocks.t, course, run, J)]
     return Found(log, there, pieces, evidence(log, there, pieces, prior), prior)
 
 

@@ -90,19 +90,31 @@ def learn_prior(
     return prior
 
 
-def split_run(t: Array, course: WindowWrench, run: Run) -> list[Run]:
-    """A contact's blocks, split where the force is gone for a while between two peaks."""
+def split_run(t: Array, course: WindowWrench, run: Run, jacobian: Array) -> list[Run]:
+    """A contact's blocks, split where force and joint torque are gone for a while between peaks.
+
+    Args:
+        t: Time. (K,) [s]
+        course: The wrench in the contact's window.
+        run: The contact's blocks.
+        jacobian: J of the wrench's point. (K, 6, n)
+    """
     inside = course.within(run)
     size = inside.size
+    torque = np.linalg.norm(np.einsum("ki,kij->kj", inside.values, jacobian[slice(*run)]), axis=1)
     sd = np.sqrt(np.trace(inside.covariance[:, :3, :3], axis1=1, axis2=2))
     low, at = size < RELEASED * sd, t[run[0] : run[1]]
     pieces, begin = [], 0
     for k, end in quiet_pauses(low, at):
-        before, after = size[begin:k].max(), size[end:].max()
-        if size[k:end].min() < RELEASE_SHARE * min(before, after):
+        if all(x[k:end].min() < valley(x[begin:k], x[end:]) for x in (size, torque)):
             pieces.append((run[0] + begin, run[0] + k))
             begin = end
     return [*pieces, (run[0] + begin, run[1])]
+
+
+def valley(before: Array, after: Array) -> float:
+    """What a valley between two stretches must fall below."""
+    return RELEASE_SHARE * float(min(before.max(), after.max()))
 
 
 def quiet_pauses(low: Array, t: Array) -> list[tuple[int, int]]:
