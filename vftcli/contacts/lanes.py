@@ -54,7 +54,7 @@ class Passed(NamedTuple):
 def correct(
     x: Array, P: Array, d: Array, J: Array, R: Array
 ) -> tuple[Array, Array, tuple[Array, Array]]:
-    """State and covariance with a block's disturbance in them; innovation and its covariance."""
+    """State and covariance with a block's disturbance in them; νᵀS⁻¹ν and S of its innovation."""
     PH = P[..., :6] @ J
     PH += P[..., 6:]
     S = J.swapaxes(-1, -2) @ PH[..., :6, :]
@@ -62,12 +62,14 @@ def correct(
     n = S.shape[-1]
     S[..., np.arange(n), np.arange(n)] += R
     nu = d - (x[..., None, :6] @ J)[..., 0, :] - x[..., 6:]
-    gain = PH @ np.linalg.inv(S)
-    x = x + (gain @ nu[..., None])[..., 0]
+    inverse = np.linalg.inv(S)
+    weighted = (inverse @ nu[..., None])[..., 0]
+    gain = PH @ inverse
+    x = x + (PH @ weighted[..., None])[..., 0]
     P = P - gain @ PH.swapaxes(-1, -2)
     P += P.swapaxes(-1, -2).copy()
     P *= 0.5
-    return x, P, (nu, S)
+    return x, P, (np.sum(nu * weighted, axis=-1), S)
 
 
 def step_ahead(x: Array, P: Array, f: Array, added: Array) -> tuple[Array, Array]:
@@ -82,15 +84,13 @@ def nats(lanes: Lanes) -> Array:
     """Log likelihood ln p(d) of each lane, less the constant −½ ln 2π a number. (L,) [nats]"""
     blocks, count, size = lanes.decay.shape
     x, P = np.zeros((count, size)), np.zeros((count, size, size))
-    squares, total = [], []
+    squares, spreads = np.zeros(count), []
     for k in range(blocks):
         x, P = step_ahead(x, P, lanes.decay[k], lanes.added[k])
-        x, P, (nu, S) = correct(x, P, lanes.d[k], lanes.jacobian[k], lanes.white[k])
-        squares.append(nu)
-        total.append(S)
-    nu, S = np.array(squares), np.array(total)
-    weighted = np.linalg.solve(S, nu[..., None])[..., 0]
-    found: Array = -0.5 * (np.sum(nu * weighted, axis=(0, 2)) + np.linalg.slogdet(S)[1].sum(axis=0))
+        x, P, (square, S) = correct(x, P, lanes.d[k], lanes.jacobian[k], lanes.white[k])
+        squares += square
+        spreads.append(S)
+    found: Array = -0.5 * (squares + np.linalg.slogdet(np.array(spreads))[1].sum(axis=0))
     return found
 
 

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vftcli.contacts.windows import (
+    MARGIN,
     BlockLog,
     ContactPrior,
     Lane,
@@ -27,6 +28,9 @@ START = ContactPrior(0.3, 30.0, 3.0)
 
 TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0
 """Correlation times that are tried. [s]"""
+
+NEAR = 0.4
+"""How far a window reaches beyond its contact where only the prior is learned. [s]"""
 
 FORCES, MOMENTS = (3.0, 300.0), (0.1, 50.0)
 """Smallest and largest standard deviation. [N], [N·m]"""
@@ -51,14 +55,27 @@ def smooth_contacts(
 
 
 def contact_lanes(
-    log: BlockLog, jacobians: Sequence[Array], runs: Sequence[Run], prior: ContactPrior
+    log: BlockLog,
+    jacobians: Sequence[Array],
+    runs: Sequence[Run],
+    prior: ContactPrior,
+    margin: float = MARGIN,
 ) -> list[Lane]:
-    """A lane for every contact, the others hidden."""
+    """A lane for every contact, the others hidden.
+
+    Args:
+        log: The log.
+        jacobians: J of each contact's point along the log. (K, 6, n) each
+        runs: The blocks of every contact.
+        prior: How the wrench may move.
+        margin: How far a lane reaches beyond its contact. [s]
+    """
     count = len(log.blocks.t)
     every, lanes = gate_of(count, runs), []
     for run, jacobian in zip(runs, jacobians, strict=True):
         gate = gate_of(count, [run])
-        lanes.append(Lane(window_of(log.blocks.t, run), gate, every & ~gate, jacobian, prior))
+        window = window_of(log.blocks.t, run, margin)
+        lanes.append(Lane(window, gate, every & ~gate, jacobian, prior))
     return lanes
 
 
@@ -76,11 +93,12 @@ def learn_prior(
     """
     each = [jacobian] * len(runs)
     for _ in range(rounds):
-        tried = [prior._replace(time=time) for time in TIMES]
-        lanes = [lane for p in tried for lane in contact_lanes(log, each, runs, p)]
-        nats = likelihoods(log, lanes).reshape(len(tried), len(runs)).sum(axis=1)
-        time = tried[int(np.argmax(nats))].time
-        courses = smooth_contacts(log, each, runs, prior._replace(time=time))
+        priors = [prior._replace(time=time) for time in TIMES]
+        lanes = [lane for p in priors for lane in contact_lanes(log, each, runs, p, NEAR)]
+        nats = likelihoods(log, lanes).reshape(len(priors), len(runs)).sum(axis=1)
+        time = TIMES[int(np.argmax(nats))]
+        tried = contact_lanes(log, each, runs, prior._replace(time=time), NEAR)
+        courses = smooth_lanes(log, tried)
         inside = [course.within(run) for course, run in zip(courses, runs, strict=True)]
         values = np.concatenate([course.values for course in inside])
         covariance = np.concatenate([course.covariance for course in inside])
