@@ -12,6 +12,10 @@ from contact_scores import score, true_contacts
 from vftcli.contacts.contact_list import ContactList
 from vftcli.contacts.listing import list_contacts
 from vftcli.readers import read
+from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.free_motion import FreeMotion
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots import Robot, load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 
@@ -143,3 +147,43 @@ def test_without_free_motion_the_hands_are_told_by_the_drives_friction(logs: Pat
     assert found.method == "threshold"
     assert len(found.contacts) == 4
     assert not list_contacts(motion(ur10e(logs, "free_12harm.csv"), "ur10e")).contacts
+
+
+def short_arm(joints: int) -> Robot:
+    """The first joints of a UR5, without friction."""
+    robot = load_robot("ur5")
+    cut = ("names", "rotation", "translation", "mass", "com", "inertia", "rotor_inertia")
+    chain = replace(robot.chain, **{name: getattr(robot.chain, name)[:joints] for name in cut})
+    few = {key: value[:joints] for key, value in vars(robot.limits).items()}
+    noise = {key: value[:joints] for key, value in vars(robot.noise).items()}
+    return replace(
+        robot, chain=chain, limits=replace(robot.limits, **few), friction=(),
+        noise=replace(robot.noise, **noise), torque_constant=None, torque_source="joint_torque",
+    )  # fmt: skip
+
+
+def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons() -> None:
+    """Inverse dynamics by Pinocchio, and 12 N·m on joint 2 from 6 to 7 s."""
+    import pinocchio as pin
+
+    robot, t = short_arm(3), 0.008 * np.arange(1250)
+    rate = np.array([0.9, 1.3, 1.7])
+    q, dq, ddq = (f * 0.4 * rate**k for k, f in enumerate((
+        np.sin(np.outer(t, rate)), np.cos(np.outer(t, rate)), -np.sin(np.outer(t, rate)),
+    )))  # fmt: skip
+    data = robot.model.createData()
+    torque = np.array([pin.rnea(robot.model, data, *row) for row in zip(q, dq, ddq, strict=True)])
+    torque += 0.2 * np.random.default_rng(10).standard_normal(torque.shape)
+    torque[(t > 6.0) & (t < 7.0), 1] -= 12.0
+    log = ModelledRun(recording=Recording(t=t, q=q, dq=dq, torque=torque), robot=robot)
+    motion = FreeMotion(log=log, choice=FreeChoice.parsed(free_part="0:5"))
+    found = list_contacts(motion)
+    (row,) = found.contacts
+    # To a block of 24 ms at either end.
+    assert row.start == pytest.approx(6.0, abs=0.03)
+    assert row.stop == pytest.approx(7.0, abs=0.03)
+    assert row.joint_torque[1] == pytest.approx(12.0, abs=1.0)
+    assert row.wrench is None
+    assert found.smallest_force is None
+    assert [remark.code for remark in found.remarks] == ["no-wrench-of-few-joints"]
+    assert not list_contacts(replace(motion, choice=FreeChoice())).contacts[0].anywhere
