@@ -24,7 +24,7 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.remarks import Remark, Where, fact
-from vftcli.signals.series import median_step
+from vftcli.signals.series import median_step, runs_of
 from vftcli.virtual_sensor.smoother.noise import dry_torques
 
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
@@ -228,9 +228,12 @@ def self_test(free: Untouched, robot: Robot, prior: ContactPrior) -> SelfTest:
 
 
 def pseudo_contacts(blocks: Blocks, most: int) -> list[tuple[int, int]]:
-    """Runs of known blocks of `PSEUDO` seconds, evenly spread and not more than `most`."""
+    """Runs of known blocks of `PSEUDO` seconds, half as much on either side, `most` at most."""
     count = max(round(PSEUDO / float(np.median(blocks.length))), 1)
-    starts = range(count, len(blocks.t) - 2 * count + 1, count)
-    runs = [(k, k + count) for k in starts if blocks.known[k - count : k + 2 * count].all()]
-    chosen = runs[:: max(len(runs) // most, 1)]
-    return chosen[:most]
+    half = (count + 1) // 2
+    runs = [
+        (k, k + count)
+        for start, stop in runs_of(blocks.known)
+        for k in range(start + half, stop - count - half + 1, count)
+    ]
+    return runs[:: max(len(runs) // most, 1)][:most]
