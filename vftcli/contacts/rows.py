@@ -25,7 +25,7 @@ from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array, Mask
 from vftcli.virtual_sensor.smoother.noise import resting
 
-WIDENED = np.repeat([1.25, 2.0], 3)
+WIDENED = np.repeat([1.3, 2.0], 3)
 """What the model's own standard deviations of force and moment are multiplied by: the error of the
 friction is not Gaussian. Chosen on simulated seeds together, for all logs."""
 
