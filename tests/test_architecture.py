@@ -28,6 +28,7 @@ ORDER = (
     "identification",
     "simulation",
     "doctor",
+    "contacts",
     "admittance",
     "analysis",
     "outputs",

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
+    from vftcli.contacts.asking import contacts_of_log as contacts
     from vftcli.evaluation import evaluate, rmse
     from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.observers import (
@@ -77,6 +78,7 @@ HOMES = {
     "analyse": "pipeline",
     "analyse_log": "pipeline",
     "assemble": "readers.assembly",
+    "contacts": "contacts",
     "dynamics_terms": "robots.terms",
     "evaluate": "evaluation",
     "flange_jacobian": "robots.kinematics",
@@ -123,6 +125,7 @@ __all__ = [
     "analyse",
     "analyse_log",
     "assemble",
+    "contacts",
     "dynamics_terms",
     "evaluate",
     "flange_jacobian",

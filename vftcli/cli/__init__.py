@@ -48,6 +48,10 @@ COMMANDS = {
         "inspect:inspect_log",
         "Examine a log: format, signals, clock, and what looks wrong, with its remedy.",
     ),
+    "contacts": ListedCommand(
+        "contacts:list_contacts",
+        "List what touched the arm: when, how hard, in which direction, where, how sure.",
+    ),
     "convert": ListedCommand(
         "convert:convert_log",
         "Convert any readable log into a flat Parquet or CSV table, or a ros2-profile MCAP.",

@@ -1,0 +1,60 @@
+"""`vftcli contacts` at the command line, and `vft.contacts` in notebooks."""
+
+import csv
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import vftcli as vft
+
+Run = Callable[..., tuple[int, str, str]]
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+TAPS = FIXTURES / "ur5_taps_ur_rtde.csv"
+
+
+def test_the_answer_is_on_stdout_and_nothing_is_written(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run("contacts", TAPS, "--robot", "ur5", "--free", "0.3:4")
+    assert code == 0
+    assert "2 contacts. The hardest" in out
+    assert "log health" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_json_and_csv_hold_the_same_rows(run: Run) -> None:
+    words = ("contacts", TAPS, "--robot", "ur5", "--free-part", "0.3:4")
+    code, out, _ = run(*words, "--json")
+    record = json.loads(out)
+    assert code == 0
+    assert record["recording"] == TAPS.name
+    rows = list(csv.DictReader(io.StringIO(run(*words, "--csv")[1])))
+    assert [float(row["peak_force_N"]) for row in rows] == [
+        each["peak_force_N"] for each in record["contacts"]
+    ]
+    assert run(*words, "--csv", "--json")[0] == 2
+
+
+def test_several_logs_are_an_array(run: Run) -> None:
+    other = FIXTURES / "panda_bag"
+    code, out, _ = run("contacts", TAPS, other, "--json")
+    assert code == 0
+    assert [record["recording"] for record in json.loads(out)] == [TAPS.name, other.name]
+
+
+def test_a_free_part_that_is_not_there_is_refused(run: Run) -> None:
+    code, _, err = run("contacts", TAPS, "--robot", "ur5", "--free", "90:95")
+    assert code == 1
+    assert "free part" in err
+
+
+def test_a_notebook_asks_the_same() -> None:
+    found = vft.contacts(TAPS, robot="ur5", free_part="0.3:4")
+    assert len(found.contacts) == 2
+    assert found.hardest is not None
+    assert found.hardest.where == "wrist"

@@ -1,0 +1,38 @@
+"""Logs with a truth, as the tests of the contacts use them."""
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.free_motion import FreeMotion
+from vftcli.repetition.free_run import FreeRun, ModelledRun
+from vftcli.robots import load_robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+
+UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+"""Columns of the UR10e logs."""
+
+
+def motion(
+    recording: Recording, robot: str, free: str | None = None, run: Recording | None = None
+) -> FreeMotion:
+    """A log with what is known of its free motion: a span of its own, or another log."""
+    arm = load_robot(robot)
+    log = ModelledRun(recording=recording, robot=arm)
+    runs = ()
+    if run is not None:
+        runs = (FreeRun(run=ModelledRun(recording=run, robot=arm), log=log),)
+    return FreeMotion(log=log, choice=FreeChoice.parsed(free_part=free), runs=runs)
+
+
+def true_wrench(name: str) -> tuple[Array, Array]:
+    """Time from the first sample, and the true wrench of a fixture. (M,), (M, 6)"""
+    table = pl.read_parquet(FIXTURES / f"{name}.truth.parquet")
+    t = table["t"].to_numpy()
+    axes = ("fx", "fy", "fz", "mx", "my", "mz")
+    return t - t[0], np.column_stack([table[f"wrench/{axis}"].to_numpy() for axis in axes])

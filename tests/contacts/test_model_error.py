@@ -1,0 +1,145 @@
+"""The model error that a contact is told from."""
+
+import numpy as np
+
+from vftcli.contacts.model_error import (
+    PUSHED_SHARE,
+    SPIKE,
+    STOP_SHARE,
+    UNKNOWN,
+    ErrorCourse,
+    ErrorNoise,
+    error_course,
+    innovations,
+    learn_noise,
+    without_reversals,
+)
+from vftcli.robots.disturbance import Blocks
+from vftcli.signals.arrays import Array, Mask
+
+B = 0.024
+
+
+def blocks(d: Array, velocity: Array, known: Mask | None = None) -> Blocks:
+    """Blocks of `B` seconds."""
+    count = len(d)
+    return Blocks(
+        t=B * (np.arange(count) + 0.5),
+        length=np.full(count, B),
+        d=d,
+        q=np.zeros_like(d),
+        velocity=velocity,
+        known=np.ones(count, dtype=bool) if known is None else known,
+    )
+
+
+def noise(**changed: object) -> ErrorNoise:
+    """White noise of .1 N·m, an error of .5 N·m over .4 s, dry friction of 10 N·m; one joint."""
+    values = {"white": [0.01], "variance": [0.25], "time": [0.4], "dry": [10.0], "seen": [1.0]}
+    return ErrorNoise(**{k: np.array(v) for k, v in values.items()} | changed, free_seconds=4.0)
+
+
+def drawn(count: int, rng: np.random.Generator) -> Array:
+    """Model error and white noise of `noise`, drawn."""
+    f = np.exp(-B / 0.4)
+    b = np.empty(count)
+    b[0] = 0.5 * rng.standard_normal()
+    for k in range(1, count):
+        b[k] = f * b[k - 1] + 0.5 * np.sqrt(1.0 - f * f) * rng.standard_normal()
+    return (b + 0.1 * rng.standard_normal(count))[:, None]
+
+
+def test_what_was_drawn_is_learned() -> None:
+    d = drawn(4000, np.random.default_rng(1))
+    found = learn_noise([blocks(d, np.full_like(d, 0.5))], np.array([10.0]))
+    assert found is not None
+    # 96 s hold 120 correlation times: the variance is known to some 13 %, two of its deviations.
+    np.testing.assert_allclose(found.variance, 0.25, rtol=0.3)
+    np.testing.assert_allclose(found.white, 0.01, rtol=0.15)
+    np.testing.assert_allclose(found.time, 0.4, rtol=0.35)
+    assert found.seen[0] == 1.0
+
+
+def test_an_offset_is_an_error_too() -> None:
+    d = drawn(1000, np.random.default_rng(2))
+    plain, shifted = (
+        learn_noise([blocks(x, np.full_like(d, 0.5))], np.array([10.0])) for x in (d, d + 3.0)
+    )
+    assert plain is not None
+    assert shifted is not None
+    assert shifted.variance[0] > plain.variance[0] + 8.0
+
+
+def test_a_short_free_part_tells_nothing() -> None:
+    d = np.zeros((10, 1))
+    assert learn_noise([blocks(d, d)], np.array([10.0])) is None
+
+
+def test_reversals_are_bridged_in_a_straight_line() -> None:
+    d = np.arange(6.0)[:, None]
+    d[3] = 50.0
+    velocity = np.array([0.3, 0.2, 0.1, 0.0, -0.1, -0.2])[:, None]
+    bridged = without_reversals(blocks(d, velocity), np.array([True])).d
+    np.testing.assert_allclose(bridged[:, 0], np.arange(6.0))
+
+
+def test_the_filter_of_the_error_agrees_with_a_dense_solve() -> None:
+    """Σ ν²/S is dᵀ C⁻¹ d with the dense covariance of the model."""
+    log = blocks(drawn(40, np.random.default_rng(3)), np.full((40, 1), 0.5))
+    course = error_course(noise(), log)._replace(spikes=np.full((40, 1), 1e-300))
+    squares = innovations(log.d, course)[0]
+    lag = np.abs(log.t[:, None] - log.t)
+    covariance = 0.25 * np.exp(-lag / 0.4) + 0.01 * np.eye(40)
+    # Rounding of a 40×40 solve.
+    np.testing.assert_allclose(
+        squares.sum(), log.d[:, 0] @ np.linalg.solve(covariance, log.d[:, 0]), rtol=1e-9
+    )
+
+
+def test_a_bad_sample_is_a_spike() -> None:
+    d = np.zeros((50, 1))
+    d[25] = 20.0
+    log = blocks(d, np.full((50, 1), 0.5))
+    course = error_course(noise(), log)
+    white = innovations(d, course)[1]
+    assert white[25, 0] > (SPIKE - 1.0) * course.white[25, 0]
+    assert np.all(np.delete(white, 25) == np.delete(course.white, 25))
+
+
+def test_a_joint_that_stops_draws_its_stiction() -> None:
+    velocity = np.concatenate([np.full(20, 0.5), np.zeros(20)])[:, None]
+    course = error_course(noise(), blocks(np.zeros((40, 1)), velocity))
+    assert course.added[20, 0] == (STOP_SHARE * 10.0) ** 2
+    assert course.decay[20, 0] < 0.01
+    # It moves away again: b may change at once.
+    back = error_course(noise(), blocks(np.zeros((40, 1)), velocity[::-1]))
+    assert back.decay[20, 0] < course.decay[30, 0]
+
+
+def test_a_push_frees_the_stiction_of_joints_at_rest_only() -> None:
+    velocity = np.column_stack([np.zeros(20), np.full(20, 0.5)])
+    log = blocks(np.zeros((20, 2)), velocity)
+    both = ErrorNoise(
+        white=np.full(2, 0.01), variance=np.full(2, 0.25), time=np.full(2, 0.4),
+        dry=np.full(2, 10.0), seen=np.ones(2), free_seconds=4.0,
+    )  # fmt: skip
+    pushed = np.arange(20) >= 10
+    strict, free = error_course(both, log), error_course(both, log, pushed)
+    stationary = free.added[15] / (1.0 - free.decay[15] ** 2)
+    np.testing.assert_allclose(stationary, [0.25 + (PUSHED_SHARE * 10.0) ** 2, 0.25])
+    np.testing.assert_array_equal(free.added[5], strict.added[5])
+
+
+def test_a_joint_that_the_free_part_never_moved_errs_by_its_friction() -> None:
+    log = blocks(np.zeros((20, 1)), np.full((20, 1), 0.5))
+    course = error_course(noise(seen=np.zeros(1)), log)
+    stationary = course.added[10, 0] / (1.0 - course.decay[10, 0] ** 2)
+    np.testing.assert_allclose(stationary, 0.25 + 4.0)
+
+
+def test_a_gap_says_nothing() -> None:
+    known = np.arange(20) != 7
+    course = error_course(noise(), blocks(np.zeros((20, 1)), np.full((20, 1), 0.5), known))
+    assert course.white[7, 0] == UNKNOWN
+    assert isinstance(course.part(slice(3, 9)), ErrorCourse)
+    assert len(course.part(slice(3, 9)).white) == 6

@@ -1,0 +1,79 @@
+"""Where a contact may be: Jacobians along the links, and the place that a torque tells."""
+
+import numpy as np
+import pytest
+
+from vftcli.contacts.places import (
+    arm_parts,
+    link_jacobian,
+    places,
+    point_fits,
+    those_that_fit,
+)
+from vftcli.robots import load_robot
+from vftcli.robots.kinematics import flange_jacobian
+
+Q = np.array([0.3, -1.2, 1.6, -1.9, -1.4, 0.5])
+
+
+def test_the_end_of_the_last_link_is_the_flange() -> None:
+    chain = load_robot("ur5").chain
+    end = link_jacobian(chain, Q[None], 6, 1.0)
+    np.testing.assert_allclose(end, flange_jacobian(chain, Q[None]), atol=1e-14)
+    np.testing.assert_allclose(places(chain, Q[None])[0].jacobian, end, atol=1e-14)
+
+
+@pytest.mark.parametrize("link", [2, 3, 4])
+def test_a_points_jacobian_is_how_it_moves(link: int) -> None:
+    """Against Pinocchio's Jacobian of a frame at the same point."""
+    import pinocchio as pin
+
+    robot = load_robot("ur5")
+    model = robot.chain.to_pinocchio()
+    half = 0.5 * np.array(robot.chain.translation[link])
+    frame = pin.Frame("point", link, pin.SE3(np.eye(3), half), pin.FrameType.OP_FRAME)
+    number = model.addFrame(frame)
+    exact = pin.computeFrameJacobian(model, model.createData(), Q, number, pin.LOCAL_WORLD_ALIGNED)
+    np.testing.assert_allclose(link_jacobian(robot.chain, Q[None], link, 0.5)[0], exact, atol=1e-12)
+
+
+def test_joints_behind_a_place_do_not_feel_it() -> None:
+    for place in places(load_robot("panda").chain, np.full((1, 7), 0.4))[1:]:
+        assert not place.jacobian[:, :, place.link :].any()
+
+
+def test_every_link_belongs_to_a_part() -> None:
+    assert [arm_parts(6)[k] for k in range(7)] == [
+        "wrist", "upper arm", "upper arm", "forearm", "wrist", "wrist", "wrist",
+    ]  # fmt: skip
+    assert [arm_parts(7)[k] for k in (3, 4, 5, 6, 7)] == [
+        "upper arm", "forearm", "forearm", "wrist", "wrist",
+    ]  # fmt: skip
+
+
+def test_a_force_on_the_forearm_is_told_from_one_on_the_flange() -> None:
+    chain = load_robot("ur5").chain
+    force = np.array([20.0, -40.0, 30.0])
+    for link, share in ((3, 0.5), (6, 1.0)):
+        torque = link_jacobian(chain, Q[None], link, share)[0, :3].T @ force
+        fits = point_fits(chain, Q, torque, np.full(6, 0.05))
+        assert fits[0].misfit < 1.0
+        # The prior of 100 N draws by (sd over lever over 100)², a millionth.
+        assert link in {fit.link for fit in those_that_fit(fits)}
+        best = next(fit for fit in fits if (fit.link, fit.share) == (link, share))
+        np.testing.assert_allclose(best.force, force, rtol=1e-2)
+        assert best.size == pytest.approx(np.linalg.norm(force), rel=1e-2)
+    parts = {arm_parts(6)[fit.link] for fit in those_that_fit(fits)}
+    assert parts == {"wrist"}
+
+
+def test_what_loads_the_first_joints_alone_can_be_anywhere() -> None:
+    """Little is known of a torque on J1 and J2 with stiction on all: many places fit."""
+    torque, sd = (
+        np.array([17.0, -42.0, 0.0, 0.0, 0.0, 0.0]),
+        np.array([9.0, 9.0, 4.0, 2.0, 2.0, 2.0]),
+    )
+    fits = point_fits(load_robot("ur10e").chain, Q, torque, sd)
+    parts = {arm_parts(6)[fit.link] for fit in those_that_fit(fits)}
+    assert "upper arm" in parts
+    assert fits == sorted(fits, key=lambda fit: fit.score)

@@ -1,0 +1,79 @@
+"""From what was found to rows."""
+
+import numpy as np
+import pytest
+from contact_logs import FIXTURES, motion
+from test_model_error import blocks, drawn, noise
+
+from vftcli.contacts.model_error import error_course
+from vftcli.contacts.places import PointFit
+from vftcli.contacts.rows import QuietError, from_flange, sensor_force, vendor_force
+from vftcli.readers import read
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots import load_robot
+from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import WrenchFrame
+
+
+def test_the_error_is_bridged_across_a_contact_as_a_dense_solve_does() -> None:
+    d = drawn(60, np.random.default_rng(8))
+    log = blocks(d, np.full_like(d, 0.5))
+    hidden = ((np.arange(60) > 20) & (np.arange(60) < 30))[:, None]
+    made = QuietError.across(d, error_course(noise(), log), hidden)
+    known = ~hidden[:, 0]
+    prior = 0.25 * np.exp(-np.abs(log.t[:, None] - log.t) / 0.4)
+    S = prior[known][:, known] + 0.01 * np.eye(known.sum())
+    gain = np.linalg.solve(S, prior[known]).T
+    # What is hidden still has a variance, 1e9 (N·m)²: it tells a part in 1e9.
+    np.testing.assert_allclose(made.mean[:, 0], gain @ d[known, 0], atol=1e-7)
+    exact = np.diag(prior - gain @ prior[known])
+    np.testing.assert_allclose(made.variance[:, 0], exact, rtol=1e-7)
+
+
+def still(**signals: object) -> ModelledRun:
+    """A UR5 that holds a pose for a second, with further signals."""
+    t = 0.01 * np.arange(100)
+    q = np.tile([0.3, -1.2, 1.6, -1.9, -1.4, 0.5], (100, 1))
+    recording = Recording(t=t, q=q, dq=np.zeros_like(q), torque=np.zeros_like(q), **signals)  # type: ignore[arg-type]
+    return ModelledRun(recording=recording, robot=load_robot("ur5"))
+
+
+def test_the_vendors_torque_is_a_force_at_the_flange() -> None:
+    plain = still()
+    J = flange_jacobian(plain.robot.chain, plain.recording.q)[0]
+    torque = np.tile(J.T @ [3.0, 4.0, 12.0, 0.0, 0.0, 0.0], (100, 1))
+    told = still(tau_ext=torque)
+    assert vendor_force(told, J, 50, told.recording.t) == pytest.approx(13.0)
+    assert vendor_force(plain, J, 50, plain.recording.t) is None
+
+
+def test_a_sensors_force_needs_no_frame() -> None:
+    wrench = np.tile([3.0, 4.0, 12.0, 1.0, 1.0, 1.0], (100, 1))
+    told = still(wrench=wrench, wrench_frame=WrenchFrame("sensor", "sensor"))
+    assert sensor_force(told, 0.5) == pytest.approx(13.0)
+    assert sensor_force(still(), 0.5) is None
+
+
+def test_a_points_arm_leads_from_the_flange() -> None:
+    run = still()
+    q = run.recording.q[0]
+    fit = PointFit(link=3, share=0.0, misfit=0.0, score=0.0, force=np.ones(3), band=1.0)
+    frames = link_poses(run.robot.chain, q[None]).translation[0]
+    np.testing.assert_allclose(from_flange(run, q, fit), frames[2] - frames[-1])
+
+
+def test_a_row_on_a_link_has_its_moment_about_the_flange() -> None:
+    """A fixture's rows: what joints 1 to 6 feel is Jᵀ of the wrench at the flange."""
+    from vftcli.contacts.listing import list_contacts
+
+    recording = read(FIXTURES / "ur5_taps_ur_rtde.csv")
+    found = list_contacts(motion(recording, "ur5", "0.3:4"))
+    assert len(found.contacts) == 2
+    for row in found.contacts:
+        assert row.wrench is not None
+        q = np.array([np.interp(row.peak, recording.t, column) for column in recording.q.T])
+        J = flange_jacobian(load_robot("ur5").chain, q[None])[0]
+        np.testing.assert_allclose(J.T @ row.wrench, row.joint_torque, atol=1e-9)
+        assert row.start < row.peak < row.stop
+        assert row.trust == "good"

@@ -1,0 +1,84 @@
+"""How hard: splitting, and the prior that is learned from the contacts."""
+
+import numpy as np
+from test_model_error import B
+
+from vftcli.contacts.model_error import ErrorNoise, error_course
+from vftcli.contacts.sizes import START, learn_prior, quiet_pauses, smooth_contacts, split_run
+from vftcli.contacts.windows import BlockLog, WindowWrench
+from vftcli.robots.disturbance import Blocks
+
+
+def wrench(size: list[float], sd: float) -> WindowWrench:
+    """A window of which each block reads so much along x."""
+    values = np.zeros((len(size), 6))
+    values[:, 0] = size
+    return WindowWrench(0, values, np.tile(np.eye(6) * sd**2 / 3.0, (len(size), 1, 1)))
+
+
+T = B * np.arange(40)
+
+FELT = np.tile(np.eye(6), (40, 1, 1))
+"""A Jacobian by which joint 1 feels the force along x, and so on."""
+
+
+def test_two_pushes_in_one_candidate_are_split() -> None:
+    size = [30.0] * 10 + [0.5] * 6 + [40.0] * 10
+    assert split_run(T, wrench(size, 2.0), (0, 26), FELT) == [(0, 10), (16, 26)]
+
+
+def test_a_hand_that_slips_for_a_moment_has_not_let_go() -> None:
+    size = [30.0] * 10 + [0.5] * 2 + [40.0] * 10
+    assert split_run(T, wrench(size, 2.0), (0, 22), FELT) == [(0, 22)]
+
+
+def test_a_force_that_turns_while_the_joints_feel_it_is_one_contact() -> None:
+    made = wrench([30.0] * 10 + [0.5] * 6 + [40.0] * 10, 2.0)
+    made.values[:, 3] = 20.0
+    assert split_run(T, made, (0, 26), FELT) == [(0, 26)]
+
+
+def test_noise_that_hides_the_force_splits_nothing() -> None:
+    size = [30.0] * 10 + [10.0] * 6 + [40.0] * 10
+    assert split_run(T, wrench(size, 20.0), (0, 26), FELT) == [(0, 26)]
+
+
+def test_pauses_lie_between_loaded_blocks() -> None:
+    low = np.array([1, 1, 1, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1, 1, 1], dtype=bool)
+    assert quiet_pauses(low, T[:15]) == [(6, 10)]
+
+
+def test_a_drawn_wrench_is_measured_and_its_prior_learned() -> None:
+    """Twelve pushes drawn with σ_f = 30 N, a random well-posed Jacobian, little noise."""
+    rng = np.random.default_rng(7)
+    count, runs = 900, [(start, start + 20) for start in range(50, 850, 66)]
+    jacobian = np.tile(rng.standard_normal((6, 6)), (count, 1, 1))
+    true = np.zeros((count, 6))
+    for start, stop in runs:
+        w = np.repeat([30.0, 3.0], 3) * rng.standard_normal(6)
+        for k in range(start, stop):
+            g = np.exp(-B / 0.3)
+            w = g * w + np.repeat([30.0, 3.0], 3) * np.sqrt(1 - g * g) * rng.standard_normal(6)
+            true[k] = w
+    d = np.einsum("ki,kij->kj", true, jacobian) + 0.1 * rng.standard_normal((count, 6))
+    still = np.full((count, 6), 0.5)
+    blocks = Blocks(
+        t=B * (np.arange(count) + 0.5), length=np.full(count, B), d=d,
+        q=np.zeros_like(d), velocity=still, known=np.ones(count, dtype=bool),
+    )  # fmt: skip
+    noise = ErrorNoise(
+        white=np.full(6, 0.01), variance=np.full(6, 1e-4), time=np.full(6, 0.5),
+        dry=np.ones(6), seen=np.ones(6), free_seconds=4.0,
+    )  # fmt: skip
+    log = BlockLog.of(blocks, error_course(noise, blocks))
+    prior = learn_prior(log, jacobian, runs, START, rounds=2)
+    assert prior.time == 0.3
+    # A dozen pushes of 1.6 correlation times and three axes: some 60 numbers, 10 %; two of these.
+    assert abs(prior.force / 30.0 - 1.0) < 0.25
+    assert abs(prior.moment / 3.0 - 1.0) < 0.25
+    for run, course in zip(
+        runs, smooth_contacts(log, [jacobian] * len(runs), runs, prior), strict=True
+    ):
+        inside = course.within(run)
+        sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))
+        assert np.mean(np.abs(inside.values - true[slice(*run)]) < 1.96 * sd) > 0.85

@@ -1,0 +1,97 @@
+"""What motion that nobody touched tells."""
+
+import numpy as np
+import pytest
+from contact_logs import FIXTURES, motion
+
+from vftcli.contacts.sizes import START
+from vftcli.contacts.untouched import (
+    BLOCK,
+    MOVING_SHARE,
+    RESTING_SHARE,
+    block_length,
+    expected_torque,
+    free_part,
+    pseudo_contacts,
+    self_test,
+    torque_level,
+    untouched_motion,
+)
+from vftcli.readers import read
+from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.virtual_sensor.smoother.noise import dry_torques
+
+LOG = read(FIXTURES / "ur5_circle.csv")
+
+
+def test_blocks_are_longer_on_a_clock_that_jitters() -> None:
+    even = 0.01 * np.arange(500)
+    assert block_length(even) == BLOCK
+    # A third of the steps 2 ms off, as on the UR10e logs.
+    rough = even + np.where(np.arange(500) % 3 == 0, 0.002, 0.0)
+    assert block_length(rough) == pytest.approx(0.05, rel=0.21)
+    assert block_length(even[:2]) == BLOCK
+
+
+def test_a_named_span_is_the_free_part() -> None:
+    part = free_part(motion(LOG, "ur5", "0.3:4"))
+    assert part is not None
+    (piece,) = part.pieces
+    t = LOG.t[piece.inside]
+    assert (t[0], t[-1]) == (pytest.approx(0.304), pytest.approx(4.0))
+    assert part.remarks[0].code == "free-span"
+
+
+def test_another_log_is_a_free_part_whatever_its_motion() -> None:
+    other = read(FIXTURES / "ur5_table1.csv")
+    part = free_part(motion(LOG, "ur5", run=other))
+    assert part is not None
+    (piece,) = part.pieces
+    assert piece.inside.all()
+    assert not part.own.any()
+    assert part.remarks[0].code == "free-log"
+
+
+def test_what_repeats_nothing_has_no_free_part() -> None:
+    short = read(FIXTURES / "ur5_taps_ur_rtde.csv")
+    assert untouched_motion(motion(short, "ur5"), BLOCK) is None
+    with pytest.raises(ParameterError, match="free part"):
+        free_part(motion(short, "ur5", "90:95"))
+
+
+def test_cycles_that_do_not_exist_are_refused() -> None:
+    from dataclasses import replace
+
+    from vftcli.repetition.choice import FreeChoice
+
+    short = motion(read(FIXTURES / "ur5_taps_ur_rtde.csv"), "ur5")
+    with pytest.raises(ReferenceTorqueError):
+        free_part(replace(short, choice=FreeChoice.parsed(free_cycles="9")))
+
+
+def test_the_level_is_that_of_the_free_samples_that_move() -> None:
+    part = free_part(motion(LOG, "ur5", "0.3:4"))
+    assert part is not None
+    level = torque_level(part.pieces)
+    assert level.shape == (6,)
+    # The simulated arm's model errs by tenths of a newton metre to a few.
+    assert np.all((level > 0.01) & (level < 5.0))
+
+
+def test_resting_joints_are_given_their_stiction() -> None:
+    log = motion(LOG, "ur5").log
+    sd, dry = expected_torque(log, None), dry_torques(log.robot)
+    speed = np.abs(LOG.require("dq"))
+    far = np.convolve(speed[:, 0] < 0.01, np.ones(101), "same") == 0
+    np.testing.assert_allclose(sd[far, 0], MOVING_SHARE * dry[0])
+    assert np.all(sd[speed < 0.01] >= np.tile(RESTING_SHARE * dry, (len(speed), 1))[speed < 0.01])
+
+
+def test_contacts_that_are_none_read_little() -> None:
+    free = untouched_motion(motion(LOG, "ur5", "0.3:4"), BLOCK)
+    assert free is not None
+    found = self_test(free, motion(LOG, "ur5").log.robot, START)
+    assert np.all(found.widening >= 1.0)
+    # Simulations told 4 to 9 N.
+    assert 1.0 < found.smallest_force < 15.0
+    assert len(pseudo_contacts(free.pieces[0], 3)) == 3

@@ -1,0 +1,25 @@
+"""Contacts: what touched the arm, when, how hard, where, and how sure that is.
+
+The room can be called: ``vft.contacts("log.csv", robot="ur5")`` is `asking.contacts_of_log`.
+"""
+
+import sys
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vftcli.contacts.contact_list import ContactList
+
+
+class ContactsRoom(ModuleType):
+    """This package as a module that can be called: its name is that of the question it answers."""
+
+    def __call__(self, *words: Any, **options: Any) -> "ContactList":  # noqa: ANN401
+        """What touched the arm along a log; see `asking.contacts_of_log`."""
+        from vftcli.contacts.asking import contacts_of_log
+
+        return contacts_of_log(*words, **options)
+
+
+contacts = sys.modules[__name__]
+contacts.__class__ = ContactsRoom

@@ -1,0 +1,152 @@
+"""Contact and ContactList: the answer to what touched the arm."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from vftcli.contacts.places import ArmPart
+from vftcli.contacts.windows import ContactPrior
+from vftcli.signals.arrays import Array, seal
+from vftcli.signals.remarks import Remark
+
+Trust = Literal["good", "fair", "weak"]
+"""How far a row may be believed."""
+
+SURE_NATS, TIGHT, WIDE = 50.0, 0.25, 0.4
+"""Evidence and band of a row that is good; a wider band makes it weak."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact:
+    """One contact: force and moment ON the robot, base axes, the moment about the flange point.
+
+    Bands and standard deviations are calibrated: they hold what the model errs by, too.
+
+    Attributes:
+        number: From 1, in the order of time.
+        start: When it begins. [s]
+        stop: When it ends. [s]
+        peak: When |F| is largest. [s]
+        is_load: Whether it lasts so long that it is a load, a wrong payload or a wrong model; its
+            numbers are then means over the row, not those of a peak.
+        peak_force: |F| at the peak. [N]
+        peak_band: Half width of its 95 % band. [N]
+        wrench: Force and moment at the peak. (6,) [N, N·m]
+        wrench_sd: Standard deviation. (6,) [N, N·m]
+        mean_force: Mean force. (3,) [N]
+        impulse: ∫F dt. (3,) [N·s]
+        anywhere: Smallest and largest |F| over every place that fits, bands included. [N]
+        where: Part of the arm.
+        lead: Evidence of that part's best place less that of every other part. [nats]
+        places: Links that fit; 0 is the flange.
+        evidence: Evidence of the best place less that of nothing. [nats]
+        joint_torque: Torque on each joint at the peak. (n,) [N·m]
+        joint_torque_sd: Its standard deviation. (n,) [N·m]
+        at_rest: Whether no joint moves at the peak.
+        vendor_force: |F| of the log's own torque estimate at the peak, None without one. [N]
+        sensor_force: |F| of the log's own wrench at the peak, None without one. [N]
+        remarks: What limits this row.
+    """
+
+    number: int
+    start: float
+    stop: float
+    peak: float
+    is_load: bool = False
+    peak_force: float | None
+    peak_band: float | None
+    wrench: Array | None
+    wrench_sd: Array | None
+    mean_force: Array | None
+    impulse: Array | None
+    anywhere: tuple[float, float] | None
+    where: ArmPart
+    lead: float | None
+    places: tuple[int, ...]
+    evidence: float | None
+    joint_torque: Array
+    joint_torque_sd: Array
+    at_rest: bool
+    vendor_force: float | None = None
+    sensor_force: float | None = None
+    remarks: tuple[Remark, ...] = ()
+
+    def __post_init__(self) -> None:
+        seal(self, "wrench", "wrench_sd", "mean_force", "impulse")
+        seal(self, "joint_torque", "joint_torque_sd")
+
+    def numbered(self, number: int) -> "Contact":
+        """The same with another number."""
+        return replace(self, number=number)
+
+    @property
+    def trust(self) -> Trust:
+        """How far the row may be believed: by its evidence, its band and its remarks."""
+        if self.remarks or self.is_load or self.evidence is None or self.evidence < SURE_NATS:
+            return "weak"
+        if self.peak_force is None or self.peak_band is None:
+            return "weak"
+        share = self.peak_band / max(self.peak_force, 1e-9)
+        if share > WIDE:
+            return "weak"
+        return "good" if share <= TIGHT else "fair"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactModel:
+    """What the list rests on.
+
+    Attributes:
+        prior: How the wrench of the contacts moves, None where it was not learned.
+        noise_sd: √R of each joint. (n,) [N·m]
+        error_sd: Standard deviation of the model error. (n,) [N·m]
+        error_time: Its correlation time. (n,) [s]
+        block: Length of a block. [s]
+    """
+
+    prior: ContactPrior | None
+    noise_sd: Array
+    error_sd: Array
+    error_time: Array
+    block: float
+
+    def __post_init__(self) -> None:
+        seal(self, "noise_sd", "error_sd", "error_time")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactList:
+    """What touched the arm along a log.
+
+    Attributes:
+        recording: The log's label.
+        duration: How long it is. [s]
+        contacts: The contacts, in the order of time.
+        method: "smoother", or "threshold" where no free motion is known.
+        free: What is known of free motion, as remarks; none where nothing is.
+        free_seconds: How much of it there is. [s]
+        false_on_free: Contacts listed in the log's own free part, None where it has none.
+        threshold: Evidence that a contact must have, None without. [nats]
+        smallest_force: The smallest force that this log can tell, None without a wrench. [N]
+        stops: When the arm stopped so abruptly that what follows is no contact. [s]
+        model: What the list rests on.
+        remarks: What limits the list as a whole.
+    """
+
+    recording: str
+    duration: float
+    contacts: tuple[Contact, ...]
+    method: Literal["smoother", "threshold"]
+    free: tuple[Remark, ...]
+    free_seconds: float
+    false_on_free: int | None
+    threshold: float | None
+    smallest_force: float | None
+    stops: tuple[float, ...]
+    model: ContactModel
+    remarks: tuple[Remark, ...] = ()
+
+    @property
+    def hardest(self) -> Contact | None:
+        """The contact with the largest force, None without any."""
+        felt = [contact for contact in self.contacts if contact.peak_force is not None]
+        return max(felt, key=lambda c: c.peak_force or 0.0, default=None)

@@ -1,0 +1,189 @@
+"""A log's contacts: the smoother's list where free motion is known, else a threshold's."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vftcli.contacts.contact_list import Contact, ContactList, ContactModel
+from vftcli.contacts.evidence import LEAST_EVIDENCE
+from vftcli.contacts.loads import is_load, load_row
+from vftcli.contacts.rows import Measurer
+from vftcli.contacts.search import Found, search
+from vftcli.contacts.stops import follows_stop
+from vftcli.contacts.threshold_list import smallest_told, threshold_rows
+from vftcli.contacts.untouched import (
+    MOVING_SHARE,
+    Untouched,
+    block_length,
+    untouched_motion,
+)
+from vftcli.repetition.free_motion import FreeMotion
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.signals.arrays import Mask
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.remarks import Remark, Where, caution
+from vftcli.virtual_sensor.smoother.noise import dry_torques
+
+FALSE_MARGIN = 1.5
+"""A contact's evidence must be this much above that of any row in the log's own free part."""
+
+
+def list_contacts(motion: FreeMotion) -> ContactList:
+    """What touched the arm along a log.
+
+    Args:
+        motion: The log, its robot, and what is known of its free motion.
+
+    Raises:
+        VftError: If a free part that the user names does not exist or holds no samples, or the log
+            holds numbers that are not finite.
+    """
+    check_finite(motion.log)
+    seconds = block_length(motion.log.recording.t)
+    free = untouched_motion(motion, seconds)
+    made = by_threshold(motion) if free is None else by_smoother(motion, free, seconds)
+    if made.contacts and is_load(motion.log.recording, made.contacts) and has_wrench(motion.log):
+        row = load_row(motion, made.contacts)
+        made = replace(made, contacts=(row,), remarks=(*made.remarks, caution("contact-is-load")))
+    return made if has_wrench(motion.log) else without_forces(made)
+
+
+def check_finite(run: ModelledRun) -> None:
+    """Raise unless momentum and torque are known at every sample.
+
+    Raises:
+        ParameterError: If they are not.
+    """
+    known: Mask = np.asarray(np.all(np.isfinite(run.terms.p + run.terms.mu), axis=1))
+    if not known.all():
+        raise ParameterError(
+            f"{run.recording.name}: {np.count_nonzero(~known)} of its {len(known)} samples are not "
+            "finite; leave them out with --interval"
+        )
+
+
+def has_wrench(run: ModelledRun) -> bool:
+    """Whether the arm has joints enough to tell the six components of a wrench."""
+    return run.robot.joints >= 6
+
+
+def by_smoother(motion: FreeMotion, free: Untouched, seconds: float) -> ContactList:
+    """The list by the two-state filter, evidence, and the gated smoother."""
+    run = motion.log
+    found = search(run, free.noise, free.level, seconds)
+    own = [k for k, span in enumerate(found.runs) if in_free_part(run, found, span, free)]
+    least = LEAST_EVIDENCE
+    if own:
+        least = max(least, FALSE_MARGIN * float(found.best[own].max()))
+    strong = [k for k in range(len(found.runs)) if found.best[k] > LEAST_EVIDENCE]
+    kept = [k for k in range(len(found.runs)) if found.best[k] > least]
+    halted = [k for k in kept if is_stop(run, found, k, seconds)]
+    stops = tuple(float(found.log.blocks.t[found.runs[k][0]]) for k in halted)
+    measurer = Measurer.of(run, found.kept([k for k in kept if k not in halted]), free)
+    return ContactList(
+        recording=run.recording.name,
+        duration=run.recording.duration,
+        contacts=measurer.rows(),
+        method="smoother",
+        free=free.remarks,
+        free_seconds=free.noise.free_seconds,
+        false_on_free=len(set(own) & set(strong)) + false_rows(free, seconds),
+        threshold=least,
+        smallest_force=measurer.smallest_force,
+        stops=stops,
+        model=ContactModel(
+            prior=measurer.prior,
+            noise_sd=np.sqrt(free.noise.white),
+            error_sd=np.sqrt(free.noise.variance),
+            error_time=free.noise.time,
+            block=seconds,
+        ),
+        remarks=tuple(limits(run, free, stops)),
+    )
+
+
+def in_free_part(run: ModelledRun, found: Found, span: tuple[int, int], free: Untouched) -> bool:
+    """Whether a candidate lies in the log's own free part."""
+    middle = float(np.mean(found.log.blocks.t[slice(*span)]))
+    return bool(free.own[np.searchsorted(run.recording.t, middle)])
+
+
+def is_stop(run: ModelledRun, found: Found, number: int, seconds: float) -> bool:
+    """Whether a candidate follows an abrupt stop of the arm."""
+    first, last = found.runs[number]
+    t, half = found.log.blocks.t, 0.5 * found.log.blocks.length
+    return follows_stop(
+        run.recording, t[first] - half[first], t[last - 1] + half[last - 1], seconds
+    )
+
+
+def false_rows(free: Untouched, seconds: float) -> int:
+    """Rows that the same search lists in free runs of other logs."""
+    count = 0
+    for run in free.runs:
+        found = search(run, free.noise, free.level, seconds)
+        strong = np.flatnonzero(found.best > LEAST_EVIDENCE).tolist()
+        count += sum(not is_stop(run, found, k, seconds) for k in strong)
+    return count
+
+
+def limits(run: ModelledRun, free: Untouched, stops: tuple[float, ...]) -> list[Remark]:
+    """What limits the list as a whole."""
+    found = [caution("arm-stopped-abruptly", Where(span=(at, at)), at_s=at) for at in stops]
+    unseen = [j + 1 for j in np.flatnonzero(free.noise.seen < 0.5).tolist()]
+    if len(unseen) == run.robot.joints:
+        found.append(caution("free-part-rests"))
+    elif unseen:
+        found.append(caution("free-part-misses-joints", Where(joints=tuple(unseen))))
+    return found
+
+
+def by_threshold(motion: FreeMotion) -> ContactList:
+    """The list where no free motion is known."""
+    run = motion.log
+    dry = dry_torques(run.robot)
+    return ContactList(
+        recording=run.recording.name,
+        duration=run.recording.duration,
+        contacts=threshold_rows(run),
+        method="threshold",
+        free=(),
+        free_seconds=0.0,
+        false_on_free=None,
+        threshold=None,
+        smallest_force=smallest_told(run) if has_wrench(run) else None,
+        stops=(),
+        model=ContactModel(
+            prior=None,
+            noise_sd=np.full(len(dry), np.nan),
+            error_sd=MOVING_SHARE * dry,
+            error_time=np.full(len(dry), np.nan),
+            block=float(run.recording.median_step),
+        ),
+        remarks=(caution("contacts-without-free-part"),),
+    )
+
+
+def without_forces(made: ContactList) -> ContactList:
+    """The list of an arm whose joints cannot tell a wrench: times and joint torques."""
+    return replace(
+        made,
+        contacts=tuple(bare(contact) for contact in made.contacts),
+        smallest_force=None,
+        remarks=(*made.remarks, caution("no-wrench-of-few-joints")),
+    )
+
+
+def bare(contact: Contact) -> Contact:
+    """A row without newtons."""
+    return replace(
+        contact,
+        peak_force=None,
+        peak_band=None,
+        wrench=None,
+        wrench_sd=None,
+        mean_force=None,
+        impulse=None,
+        anywhere=None,
+        vendor_force=None,
+    )

@@ -1,0 +1,89 @@
+"""A contact that lasts for most of a log is a load, a wrong payload or a wrong model: its mean."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vftcli.contacts.contact_list import Contact
+from vftcli.contacts.rows import DRIVES, NORMAL
+from vftcli.contacts.untouched import free_part
+from vftcli.repetition.free_motion import FreeMotion
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
+from vftcli.virtual_sensor.smoother.noise import FreeTerms
+from vftcli.virtual_sensor.smoother.smoothing import SmoothedWrench, smooth_wrench
+
+SHARE = 0.5
+"""Share of the time since the first motion that contacts must fill together to be a load."""
+
+ALIKE = 0.95
+"""Several contacts are one load if their forces add up to more than this share of their sizes:
+pushes that follow one another come from different sides."""
+
+MOVES = 0.01
+"""A joint that is faster moves. [rad/s]"""
+
+PIECE = 5.0
+"""Length of the pieces whose means tell how far the mean may be off. [s]"""
+
+
+def is_load(recording: Recording, contacts: tuple[Contact, ...]) -> bool:
+    """Whether contacts fill more than half of the time since the first motion, with one force."""
+    moving = np.any(np.abs(recording.require("dq")) > MOVES, axis=1)
+    t = recording.t
+    first = float(t[np.argmax(moving)]) if moving.any() else float(t[0])
+    lasts = np.array([contact.stop - contact.start for contact in contacts])
+    if lasts.sum() <= SHARE * (float(t[-1]) - first):
+        return False
+    forces = np.array([contact.mean_force for contact in contacts]) * lasts[:, None]
+    sizes = np.linalg.norm(forces, axis=1).sum()
+    together = float(np.linalg.norm(forces.sum(axis=0)))
+    return len(contacts) == 1 or together > ALIKE * float(sizes)
+
+
+def free_terms(motion: FreeMotion) -> list[FreeTerms]:
+    """The free part as the wrench smoother takes it."""
+    part = free_part(motion)
+    pieces = () if part is None else part.pieces
+    return [FreeTerms(p.run.terms, p.run.recording.q, p.inside) for p in pieces]
+
+
+def load_row(motion: FreeMotion, contacts: tuple[Contact, ...]) -> Contact:
+    """One row for contacts that are a load: the mean of the ungated wrench, with its band."""
+    run = motion.log
+    wrench = smooth_wrench(run.terms, run.recording.q, run.robot, free_terms(motion))
+    start, stop = contacts[0].start, contacts[-1].stop
+    mean, sd = mean_and_spread(wrench, start, stop)
+    size = float(np.linalg.norm(mean[:3]))
+    u = mean[:3] / max(size, 1e-12)
+    band = NORMAL * float(np.sqrt(u**2 @ sd[:3] ** 2))
+    hardest = max(contacts, key=lambda contact: contact.evidence or 0.0)
+    return replace(
+        hardest,
+        number=1,
+        start=start,
+        stop=stop,
+        is_load=True,
+        peak_force=size,
+        peak_band=band,
+        wrench=mean,
+        wrench_sd=sd,
+        mean_force=mean[:3],
+        impulse=mean[:3] * (stop - start),
+        anywhere=(max(size - band, 0.0), size + band),
+        where="wrist" if "wrist" in {contact.where for contact in contacts} else "cannot tell",
+    )
+
+
+def mean_and_spread(wrench: SmoothedWrench, start: float, stop: float) -> tuple[Array, Array]:
+    """Mean over a span, and √(s²/m + (3 % of the mean)²), s the spread of m means over 5 s. (6,)"""
+    inside = (wrench.t >= start) & (wrench.t <= stop)
+    values, t = wrench.values[inside], wrench.t[inside]
+    mean = values.mean(axis=0)
+    number = ((t - t[0]) / PIECE).astype(int)
+    pieces = np.array([values[number == k].mean(axis=0) for k in np.unique(number)])
+    if len(pieces) > 1:
+        error = pieces.std(axis=0, ddof=1) / np.sqrt(len(pieces))
+    else:
+        error = wrench.sd[inside].mean(axis=0)
+    return mean, np.hypot(error, DRIVES * mean)

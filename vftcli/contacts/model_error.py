@@ -1,0 +1,240 @@
+"""The model error b that a contact is told from: of each joint d = b + n in motion nobody touched.
+
+b is an Ornstein–Uhlenbeck process of variance s² and correlation time T, n white of variance R, as
+for the wrench smoother. A list of contacts is measured against the quiet blocks on either side, so
+here b is modelled closer: reversals are taken out before the spectrum is learned, what the spectrum
+misses of the tails inflates it, and a joint that comes to rest draws its stiction anew.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.robots.disturbance import Blocks
+from vftcli.signals.arrays import Array, Mask, seal
+from vftcli.signals.series import runs_of
+from vftcli.virtual_sensor.smoother.noise import fit_joints, resting, steps
+
+LEAST_STRETCH = 20
+"""Fewest blocks in a row that a spectrum is learned from."""
+
+MOVES = 0.3
+"""Share of the free part's blocks in which a joint must move for its reversals to be bridged."""
+
+QUANTILES = (0.9, 2.706), (0.97, 4.709)
+"""Shares of the normalised squares ν²/S, and where χ² of one degree has them."""
+
+UNSEEN, UNSEEN_SHARE, UNSEEN_TIME = 0.2, 0.2, 1.0
+"""A joint that moves in less than this share of the free part errs by so much of F_c beyond what
+was learned, for at least so long [s]."""
+
+REST_SHARE, REST_TIME = 0.3, 2.0
+"""A resting joint errs by so much of F_c beyond what was learned, for at least so long [s]."""
+
+STOP_SHARE, STOP_DECAY = 0.7, float(np.exp(-5.0))
+"""The block in which a joint comes to rest draws b anew: so much of F_c, and this share left."""
+
+RECENT = 0.1
+"""What a joint has just done: it stops if it moved for more than half of this time before, and for
+this time after a start b changes within `START_TIME`. [s]"""
+
+START_TIME = 0.05
+"""Correlation time of b while a joint breaks away. [s]"""
+
+PUSHED_SHARE, PUSHED_TIME = 0.6, 0.3
+"""A joint that rests under a contact: the push re-settles its stiction, by so much of F_c."""
+
+SPIKE = 40.0
+"""Variance of a spike, in variances of the innovation."""
+
+SPIKES_MOVING, SPIKES_RESTING, SPIKE_REACH = 0.01, 1e-5, 0.3
+"""How often a joint's innovation is a spike within so long [s] of its motion, and at rest."""
+
+UNKNOWN = 1e9
+"""Variance of the white noise of a block that says nothing. [(N·m)²]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorNoise:
+    """What motion that nobody touched shows of each joint.
+
+    Attributes:
+        white: R. (n,) [(N·m)²]
+        variance: s². (n,) [(N·m)²]
+        time: T. (n,) [s]
+        dry: F_c. (n,) [N·m]
+        seen: Whether the free part moved the joint: 1 or 0. (n,)
+        free_seconds: Length of the free part. [s]
+    """
+
+    white: Array
+    variance: Array
+    time: Array
+    dry: Array
+    seen: Array
+    free_seconds: float
+
+    def __post_init__(self) -> None:
+        seal(self, "white", "variance", "time", "dry", "seen")
+
+
+class ErrorCourse(NamedTuple):
+    """How b goes from block to block, and the white noise upon it.
+
+    Attributes:
+        decay: Share of b that is kept from the block before. (K, n)
+        added: Variance that is added. (K, n) [(N·m)²]
+        white: R, `UNKNOWN` where the block's disturbance is. (K, n) [(N·m)²]
+        spikes: How often an innovation is a spike. (K, n)
+    """
+
+    decay: Array
+    added: Array
+    white: Array
+    spikes: Array
+
+    def part(self, chosen: slice) -> "ErrorCourse":
+        """Some of the blocks."""
+        return ErrorCourse(*(field[chosen] for field in self))
+
+
+def learn_noise(free: Sequence[Blocks], dry: Array) -> ErrorNoise | None:
+    """The noise of a free part, None where no stretch of it is long enough.
+
+    Args:
+        free: Blocks of every free piece.
+        dry: F_c of each joint. (n,) [N·m]
+    """
+    pieces = [piece.part(slice(*run)) for piece in free for run in stretches(piece)]
+    if not pieces:
+        return None
+    moving = ~np.concatenate([resting(piece) for piece in pieces])
+    share = moving.mean(axis=0)
+    bridged = [without_reversals(piece, share > MOVES) for piece in pieces]
+    each = fit_joints(bridged)
+    white, variance, time = (np.array(v) for v in zip(*each, strict=True))
+    # An offset is an error too.
+    variance += np.concatenate([piece.d for piece in bridged]).mean(axis=0) ** 2
+    found = ErrorNoise(
+        white=white,
+        variance=variance,
+        time=time,
+        dry=dry,
+        seen=(share >= UNSEEN).astype(float),
+        free_seconds=float(sum(piece.length.sum() for piece in pieces)),
+    )
+    factor = inflation(found, pieces)
+    return replace(found, white=white * factor, variance=variance * factor)
+
+
+def stretches(piece: Blocks) -> list[tuple[int, int]]:
+    """Where the stretches of known blocks that a spectrum can be learned from begin and end."""
+    return [run for run in runs_of(piece.known) if run[1] - run[0] >= LEAST_STRETCH]
+
+
+def without_reversals(piece: Blocks, joints: Mask) -> Blocks:
+    """The blocks with d of the given joints bridged in a straight line where they rest."""
+    d, still = piece.d.copy(), resting(piece)
+    for j in np.flatnonzero(joints):
+        moves = ~still[:, j]
+        if moves.any():
+            d[:, j] = np.interp(piece.t, piece.t[moves], d[moves, j])
+    return piece._replace(d=d)
+
+
+def inflation(noise: ErrorNoise, pieces: Sequence[Blocks]) -> Array:
+    """What the tails of the innovations ask for beyond the spectrum, at least 1. (n,)"""
+    squares = []
+    for piece in pieces:
+        course = error_course(noise, piece)
+        squares.append(innovations(piece.d, course)[0])
+    together = np.concatenate(squares)
+    each = [np.quantile(together, share, axis=0) / value for share, value in QUANTILES]
+    factor: Array = np.maximum(np.max(each, axis=0), 1.0)
+    return factor
+
+
+def innovations(d: Array, course: ErrorCourse) -> tuple[Array, Array]:
+    """ν²/S of the filter of b alone, and R with its spikes in it. (K, n) each
+
+    An innovation that is more likely a spike counts with `SPIKE` times its variance.
+    """
+    squares, white = np.empty_like(d), course.white.copy()
+    b, P = np.zeros(d.shape[1]), np.zeros(d.shape[1])
+    often = np.log(course.spikes / (1.0 - course.spikes)) - 0.5 * np.log(SPIKE)
+    for k in range(len(d)):
+        f = course.decay[k]
+        b, P = f * b, f * f * P + course.added[k]
+        S = P + white[k]
+        nu = d[k] - b
+        square = nu * nu / S
+        squares[k] = square
+        spike = often[k] + 0.5 * square * (1.0 - 1.0 / SPIKE) > 0.0
+        white[k] += np.where(spike, (SPIKE - 1.0) * S, 0.0)
+        gain = P / np.where(spike, SPIKE * S, S)
+        b, P = b + gain * nu, P * (1.0 - gain)
+    return squares, white
+
+
+def error_course(noise: ErrorNoise, blocks: Blocks, pushed: Mask | None = None) -> ErrorCourse:
+    """How b goes along a log.
+
+    Args:
+        noise: What free motion shows.
+        blocks: The log.
+        pushed: Blocks in which a contact may re-settle the stiction of joints at rest; None for
+            none. (K,)
+    """
+    step = steps(blocks)
+    rests = resting(blocks)
+    count = max(round(RECENT / float(np.median(blocks.length))), 1)
+    moved = moved_before(~rests, count)
+    unseen = noise.seen < 0.5
+    in_motion = noise.variance + unseen * (UNSEEN_SHARE * noise.dry) ** 2
+    motion_time = np.where(unseen, np.maximum(noise.time, UNSEEN_TIME), noise.time)
+    variance = np.where(rests, noise.variance + (REST_SHARE * noise.dry) ** 2, in_motion)
+    time = np.where(rests, np.maximum(noise.time, REST_TIME), motion_time)
+    starts = ~rests & rested_within(rests, count)
+    time = np.where(starts, np.minimum(time, START_TIME), time)
+    if pushed is not None:
+        held = rests & pushed[:, None]
+        variance = np.where(held, noise.variance + (PUSHED_SHARE * noise.dry) ** 2, variance)
+        time = np.where(held, PUSHED_TIME, time)
+    decay = np.exp(-step[:, None] / time)
+    added = variance * (1.0 - decay**2)
+    stops = rests & ~np.vstack([np.ones((1, rests.shape[1]), bool), rests[:-1]]) & (moved > 0.5)
+    decay[stops] = STOP_DECAY
+    anew = np.broadcast_to((STOP_SHARE * noise.dry) ** 2, variance.shape)
+    added[stops] = anew[stops]
+    decay[0] = 0.0
+    added[0] = variance[0] + np.where(rests[0], anew[0], 0.0)
+    white = np.where(blocks.known[:, None], noise.white, UNKNOWN)
+    near = near_motion(~rests, blocks)
+    return ErrorCourse(decay, added, white, np.where(near, SPIKES_MOVING, SPIKES_RESTING))
+
+
+def moved_before(moving: Mask, count: int) -> Array:
+    """Share of the `count` blocks before each in which a joint moved. (K, n)"""
+    total = np.vstack([np.zeros((1, moving.shape[1])), np.cumsum(moving, axis=0)])
+    first = np.maximum(np.arange(len(moving)) - count, 0)
+    many = np.maximum(np.arange(len(moving)) - first, 1)
+    share: Array = (total[:-1] - total[first]) / many[:, None]
+    return share
+
+
+def rested_within(rests: Mask, count: int) -> Mask:
+    """Blocks that follow a rest of a joint by no more than `count` blocks. (K, n)"""
+    found: Mask = moved_before(rests, count) > 0.0
+    return found
+
+
+def near_motion(moving: Mask, blocks: Blocks) -> Mask:
+    """Blocks within `SPIKE_REACH` of a joint's motion. (K, n)"""
+    count = max(round(SPIKE_REACH / float(np.median(blocks.length))), 1)
+    total = np.vstack([np.zeros((1, moving.shape[1])), np.cumsum(moving, axis=0)])
+    k = np.arange(len(moving))
+    first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, len(moving))
+    near: Mask = total[last] - total[first] > 0.0
+    return near

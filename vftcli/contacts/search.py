@@ -1,0 +1,108 @@
+"""The search along one log: candidates of both kinds, split, each with its evidence."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.contacts.candidates import filtered_contacts, threshold_contacts
+from vftcli.contacts.evidence import evidence
+from vftcli.contacts.model_error import UNKNOWN, ErrorNoise, error_course, innovations
+from vftcli.contacts.places import ContactPlace, places
+from vftcli.contacts.sizes import START, learn_prior, smooth_contacts, split_run
+from vftcli.contacts.untouched import GAIN, SETTLED, expected_torque, observed
+from vftcli.contacts.windows import BlockLog, ContactPrior, Run
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.disturbance import Blocks, disturbance_blocks
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.series import runs_of
+
+
+class Found(NamedTuple):
+    """What may be contacts along a log.
+
+    Attributes:
+        log: The log in blocks, b strict.
+        places: Where a contact may be.
+        runs: Blocks of every candidate, in the order of time.
+        evidence: Of every candidate at every place. (C, places) [nats]
+        prior: How the wrench of the candidates moves.
+    """
+
+    log: BlockLog
+    places: list[ContactPlace]
+    runs: list[Run]
+    evidence: Array
+    prior: ContactPrior
+
+    @property
+    def best(self) -> Array:
+        """Evidence of each candidate's best place. (C,) [nats]"""
+        found: Array = self.evidence.max(axis=1)
+        return found
+
+    def kept(self, chosen: Sequence[int]) -> "Found":
+        """Some of the candidates."""
+        return self._replace(
+            runs=[self.runs[i] for i in chosen], evidence=self.evidence[list(chosen)]
+        )
+
+
+def search(run: ModelledRun, noise: ErrorNoise, level: Array, seconds: float) -> Found:
+    """Look for contacts along a log.
+
+    Args:
+        run: The log with its robot's model.
+        noise: Noise and model error of free motion.
+        level: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
+        seconds: Length of a block. [s]
+    """
+    blocks = disturbance_blocks(run.terms, run.recording.q, seconds)
+    there = places(run.robot.loaded_chain, blocks.q)
+    J = there[0].jacobian
+    ahead, back = error_course(noise, blocks), error_course(noise, turned_round(blocks))
+    taken = filtered_contacts(blocks, (ahead, back), J)
+    runs = [*runs_of(taken), *beyond_threshold(run, level, blocks, taken)]
+    runs.sort()
+    for start, stop in runs:
+        taken[start:stop] = True
+    # What is no candidate keeps its spikes, whatever hypothesis is weighed.
+    hidden = ahead._replace(white=np.where(taken[:, None], UNKNOWN, ahead.white))
+    spiked = innovations(blocks.d, hidden)[1]
+    white = np.where(taken[:, None], ahead.white, spiked)
+    log = BlockLog.of(blocks, ahead._replace(white=white))
+    if not runs:
+        return Found(log, there, [], np.zeros((0, len(there))), START)
+    prior = learn_prior(log, J, runs, START, rounds=1)
+    courses = smooth_contacts(log, [J] * len(runs), runs, prior)
+    pairs = zip(courses, runs, strict=True)
+    pieces = [piece for course, run in pairs for piece in split_run(blocks.t, course, run, J)]
+    return Found(log, there, pieces, evidence(log, there, pieces, prior), prior)
+
+
+def turned_round(blocks: Blocks) -> Blocks:
+    """The blocks of the log played backward."""
+    return Blocks(
+        t=-blocks.t[::-1],
+        length=blocks.length[::-1],
+        d=blocks.d[::-1],
+        q=blocks.q[::-1],
+        velocity=-blocks.velocity[::-1],
+        known=blocks.known[::-1],
+    )
+
+
+def beyond_threshold(run: ModelledRun, level: Array, blocks: Blocks, taken: Mask) -> list[Run]:
+    """Runs of blocks in which a joint's torque is beyond its threshold, away from those taken."""
+    t = run.recording.t
+    above = threshold_contacts(t, observed(run), expected_torque(run, level))
+    above &= t >= t[0] + SETTLED
+    found = []
+    for start, stop in runs_of(above):
+        # The observer lags by 1/gain.
+        span = np.array([t[start], t[stop - 1]]) - 1.0 / GAIN
+        first, last = (int(k) for k in np.searchsorted(blocks.t, span))
+        last = max(last, first + 1)
+        if not taken[max(first - 1, 0) : last + 1].any():
+            found.append((first, min(last, len(blocks.t))))
+    return [each for each in found if each[0] < each[1]]

@@ -1,0 +1,147 @@
+"""How hard: the wrench of every contact by the gated smoother, its prior learned from the contacts.
+
+Outside its contact a wrench is pinned to zero, so that the model error is learned from the quiet
+blocks on both sides of a contact, and the contact is measured against that. What other contacts
+load says nothing of it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vftcli.contacts.windows import (
+    MARGIN,
+    BlockLog,
+    ContactPrior,
+    Lane,
+    Run,
+    WindowWrench,
+    gate_of,
+    likelihoods,
+    smooth_lanes,
+    window_of,
+)
+from vftcli.signals.arrays import Array
+
+START = ContactPrior(0.3, 30.0, 3.0)
+"""The prior that learning starts from."""
+
+TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0
+"""Correlation times that are tried. [s]"""
+
+NEAR = 0.4
+"""How far a window reaches beyond its contact where only the prior is learned. [s]"""
+
+FORCES, MOMENTS = (3.0, 300.0), (0.1, 50.0)
+"""Smallest and largest standard deviation. [N], [N·m]"""
+
+RELEASED, RELEASE_TIME, RELEASE_SHARE = 1.5, 0.08, 0.25
+"""A contact is split where the force is below so many standard deviations for so long [s], and
+below this share of the peaks on both sides."""
+
+
+def smooth_contacts(
+    log: BlockLog, jacobians: Sequence[Array], runs: Sequence[Run], prior: ContactPrior
+) -> list[WindowWrench]:
+    """The wrench in the window of every contact.
+
+    Args:
+        log: The log.
+        jacobians: J of each contact's point along the log. (K, 6, n) each
+        runs: The blocks of every contact.
+        prior: How the wrench may move.
+    """
+    return smooth_lanes(log, contact_lanes(log, jacobians, runs, prior))
+
+
+def contact_lanes(
+    log: BlockLog,
+    jacobians: Sequence[Array],
+    runs: Sequence[Run],
+    prior: ContactPrior,
+    margin: float = MARGIN,
+) -> list[Lane]:
+    """A lane for every contact, the others hidden.
+
+    Args:
+        log: The log.
+        jacobians: J of each contact's point along the log. (K, 6, n) each
+        runs: The blocks of every contact.
+        prior: How the wrench may move.
+        margin: How far a lane reaches beyond its contact. [s]
+    """
+    count = len(log.blocks.t)
+    every, lanes = gate_of(count, runs), []
+    for run, jacobian in zip(runs, jacobians, strict=True):
+        gate = gate_of(count, [run])
+        window = window_of(log.blocks.t, run, margin)
+        lanes.append(Lane(window, gate, every & ~gate, jacobian, prior))
+    return lanes
+
+
+def learn_prior(
+    log: BlockLog, jacobian: Array, runs: Sequence[Run], prior: ContactPrior, rounds: int
+) -> ContactPrior:
+    """The prior by expectation and maximisation: τ_w by likelihood, then σ_f and σ_m by the mean.
+
+    Args:
+        log: The log.
+        jacobian: J of the flange. (K, 6, n)
+        runs: The blocks of every contact.
+        prior: Where to start.
+        rounds: How often.
+    """
+    each = [jacobian] * len(runs)
+    for _ in range(rounds):
+        priors = [prior._replace(time=time) for time in TIMES]
+        lanes = [lane for p in priors for lane in contact_lanes(log, each, runs, p, NEAR)]
+        nats = likelihoods(log, lanes).reshape(len(priors), len(runs)).sum(axis=1)
+        time = TIMES[int(np.argmax(nats))]
+        tried = contact_lanes(log, each, runs, prior._replace(time=time), NEAR)
+        courses = smooth_lanes(log, tried)
+        inside = [course.within(run) for course, run in zip(courses, runs, strict=True)]
+        values = np.concatenate([course.values for course in inside])
+        covariance = np.concatenate([course.covariance for course in inside])
+        power = (values**2 + np.diagonal(covariance, axis1=1, axis2=2)).mean(axis=0)
+        force, moment = np.sqrt(power[:3].mean()), np.sqrt(power[3:].mean())
+        prior = ContactPrior(time, float(np.clip(force, *FORCES)), float(np.clip(moment, *MOMENTS)))
+    return prior
+
+
+def split_run(t: Array, course: WindowWrench, run: Run, jacobian: Array) -> list[Run]:
+    """A contact's blocks, split where force and joint torque are gone for a while between peaks.
+
+    Args:
+        t: Time. (K,) [s]
+        course: The wrench in the contact's window.
+        run: The contact's blocks.
+        jacobian: J of the wrench's point. (K, 6, n)
+    """
+    inside = course.within(run)
+    size = inside.size
+    torque = np.linalg.norm(np.einsum("ki,kij->kj", inside.values, jacobian[slice(*run)]), axis=1)
+    sd = np.sqrt(np.trace(inside.covariance[:, :3, :3], axis1=1, axis2=2))
+    low, at = size < RELEASED * sd, t[run[0] : run[1]]
+    pieces, begin = [], 0
+    for k, end in quiet_pauses(low, at):
+        if all(x[k:end].min() < valley(x[begin:k], x[end:]) for x in (size, torque)):
+            pieces.append((run[0] + begin, run[0] + k))
+            begin = end
+    return [*pieces, (run[0] + begin, run[1])]
+
+
+def valley(before: Array, after: Array) -> float:
+    """What a valley between two stretches must fall below."""
+    return RELEASE_SHARE * float(min(before.max(), after.max()))
+
+
+def quiet_pauses(low: Array, t: Array) -> list[tuple[int, int]]:
+    """Runs of low blocks within a contact that last at least `RELEASE_TIME`."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], low, [False]]).astype(int)))
+    pairs = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    usual = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    return [
+        (start, stop)
+        for start, stop in pairs
+        if start > 0 and stop < len(low) and t[stop - 1] - t[start] + usual >= RELEASE_TIME
+    ]

@@ -1,0 +1,239 @@
+"""What motion that nobody touched tells: noise, the level of a threshold, the smallest force."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.contacts.model_error import ErrorNoise, error_course, learn_noise
+from vftcli.contacts.places import places
+from vftcli.contacts.windows import (
+    BlockLog,
+    ContactPrior,
+    Lane,
+    gate_of,
+    smooth_lanes,
+    window_of,
+)
+from vftcli.observers import MomentumObserver
+from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.disturbance import Blocks, disturbance_blocks
+from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.remarks import Remark, Where, fact
+from vftcli.signals.series import median_step, runs_of
+from vftcli.virtual_sensor.smoother.noise import dry_torques
+
+BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
+"""Length of a block [s]; on a clock whose steps differ by this share it holds so many samples."""
+
+GAIN = 30.0
+"""Gain of the momentum observer that a threshold is laid on. [1/s]"""
+
+SETTLED = 0.3
+"""Start of a log that the observer is left. [s]"""
+
+MOVING, LEAST_MOVING = 0.01, 50
+"""Speed from which a joint moves [rad/s], and fewest such samples that its level is taken from."""
+
+NEAR_REST, MOVING_SHARE, RESTING_SHARE = 0.3, 0.2, 0.6 / 1.96
+"""What the drives' dry friction F_c lets expect: shares of it in motion, and within so long [s] of
+a rest."""
+
+LEAST_LEVEL = 0.1
+"""Smallest standard deviation of a joint's torque where no free motion is known. [N·m]"""
+
+LEAST_CYCLES = 2
+"""Fewest whole cycles of which free ones can be found: one alone cannot be compared."""
+
+PSEUDO, MOST_PSEUDO = 0.6, 48
+"""Length of the contacts that are made up in free motion [s], and how many at most."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Untouched:
+    """Motion that nobody touched, as a list of contacts needs it.
+
+    Attributes:
+        noise: Noise and model error.
+        level: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
+        own: Samples of the log itself that are free. (T,)
+        runs: Free runs in other logs.
+        pieces: Every free piece in blocks, each with the log it is from.
+        remarks: What it is and how it was found.
+    """
+
+    noise: ErrorNoise
+    level: Array
+    own: Mask
+    runs: tuple[ModelledRun, ...]
+    pieces: tuple[Blocks, ...]
+    remarks: tuple[Remark, ...]
+
+
+def block_length(t: Array) -> float:
+    """Length of a block for a clock. [s]"""
+    if len(t) < 3:
+        return BLOCK
+    usual, steps = median_step(t), np.diff(t)
+    uneven = float(np.quantile(np.abs(steps - usual), 0.9)) > UNEVEN * usual
+    return max(BLOCK, SAMPLES * usual) if uneven else BLOCK
+
+
+def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
+    """The free motion of a log, None where nothing is known to be free.
+
+    Args:
+        motion: The log and what the user says is free.
+        seconds: Length of a block. [s]
+
+    Raises:
+        ReferenceTorqueError: If what the user names does not exist.
+        ParameterError: If a given span holds no samples, or the whole log.
+    """
+    part = free_part(motion)
+    if part is None:
+        return None
+    robot = motion.log.robot
+    blocks = tuple(
+        disturbance_blocks(piece.run.terms, piece.run.recording.q, seconds, piece.inside)
+        for piece in part.pieces
+    )
+    noise = learn_noise(blocks, dry_torques(robot))
+    if noise is None:
+        return None
+    return Untouched(
+        noise=noise,
+        level=torque_level(part.pieces),
+        own=part.own,
+        runs=tuple(piece.run for piece in part.pieces if piece.run is not motion.log),
+        pieces=blocks,
+        remarks=part.remarks,
+    )
+
+
+def free_part(motion: FreeMotion) -> FreePart | None:
+    """What is free of contact, None where nothing is known to be.
+
+    Where in a free run or cycle the log's own motion lies does not matter here: nothing is paired.
+
+    Raises:
+        ReferenceTorqueError: If what the user names does not exist.
+        ParameterError: If a given span holds no samples, or the whole log.
+    """
+    own, log, choice = motion.within_spans, motion.log, motion.choice
+    remarks = [fact("free-span", begin_s=begin, end_s=end) for begin, end in choice.spans]
+    if choice.cycles or not (choice.is_given or motion.runs):
+        if not choice.cycles and not repeats(motion):
+            return None
+        found = motion.free_cycles
+        own = own | np.isin(motion.cycles.number(log.recording.t), found.numbers)
+        remarks.append(found.remark(motion.cycles.whole))
+    pieces = [FreePiece(log, own, ())] if own.any() else []
+    for run in motion.runs:
+        pieces.append(FreePiece(run.run, np.ones(run.recording.samples, dtype=bool), ()))
+        remarks.append(fact("free-log", Where(about=run.recording.name)))
+    return FreePart(tuple(pieces), own, tuple(remarks))
+
+
+def repeats(motion: FreeMotion) -> bool:
+    """Whether the log has two cycles at least, of which the quieter may be free."""
+    try:
+        return motion.cycles.whole >= LEAST_CYCLES
+    except ReferenceTorqueError:
+        return False
+
+
+def observed(run: ModelledRun) -> Array:
+    """The momentum observer's torque along a log. (T, n) [N·m]"""
+    return MomentumObserver(gain=GAIN).estimate(run.terms).tau
+
+
+def torque_level(pieces: Sequence[FreePiece]) -> Array:
+    """q95|τ|/1.96 of each joint over the free samples in which it moves. (n,) [N·m]"""
+    values, moves = [], []
+    for piece in pieces:
+        t = piece.run.recording.t
+        use = piece.inside & (t >= t[0] + SETTLED)
+        values.append(observed(piece.run)[use])
+        moves.append(np.abs(piece.run.recording.require("dq")[use]) > MOVING)
+    torque, moving = np.abs(np.concatenate(values)), np.concatenate(moves)
+    found = np.empty(torque.shape[1])
+    for j, column in enumerate(torque.T):
+        some = column[moving[:, j]]
+        chosen = some if len(some) >= LEAST_MOVING else column
+        found[j] = np.quantile(chosen, 0.95) / 1.96 if len(chosen) else 0.0
+    return found
+
+
+def expected_torque(run: ModelledRun, level: Array | None) -> Array:
+    """Standard deviation of the observer's torque where nothing touches. (T, n) [N·m]
+
+    Args:
+        run: The log.
+        level: What free motion shows, None without any. (n,) [N·m]
+    """
+    dry, recording = dry_torques(run.robot), run.recording
+    least = np.full(len(dry), LEAST_LEVEL) if level is None else level
+    sd = np.tile(np.maximum(least, MOVING_SHARE * dry), (recording.samples, 1))
+    count = max(round(NEAR_REST / median_step(recording.t)), 1)
+    still = np.abs(recording.require("dq")) < MOVING
+    total = np.vstack([np.zeros((1, len(dry))), np.cumsum(still, axis=0)])
+    k = np.arange(recording.samples)
+    first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, recording.samples)
+    near = total[last] - total[first] > 0.0
+    return np.where(near, np.maximum(sd, RESTING_SHARE * dry), sd)
+
+
+class SelfTest(NamedTuple):
+    """What the smoother reads in free motion where it is told of contacts that are none.
+
+    Attributes:
+        widening: Factor on each axis' standard deviation that would hold 95 %, at least 1. (6,)
+        smallest_force: |F| that 95 % of the blocks stay below. [N]
+    """
+
+    widening: Array
+    smallest_force: float
+
+
+def self_test(free: Untouched, robot: Robot, prior: ContactPrior) -> SelfTest:
+    """Make contacts up in free motion, whose wrench is zero, and see what is measured."""
+    shares, forces = [], []
+    each = max(MOST_PSEUDO // max(len(free.pieces), 1), 4)
+    for blocks in free.pieces:
+        made_up, count = pseudo_contacts(blocks, each), len(blocks.t)
+        if not made_up:
+            continue
+        course = error_course(free.noise, blocks, gate_of(count, made_up))
+        J = places(robot.loaded_chain, blocks.q)[0].jacobian
+        nowhere = np.zeros(count, dtype=bool)
+        lanes = [
+            Lane(window_of(blocks.t, run), gate_of(count, [run]), nowhere, J, prior)
+            for run in made_up
+        ]
+        measured = smooth_lanes(BlockLog.of(blocks, course), lanes)
+        for run, wrench in zip(made_up, measured, strict=True):
+            inside = wrench.within(run)
+            sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))
+            shares.append(np.abs(inside.values) / np.maximum(sd, 1e-12))
+            forces.append(inside.size)
+    if not forces:
+        return SelfTest(np.ones(6), float("nan"))
+    widening = np.maximum(np.quantile(np.concatenate(shares), 0.95, axis=0) / 1.96, 1.0)
+    return SelfTest(widening, float(np.quantile(np.concatenate(forces), 0.95)))
+
+
+def pseudo_contacts(blocks: Blocks, most: int) -> list[tuple[int, int]]:
+    """Runs of known blocks of `PSEUDO` seconds, half as much on either side, `most` at most."""
+    count = max(round(PSEUDO / float(np.median(blocks.length))), 1)
+    half = (count + 1) // 2
+    runs = [
+        (k, k + count)
+        for start, stop in runs_of(blocks.known)
+        for k in range(start + half, stop - count - half + 1, count)
+    ]
+    return runs[:: max(len(runs) // most, 1)][:most]

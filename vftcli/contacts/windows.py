@@ -1,0 +1,185 @@
+"""Windows: the stretches of a log in which its contacts are weighed and measured."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.contacts.lanes import Lanes, nats, smoothed
+from vftcli.contacts.model_error import UNKNOWN, ErrorCourse
+from vftcli.robots.disturbance import Blocks
+from vftcli.signals.arrays import Array, Mask
+from vftcli.virtual_sensor.smoother.noise import steps
+
+MARGIN = 1.0
+"""How far a window reaches beyond its contacts on either side. [s]"""
+
+MOST_LANES = 96
+"""Lanes that are worked on at once."""
+
+Run = tuple[int, int]
+"""Number of the first block, and of the one behind the last."""
+
+
+class ContactPrior(NamedTuple):
+    """An Ornstein–Uhlenbeck prior of a contact's wrench in base axes.
+
+    Attributes:
+        time: Correlation time τ_w. [s]
+        force: Standard deviation σ_f of each component of the force. [N]
+        moment: That of the moment, σ_m. [N·m]
+    """
+
+    time: float
+    force: float
+    moment: float
+
+
+class BlockLog(NamedTuple):
+    """A log in blocks, with what its model errs by.
+
+    Attributes:
+        blocks: The blocks.
+        course: How b goes along them.
+        step: Time from the block before. (K,) [s]
+    """
+
+    blocks: Blocks
+    course: ErrorCourse
+    step: Array
+
+    @classmethod
+    def of(cls, blocks: Blocks, course: ErrorCourse) -> "BlockLog":
+        """The log of these blocks."""
+        return cls(blocks, course, steps(blocks))
+
+
+class Lane(NamedTuple):
+    """One hypothesis on one window.
+
+    Attributes:
+        window: Which blocks.
+        gate: Blocks of the log in which the wrench may differ from zero. (K,)
+        hidden: Blocks of the log that say nothing. (K,)
+        jacobian: J along the log. (K, 6, n)
+        prior: How the wrench may move; None where nothing touches.
+    """
+
+    window: Run
+    gate: Mask
+    hidden: Mask
+    jacobian: Array
+    prior: ContactPrior | None
+
+
+def window_of(t: Array, run: Run, margin: float = MARGIN) -> Run:
+    """The blocks within `margin` of a run of them."""
+    first = int(np.searchsorted(t, t[run[0]] - margin))
+    last = int(np.searchsorted(t, t[run[1] - 1] + margin, side="right"))
+    return first, last
+
+
+def gate_of(count: int, runs: Sequence[Run]) -> Mask:
+    """The blocks of some runs and one on either side. (K,)"""
+    inside = np.zeros(count, dtype=bool)
+    for start, stop in runs:
+        inside[max(start - 1, 0) : stop + 1] = True
+    return inside
+
+
+def batches(lanes: Sequence[Lane]) -> Iterator[list[int]]:
+    """Numbers of lanes that are about equally long, so that little is padded."""
+    length = [stop - start for start, stop in (lane.window for lane in lanes)]
+    order = sorted(range(len(lanes)), key=length.__getitem__)
+    batch: list[int] = []
+    for number in order:
+        if batch and (len(batch) == MOST_LANES or length[number] > 1.5 * length[batch[0]] + 20):
+            yield batch
+            batch = []
+        batch.append(number)
+    if batch:
+        yield batch
+
+
+def assembled(log: BlockLog, lanes: Sequence[Lane]) -> Lanes:
+    """Lanes side by side; shorter ones end in blocks that say nothing."""
+    n = log.blocks.d.shape[1]
+    longest = max(lane.window[1] - lane.window[0] for lane in lanes)
+    shape = (longest, len(lanes))
+    d, jacobian = np.zeros((*shape, n)), np.zeros((*shape, 6, n))
+    white, decay = np.full((*shape, n), UNKNOWN), np.ones((*shape, 6 + n))
+    added = np.zeros((*shape, 6 + n))
+    decay[:, :, :6] = 0.0
+    for i, lane in enumerate(lanes):
+        first, last = lane.window
+        span, count = slice(first, last), last - first
+        d[:count, i] = log.blocks.d[span]
+        white[:count, i] = np.where(lane.hidden[span, None], UNKNOWN, log.course.white[span])
+        decay[:count, i, 6:] = log.course.decay[span]
+        added[:count, i, 6:] = log.course.added[span]
+        # A window begins with what b is like anywhere, not with what it was before.
+        kept = decay[0, i, 6:].copy()
+        decay[0, i, 6:] = 0.0
+        added[0, i, 6:] /= np.maximum(1.0 - kept**2, 1e-9)
+        if lane.prior is None:
+            continue
+        jacobian[:count, i] = lane.jacobian[span]
+        inside = lane.gate[span]
+        goes_on = inside & np.concatenate([[False], inside[:-1]])
+        stays = np.where(goes_on, np.exp(-log.step[span] / lane.prior.time), 0.0)
+        variance = np.repeat([lane.prior.force**2, lane.prior.moment**2], 3)
+        decay[:count, i, :6] = stays[:, None]
+        added[:count, i, :6] = np.where(inside, 1.0 - stays**2, 0.0)[:, None] * variance
+    return Lanes(d, jacobian, white, decay, added)
+
+
+def likelihoods(log: BlockLog, lanes: Sequence[Lane]) -> Array:
+    """Log likelihood ln p(d) of every lane; only lanes of one window may be compared. [nats]"""
+    found = np.empty(len(lanes))
+    for batch in batches(lanes):
+        found[batch] = nats(assembled(log, [lanes[i] for i in batch]))
+        # What the padding and the hidden blocks add is the same for lanes of one window only if
+        # they went side by side; it is taken off, so that it is the same everywhere.
+        longest = max(lanes[i].window[1] - lanes[i].window[0] for i in batch)
+        for i in batch:
+            padded = longest - (lanes[i].window[1] - lanes[i].window[0])
+            found[i] += 0.5 * padded * log.blocks.d.shape[1] * np.log(UNKNOWN)
+    return found
+
+
+class WindowWrench(NamedTuple):
+    """The wrench in one window, zero with certainty outside its gate.
+
+    Attributes:
+        first: Number of the window's first block.
+        values: Force and moment in base axes. (k, 6) [N, N·m]
+        covariance: (k, 6, 6)
+    """
+
+    first: int
+    values: Array
+    covariance: Array
+
+    def within(self, run: Run) -> "WindowWrench":
+        """The wrench in some of its blocks."""
+        span = slice(run[0] - self.first, run[1] - self.first)
+        return WindowWrench(run[0], self.values[span], self.covariance[span])
+
+    @property
+    def size(self) -> Array:
+        """|F|. (k,) [N]"""
+        found: Array = np.linalg.norm(self.values[:, :3], axis=1)
+        return found
+
+
+def smooth_lanes(log: BlockLog, lanes: Sequence[Lane]) -> list[WindowWrench]:
+    """The smoothed wrench of every lane along its window."""
+    found: list[WindowWrench | None] = [None] * len(lanes)
+    for batch in batches(lanes):
+        mean, covariance = smoothed(assembled(log, [lanes[i] for i in batch]))
+        for place, i in enumerate(batch):
+            count = lanes[i].window[1] - lanes[i].window[0]
+            found[i] = WindowWrench(
+                lanes[i].window[0], mean[:count, place, :6], covariance[:count, place, :6, :6]
+            )
+    return [each for each in found if each is not None]

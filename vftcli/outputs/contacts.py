@@ -1,0 +1,260 @@
+"""The list of contacts as JSON, CSV and on the terminal."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.outputs.grid import Column, Grid, csv_rows, terminal
+from vftcli.signals.arrays import Array
+from vftcli.signals.letters import printable
+from vftcli.signals.remarks import sentence
+
+MOST_ROWS = 20
+"""Rows on the terminal unless all are asked for."""
+
+ONE_AXIS = 0.8
+"""A force is said to go along an axis that holds more than this share of it."""
+
+AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")
+"""An axis' two directions, base axes."""
+
+FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
+
+
+def contacts_record(found: ContactList) -> dict[str, Any]:
+    """A log's contacts for machines; units stand in the names."""
+    model = found.model
+    return {
+        "recording": found.recording,
+        "frame": FRAME,
+        "sign": SIGN,
+        "free_part": free_words(found) or None,
+        "free_s": found.free_seconds,
+        "smallest_force_N": found.smallest_force,
+        "evidence_threshold_nats": found.threshold,
+        "false_on_free": found.false_on_free,
+        "method": found.method,
+        "duration_s": found.duration,
+        "stops_s": list(found.stops),
+        "model": {
+            "tau_w_s": model.prior.time if model.prior else None,
+            "sigma_force_N": model.prior.force if model.prior else None,
+            "sigma_moment_Nm": model.prior.moment if model.prior else None,
+            "noise_sd_Nm": model.noise_sd,
+            "friction_sd_Nm": model.error_sd,
+            "friction_time_s": model.error_time,
+            "block_s": model.block,
+        },
+        "remarks": list(found.remarks),
+        "contacts": [contact_record(contact) for contact in found.contacts],
+    }
+
+
+def contact_record(contact: Contact) -> dict[str, Any]:
+    """One contact for machines."""
+    wrench, sd = contact.wrench, contact.wrench_sd
+    return {
+        "number": contact.number,
+        "kind": "load" if contact.is_load else "contact",
+        "start_s": contact.start,
+        "stop_s": contact.stop,
+        "peak_s": contact.peak,
+        "peak_force_N": contact.peak_force,
+        "peak_force_band_N": contact.peak_band,
+        "force_N": None if wrench is None else wrench[:3],
+        "force_sd_N": None if sd is None else sd[:3],
+        "moment_Nm": None if wrench is None else wrench[3:],
+        "moment_sd_Nm": None if sd is None else sd[3:],
+        "mean_force_N": contact.mean_force,
+        "impulse_Ns": contact.impulse,
+        "where": contact.where,
+        "where_lead_nats": contact.lead,
+        "places": [link or "flange" for link in contact.places],
+        "anywhere_N": None if contact.anywhere is None else list(contact.anywhere),
+        "trust": contact.trust,
+        "evidence_nats": contact.evidence,
+        "joint_torque_Nm": contact.joint_torque,
+        "joint_torque_sd_Nm": contact.joint_torque_sd,
+        "at_rest": contact.at_rest,
+        "remarks": list(contact.remarks),
+        "vendor_force_N": contact.vendor_force,
+        "sensor_force_N": contact.sensor_force,
+    }
+
+
+def contacts_csv(lists: Sequence[ContactList]) -> str:
+    """One row a contact of every log, vectors taken apart."""
+    rows = [
+        {"recording": found.recording} | flat(contact_record(contact))
+        for found in lists
+        for contact in found.contacts
+    ]
+    keys = list(dict.fromkeys(key for row in rows for key in row))
+    if not rows:
+        keys = ["recording", "number", "start_s", "stop_s", "peak_s", "peak_force_N"]
+    return csv_rows([{key: row.get(key) for key in keys} for row in rows], keys)
+
+
+def flat(record: Mapping[str, Any]) -> dict[str, Any]:
+    """A contact's record in one row: ``force_N`` becomes ``force_N_x`` …, joints are numbered."""
+    row: dict[str, Any] = {}
+    for key, value in record.items():
+        if isinstance(value, np.ndarray):
+            axes = "xyz" if len(value) == 3 else range(1, len(value) + 1)
+            row |= {f"{key}_{axis}": float(v) for axis, v in zip(axes, value, strict=True)}
+        elif key == "anywhere_N":
+            low, high = value or (None, None)
+            row |= {"anywhere_least_N": low, "anywhere_most_N": high}
+        elif isinstance(value, list):
+            row[key] = " ".join(str(item) for item in value)
+        else:
+            row[key] = value
+    return row
+
+
+def contacts_text(found: ContactList, *, every: bool = False) -> str:
+    """The answer for people: a sentence, the table, what it rests on.
+
+    Args:
+        found: The list.
+        every: Whether all rows are shown, else the `MOST_ROWS` hardest.
+    """
+    lines = [f"{printable(found.recording)} · {found.duration:.1f} s", "", f"  {answer(found)}"]
+    if found.contacts:
+        shown = found.contacts if every else hardest_rows(found.contacts)
+        table = terminal(contact_grid(shown)).splitlines()
+        lines += ["", *(f"  {line}" for line in table)]
+        if len(shown) < len(found.contacts):
+            lines.append(f"  the {len(shown)} hardest of {len(found.contacts)}: --all for the rest")
+        if found.hardest is not None:
+            lines.append(
+                "  (± 95 %; force ON the robot, base axes; anywhere: over every place that fits)"
+            )
+    lines += ["", *(f"  {line}" for line in basis(found))]
+    return "\n".join(lines) + "\n"
+
+
+def hardest_rows(contacts: Sequence[Contact]) -> list[Contact]:
+    """The `MOST_ROWS` contacts with the largest force, else the most evidence, in time's order."""
+    order = sorted(contacts, key=lambda c: (c.peak_force or 0.0, c.evidence or 0.0), reverse=True)
+    return sorted(order[:MOST_ROWS], key=lambda contact: contact.start)
+
+
+def answer(found: ContactList) -> str:
+    """What touched the arm, in one sentence."""
+    count = len(found.contacts)
+    if not count:
+        return "Nothing touched the arm, as far as this log can tell."
+    first = found.contacts[0]
+    if first.is_load and first.peak_force is not None and first.mean_force is not None:
+        size = f"{first.peak_force:.0f} ± {first.peak_band:.0f} N"
+        return (
+            f"A load, or a wrong payload, or a wrong model: {size} on average, "
+            f"{direction(first.mean_force)}."
+        )
+    what = f"{count} contact{'s' if count > 1 else ''}."
+    hardest = found.hardest
+    if hardest is None:
+        return what
+    where = "" if hardest.where == "cannot tell" else f" on the {hardest.where}"
+    size = f"{hardest.peak_force:.0f} ± {hardest.peak_band:.0f} N"
+    return f"{what} The hardest, at {hardest.peak:.1f} s: {size}{where}."
+
+
+def contact_grid(contacts: Sequence[Contact]) -> Grid:
+    """The table of contacts."""
+    force = any(contact.peak_force is not None for contact in contacts)
+    columns = [Column("#"), Column("from – to [s]", words=True)]
+    if force:
+        columns += [Column("|F| [N]"), Column("anywhere"), Column("direction", words=True)]
+    else:
+        columns += [Column("joint torque [N·m]", words=True)]
+    columns += [Column("where", words=True), Column("trust", words=True)]
+    return Grid(columns=tuple(columns), rows=tuple(contact_row(c, force) for c in contacts))
+
+
+def contact_row(contact: Contact, force: bool) -> list[str]:
+    """One row of the table."""
+    row = [str(contact.number), f"{contact.start:6.2f} – {contact.stop:6.2f}"]
+    if force and contact.wrench is not None and contact.anywhere is not None:
+        low, high = contact.anywhere
+        row += [f"{contact.peak_force:.0f} ± {contact.peak_band:.0f}", f"{low:.0f}–{high:.0f}"]
+        row.append(direction(contact.wrench[:3]))
+    else:
+        row.append(" ".join(f"{torque:.1f}" for torque in contact.joint_torque))
+    return [*row, place_words(contact), contact.trust]
+
+
+def direction(force: Array) -> str:
+    """A force's direction: an axis that holds most of it, else the unit vector."""
+    size = float(np.linalg.norm(force))
+    if size == 0.0:
+        return "–"
+    u = force / size
+    k = int(np.argmax(np.abs(u)))
+    if abs(u[k]) > ONE_AXIS:
+        return AXIS_WORDS[k][int(u[k] > 0)]
+    # Rounding leaves no minus before a nought.
+    return f"({', '.join(f'{x + 0.0:.1f}' for x in np.round(u, 1))})".replace("-", "−")
+
+
+def place_words(contact: Contact) -> str:
+    """The part of the arm, and the links where it cannot be told."""
+    if contact.where != "cannot tell":
+        return contact.where
+    links = [link for link in contact.places if link]
+    if not links:
+        return contact.where
+    first = f"link {links[0]}"
+    last = "flange" if 0 in contact.places else f"link {links[-1]}"
+    return first if first == last else f"{first} … {last}"
+
+
+def free_words(found: ContactList) -> str:
+    """What is known of free motion, in words; "" where nothing is."""
+    return "; ".join(sentence(remark) for remark in found.free)
+
+
+def basis(found: ContactList) -> list[str]:
+    """What the list rests on: smallest force, free motion, cautions."""
+    lines = []
+    if found.smallest_force is not None and np.isfinite(found.smallest_force):
+        lines.append(f"smallest force this log can tell: {found.smallest_force:.0f} N")
+    if found.free:
+        false = "no" if not found.false_on_free else str(found.false_on_free)
+        lines.append(
+            f"{free_words(found)}; {false} contact listed in its {found.free_seconds:.0f} s"
+        )
+    return [*lines, *(f"caution: {sentence(remark)}" for remark in found.remarks)]
+
+
+def overview(lists: Sequence[ContactList]) -> str:
+    """Several logs: one line a log."""
+    columns = (
+        Column("log", words=True),
+        Column("span"),
+        Column("contacts"),
+        Column("hardest", words=True),
+        Column("smallest"),
+    )
+    rows = [
+        (
+            found.recording,
+            f"{found.duration:.1f} s",
+            "load" if found.contacts and found.contacts[0].is_load else str(len(found.contacts)),
+            hardest_words(found),
+            None if found.smallest_force is None else f"{found.smallest_force:.0f} N",
+        )
+        for found in lists
+    ]
+    return terminal(Grid(columns=columns, rows=tuple(rows)))
+
+
+def hardest_words(found: ContactList) -> str:
+    """The hardest contact of a log in a few words."""
+    contact = found.hardest
+    if contact is None or contact.peak_force is None:
+        return "–"
+    return f"{contact.peak_force:.0f} ± {contact.peak_band:.0f} N at {contact.peak:.1f} s"
