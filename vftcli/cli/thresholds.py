@@ -1,0 +1,171 @@
+"""`vftcli thresholds`: from motion nobody touched to the thresholds that a robot is given."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vftcli.cli import options as opt
+from vftcli.cli.bundles import Bundle, option, taken_apart
+
+if TYPE_CHECKING:
+    from vftcli.contacts.caught import ContactCheck
+    from vftcli.contacts.thresholds import Thresholds
+    from vftcli.evaluation.reference_choice import ReferenceChoice
+    from vftcli.pipeline import AnalysisChoice
+    from vftcli.repetition.free_run import ModelledRun, Models
+    from vftcli.signals.recording import Recording
+    from vftcli.signals.remarks import Remark
+
+
+class CheckOptions(Bundle):
+    """A log with contacts, and what says where they are."""
+
+    log: Path | None = option(
+        "--check",
+        "LOG",
+        "A log with contacts: which of them the thresholds would have caught, how late, how hard.",
+    )
+    reference: str | None = option(
+        "--reference",
+        "REF",
+        "What touched the --check log: sensor, vendor, file:PATH. Default: the truth beside a "
+        "simulated log, else its sensor's wrench, else the alarms themselves are listed.",
+    )
+    columns: str | None = option(
+        "--reference-columns", "SPEC", "Columns of a reference file, as --columns: 't,tau_ext:6'."
+    )
+
+
+@taken_apart
+def contact_thresholds(
+    logs: opt.Logs,
+    reading: opt.ReadOptions,
+    robot: opt.RobotOptions,
+    check: CheckOptions,
+    anyway: opt.Anyway = False,
+    rate: Annotated[
+        float,
+        typer.Option(
+            "--rate", metavar="PER_HOUR", help="False alarms per hour of all joints, or axes."
+        ),
+    ] = 1.0,
+    json: opt.Json = False,
+) -> None:
+    """Learn from free motion the thresholds that a robot is given, at a rate of false alarms.
+
+    The logs are motion that nobody touches, the longer the better; of several days the worst
+    counts. Printed as libfranka's call, franka_ros parameters, URScript and TOML.
+
+    Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
+    """
+    from vftcli.cli.console import health_of, say, say_json, say_recording
+    from vftcli.contacts.compared_signals import compared_signals
+    from vftcli.contacts.thresholds import find_thresholds, left_out
+    from vftcli.outputs.examination import health_record
+    from vftcli.outputs.grid import terminal
+    from vftcli.outputs.thresholds import (
+        calls,
+        check_grid,
+        check_line,
+        left_out_grid,
+        thresholds_grid,
+        thresholds_record,
+    )
+    from vftcli.pipeline import AnalysisChoice
+    from vftcli.readers.library import Library
+    from vftcli.repetition.free_run import Models
+
+    library = Library([*logs, *([check.log] if check.log else [])])
+    choice = AnalysisChoice(
+        read=reading.choice(),
+        robot=robot.choice(),
+        library=library,
+        examiner=health_of(library, anyway=anyway),
+    )
+    models = Models()
+    free = [modelled(log, choice, models) for log in library.open_logs(logs, choice.read)]
+    signals = [compared_signals(run) for run in free]
+    thresholds = find_thresholds(signals, rate)
+    counted = left_out(signals, rate)
+    checked = checked_log(check, thresholds, choice, models) if check.log else None
+    remarks = (*thresholds.remarks, *(r for run in free for r in touched(run)))
+    if json:
+        record = thresholds_record(thresholds, counted, checked)
+        record |= {"logs": [run.recording.name for run in free], "remarks": list(remarks)}
+        say_json({**record, "examination": health_record(choice.examiner.examinations)})
+        return
+    for run in free:
+        say_recording(run.recording)
+    for remark in (*remarks, *(checked.remarks if checked else ())):
+        say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
+    typer.echo(terminal(thresholds_grid(thresholds)))
+    if counted:
+        typer.echo(terminal(left_out_grid(counted)))
+    if checked:
+        typer.echo(terminal(check_grid(checked)) + check_line(checked) + "\n")
+    for name, text in calls(thresholds).items():
+        typer.echo(f"{name}:\n{text}")
+
+
+def modelled(recording: "Recording", choice: "AnalysisChoice", models: "Models") -> "ModelledRun":
+    """A log with its robot, examined.
+
+    Raises:
+        ExaminationError: If a finding makes every result meaningless.
+    """
+    from vftcli.pipeline import prepared
+
+    run = models.of(*prepared(recording, choice))
+    choice.examiner.examine(run.recording, run.robot)
+    return run
+
+
+def touched(run: "ModelledRun") -> tuple["Remark", ...]:
+    """A remark where a log that is to be free shows contact."""
+    from vftcli.evaluation.touches import touches
+    from vftcli.signals.recording import EFFORTS
+    from vftcli.signals.remarks import Where, caution
+
+    found = touches(run) if set(EFFORTS) & set(run.recording.signals) else ()
+    if not found:
+        return ()
+    worst = max(found, key=lambda touch: touch.torque)
+    where = Where(run.recording.name, (worst.joint + 1,), (worst.start, worst.stop))
+    sizes = {"torque_Nm": worst.torque, "quiet_Nm": worst.quiet}
+    return (caution("free-log-touched", where, count=len(found), **sizes),)
+
+
+def checked_log(
+    check: CheckOptions, thresholds: "Thresholds", choice: "AnalysisChoice", models: "Models"
+) -> "ContactCheck":
+    """What the thresholds would have done along the log with contacts.
+
+    Raises:
+        ParameterError: If it is another arm's.
+    """
+    from vftcli.contacts.caught import check_contacts
+    from vftcli.contacts.compared_signals import compared_signals
+    from vftcli.evaluation.reference_choice import ReferenceSource, make_reference
+    from vftcli.repetition.free_motion import FreeMotion
+
+    assert check.log is not None
+    run = modelled(choice.library.open(check.log, choice.read.whole), choice, models)
+    asked = reference_of(check, run.recording)
+    made = make_reference(ReferenceSource(motion=FreeMotion(log=run)), asked) if asked else None
+    torque, wrench = (made.torque, made.wrench) if made else (None, None)
+    return check_contacts(compared_signals(run), thresholds, torque, wrench)
+
+
+def reference_of(check: CheckOptions, recording: "Recording") -> "ReferenceChoice | None":
+    """What says where the log is touched: what is asked for, else its truth, else its sensor."""
+    from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
+
+    truth = Path(f"{check.log}.truth.parquet")
+    if check.reference is not None:
+        return ReferenceChoice(name=check.reference, columns=check.columns)
+    if truth.exists():
+        return ReferenceChoice(name=f"{FILE}{truth}")
+    frame, wrench = recording.wrench_frame, recording.wrench
+    measured = wrench is not None and wrench.any() and frame is not None and frame.axes == "sensor"
+    return ReferenceChoice(name="sensor") if measured else None

@@ -1,0 +1,1 @@
+"""The answer: what touched the arm, and thresholds a robot can use."""
