@@ -123,11 +123,13 @@ def modelled(recording: "Recording", choice: "AnalysisChoice", models: "Models")
 
 def touched(run: "ModelledRun") -> tuple["Remark", ...]:
     """A remark where a log that is to be free shows contact."""
+    from vftcli.contacts.tail import SETTLING
     from vftcli.evaluation.touches import touches
     from vftcli.signals.recording import EFFORTS
     from vftcli.signals.remarks import Where, caution
 
-    found = touches(run) if set(EFFORTS) & set(run.recording.signals) else ()
+    known = touches(run) if set(EFFORTS) & set(run.recording.signals) else ()
+    found = [touch for touch in known if touch.stop > run.recording.t[0] + SETTLING]
     if not found:
         return ()
     worst = max(found, key=lambda touch: touch.torque)

@@ -114,7 +114,7 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
             f"passed; record at least {LONG_ENOUGH:g} s, better an hour"
         )
     untold = (caution("axes-untold"),) if free[0].wrench.shape[1] and not found["axes"] else ()
-    remarks = (*remarks_on(free, found["joints"], rate), *untold)
+    remarks = (*remarks_on(free, len(found["joints"]), rate), *untold)
     return Thresholds(
         rate=rate,
         joints=found["joints"],
@@ -155,19 +155,18 @@ def thresholds_of_set(
     return tuple(found)
 
 
-def remarks_on(
-    free: Sequence[ComparedSignals], joints: Sequence[SignalThreshold], rate: float
-) -> tuple[Remark, ...]:
+def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> tuple[Remark, ...]:
     """What the logs can bear: whose estimate it is, how far it is extrapolated, what is missing."""
-    first, own_rate = free[0], rate / len(joints)
+    first, own_rate = free[0], rate / joints
     remarks = [
         fact("thresholds-of-vendor") if first.of_vendor else caution("thresholds-of-observer")
     ]
     if first.frame:
         code = "thresholds-of-logged-wrench" if first.logged_wrench else "thresholds-of-torques"
         remarks.append(fact(code, frame=first.frame))
-    tails = [one.tail for one in joints if one.tail is not None]
-    longest = max(tails, key=lambda tail: tail.hours)
+    # How many readings there are is the same for every joint.
+    tails = [tail_of(block_maxima(signals.t, signals.torque[:, 0])) for signals in free]
+    longest = max((tail for tail in tails if tail is not None), key=lambda tail: tail.hours)
     if longest.hours < (need := DUE / rate):
         remarks.append(
             caution(

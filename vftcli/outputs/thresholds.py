@@ -151,7 +151,8 @@ def thresholds_record(
     joints = range(1, len(thresholds.joints) + 1)
     axes = AXES[: len(thresholds.axes)]
     units = [unit_of(axis).replace("·", "") for axis in axes]
-    force = threshold_rows(thresholds.force, "axis", ["|F|"] * len(thresholds.force), ["N"])
+    count = len(thresholds.force)
+    force = threshold_rows(thresholds.force, "axis", ["|F|"] * count, ["N"] * count)
     return {
         "rate_per_h": thresholds.rate,
         "joints": threshold_rows(thresholds.joints, "joint", joints, ["Nm"] * len(joints)),
