@@ -113,3 +113,13 @@ def test_nothing_caught_and_nothing_there() -> None:
     assert np.isnan(check.median_delay)
     assert np.isnan(check.longest_delay)
     assert check.largest_missed == 40.0
+
+
+def test_an_alarm_that_stays_on_catches_nothing_new() -> None:
+    """J1 stays at 99 N·m from the first push on, as a joint at rest keeps its stiction."""
+    stays = np.where(T >= 5.2, 99.0, 0.0)
+    check = check_contacts(estimated(stays), limits(1e2, 1e3), *truth())
+    assert check.caught == ()
+    check = check_contacts(estimated(stays), limits(98.0, 1e3), *truth())
+    assert [(c.by, c.was_on) for c in check.contacts] == [("J1", False), ("", True), ("", True)]
+    assert np.isnan(check.largest_missed)

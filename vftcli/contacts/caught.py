@@ -9,11 +9,11 @@ import numpy as np
 from vftcli.contacts.compared_signals import ComparedSignals
 from vftcli.contacts.tail import SETTLING, events
 from vftcli.contacts.thresholds import Thresholds, worst_of
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.wrench import AXES, Wrench
-from vftcli.virtual_sensor.contact import ContactInterval, match_contacts
+from vftcli.virtual_sensor.contact import EARLY, ContactInterval, match_contacts
 from vftcli.virtual_sensor.detection import TRUE_TORQUE, true_intervals
 
 
@@ -26,6 +26,7 @@ class CheckedContact(NamedTuple):
         peak_force: Its largest force, NaN where that is not known. [N]
         delay: From its start to the first alarm; NaN where there is none, or no truth. [s]
         by: The joint or axis that raises the alarm, "" where there is none.
+        was_on: Whether none begins because one was on already, left over from a contact before.
     """
 
     start: float
@@ -33,6 +34,7 @@ class CheckedContact(NamedTuple):
     peak_force: float
     delay: float
     by: str
+    was_on: bool = False
 
     @property
     def is_caught(self) -> bool:
@@ -85,7 +87,7 @@ class ContactCheck:
     @property
     def largest_missed(self) -> float:
         """Peak force of the hardest contact that is not caught, NaN if there is none. [N]"""
-        missed = [contact for contact in self.contacts if not contact.is_caught]
+        missed = [c for c in self.contacts if not c.is_caught and not c.was_on]
         return max(known_forces(missed), default=float("nan"))
 
 
@@ -102,8 +104,8 @@ def check_contacts(
 ) -> ContactCheck:
     """What thresholds would have done along a log: every joint and every axis may raise the alarm.
 
-    A contact is caught by an alarm that overlaps it, or follows its end by less than a second. One
-    that is over before the settling is left out, like what is read then.
+    A contact is caught if a signal passes its threshold while it lasts; one that has stayed beyond
+    it since before says nothing of it. Contacts that are over before the settling are left out.
 
     Args:
         signals: The log.
@@ -115,24 +117,24 @@ def check_contacts(
     """
     t = signals.t
     level = np.column_stack([thresholds.level(name, signals) for name in ("joints", "axes")])
-    names = [*(f"J{j}" for j in range(1, len(thresholds.joints) + 1)), *AXES]
     alarms = events(t, worst_of(level))
+    names = [*(f"J{j}" for j in range(1, len(thresholds.joints) + 1)), *AXES]
+    own = [
+        RaisedAlarm(n, e) for n, one in zip(names, level.T, strict=False) for e in events(t, one)
+    ]
+    own.sort(key=lambda alarm: alarm.span.start)
     if reference is None:
         size = signals.force[:, 0] if signals.force.shape[1] else np.full(len(t), np.nan)
-        found = tuple(
-            CheckedContact(
-                a.start, a.stop, peak_of(size, t, a), np.nan, first_over(level, names, t, a)
-            )
-            for a in alarms
-        )
-        remarks = (caution("check-without-truth"),)
         return ContactCheck(
             log=signals.recording.name,
             reference=None,
-            contacts=found,
+            contacts=tuple(
+                CheckedContact(a.start, a.stop, peak_of(size, t, a), np.nan, first_within(own, a))
+                for a in alarms
+            ),
             false_alarms=None,
             untouched_h=float("nan"),
-            remarks=remarks,
+            remarks=(caution("check-without-truth"),),
         )
     floor = np.zeros(reference.joints) if reference.floor is None else reference.floor
     limits = np.maximum(TRUE_TORQUE, 5.0 * np.nan_to_num(floor))
@@ -141,41 +143,46 @@ def check_contacts(
     if wrench is not None:
         size = np.linalg.norm(wrench.force, axis=1)
     told = match_contacts(alarms, true, signals.recording.duration - SETTLING)
-    found = tuple(
-        CheckedContact(
-            contact.start,
-            contact.stop,
-            peak_of(size, t, contact),
-            delay,
-            first_over(level, names, t, ContactInterval(contact.start + delay, float(t[-1]), 0.0)),
-        )
-        for contact, delay in zip(true, told.delay, strict=True)
-    )
     touched = sum(c.stop - max(c.start, float(t[0]) + SETTLING) for c in true)
     return ContactCheck(
         log=signals.recording.name,
         reference=reference.name,
-        contacts=found,
+        contacts=tuple(checked(c, peak_of(size, t, c), own) for c in true),
         false_alarms=told.false_alarms,
         untouched_h=(signals.recording.duration - SETTLING - touched) / 3600.0,
         remarks=(fact("check-against-reference", reference=reference.name), *reference.remarks),
     )
 
 
-def inside(t: Array, span: ContactInterval) -> Mask:
-    """Samples of a contact. (T,)"""
-    found: Mask = (t >= span.start) & (t <= span.stop)
-    return found
+class RaisedAlarm(NamedTuple):
+    """One signal beyond its threshold.
+
+    Attributes:
+        by: The joint or axis.
+        span: From when to when.
+    """
+
+    by: str
+    span: ContactInterval
+
+
+def checked(contact: ContactInterval, peak: float, alarms: Sequence[RaisedAlarm]) -> CheckedContact:
+    """A true contact of a peak force [N] with the first alarm, in their order, that it raises."""
+    for alarm in alarms:
+        if contact.start - EARLY <= alarm.span.start <= contact.stop:
+            delay = max(alarm.span.start - contact.start, 0.0)
+            return CheckedContact(contact.start, contact.stop, peak, delay, alarm.by)
+    was_on = any(a.span.start < contact.start <= a.span.stop for a in alarms)
+    return CheckedContact(contact.start, contact.stop, peak, np.nan, "", was_on)
+
+
+def first_within(alarms: Sequence[RaisedAlarm], span: ContactInterval) -> str:
+    """Who raises the first of some alarms, in their order, within a span."""
+    return next(a.by for a in alarms if span.start <= a.span.start <= span.stop)
 
 
 def peak_of(size: Array, t: Array, span: ContactInterval) -> float:
     """The largest known value (T,) within a contact, NaN if none is known."""
-    there = size[inside(t, span)]
+    there = size[(t >= span.start) & (t <= span.stop)]
     known = there[np.isfinite(there)]
     return float(known.max()) if len(known) else float("nan")
-
-
-def first_over(level: Array, names: Sequence[str], t: Array, span: ContactInterval) -> str:
-    """The joint or axis, of the columns' names, that is first beyond 1 in a span, "" if none is."""
-    rows = np.flatnonzero(inside(t, span) & (worst_of(level) > 1.0))
-    return names[int(np.nanargmax(level[rows[0]]))] if len(rows) else ""

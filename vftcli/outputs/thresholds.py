@@ -23,7 +23,7 @@ def thresholds_grid(thresholds: Thresholds) -> Grid:
         *(("|F|", "N", one) for one in thresholds.force),
     ]
     return Grid(
-        title=f"thresholds at {thresholds.rate:g} false alarms per hour of any joint, of any axis",
+        title=f"passed untouched by any joint, or any axis, {thresholds.rate:g} × an hour",
         columns=(
             Column("", words=True, width=3),
             Column("threshold"),
@@ -32,7 +32,7 @@ def thresholds_grid(thresholds: Thresholds) -> Grid:
             Column("tail from"),
             Column("λ", unit="1/h", form=".0f"),
             Column("k"),
-            Column("of", unit="h"),
+            Column("log", unit="h"),
             Column("needed by", words=True),
         ),
         rows=tuple((name, one.value, unit, *tail_entries(one)) for name, unit, one in named),
@@ -88,10 +88,15 @@ def check_grid(check: ContactCheck) -> Grid:
             Column("by", words=True),
         ),
         rows=tuple(
-            (str(k), c.start, c.stop, c.peak_force, 1e3 * c.delay, c.by or "missed")
+            (str(k), c.start, c.stop, c.peak_force, 1e3 * c.delay, verdict(c))
             for k, c in enumerate(check.contacts, start=1)
         ),
     )
+
+
+def verdict(contact: CheckedContact) -> str:
+    """What raised the alarm, or why there is none."""
+    return contact.by or ("on already" if contact.was_on else "missed")
 
 
 def check_line(check: ContactCheck) -> str:
@@ -109,6 +114,8 @@ def check_line(check: ContactCheck) -> str:
         words.append(f"the weakest caught {significant(check.smallest_caught)} N")
     if not isnan(check.largest_missed):
         words.append(f"the hardest missed {significant(check.largest_missed)} N")
+    if on := sum(contact.was_on for contact in check.contacts):
+        words.append(f"{on} while an alarm was on already")
     words.append(f"{check.false_alarms} false in {significant(check.untouched_h)} h untouched")
     return ", ".join(words)
 
@@ -191,6 +198,7 @@ def contact_record(number: int, contact: CheckedContact) -> dict[str, Any]:
         "peak_force_N": contact.peak_force,
         "delay_s": contact.delay,
         "by": contact.by or None,
+        "alarm_was_on": contact.was_on,
     }
 
 
