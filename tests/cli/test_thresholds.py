@@ -57,6 +57,17 @@ def test_the_json_stands_alone_and_the_push_is_found(free: Path, pushed: Path, r
     assert record["check"]["reference"] is None
 
 
+def test_the_robots_own_estimate_may_be_the_reference(free: Path, pushed: Path, run: Run) -> None:
+    """Beyond 3.4 sd of noise everything is a contact of that reference; the push is among them."""
+    words = ("--rate", 60, "--check", pushed, "--reference", "vendor", "--json")
+    code, out, err = run("thresholds", free, *COLUMNS, *words)
+    assert code == 0, err
+    check = json.loads(out)["check"]
+    assert check["reference"] == "vendor"
+    assert [c["by"] for c in check["contacts"] if c["by"]] == ["J2"]
+    assert check["smallest_caught_N"] is None
+
+
 def test_two_free_logs_are_counted_against_each_other(free: Path, pushed: Path, run: Run) -> None:
     code, out, err = run("thresholds", free, pushed, *COLUMNS, "--rate", 60, "--json")
     assert code == 0, err
@@ -84,6 +95,7 @@ def test_a_simulated_log_is_checked_against_the_truth_beside_it(run: Run) -> Non
         (("--interval", "0:6"), "record at least 27 s"),
         (("--check", "none.npy"), "none.npy"),
         (("--check", "pushed.npy", "--reference", "nobody"), "no reference 'nobody'"),
+        (("--reference", "sensor"), "name that with --check LOG"),
     ],
 )
 def test_an_error_is_one_line(

@@ -6,35 +6,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, option, taken_apart
+from vftcli.cli.bundles import taken_apart
 
 if TYPE_CHECKING:
-    from vftcli.contacts.caught import ContactCheck
-    from vftcli.contacts.thresholds import Thresholds
     from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.pipeline import AnalysisChoice
     from vftcli.repetition.free_run import ModelledRun, Models
+    from vftcli.signals.external_torque import ExternalTorque
     from vftcli.signals.recording import Recording
     from vftcli.signals.remarks import Remark
-
-
-class CheckOptions(Bundle):
-    """A log with contacts, and what says where they are."""
-
-    log: Path | None = option(
-        "--check",
-        "LOG",
-        "A log with contacts: which of them the thresholds would have caught, how late, how hard.",
-    )
-    reference: str | None = option(
-        "--reference",
-        "REF",
-        "What touched the --check log: sensor, vendor, file:PATH. Default: the truth beside a "
-        "simulated log, else its sensor's wrench, else the alarms themselves are listed.",
-    )
-    columns: str | None = option(
-        "--reference-columns", "SPEC", "Columns of a reference file, as --columns: 't,tau_ext:6'."
-    )
+    from vftcli.signals.wrench import Wrench
 
 
 @taken_apart
@@ -42,7 +23,17 @@ def contact_thresholds(
     logs: opt.Logs,
     reading: opt.ReadOptions,
     robot: opt.RobotOptions,
-    check: CheckOptions,
+    reference: opt.NamedReferenceOptions,
+    check: Annotated[
+        Path | None,
+        typer.Option(
+            "--check",
+            metavar="LOG",
+            help="A log with contacts: which of them they would have caught, how late, how hard. "
+            "Where they are says --reference, else the truth beside a simulated log, else its "
+            "sensor; else the alarms are listed.",
+        ),
+    ] = None,
     anyway: opt.Anyway = False,
     rate: Annotated[
         float,
@@ -60,6 +51,7 @@ def contact_thresholds(
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
     from vftcli.cli.console import health_of, say, say_json, say_recording
+    from vftcli.contacts.caught import check_contacts
     from vftcli.contacts.compared_signals import compared_signals
     from vftcli.contacts.thresholds import find_thresholds, left_out
     from vftcli.outputs.examination import health_record
@@ -75,8 +67,12 @@ def contact_thresholds(
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
     from vftcli.repetition.free_run import Models
+    from vftcli.signals.errors import ParameterError
 
-    library = Library([*logs, *([check.log] if check.log else [])])
+    asked = reference.choice()
+    if asked is not None and check is None:
+        raise ParameterError("--reference says where a log was touched: name that with --check LOG")
+    library = Library([*logs, *([check] if check else [])])
     choice = AnalysisChoice(
         read=reading.choice(),
         robot=robot.choice(),
@@ -88,7 +84,11 @@ def contact_thresholds(
     signals = [compared_signals(run) for run in free]
     thresholds = find_thresholds(signals, rate)
     counted = left_out(signals, rate)
-    checked = checked_log(check, thresholds, choice, models) if check.log else None
+    checked = None
+    if check is not None:
+        touched_log = modelled(library.open(check, choice.read.whole), choice, models)
+        truth = truth_of(touched_log, asked or settled_reference(touched_log.recording))
+        checked = check_contacts(compared_signals(touched_log), thresholds, *truth)
     remarks = (*thresholds.remarks, *(r for run in free for r in touched(run)))
     if json:
         record = thresholds_record(thresholds, counted, checked)
@@ -138,34 +138,28 @@ def touched(run: "ModelledRun") -> tuple["Remark", ...]:
     return (caution("free-log-touched", where, count=len(found), **sizes),)
 
 
-def checked_log(
-    check: CheckOptions, thresholds: "Thresholds", choice: "AnalysisChoice", models: "Models"
-) -> "ContactCheck":
-    """What the thresholds would have done along the log with contacts.
+def truth_of(
+    run: "ModelledRun", asked: "ReferenceChoice | None"
+) -> "tuple[ExternalTorque | None, Wrench | None]":
+    """The torque and the wrench that are taken for true along a log, None where nothing says.
 
     Raises:
-        ParameterError: If it is another arm's.
+        ReferenceTorqueError: If the reference cannot be made.
     """
-    from vftcli.contacts.caught import check_contacts
-    from vftcli.contacts.compared_signals import compared_signals
     from vftcli.evaluation.reference_choice import ReferenceSource, make_reference
     from vftcli.repetition.free_motion import FreeMotion
 
-    assert check.log is not None
-    run = modelled(choice.library.open(check.log, choice.read.whole), choice, models)
-    asked = reference_of(check, run.recording)
-    made = make_reference(ReferenceSource(motion=FreeMotion(log=run)), asked) if asked else None
-    torque, wrench = (made.torque, made.wrench) if made else (None, None)
-    return check_contacts(compared_signals(run), thresholds, torque, wrench)
+    if asked is None:
+        return None, None
+    made = make_reference(ReferenceSource(motion=FreeMotion(log=run)), asked)
+    return made.torque, made.wrench
 
 
-def reference_of(check: CheckOptions, recording: "Recording") -> "ReferenceChoice | None":
-    """What says where the log is touched: what is asked for, else its truth, else its sensor."""
+def settled_reference(recording: "Recording") -> "ReferenceChoice | None":
+    """What says where a log is touched without being named: its truth beside it, or its sensor."""
     from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
 
-    truth = Path(f"{check.log}.truth.parquet")
-    if check.reference is not None:
-        return ReferenceChoice(name=check.reference, columns=check.columns)
+    truth = Path(f"{recording.source.path}.truth.parquet")
     if truth.exists():
         return ReferenceChoice(name=f"{FILE}{truth}")
     frame, wrench = recording.wrench_frame, recording.wrench
