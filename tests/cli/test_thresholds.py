@@ -2,10 +2,15 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from vftcli.cli.thresholds import settled_reference
+from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import WrenchFrame
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -85,6 +90,26 @@ def test_a_simulated_log_is_checked_against_the_truth_beside_it(run: Run) -> Non
     assert "contacts are where file:panda_bearing.csv.truth.parquet says so" in err
     # It is no free log: J2 bears the load for half of it.
     assert "as if touched" in err
+
+
+@pytest.mark.parametrize(
+    ("frame", "reference"),
+    [
+        (None, "sensor"),
+        (WrenchFrame("sensor", "sensor"), "sensor"),
+        (WrenchFrame("base", "flange"), None),
+    ],
+)
+def test_a_sensor_in_the_log_says_where_it_is_touched(
+    frame: WrenchFrame | None, reference: str | None
+) -> None:
+    log = Recording(
+        t=np.arange(3.0), q=np.zeros((3, 6)), wrench_frame=frame, wrench=np.ones((3, 6))
+    )
+    found = settled_reference(log)
+    assert (found.name if found else None) == reference
+    assert settled_reference(replace(log, wrench=np.zeros((3, 6)))) is None
+    assert settled_reference(replace(log, wrench=None)) is None
 
 
 @pytest.mark.parametrize(

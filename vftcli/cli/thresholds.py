@@ -52,7 +52,7 @@ def contact_thresholds(
     """
     from vftcli.cli.console import health_of, say, say_json, say_recording
     from vftcli.contacts.caught import check_contacts
-    from vftcli.contacts.compared_signals import compared_signals
+    from vftcli.contacts.compared_signals import check_alike, compared_signals
     from vftcli.contacts.thresholds import find_thresholds, left_out
     from vftcli.outputs.examination import health_record
     from vftcli.outputs.grid import terminal
@@ -86,9 +86,10 @@ def contact_thresholds(
     counted = left_out(signals, rate)
     checked = None
     if check is not None:
-        touched_log = modelled(library.open(check, choice.read.whole), choice, models)
-        truth = truth_of(touched_log, asked or settled_reference(touched_log.recording))
-        checked = check_contacts(compared_signals(touched_log), thresholds, *truth)
+        pushed = modelled(library.open(check, choice.read.whole), choice, models)
+        check_alike((signals[0], compared := compared_signals(pushed)))
+        truth = truth_of(pushed, asked or settled_reference(pushed.recording))
+        checked = check_contacts(compared, thresholds, *truth)
     remarks = (*thresholds.remarks, *(r for run in free for r in touched(run)))
     if json:
         record = thresholds_record(thresholds, counted, checked)
@@ -163,5 +164,7 @@ def settled_reference(recording: "Recording") -> "ReferenceChoice | None":
     if truth.exists():
         return ReferenceChoice(name=f"{FILE}{truth}")
     frame, wrench = recording.wrench_frame, recording.wrench
-    measured = wrench is not None and wrench.any() and frame is not None and frame.axes == "sensor"
+    # What states no frame is taken for a sensor's everywhere.
+    of_sensor = frame is None or frame.axes == "sensor"
+    measured = of_sensor and wrench is not None and bool(wrench.any())
     return ReferenceChoice(name="sensor") if measured else None
