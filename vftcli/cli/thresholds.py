@@ -55,15 +55,7 @@ def contact_thresholds(
     from vftcli.contacts.compared_signals import check_alike, compared_signals
     from vftcli.contacts.thresholds import find_thresholds, left_out
     from vftcli.outputs.examination import health_record
-    from vftcli.outputs.grid import terminal
-    from vftcli.outputs.thresholds import (
-        calls,
-        check_grid,
-        check_line,
-        left_out_grid,
-        thresholds_grid,
-        thresholds_record,
-    )
+    from vftcli.outputs.thresholds import thresholds_record, thresholds_text
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
     from vftcli.repetition.free_run import Models
@@ -100,13 +92,7 @@ def contact_thresholds(
         say_recording(run.recording)
     for remark in (*remarks, *(checked.remarks if checked else ())):
         say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
-    typer.echo(terminal(thresholds_grid(thresholds)))
-    if counted:
-        typer.echo(terminal(left_out_grid(counted)))
-    if checked:
-        typer.echo(terminal(check_grid(checked)) + check_line(checked) + "\n")
-    for name, text in calls(thresholds).items():
-        typer.echo(f"{name}:\n{text}")
+    typer.echo(thresholds_text(thresholds, counted, checked), nl=False)
 
 
 def modelled(recording: "Recording", choice: "AnalysisChoice", models: "Models") -> "ModelledRun":

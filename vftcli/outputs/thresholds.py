@@ -6,12 +6,25 @@ from typing import Any, NamedTuple
 
 from vftcli.contacts.caught import CheckedContact, ContactCheck
 from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
-from vftcli.outputs.grid import DASH, Column, Grid, joint_columns, significant
+from vftcli.outputs.grid import DASH, Column, Grid, joint_columns, significant, terminal
 from vftcli.robots.writing import lines_of
 from vftcli.signals.wrench import AXES, unit_of
 
 SHARES = 100
 """A threshold in a call is a multiple of a hundredth: no robot tells less of a newton-metre."""
+
+
+def thresholds_text(
+    thresholds: Thresholds, counted: Sequence[CountedAlarms], check: ContactCheck | None
+) -> str:
+    """All of it for the terminal: the tables, and the calls by the names of their interfaces."""
+    parts = [terminal(thresholds_grid(thresholds))]
+    if counted:
+        parts.append(terminal(left_out_grid(counted)))
+    if check is not None:
+        parts.append(f"{terminal(check_grid(check))}{check_line(check)}\n")
+    parts += [f"{name}:\n{text}" for name, text in calls(thresholds).items()]
+    return "\n".join(parts)
 
 
 def thresholds_grid(thresholds: Thresholds) -> Grid:
