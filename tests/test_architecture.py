@@ -38,7 +38,7 @@ ORDER = (
 )
 """Rooms, lowest floor first: a room knows those before it."""
 
-APART = {"refinement", "evaluation", "identification", "simulation", "doctor"}
+APART = {"refinement", "evaluation", "identification", "simulation", "doctor", "contacts"}
 """Rooms that do not know each other."""
 
 KNOWN = {("evaluation", "refinement")}

@@ -20,6 +20,7 @@ READING = {
     "admit": (),
     "identify": ("-o", "robot.toml", "--find-payload"),
     "inspect": (),
+    "thresholds": (),
     "convert": ("-o", "log.parquet"),
 }
 """Command that reads a log → what else it has to be given."""

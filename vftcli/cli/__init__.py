@@ -68,6 +68,10 @@ COMMANDS = {
         "tune:tune_gains",
         "Find gains on a log for a stated goal, and write them to a file for --gains.",
     ),
+    "thresholds": ListedCommand(
+        "thresholds:contact_thresholds",
+        "Learn from free motion the thresholds that a robot is given, at a rate of false alarms.",
+    ),
     "simulate": ListedCommand(
         "simulate:simulate_log",
         "Simulate an experiment: the log, PATH.truth.parquet and PATH.scenario.toml.",

@@ -232,8 +232,8 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
         return super().choice() if self.asks else None
 
 
-class ReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
-    """What the estimates are compared with."""
+class NamedReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
+    """What is taken for true."""
 
     HOME = "evaluation.reference_choice:ReferenceChoice"
 
@@ -243,14 +243,19 @@ class ReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
         "SPEC",
         "Columns of a reference file, as --columns: 't,tau_ext:6'.",
     )
-    contacts: bool = flag(
-        "--contacts",
-        "Also detection delay, false alarms per hour and missed contacts against the reference.",
-    )
 
     def choice(self) -> "ReferenceChoice | None":
         """The choice that the options state, None where no reference is named."""
         return super().choice() if self.reference is not None else None
+
+
+class ReferenceOptions(NamedReferenceOptions):
+    """What the estimates are compared with."""
+
+    contacts: bool = flag(
+        "--contacts",
+        "Also detection delay, false alarms per hour and missed contacts against the reference.",
+    )
 
 
 class RequiredReferenceOptions(ReferenceOptions):

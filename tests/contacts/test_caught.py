@@ -1,0 +1,125 @@
+"""What thresholds would have caught, on steps whose times and sizes are known."""
+
+import numpy as np
+import pytest
+
+from vftcli.contacts.caught import check_contacts
+from vftcli.contacts.compared_signals import ComparedSignals
+from vftcli.contacts.thresholds import SignalThreshold, Thresholds
+from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.recording import Recording, Source
+from vftcli.signals.wrench import Wrench
+
+T = np.arange(0.0, 20.0, 0.01)
+PUSHES = ((5.0, 6.0, 40.0), (9.0, 10.0, 10.0), (14.0, 15.0, 25.0))
+"""From and to [s], force along z [N]; J2 takes it with a lever of .5 m."""
+LAG = 0.1
+"""Of the estimate behind the truth. [s]"""
+
+
+def one(value: float) -> SignalThreshold:
+    return SignalThreshold(value, (value, value), 1.0, "free", None)
+
+
+def limits(torque: float, force: float) -> Thresholds:
+    return Thresholds(
+        rate=1.0,
+        joints=(one(torque),) * 6,
+        axes=(one(force),) * 6,
+        force=(one(force),),
+        of_vendor=True,
+        logged_wrench=True,
+    )
+
+
+def steps(delay: float) -> Array:
+    """The force along z. (T,) [N]"""
+    inside = [(f, (t0 + delay <= T) & (t1 + delay >= T)) for t0, t1, f in PUSHES]
+    return np.sum([force * there for force, there in inside], axis=0)
+
+
+def estimated(extra: Array | float = 0.0) -> ComparedSignals:
+    torque, wrench = np.zeros((len(T), 6)), np.zeros((len(T), 6))
+    torque[:, 1] = 0.5 * steps(LAG)
+    torque[:, 0] += extra
+    wrench[:, 2] = steps(LAG)
+    return ComparedSignals(
+        recording=Recording(t=T, q=torque, source=Source(label="pushes")),
+        torque=torque,
+        wrench=wrench,
+        of_vendor=True,
+        logged_wrench=True,
+        frame="base axes",
+    )
+
+
+def truth() -> tuple[ExternalTorque, Wrench]:
+    torque, wrench = np.zeros((len(T), 6)), np.zeros((len(T), 6))
+    torque[:, 1], wrench[:, 2] = 0.5 * steps(0.0), steps(0.0)
+    return (
+        ExternalTorque(name="file:truth", t=T, tau=torque),
+        Wrench(name="truth", t=T, values=wrench, frame="base"),
+    )
+
+
+def test_every_contact_is_caught_or_missed_with_its_delay_and_force() -> None:
+    """J2 at 10 N·m tells 20 and 12.5 N·m and not 5; each begins a lag of .1 s after the truth."""
+    check = check_contacts(estimated(), limits(10.0, 1e3), *truth())
+    assert [c.by for c in check.contacts] == ["J2", "", "J2"]
+    # Half a sample for the rounding of edges.
+    assert [c.delay for c in check.caught] == pytest.approx([LAG, LAG], abs=0.006)
+    assert (check.smallest_caught, check.largest_missed) == (25.0, 10.0)
+    assert check.median_delay == pytest.approx(LAG, abs=0.006)
+    assert check.longest_delay == pytest.approx(LAG, abs=0.006)
+    assert check.false_alarms == 0
+    # 18 s after the settling, 3 of them touched, each a sample longer or shorter.
+    assert 3600.0 * check.untouched_h == pytest.approx(15.0, abs=0.07)
+    assert check.reference == "file:truth"
+
+
+def test_an_axis_tells_what_no_joint_does() -> None:
+    check = check_contacts(estimated(), limits(1e3, 20.0), *truth())
+    assert [c.by for c in check.contacts] == ["fz", "", "fz"]
+
+
+def test_an_alarm_where_nothing_touches_is_false() -> None:
+    spike = np.where(np.abs(T - 12.0) < 0.05, 99.0, 0.0)
+    check = check_contacts(estimated(spike), limits(10.0, 1e3), *truth())
+    assert check.false_alarms == 1
+    assert [c.by for c in check.contacts] == ["J2", "", "J2"]
+
+
+def test_without_a_wrench_the_force_is_not_known() -> None:
+    torque, _ = truth()
+    check = check_contacts(estimated(), limits(10.0, 1e3), torque, None)
+    assert np.isnan(check.smallest_caught)
+    assert len(check.caught) == 2
+
+
+def test_without_a_truth_the_alarms_are_listed_with_what_is_estimated() -> None:
+    check = check_contacts(estimated(), limits(10.0, 1e3), None, None)
+    assert [round(c.start, 6) for c in check.contacts] == [5.1, 14.1]
+    assert [c.peak_force for c in check.contacts] == [40.0, 25.0]
+    assert (check.reference, check.false_alarms) == (None, None)
+    assert np.isnan(check.median_delay)
+    assert check.smallest_caught == 25.0
+    assert [remark.code for remark in check.remarks] == ["check-without-truth"]
+
+
+def test_nothing_caught_and_nothing_there() -> None:
+    check = check_contacts(estimated(), limits(1e3, 1e3), *truth())
+    assert check.caught == ()
+    assert np.isnan(check.median_delay)
+    assert np.isnan(check.longest_delay)
+    assert check.largest_missed == 40.0
+
+
+def test_an_alarm_that_stays_on_catches_nothing_new() -> None:
+    """J1 stays at 99 N·m from the first push on, as a joint at rest keeps its stiction."""
+    stays = np.where(T >= 5.2, 99.0, 0.0)
+    check = check_contacts(estimated(stays), limits(1e2, 1e3), *truth())
+    assert check.caught == ()
+    check = check_contacts(estimated(stays), limits(98.0, 1e3), *truth())
+    assert [(c.by, c.was_on) for c in check.contacts] == [("J1", False), ("", True), ("", True)]
+    assert np.isnan(check.largest_missed)

@@ -1,0 +1,172 @@
+"""Thresholds of noise whose tail is known: rates, the worst day, what is too short, counts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vftcli.contacts.compared_signals import ComparedSignals
+from vftcli.contacts.thresholds import (
+    Thresholds,
+    counted_alarms,
+    find_thresholds,
+    left_out,
+    worst_of,
+)
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.recording import Recording, Source
+
+RATE = 10.0
+"""Samples a second. [Hz]"""
+
+
+def free_log(
+    name: str, seconds: float, scale: float = 1.0, *, seed: int = 0, joints: int = 6, axes: int = 6
+) -> ComparedSignals:
+    """Joints and axes of exponential noise whose mean is `scale`. [N·m, N]"""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(seconds * RATE)) / RATE
+    torque = rng.exponential(scale, (len(t), joints)) * rng.choice([-1.0, 1.0], (len(t), joints))
+    return compared(name, t, torque, rng.exponential(scale, (len(t), axes)))
+
+
+def compared(name: str, t: Array, torque: Array, wrench: Array) -> ComparedSignals:
+    """Signals as a robot of its own estimate has them."""
+    recording = Recording(t=t, q=np.zeros(torque.shape), source=Source(label=name))
+    return ComparedSignals(
+        recording=recording,
+        torque=torque,
+        wrench=wrench,
+        of_vendor=True,
+        logged_wrench=True,
+        frame="base axes" if wrench.shape[1] else "",
+    )
+
+
+def codes(thresholds: Thresholds) -> list[str]:
+    return [remark.code for remark in thresholds.remarks]
+
+
+def test_every_signal_of_a_set_has_its_share_of_the_rate() -> None:
+    """An hour of exponential noise of 2 N·m: of rate 6, one an hour a joint, 2 ln 36 000 = 21.0.
+
+    k = 60 of them know the distance from λ = 60 an hour, 2 ln 60, to 13 %; 3 sd are allowed.
+    """
+    found = find_thresholds([free_log("a", 3602.0, 2.0)], 6.0)
+    exact, allowed = 2.0 * np.log(3600.0 * RATE), 3.0 / np.sqrt(60.0) * 2.0 * np.log(60.0)
+    for one in (*found.joints, *found.axes):
+        assert one.rate == 1.0
+        assert abs(one.value - exact) < allowed
+        assert one.interval[0] < one.value < one.interval[1]
+    (force,) = found.force
+    assert force.rate == 6.0
+
+
+@pytest.mark.statistical
+def test_an_unseen_half_passes_the_thresholds_at_the_stated_rate() -> None:
+    """30 pairs of hours at 12 per hour: 360 are due; events nearer than .5 s hardly take any.
+
+    Each count scatters by √12, each threshold by e-folds of ln(30)/√60 beside it: 360 ± 30 %.
+    """
+    counted = sum(
+        counted_alarms(
+            free_log("b", 3602.0, seed=1000 + seed),
+            find_thresholds([free_log("a", 3602.0, seed=seed)], 12.0),
+        ).any_joint
+        for seed in range(30)
+    )
+    assert 250 <= counted <= 470
+
+
+def test_the_worst_day_counts_and_not_the_mean() -> None:
+    calm, rough = free_log("calm", 600.0, 1.0), free_log("rough", 600.0, 3.0, seed=1)
+    alone = find_thresholds([rough], 1.0)
+    both = find_thresholds([calm, rough], 1.0)
+    assert [one.value for one in both.joints] == [one.value for one in alone.joints]
+    assert {one.log for one in both.joints} == {"rough"}
+
+
+def test_a_short_log_beside_a_long_one_counts_by_its_largest_reading() -> None:
+    long, short = free_log("long", 600.0), free_log("short", 12.0, 40.0, seed=1)
+    found = find_thresholds([long, short], 1.0)
+    settled = short.t >= 2.0
+    largest = np.abs(short.torque[settled]).max(axis=0)
+    assert [one.value for one in found.joints] == pytest.approx(largest.tolist(), rel=1e-12)
+    assert found.joints[0].tail is None
+    assert "free-log-too-short" in codes(found)
+
+
+def test_short_logs_alone_tell_a_guess_and_say_so() -> None:
+    found = find_thresholds([free_log("a", 12.0), free_log("b", 12.0, seed=1)], 60.0)
+    assert "tail-of-few" in codes(found)
+    assert all(one.tail is not None and one.tail.count == 2 for one in found.joints)
+
+
+@pytest.mark.parametrize(("seconds", "said"), [(3602.0, True), (3 * 3600.0 + 2.1, False)])
+def test_a_log_shorter_than_three_false_alarms_extrapolates(seconds: float, said: bool) -> None:
+    found = find_thresholds([free_log("a", seconds, joints=1, axes=0)], 1.0)
+    assert ("thresholds-extrapolated" in codes(found)) is said
+
+
+def test_an_arm_of_few_joints_has_no_axes() -> None:
+    found = find_thresholds([free_log("a", 600.0, joints=4, axes=0)], 1.0)
+    assert (len(found.joints), found.axes, found.force) == (4, (), ())
+
+
+def test_a_wrench_that_is_hardly_known_gives_no_axes_and_is_said() -> None:
+    log = free_log("a", 600.0)
+    wrench = np.where(log.t[:, None] < 5.0, log.wrench, np.nan)
+    found = find_thresholds([compared("a", log.t, log.torque, wrench)], 1.0)
+    assert (found.axes, found.force) == ((), ())
+    assert {"axes-untold", "wrench-seldom-known"} <= set(codes(found))
+
+
+def test_every_log_is_counted_at_the_thresholds_of_the_others() -> None:
+    calm, rough = free_log("calm", 600.0), free_log("rough", 600.0, 3.0, seed=1)
+    of_calm, of_rough = left_out([calm, rough], 60.0)
+    assert (of_calm.log, of_calm.any_joint) == ("calm", 0)
+    limits = find_thresholds([calm], 60.0)
+    assert of_rough == counted_alarms(rough, limits)
+    assert of_rough.due == pytest.approx(60.0 * 597.9 / 3600.0, rel=1e-9)
+    # Three times the noise passes nearly all the time, some joint or other.
+    assert of_rough.any_joint > of_rough.due
+    assert max(of_rough.joints) <= of_rough.any_joint + sum(of_rough.joints)
+
+
+def test_one_log_alone_is_left_out_of_nothing() -> None:
+    assert left_out([free_log("a", 600.0)], 1.0) == ()
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_rate_that_is_no_rate_is_refused(rate: float) -> None:
+    with pytest.raises(ParameterError, match="--rate"):
+        find_thresholds([free_log("a", 600.0)], rate)
+
+
+def test_a_log_of_some_seconds_is_refused_with_what_is_needed() -> None:
+    with pytest.raises(ParameterError, match="at least 27 s"):
+        find_thresholds([free_log("a", 6.0)], 1.0)
+
+
+def test_logs_of_different_arms_or_estimates_are_refused() -> None:
+    log = free_log("a", 600.0)
+    with pytest.raises(ParameterError, match="logs of one arm"):
+        find_thresholds([log, free_log("b", 600.0, joints=7)], 1.0)
+    with pytest.raises(ParameterError, match="recorded alike"):
+        find_thresholds([log, replace(log, of_vendor=False)], 1.0)
+
+
+def test_a_joint_that_never_moved_alarms_at_whatever_it_reads() -> None:
+    log = free_log("a", 600.0)
+    still = compared("a", log.t, np.zeros(log.torque.shape), log.wrench)
+    found = find_thresholds([still], 1.0)
+    assert found.joints[0].value == 0.0
+    assert np.all(found.level("joints", still) == 0.0)
+    assert np.all(found.level("joints", log) > 1.0)
+
+
+def test_the_worst_of_nothing_is_not_known() -> None:
+    level = np.array([[1.0, np.nan], [np.nan, np.nan]])
+    np.testing.assert_array_equal(worst_of(level), [1.0, np.nan])
+    assert np.isnan(worst_of(np.zeros((2, 0)))).all()

@@ -1,0 +1,166 @@
+"""Thresholds as the robots' own calls and as tables; the numbers are made up, their places not."""
+
+import ast
+import json
+import re
+import tomllib
+
+import numpy as np
+import pytest
+
+from vftcli.contacts.caught import CheckedContact, ContactCheck
+from vftcli.contacts.tail import tail_of
+from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
+from vftcli.outputs.grid import terminal
+from vftcli.outputs.log.run_record import jsonable
+from vftcli.outputs.thresholds import (
+    calls,
+    check_grid,
+    check_line,
+    left_out_grid,
+    thresholds_grid,
+    thresholds_record,
+)
+
+NAN = float("nan")
+
+
+def made(joints: int = 7, *, own: bool = True, axes: int = 6) -> Thresholds:
+    """Joint j at j + .001 N·m with its upper end 1 beyond; axes likewise from 10 on."""
+    tail = tail_of(np.arange(900.0))
+
+    def one(value: float) -> SignalThreshold:
+        return SignalThreshold(value + 0.001, (value - 1, value + 1), 0.1, "free.csv", tail)
+
+    return Thresholds(
+        rate=1.0,
+        joints=tuple(one(j) for j in range(1, joints + 1)),
+        axes=tuple(one(10.0 + k) for k in range(axes)),
+        force=(one(30.0),) if axes else (),
+        of_vendor=own,
+        logged_wrench=own,
+    )
+
+
+def test_libfranka_is_told_contacts_at_the_threshold_and_collisions_at_its_upper_end() -> None:
+    text = calls(made())["libfranka"]
+    call = ast.parse(text).body[0]
+    assert isinstance(call, ast.Expr)
+    assert isinstance(call.value, ast.Call)
+    lists = [ast.literal_eval(argument) for argument in call.value.args]
+    # Rounded up to hundredths.
+    assert lists == [
+        [1.01, 2.01, 3.01, 4.01, 5.01, 6.01, 7.01],
+        [2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0],
+        [10.01, 11.01, 12.01, 13.01, 14.01, 15.01],
+        [11.0, 12.0, 13.0, 14.0, 15.0, 16.0],
+    ]
+
+
+def test_franka_ros_is_told_the_same_in_both_phases() -> None:
+    head, *lines = calls(made())["franka_ros"].splitlines()
+    assert head == "collision_config:"
+    found = {key.strip(): ast.literal_eval(value.strip()) for key, value in
+             (line.split(":") for line in lines)}  # fmt: skip
+    assert set(found) == {
+        f"{side}_{quantity}_thresholds_{phase}"
+        for side in ("lower", "upper")
+        for quantity in ("torque", "force")
+        for phase in ("acceleration", "nominal")
+    }
+    assert found["upper_force_thresholds_nominal"] == [11.0, 12.0, 13.0, 14.0, 15.0, 16.0]
+    assert len(found["lower_torque_thresholds_acceleration"]) == 7
+
+
+def test_a_ur_is_told_the_size_of_the_force() -> None:
+    text = calls(made(6))["ur_script"]
+    assert re.search(r"if force\(\) > 30\.01:", text)
+    assert text.count("end\n") == 3
+    assert "#" not in text.splitlines()[0]
+
+
+def test_an_interface_of_other_joints_is_left_out() -> None:
+    assert set(calls(made(7))) == {"libfranka", "franka_ros", "toml"}
+    assert set(calls(made(6))) == {"ur_script", "toml"}
+    assert set(calls(made(7, axes=0))) == {"toml"}
+    assert set(calls(made(4, axes=0))) == {"toml"}
+
+
+def test_a_call_says_that_the_robot_compares_something_else() -> None:
+    assert "tau_ext" in calls(made(7, own=False))["libfranka"].splitlines()[0]
+    assert "tau_ext" in calls(made(7, own=False))["franka_ros"].splitlines()[0]
+    assert "actual_TCP_force" in calls(made(6, own=False))["ur_script"].splitlines()[0]
+
+
+def test_the_toml_reads_back() -> None:
+    found = tomllib.loads(calls(made(6))["toml"])["thresholds"]
+    assert found["joint_torque_Nm"] == [1.01, 2.01, 3.01, 4.01, 5.01, 6.01]
+    assert (found["force_N"], found["moment_upper_Nm"]) == (
+        [10.01, 11.01, 12.01],
+        [14.0, 15.0, 16.0],
+    )
+    assert (found["rate_per_h"], found["force_size_N"]) == (1.0, 30.01)
+
+
+def check(reference: str | None = "sensor") -> ContactCheck:
+    return ContactCheck(
+        log="pushed.csv",
+        reference=reference,
+        contacts=(
+            CheckedContact(1.0, 2.0, 40.0, 0.05, "J2"),
+            CheckedContact(4.0, 5.0, 12.0, NAN, ""),
+            CheckedContact(7.0, 8.0, 20.0, 0.15, "fz"),
+        ),
+        false_alarms=2 if reference else None,
+        untouched_h=0.5 if reference else NAN,
+        remarks=(),
+    )
+
+
+def test_the_record_has_the_keys_of_the_contract_and_is_strict_json() -> None:
+    counted = (CountedAlarms("a.csv", 0.5, 0.5, (0,) * 7, 0, 1),)
+    text = json.dumps(jsonable(thresholds_record(made(), counted, check())), allow_nan=False)
+    record = json.loads(text)
+    assert {"rate_per_h", "joints", "axes", "calls"} <= set(record)
+    assert {"joint", "threshold_Nm", "interval_Nm"} <= set(record["joints"][0])
+    assert [row["joint"] for row in record["joints"]] == [1, 2, 3, 4, 5, 6, 7]
+    assert {"axis", "threshold_N", "interval_N"} <= set(record["axes"][0])
+    assert {"axis", "threshold_Nm", "interval_Nm"} <= set(record["axes"][5])
+    assert [row["axis"] for row in record["axes"]] == ["fx", "fy", "fz", "mx", "my", "mz"]
+    assert record["force"]["threshold_N"] == pytest.approx(30.001)
+    # k = 30 of 900 readings of a second: 120 an hour, a quarter of one.
+    assert (record["joints"][0]["tail_maxima"], record["joints"][0]["hours"]) == (30, 0.25)
+    assert (record["check"]["caught"], record["check"]["smallest_caught_N"]) == (2, 20.0)
+    assert record["check"]["contacts"][1]["delay_s"] is None
+    assert record["left_out"][0]["any_axis"] == 1
+
+
+def test_what_has_no_tail_has_no_upper_end_either() -> None:
+    short = SignalThreshold(5.0, (5.0, NAN), 1.0, "short.csv", None)
+    one = Thresholds(
+        rate=1.0, joints=(short,), axes=(), force=(), of_vendor=True, logged_wrench=False
+    )
+    record = json.loads(json.dumps(jsonable(thresholds_record(one, (), None)), allow_nan=False))
+    assert record["joints"][0]["interval_Nm"] == [5.0, None]
+    assert tomllib.loads(record["calls"]["toml"])["thresholds"]["joint_torque_upper_Nm"] == [5.0]
+    assert "short.csv" in terminal(thresholds_grid(one))
+
+
+def test_the_tables_name_every_signal_and_log() -> None:
+    table = terminal(thresholds_grid(made(6)))
+    lines = table.splitlines()[2:]
+    assert [line.split()[0] for line in lines] == [
+        "J1", "J2", "J3", "J4", "J5", "J6", "fx", "fy", "fz", "mx", "my", "mz", "|F|",
+    ]  # fmt: skip
+    assert "a.csv" in terminal(left_out_grid((CountedAlarms("a.csv", 0.5, 0.5, (0,) * 6, 3, 1),)))
+    assert "missed" in terminal(check_grid(check()))
+
+
+def test_the_line_on_a_check_counts_and_sizes() -> None:
+    line = check_line(check())
+    assert "2 of 3 contacts caught" in line
+    assert "100 ms after they begin (median), at most 150 ms" in line
+    assert "weakest caught 20.0 N" in line
+    assert "hardest missed 12.0 N" in line
+    assert "2 false in 0.500 h" in line
+    assert check_line(check(None)) == "pushed.csv: 3 alarms, the weakest at 20.0 N"

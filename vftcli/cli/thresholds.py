@@ -1,0 +1,156 @@
+"""`vftcli thresholds`: from motion nobody touched to the thresholds that a robot is given."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vftcli.cli import options as opt
+from vftcli.cli.bundles import taken_apart
+
+if TYPE_CHECKING:
+    from vftcli.evaluation.reference_choice import ReferenceChoice
+    from vftcli.pipeline import AnalysisChoice
+    from vftcli.repetition.free_run import ModelledRun, Models
+    from vftcli.signals.external_torque import ExternalTorque
+    from vftcli.signals.recording import Recording
+    from vftcli.signals.remarks import Remark
+    from vftcli.signals.wrench import Wrench
+
+
+@taken_apart
+def contact_thresholds(
+    logs: opt.Logs,
+    reading: opt.ReadOptions,
+    robot: opt.RobotOptions,
+    reference: opt.NamedReferenceOptions,
+    check: Annotated[
+        Path | None,
+        typer.Option(
+            "--check",
+            metavar="LOG",
+            help="A log with contacts: which of them they would have caught, how late, how hard. "
+            "Where they are says --reference, else the truth beside a simulated log, else its "
+            "sensor; else the alarms are listed.",
+        ),
+    ] = None,
+    anyway: opt.Anyway = False,
+    rate: Annotated[
+        float,
+        typer.Option(
+            "--rate", metavar="PER_HOUR", help="False alarms per hour of all joints, or axes."
+        ),
+    ] = 1.0,
+    json: opt.Json = False,
+) -> None:
+    """Learn from free motion the thresholds that a robot is given, at a rate of false alarms.
+
+    The logs are motion that nobody touches, the longer the better; of several days the worst
+    counts. Printed as libfranka's call, franka_ros parameters, URScript and TOML.
+
+    Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
+    """
+    from vftcli.cli.console import health_of, say, say_json, say_recording
+    from vftcli.contacts.caught import check_contacts
+    from vftcli.contacts.compared_signals import check_alike, compared_signals
+    from vftcli.contacts.thresholds import find_thresholds, left_out
+    from vftcli.outputs.examination import health_record
+    from vftcli.outputs.thresholds import thresholds_record, thresholds_text
+    from vftcli.pipeline import AnalysisChoice
+    from vftcli.readers.library import Library
+    from vftcli.repetition.free_run import Models
+    from vftcli.signals.errors import ParameterError
+
+    asked = reference.choice()
+    if asked is not None and check is None:
+        raise ParameterError("--reference says where a log was touched: name that with --check LOG")
+    library = Library([*logs, *([check] if check else [])])
+    choice = AnalysisChoice(
+        read=reading.choice(),
+        robot=robot.choice(),
+        library=library,
+        examiner=health_of(library, anyway=anyway),
+    )
+    models = Models()
+    free = [modelled(log, choice, models) for log in library.open_logs(logs, choice.read)]
+    signals = [compared_signals(run) for run in free]
+    thresholds = find_thresholds(signals, rate)
+    counted = left_out(signals, rate)
+    checked = None
+    if check is not None:
+        pushed = modelled(library.open(check, choice.read.whole), choice, models)
+        check_alike((signals[0], compared := compared_signals(pushed)))
+        truth = truth_of(pushed, asked or settled_reference(pushed.recording))
+        checked = check_contacts(compared, thresholds, *truth)
+    remarks = (*thresholds.remarks, *(r for run in free for r in touched(run)))
+    if json:
+        record = thresholds_record(thresholds, counted, checked)
+        record |= {"logs": [run.recording.name for run in free], "remarks": list(remarks)}
+        say_json({**record, "examination": health_record(choice.examiner.examinations)})
+        return
+    for run in free:
+        say_recording(run.recording)
+    for remark in (*remarks, *(checked.remarks if checked else ())):
+        say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
+    typer.echo(thresholds_text(thresholds, counted, checked), nl=False)
+
+
+def modelled(recording: "Recording", choice: "AnalysisChoice", models: "Models") -> "ModelledRun":
+    """A log with its robot, examined.
+
+    Raises:
+        ExaminationError: If a finding makes every result meaningless.
+    """
+    from vftcli.pipeline import prepared
+
+    run = models.of(*prepared(recording, choice))
+    choice.examiner.examine(run.recording, run.robot)
+    return run
+
+
+def touched(run: "ModelledRun") -> tuple["Remark", ...]:
+    """A remark where a log that is to be free shows contact."""
+    from vftcli.contacts.tail import SETTLING
+    from vftcli.evaluation.touches import touches
+    from vftcli.signals.recording import EFFORTS
+    from vftcli.signals.remarks import Where, caution
+
+    known = touches(run) if set(EFFORTS) & set(run.recording.signals) else ()
+    found = [touch for touch in known if touch.stop > run.recording.t[0] + SETTLING]
+    if not found:
+        return ()
+    worst = max(found, key=lambda touch: touch.torque)
+    where = Where(run.recording.name, (worst.joint + 1,), (worst.start, worst.stop))
+    sizes = {"torque_Nm": worst.torque, "quiet_Nm": worst.quiet}
+    return (caution("free-log-touched", where, count=len(found), **sizes),)
+
+
+def truth_of(
+    run: "ModelledRun", asked: "ReferenceChoice | None"
+) -> "tuple[ExternalTorque | None, Wrench | None]":
+    """The torque and the wrench that are taken for true along a log, None where nothing says.
+
+    Raises:
+        ReferenceTorqueError: If the reference cannot be made.
+    """
+    from vftcli.evaluation.reference_choice import ReferenceSource, make_reference
+    from vftcli.repetition.free_motion import FreeMotion
+
+    if asked is None:
+        return None, None
+    made = make_reference(ReferenceSource(motion=FreeMotion(log=run)), asked)
+    return made.torque, made.wrench
+
+
+def settled_reference(recording: "Recording") -> "ReferenceChoice | None":
+    """What says where a log is touched without being named: its truth beside it, or its sensor."""
+    from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
+
+    truth = Path(f"{recording.source.path}.truth.parquet")
+    if truth.exists():
+        return ReferenceChoice(name=f"{FILE}{truth}")
+    frame, wrench = recording.wrench_frame, recording.wrench
+    # What states no frame is taken for a sensor's everywhere.
+    of_sensor = frame is None or frame.axes == "sensor"
+    measured = of_sensor and wrench is not None and bool(wrench.any())
+    return ReferenceChoice(name="sensor") if measured else None

@@ -1,0 +1,248 @@
+"""Thresholds from motion that nobody touched, at a stated rate of false alarms."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.contacts.compared_signals import ComparedSignals, check_alike
+from vftcli.contacts.tail import BLOCK, ENOUGH, SETTLING, Tail, block_maxima, events, tail_of
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.remarks import Remark, Where, caution, fact
+
+DUE = 3.0
+"""A log that holds this many false alarms, at their rate, shows it; a shorter one extrapolates."""
+LEAST = 1e-9
+"""What stands for a threshold of zero, so that a level can be told. [N·m, N]"""
+LONG_ENOUGH = SETTLING + 5 * ENOUGH * BLOCK
+"""A log of this length has enough readings to tell its own tail. [s]"""
+SELDOM = 0.5
+"""A wrench that is known in less than this share of the samples is said to be."""
+
+Select = Callable[[ComparedSignals], Array]
+"""A set of signals that share a rate. (T, k)"""
+
+SETS: dict[str, Select] = {
+    "joints": lambda signals: signals.torque,
+    "axes": lambda signals: signals.wrench,
+    "force": lambda signals: signals.force,
+}
+"""Name of a set → its signals: false alarms are counted over all signals of a set."""
+
+
+class SignalThreshold(NamedTuple):
+    """The threshold of one joint, axis or of the force's size.
+
+    Attributes:
+        value: The threshold. [N·m, N]
+        interval: 95 % of it.
+        rate: The false alarms that are this signal's share. [1/h]
+        log: The free log that it comes from: the one that needs the highest.
+        tail: That log's tail; None where the log is too short for one, and its largest reading
+            stands higher than what the others' tails say.
+    """
+
+    value: float
+    interval: tuple[float, float]
+    rate: float
+    log: str
+    tail: Tail | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thresholds:
+    """Thresholds of an arm.
+
+    Attributes:
+        rate: False alarms of a whole set, as of any joint. [1/h]
+        joints: One a joint. [N·m]
+        axes: One an axis of the wrench, none for an arm of fewer than six joints. [N, N·m]
+        force: That of the force's size, or none; its rate is `rate` itself. [N]
+        of_vendor: Whether the joints' are of the robot's own estimate.
+        logged_wrench: Whether those of axes and force are of the robot's own wrench.
+        remarks: What a reader of the numbers should know.
+    """
+
+    rate: float
+    joints: tuple[SignalThreshold, ...]
+    axes: tuple[SignalThreshold, ...]
+    force: tuple[SignalThreshold, ...]
+    of_vendor: bool
+    logged_wrench: bool
+    remarks: tuple[Remark, ...] = ()
+
+    def level(self, name: str, signals: ComparedSignals) -> Array:
+        """A set's signals in multiples of their thresholds, no column without thresholds. (T, k)
+
+        Args:
+            name: A key of `SETS`.
+            signals: A log.
+        """
+        limits = np.array([one.value for one in getattr(self, name)])
+        if not len(limits):
+            return np.zeros((len(signals.t), 0))
+        # A signal that never moved has the threshold zero: whatever it reads then is an alarm.
+        share: Array = np.abs(SETS[name](signals)) / np.maximum(limits, LEAST)
+        return share
+
+
+def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
+    """Thresholds that motion like that of some logs passes at a rate.
+
+    Every signal of a set of n gets rate/n. Several logs are not mixed: every threshold is that of
+    the log which needs the highest, so that the worst day has the rate and the others fewer. A log
+    too short for a tail counts by its largest reading alone, where another is long enough.
+
+    Args:
+        free: Logs of one arm that nobody touched.
+        rate: False alarms of all joints together; of all axes likewise. [1/h]
+
+    Raises:
+        ParameterError: If the rate is no positive number, the logs are of different kinds, or all
+            are too short.
+    """
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise ParameterError(f"--rate {rate:g} is not a positive number of false alarms per hour")
+    check_alike(free)
+    found = {name: thresholds_of_set(free, select, rate) for name, select in SETS.items()}
+    if not found["joints"]:
+        longest = max(signals.recording.duration for signals in free)
+        raise ParameterError(
+            f"the longest free log has {longest:.3g} s: too few to tell how often a level is "
+            f"passed; record at least {LONG_ENOUGH:g} s, better an hour"
+        )
+    untold = (caution("axes-untold"),) if free[0].wrench.shape[1] and not found["axes"] else ()
+    remarks = (*remarks_on(free, len(found["joints"]), rate), *untold)
+    return Thresholds(
+        rate=rate,
+        joints=found["joints"],
+        axes=found["axes"],
+        force=found["force"],
+        of_vendor=free[0].of_vendor,
+        logged_wrench=free[0].logged_wrench,
+        remarks=remarks,
+    )
+
+
+def thresholds_of_set(
+    free: Sequence[ComparedSignals], select: Select, rate: float
+) -> tuple[SignalThreshold, ...]:
+    """The threshold of every signal of a set, none if no log tells one; see `find_thresholds`."""
+    maxima = [
+        [block_maxima(signals.t, size) for size in np.abs(select(signals)).T] for signals in free
+    ]
+    count = len(maxima[0])
+    names = [signals.recording.name for signals in free]
+    found = []
+    for k in range(count):
+        each = {name: own[k] for name, own in zip(names, maxima, strict=True) if len(own[k])}
+        tails = {name: tail for name, own in each.items() if (tail := tail_of(own)) is not None}
+        if not tails:
+            return ()
+        # Of few readings a tail is a guess, and a guess may not outdo what others know.
+        sure = {name: tail for name, tail in tails.items() if tail.count >= ENOUGH} or tails
+        levels = {name: tail.threshold(rate / count) for name, tail in sure.items()}
+        told = [
+            SignalThreshold(level.value, level.interval, rate / count, name, sure[name])
+            for name, level in levels.items()
+        ]
+        for name in each.keys() - sure.keys():
+            largest = float(each[name].max())
+            told.append(SignalThreshold(largest, (largest, float("nan")), rate / count, name, None))
+        found.append(max(told, key=lambda one: one.value))
+    return tuple(found)
+
+
+def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> tuple[Remark, ...]:
+    """What the logs can bear: whose estimate it is, how far it is extrapolated, what is missing."""
+    first, own_rate = free[0], rate / joints
+    remarks = [
+        fact("thresholds-of-vendor") if first.of_vendor else caution("thresholds-of-observer")
+    ]
+    if first.frame:
+        code = "thresholds-of-logged-wrench" if first.logged_wrench else "thresholds-of-torques"
+        remarks.append(fact(code, frame=first.frame))
+    # How many readings there are is the same for every joint.
+    tails = [tail_of(block_maxima(signals.t, signals.torque[:, 0])) for signals in free]
+    longest = max((tail for tail in tails if tail is not None), key=lambda tail: tail.hours)
+    if longest.hours < (need := DUE / rate):
+        remarks.append(
+            caution(
+                "thresholds-extrapolated",
+                rate_per_h=rate,
+                need_h=need,
+                hours=longest.hours,
+                maxima=longest.count,
+                tail_rate_per_h=longest.rate,
+                own_rate_per_h=own_rate,
+            )
+        )
+    if longest.count < ENOUGH:
+        remarks.append(caution("tail-of-few", maxima=longest.count, need_s=LONG_ENOUGH))
+    for signals in free:
+        where, duration = Where(signals.recording.name), signals.recording.duration
+        if duration < LONG_ENOUGH and longest.count >= ENOUGH:
+            remarks.append(caution("free-log-too-short", where, duration_s=duration))
+        if signals.frame and (share := known_share(signals)) < SELDOM:
+            remarks.append(caution("wrench-seldom-known", where, share=share))
+    return tuple(remarks)
+
+
+def known_share(signals: ComparedSignals) -> float:
+    """Share of the samples in which the wrench is known."""
+    return float(np.mean(np.isfinite(signals.wrench[:, 0])))
+
+
+class CountedAlarms(NamedTuple):
+    """False alarms of one free log, at thresholds learned without it.
+
+    Attributes:
+        log: The log.
+        hours: Its length without the settling. [h]
+        due: The false alarms of any joint that the rate allows in that time.
+        joints: Those of every joint alone.
+        any_joint: Those of all joints together.
+        any_axis: Those of all axes together.
+    """
+
+    log: str
+    hours: float
+    due: float
+    joints: tuple[int, ...]
+    any_joint: int
+    any_axis: int
+
+
+def counted_alarms(signals: ComparedSignals, thresholds: Thresholds) -> CountedAlarms:
+    """How often a log passes thresholds."""
+    t, joints = signals.t, thresholds.level("joints", signals)
+    hours = max(signals.recording.duration - SETTLING, 0.0) / 3600.0
+    return CountedAlarms(
+        log=signals.recording.name,
+        hours=hours,
+        due=hours * thresholds.rate,
+        joints=tuple(len(events(t, column)) for column in joints.T),
+        any_joint=len(events(t, worst_of(joints))),
+        any_axis=len(events(t, worst_of(thresholds.level("axes", signals)))),
+    )
+
+
+def left_out(free: Sequence[ComparedSignals], rate: float) -> tuple[CountedAlarms, ...]:
+    """Every free log at the thresholds of the others: what a new day would have brought.
+
+    None where there is one log alone, or the others are all too short.
+    """
+    found = []
+    for k, signals in enumerate(free):
+        others = [*free[:k], *free[k + 1 :]]
+        if any(one.recording.duration >= LONG_ENOUGH for one in others):
+            found.append(counted_alarms(signals, find_thresholds(others, rate)))
+    return tuple(found)
+
+
+def worst_of(level: Array) -> Array:
+    """The largest of each sample's levels, NaN where none is known. (T,)"""
+    worst: Array = np.fmax.reduce(level, axis=1, initial=np.nan)
+    return worst

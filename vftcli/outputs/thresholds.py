@@ -1,0 +1,335 @@
+"""Thresholds as tables, as rows for machines, and as the calls of the robots' own interfaces."""
+
+from collections.abc import Callable, Sequence
+from math import ceil, isnan
+from typing import Any, NamedTuple
+
+from vftcli.contacts.caught import CheckedContact, ContactCheck
+from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
+from vftcli.outputs.grid import DASH, Column, Grid, joint_columns, significant, terminal
+from vftcli.robots.writing import lines_of
+from vftcli.signals.wrench import AXES, unit_of
+
+SHARES = 100
+"""A threshold in a call is a multiple of a hundredth: no robot tells less of a newton-metre."""
+
+
+def thresholds_text(
+    thresholds: Thresholds, counted: Sequence[CountedAlarms], check: ContactCheck | None
+) -> str:
+    """All of it for the terminal: the tables, and the calls by the names of their interfaces."""
+    parts = [terminal(thresholds_grid(thresholds))]
+    if counted:
+        parts.append(terminal(left_out_grid(counted)))
+    if check is not None:
+        parts.append(f"{terminal(check_grid(check))}{check_line(check)}\n")
+    parts += [f"{name}:\n{text}" for name, text in calls(thresholds).items()]
+    return "\n".join(parts)
+
+
+def thresholds_grid(thresholds: Thresholds) -> Grid:
+    """Every threshold with its interval, and the tail it comes from."""
+    joints = [f"J{j}" for j in range(1, len(thresholds.joints) + 1)]
+    named = [
+        *((name, "N·m", one) for name, one in zip(joints, thresholds.joints, strict=True)),
+        *((n, unit_of(n), one) for n, one in zip(AXES, thresholds.axes, strict=False)),
+        *(("|F|", "N", one) for one in thresholds.force),
+    ]
+    return Grid(
+        title=f"passed untouched by any joint, or any axis, {thresholds.rate:g} × an hour",
+        columns=(
+            Column("", words=True, width=3),
+            Column("threshold"),
+            Column("", words=True, width=3),
+            Column("95 %"),
+            Column("tail from"),
+            Column("λ", unit="1/h", form=".0f"),
+            Column("k"),
+            Column("log", unit="h"),
+            Column("needed by", words=True),
+        ),
+        rows=tuple((name, one.value, unit, *tail_entries(one)) for name, unit, one in named),
+    )
+
+
+def tail_entries(one: SignalThreshold) -> tuple[str | float, ...]:
+    """Interval and tail of a threshold: 95 %, u, λ, k, hours, the log."""
+    low, high = one.interval
+    span = f"{significant(low)}{DASH}{significant(high)}"
+    if one.tail is None:
+        return span, *(float("nan"),) * 4, one.log
+    tail = one.tail
+    return span, tail.start, tail.rate, str(tail.count), tail.hours, one.log
+
+
+def left_out_grid(counted: Sequence[CountedAlarms]) -> Grid:
+    """False alarms of every free log at the thresholds of the others."""
+    return Grid(
+        title="each log at the thresholds of the others: false alarms",
+        columns=(
+            Column("log", words=True),
+            Column("", unit="h"),
+            Column("due"),
+            Column("any joint"),
+            *joint_columns(len(counted[0].joints)),
+            Column("any axis"),
+        ),
+        rows=tuple(
+            (
+                one.log,
+                one.hours,
+                one.due,
+                str(one.any_joint),
+                *map(str, one.joints),
+                str(one.any_axis),
+            )
+            for one in counted
+        ),
+    )
+
+
+def check_grid(check: ContactCheck) -> Grid:
+    """The contacts of a log, and what told them."""
+    return Grid(
+        title=f"{check.log}: what they would have caught",
+        columns=(
+            Column("#"),
+            Column("from", unit="s", form=".2f"),
+            Column("to", unit="s", form=".2f"),
+            Column("|F|", unit="N"),
+            Column("delay", unit="ms", form=".0f"),
+            Column("by", words=True),
+        ),
+        rows=tuple(
+            (str(k), c.start, c.stop, c.peak_force, 1e3 * c.delay, verdict(c))
+            for k, c in enumerate(check.contacts, start=1)
+        ),
+    )
+
+
+def verdict(contact: CheckedContact) -> str:
+    """What raised the alarm, or why there is none."""
+    return contact.by or ("on already" if contact.was_on else "missed")
+
+
+def check_line(check: ContactCheck) -> str:
+    """A check in a sentence."""
+    if check.reference is None:
+        count = len(check.contacts)
+        least = f", the weakest at {significant(check.smallest_caught)} N" if count else ""
+        return f"{check.log}: {count} alarm{'s' * (count != 1)}{least}"
+    caught, all_of_them = len(check.caught), len(check.contacts)
+    words = [f"{check.log}: {caught} of {all_of_them} contacts caught"]
+    if caught:
+        words.append(f"{1e3 * check.median_delay:.0f} ms after they begin (median)")
+        words.append(f"at most {1e3 * check.longest_delay:.0f} ms")
+    if not isnan(check.smallest_caught):
+        words.append(f"the weakest caught {significant(check.smallest_caught)} N")
+    if not isnan(check.largest_missed):
+        words.append(f"the hardest missed {significant(check.largest_missed)} N")
+    if on := sum(contact.was_on for contact in check.contacts):
+        words.append(f"{on} while an alarm was on already")
+    words.append(f"{check.false_alarms} false in {significant(check.untouched_h)} h untouched")
+    return ", ".join(words)
+
+
+def threshold_rows(
+    thresholds: Sequence[SignalThreshold], key: str, names: Sequence[Any], units: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Rows for machines, the unit in the names.
+
+    Args:
+        thresholds: One a signal.
+        key: What a signal is, as "joint".
+        names: Their names.
+        units: Unit of each, as it stands in a name: N or Nm.
+    """
+    rows = []
+    for name, unit, one in zip(names, units, thresholds, strict=True):
+        tail = one.tail
+        rows.append(
+            {
+                key: name,
+                f"threshold_{unit}": one.value,
+                f"interval_{unit}": list(one.interval),
+                "rate_per_h": one.rate,
+                "log": one.log,
+                f"tail_from_{unit}": tail.start if tail else None,
+                f"tail_excess_{unit}": tail.excess if tail else None,
+                "tail_rate_per_h": tail.rate if tail else None,
+                "tail_maxima": tail.count if tail else None,
+                "hours": tail.hours if tail else None,
+            }
+        )
+    return rows
+
+
+def thresholds_record(
+    thresholds: Thresholds, counted: Sequence[CountedAlarms], check: ContactCheck | None
+) -> dict[str, Any]:
+    """All of it for machines."""
+    joints = range(1, len(thresholds.joints) + 1)
+    axes = AXES[: len(thresholds.axes)]
+    units = [unit_of(axis).replace("·", "") for axis in axes]
+    count = len(thresholds.force)
+    force = threshold_rows(thresholds.force, "axis", ["|F|"] * count, ["N"] * count)
+    return {
+        "rate_per_h": thresholds.rate,
+        "joints": threshold_rows(thresholds.joints, "joint", joints, ["Nm"] * len(joints)),
+        "axes": threshold_rows(thresholds.axes, "axis", axes, units),
+        "force": force[0] if force else None,
+        "calls": calls(thresholds),
+        "left_out": [one._asdict() for one in counted],
+        "check": None if check is None else check_record(check),
+        "remarks": list(thresholds.remarks),
+    }
+
+
+def check_record(check: ContactCheck) -> dict[str, Any]:
+    """A check for machines."""
+    return {
+        "log": check.log,
+        "reference": check.reference,
+        "caught": None if check.reference is None else len(check.caught),
+        "median_delay_s": check.median_delay,
+        "longest_delay_s": check.longest_delay,
+        "smallest_caught_N": check.smallest_caught,
+        "largest_missed_N": check.largest_missed,
+        "false_alarms": check.false_alarms,
+        "untouched_h": check.untouched_h,
+        "contacts": [contact_record(k, c) for k, c in enumerate(check.contacts, start=1)],
+        "remarks": list(check.remarks),
+    }
+
+
+def contact_record(number: int, contact: CheckedContact) -> dict[str, Any]:
+    """One contact of a check for machines."""
+    return {
+        "number": number,
+        "start_s": contact.start,
+        "stop_s": contact.stop,
+        "peak_force_N": contact.peak_force,
+        "delay_s": contact.delay,
+        "by": contact.by or None,
+        "alarm_was_on": contact.was_on,
+    }
+
+
+class Interface(NamedTuple):
+    """How one robot's interface is told thresholds.
+
+    Attributes:
+        joints: How many joint torques it takes, None for any number.
+        write: Makes the text of it.
+    """
+
+    joints: int | None
+    write: Callable[[Thresholds], str]
+
+
+def calls(thresholds: Thresholds) -> dict[str, str]:
+    """Name of every interface that takes as many joints as there are → its text."""
+    count = len(thresholds.joints)
+    written = {
+        name: interface.write(thresholds)
+        for name, interface in INTERFACES.items()
+        if interface.joints in (None, count)
+    }
+    # An interface that needs what is not known here has nothing to be told.
+    return {name: text for name, text in written.items() if text}
+
+
+def lower(thresholds: Sequence[SignalThreshold]) -> list[float]:
+    """The thresholds themselves: what is beyond is a contact. [N·m, N]"""
+    return [rounded_up(one.value) for one in thresholds]
+
+
+def upper(thresholds: Sequence[SignalThreshold]) -> list[float]:
+    """The upper ends of their intervals, where the robot stops. [N·m, N]"""
+    ends = [one.value if isnan(one.interval[1]) else one.interval[1] for one in thresholds]
+    return list(map(rounded_up, ends))
+
+
+def rounded_up(value: float) -> float:
+    """A threshold as a call states it; rounding down would raise more alarms."""
+    return ceil(value * SHARES) / SHARES
+
+
+def doubt(thresholds: Thresholds) -> str:
+    """A comment where the robot compares another estimate than the thresholds are learned from."""
+    own = thresholds.of_vendor
+    return "" if own else "# learned from gmo, not from the robot's own tau_ext: record that\n"
+
+
+def libfranka_call(thresholds: Thresholds) -> str:
+    """`set_collision_behavior` of pylibfranka; the C++ call takes the same four lists."""
+    if not thresholds.axes:
+        return ""
+    lists = {
+        "lower_torque_thresholds": lower(thresholds.joints),
+        "upper_torque_thresholds": upper(thresholds.joints),
+        "lower_force_thresholds": lower(thresholds.axes),
+        "upper_force_thresholds": upper(thresholds.axes),
+    }
+    lines = [f"    {values},  # {name}\n" for name, values in lists.items()]
+    return f"{doubt(thresholds)}robot.set_collision_behavior(\n{''.join(lines)})\n"
+
+
+def franka_ros_parameters(thresholds: Thresholds) -> str:
+    """`collision_config` of franka_control_node.yaml."""
+    if not thresholds.axes:
+        return ""
+    each = {"torque": thresholds.joints, "force": thresholds.axes}
+    lines = [doubt(thresholds), "collision_config:\n"]
+    for quantity, ones in each.items():
+        for phase in ("acceleration", "nominal"):
+            lines.append(f"  lower_{quantity}_thresholds_{phase}: {lower(ones)}\n")
+            lines.append(f"  upper_{quantity}_thresholds_{phase}: {upper(ones)}\n")
+    return "".join(lines)
+
+
+def ur_script(thresholds: Thresholds) -> str:
+    """A thread in URScript that ends the program when the size of the force is beyond the limit."""
+    if not thresholds.force:
+        return ""
+    limit = lower(thresholds.force)[0]
+    own = thresholds.logged_wrench
+    head = "" if own else "# learned from gmo, not from actual_TCP_force: record that\n"
+    return (
+        f"{head}thread watch_force():\n"
+        "  while True:\n"
+        f"    if force() > {limit}:  # N\n"
+        "      halt\n"
+        "    end\n"
+        "    sync()\n"
+        "  end\n"
+        "end\n"
+        "run watch_force()\n"
+    )
+
+
+def toml_text(thresholds: Thresholds) -> str:
+    """The thresholds as TOML, units in the names."""
+    table: dict[str, Any] = {
+        "rate_per_h": thresholds.rate,
+        "joint_torque_Nm": lower(thresholds.joints),
+        "joint_torque_upper_Nm": upper(thresholds.joints),
+    }
+    if thresholds.axes:
+        table["force_N"] = lower(thresholds.axes)[:3]
+        table["force_upper_N"] = upper(thresholds.axes)[:3]
+        table["moment_Nm"] = lower(thresholds.axes)[3:]
+        table["moment_upper_Nm"] = upper(thresholds.axes)[3:]
+    if thresholds.force:
+        table["force_size_N"] = lower(thresholds.force)[0]
+        table["force_size_upper_N"] = upper(thresholds.force)[0]
+    return "".join(lines_of({"thresholds": table})).lstrip()
+
+
+INTERFACES = {
+    "libfranka": Interface(7, libfranka_call),
+    "franka_ros": Interface(7, franka_ros_parameters),
+    "ur_script": Interface(6, ur_script),
+    "toml": Interface(None, toml_text),
+}
+"""Name → how it is told thresholds."""
