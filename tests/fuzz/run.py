@@ -67,7 +67,7 @@ Seeds = dict[str, list[Seed]]
 BATCH = 40
 """Inputs that one child tries: a fork costs as much as refusing a file."""
 
-OF_HEALTH = re.compile(r"(\S.*: )?log health: |MEANINGLESS ")
+OF_HEALTH = re.compile(r"(\S.*: )?log health: |MEANINGLESS |note: ")
 """How the lines begin that say what the examination of a log found."""
 
 ENDED_BY_LIMIT = (signal.SIGXCPU, signal.SIGALRM, signal.SIGKILL)
@@ -190,8 +190,7 @@ def failure(status: int, made: Attempt, folder: Path, said: str) -> tuple[str, s
         ), f"signal {-status} {said[-300:]}"
     if status == BROKEN or "Traceback (most recent" in said:
         return "traceback", text(folder / "trace") or said
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    if peak > MEMORY or "out of memory" in said:
+    if (peak := peak_memory()) > MEMORY or "out of memory" in said:
         return "memory", f"{peak >> 20} MiB {said}"
     if status == 0:
         return of_result(made, folder)
@@ -200,11 +199,16 @@ def failure(status: int, made: Attempt, folder: Path, said: str) -> tuple[str, s
         return "left behind", f"{left} after: {said}"
     if status == 2:
         return ("usage", said) if made.family == "options" else ("exit code 2", said)
-    # The health of a log that was read stands before what cannot be done with it.
+    # The health of a log that was read, and notes on it, stand before what cannot be done with it.
     lines = [line for line in said.splitlines() if line.strip() and not OF_HEALTH.match(line)]
     if len(lines) != 1 or not lines[0].startswith("error: "):
         return "several lines", said
     return "refused", said
+
+
+def peak_memory() -> int:
+    """Most resident memory of this process so far. [B]"""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 def of_result(made: Attempt, folder: Path) -> tuple[str, str]:

@@ -49,6 +49,7 @@ def attempt(*words: str, family: str = "table", rows: int | None = None) -> Atte
     [
         (1, attempt("inspect"), {"stderr": "error: no log"}, "refused"),
         (1, attempt("estimate"), {"stderr": "log health: sound\nerror: no current"}, "refused"),
+        (1, attempt("estimate"), {"stderr": "note: at 35 °C\nerror: no current"}, "refused"),
         (0, attempt("estimate"), {}, "read"),
         (0, attempt("inspect", "--json", rows=9), {"stdout": '{"samples": 9}'}, "read"),
         (0, attempt("inspect", "--json", rows=9), {"stdout": '{"samples": 8}'}, "rows lost"),
@@ -71,8 +72,15 @@ def attempt(*words: str, family: str = "table", rows: int | None = None) -> Atte
     ],
 )
 def test_each_kind_of_failure_is_seen(
-    tmp_path: Path, status: int, made: Attempt, files: dict[str, str], kind: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    status: int,
+    made: Attempt,
+    files: dict[str, str],
+    kind: str,
 ) -> None:
+    # What ran in this process before is no part of it.
+    monkeypatch.setattr(fuzz, "peak_memory", lambda: 0)
     for name, text in {**files, "attempt.json": json.dumps(made._asdict())}.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     assert fuzz.judged(status, 3, tmp_path).kind == kind

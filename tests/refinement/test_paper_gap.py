@@ -10,7 +10,7 @@ from vftcli.analysis import Analysis
 from vftcli.evaluation.judgement import with_measured_gap
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
-from vftcli.refinement.paper_gap import expected_gap, gap_remark
+from vftcli.refinement.paper_gap import EXPECTED, expected_gap, gap_remark
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.remarks import Remark, fact
 
@@ -53,9 +53,9 @@ def test_nothing_is_said_where_a_side_is_not_known(analysis: Analysis) -> None:
     bare = [replace(estimates[0], error_sd=None), *estimates[1:]]
     assert expected_gap(found, bare, gains_of_file=True) is None
     delay = {"gmo": np.array([0.1, 0.2])}
-    assert gap_remark("paper-gains-expected", {"best": 0.0, "gmo": 1.0}, delay) is None
-    assert gap_remark("paper-gains-expected", {"best": 1.0, "gmo": np.nan}, delay) is None
-    said = gap_remark("paper-gains-expected", {"best": 0.5, "gmo": 1.0}, delay)
+    assert gap_remark(EXPECTED, {"best": 0.0, "gmo": 1.0}, delay) is None
+    assert gap_remark(EXPECTED, {"best": 1.0, "gmo": np.nan}, delay) is None
+    said = gap_remark(EXPECTED, {"best": 0.5, "gmo": 1.0}, delay)
     assert said is not None
     assert said.values == {
         "ratio": 2.0,
@@ -68,7 +68,7 @@ def test_nothing_is_said_where_a_side_is_not_known(analysis: Analysis) -> None:
 def test_gains_that_do_as_well_are_not_called_off_the_best() -> None:
     delay = {"gmo": np.array([0.1, 0.2])}
     for error, code in ((1.1, "paper-gains-expected"), (0.7, "paper-gains-expected-level")):
-        said = gap_remark("paper-gains-expected", {"best": 1.0, "gmo": error}, delay)
+        said = gap_remark(EXPECTED, {"best": 1.0, "gmo": error}, delay)
         assert said is not None
         assert said.code == code
         assert str(said)

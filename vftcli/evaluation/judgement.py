@@ -11,7 +11,7 @@ from vftcli.evaluation.reference_wrench import reference_wrench
 from vftcli.evaluation.wrenches import with_contacts, with_wrenches
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
-from vftcli.refinement.paper_gap import EXPECTED, gap_remark
+from vftcli.refinement.paper_gap import EXPECTED, MEASURED, gap_remark
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark
@@ -50,10 +50,10 @@ def with_measured_gap(
     delays = {name: tunings[name].delay for name in PAPER if name in means}
     if not delays or BEST not in means:
         return tuple(remarks)
-    gap = gap_remark("paper-gains-measured", means, delays)
+    gap = gap_remark(MEASURED, means, delays)
     if gap is None:
         return tuple(remarks)
-    return (*(remark for remark in remarks if not remark.code.startswith(EXPECTED)), gap)
+    return (*(remark for remark in remarks if remark.code not in EXPECTED), gap)
 
 
 def judge(

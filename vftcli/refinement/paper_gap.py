@@ -18,11 +18,11 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, fact
 
-EXPECTED = "paper-gains-expected"
-"""Code of the remark that holds what the bands let expect."""
+EXPECTED = ("paper-gains-expected", "paper-gains-expected-level")
+"""Codes of the remark that holds what the bands let expect: the gains are off the best, or not."""
 
-LEVEL = "-level"
-"""What its code ends in where the paper's gains do as well as the best."""
+MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
+"""Codes of the remark that holds what a reference says, likewise."""
 
 AHEAD = 1.05
 """The best is ahead where the paper's gains make this many times its error."""
@@ -65,13 +65,12 @@ def expected_error(estimate: ExternalTorque) -> float:
 
 
 def gap_remark(
-    code: str, errors: Mapping[str, float], delays: Mapping[str, Array]
+    codes: tuple[str, str], errors: Mapping[str, float], delays: Mapping[str, Array]
 ) -> Remark | None:
     """How far the paper's gains are off the best; None where an error is not known, or is none.
 
     Args:
-        code: The remark's code: whether it was measured or is expected; with `LEVEL` behind it
-            where the paper's gains do as well.
+        codes: `MEASURED` or `EXPECTED`.
         errors: Observer → error, `best` among them. [N·m]
         delays: Observer of the paper → delay of each joint. (n,) [s]
     """
@@ -81,7 +80,7 @@ def gap_remark(
         return None
     spread = np.concatenate([*delays.values()])
     return fact(
-        code if ratio >= AHEAD else code + LEVEL,
+        codes[0] if ratio >= AHEAD else codes[1],
         ratio=ratio,
         ratios=ratios,
         least_delay_ms=1e3 * float(spread.min()),

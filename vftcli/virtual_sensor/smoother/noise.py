@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
-from vftcli.robots.friction import dry_torque
+from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, median
@@ -122,11 +122,14 @@ def resting(blocks: Blocks) -> Mask:
 
 
 def dry_torques(robot: Robot) -> Array:
-    """F_c of each joint: Coulomb torque or a sigmoid's whole amplitude, 0 if unknown. (n,) [N·m]"""
-    if not robot.friction:
-        return np.zeros(robot.joints)
-    each = (joint.parameters for joint in robot.friction)
-    return np.array([max(float(dry_torque(p)), abs(p.get("amplitude", 0.0))) for p in each])
+    """Dry friction of every joint, of a sigmoid its whole amplitude; 0 where none is known. (n,)
+
+    Args:
+        robot: The arm.
+    """
+    dry = dry_friction(robot.friction, robot.joints)
+    whole = [abs(joint.parameters.get("amplitude", 0.0)) for joint in robot.friction]
+    return np.maximum(dry, whole) if whole else dry
 
 
 def torque_noise(
