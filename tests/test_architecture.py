@@ -41,8 +41,8 @@ ORDER = (
 APART = {"refinement", "evaluation", "identification", "simulation", "doctor", "contacts"}
 """Rooms that do not know each other."""
 
-KNOWN = {("evaluation", "refinement")}
-"""Pairs of those that do, the first the second."""
+KNOWN = {("evaluation", "refinement"), ("contacts", "doctor")}
+"""Pairs of those that do, the first the second: contacts are those of a log that is sound."""
 
 FILES = (
     "cli/",  # asks before it overwrites

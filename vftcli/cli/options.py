@@ -58,6 +58,11 @@ FREE = (
 )
 SEED = ("--seed", "N", "Seed of everything drawn; the scenario's own if not given.")
 REFERENCE = ("--reference", "REF", "two-cycle, sensor, vendor, zero, or file:PATH.")
+REFERENCE_COLUMNS = (
+    "--reference-columns",
+    "SPEC",
+    "Columns of a reference file, as --columns: 't,tau_ext:6'.",
+)
 
 
 class ReadOptions(ChoiceBundle["ReadChoice"]):
@@ -232,16 +237,16 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
         return super().choice() if self.asks else None
 
 
-class NamedReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
-    """What is taken for true."""
+class ReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
+    """What the estimates are compared with."""
 
     HOME = "evaluation.reference_choice:ReferenceChoice"
 
     reference: str | None = option(*REFERENCE)
-    reference_columns: str | None = option(
-        "--reference-columns",
-        "SPEC",
-        "Columns of a reference file, as --columns: 't,tau_ext:6'.",
+    reference_columns: str | None = option(*REFERENCE_COLUMNS)
+    contacts: bool = flag(
+        "--contacts",
+        "Also detection delay, false alarms per hour and missed contacts against the reference.",
     )
 
     def choice(self) -> "ReferenceChoice | None":
@@ -249,13 +254,15 @@ class NamedReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
         return super().choice() if self.reference is not None else None
 
 
-class ReferenceOptions(NamedReferenceOptions):
-    """What the estimates are compared with."""
+class NamedReferenceOptions(Bundle):
+    """What is taken for true where nothing else is asked of it."""
 
-    contacts: bool = flag(
-        "--contacts",
-        "Also detection delay, false alarms per hour and missed contacts against the reference.",
-    )
+    reference: str | None = option(*REFERENCE)
+    reference_columns: str | None = option(*REFERENCE_COLUMNS)
+
+    def choice(self) -> "ReferenceChoice | None":
+        """The choice that the options state, None where no reference is named."""
+        return ReferenceOptions(**self.words(), contacts=False).choice()
 
 
 class RequiredReferenceOptions(ReferenceOptions):

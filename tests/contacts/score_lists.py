@@ -1,6 +1,6 @@
 """Score lists of contacts on simulated arms: found, rows, false, onset, peak, direction, bands.
 
-Example: python tests/contacts/run.py --seeds 31,32,33 ur5-circle ur5-table1 taps
+Example: python tests/contacts/score_lists.py --seeds 31,32,33 ur5-circle ur5-table1 taps
 """
 
 import argparse
@@ -34,7 +34,7 @@ def main() -> None:
     """Simulate, list, score, and print one line a scenario."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scenario", nargs="*", default=["ur5-circle", "ur5-table1", "taps"])
-    parser.add_argument("--seeds", default="31,32,33")
+    parser.add_argument("--seeds", default="41,42,43")
     chosen = parser.parse_args()
     for name in chosen.scenario:
         scenario, settings, free = SCENARIOS[name]
