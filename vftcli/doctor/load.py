@@ -8,6 +8,7 @@ import numpy as np
 from vftcli.doctor.case import Case
 from vftcli.doctor.findings import on_joints
 from vftcli.robots import Robot
+from vftcli.robots.drive import gain_sd
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, warning
@@ -89,7 +90,7 @@ def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Rem
     share = case.loaded.size / case.bare.size
     values: dict[str, Any] = {
         "load_kg": mass,
-        "sd_kg": sd,
+        "sd_kg": float(np.hypot(sd, gain_sd(recording, robot) * mass)),
         "robot": robot.name,
         "bare_percent": 100 * case.bare.size / case.size,
         "loaded_percent": 100 * case.loaded.size / case.size,

@@ -14,7 +14,7 @@ from vftcli.identification.processing import (
 )
 from vftcli.identification.result import root_mean_square
 from vftcli.robots.chain import Payload
-from vftcli.robots.drive import drive_torque, uses_current
+from vftcli.robots.drive import drive_torque, gain_sd
 from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
@@ -42,10 +42,6 @@ WINDOW, STILL = 0.2, 1e-3
 
 POSES = 4
 """Fewest different poses for mass and centre of mass."""
-
-CONSTANT_SD, SENSOR_SD = 0.03, 0.01
-"""How well drive constants and torque sensors are known: a weighed 2.805 kg reads 2.88 kg through
-the constants of a UR10e's maker. [1]"""
 
 STRETCHES = 12
 """Stretches of a motion whose errors are taken as each other's strangers."""
@@ -201,11 +197,6 @@ def fit_all_joints(A: Array, y: Array, usable: Array, passes: int = 3) -> Array:
         left = y - np.einsum("knp,p->kn", A, x)
         scale = np.maximum(root_mean_square(left), 1e-9)
     return x
-
-
-def gain_sd(recording: Recording, robot: Robot) -> float:
-    """How well a log's torques are known as a whole: a standard deviation over the value. [1]"""
-    return CONSTANT_SD if uses_current(recording, robot) else SENSOR_SD
 
 
 def weighted_rows(A: Array, values: Array, usable: Array, left: Array) -> tuple[Array, Array]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from vftcli.repetition.free_motion import FreePiece
 from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.drive import gain_sd
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.regressor import load_regressor
 from vftcli.robots.terms import DynamicsTerms
@@ -125,7 +126,9 @@ def free_load(pieces: Sequence[FreePiece]) -> FreeLoad | None:
     share = float(np.sqrt(np.mean((loaded.left / bare.left) ** 2)))
     if mass < max(LEAST, SURE * sd) or share > PARTLY:
         return None
-    return FreeLoad(mass=mass, moment=loaded.weights[1:4].copy(), sd=sd, share=share)
+    scale = gain_sd(pieces[0].run.recording, robot) * mass
+    whole = float(np.hypot(sd, scale))
+    return FreeLoad(mass=mass, moment=loaded.weights[1:4].copy(), sd=whole, share=share)
 
 
 def columns(piece: FreePiece) -> tuple[Array, Array] | None:

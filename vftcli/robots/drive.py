@@ -8,6 +8,10 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, RobotError
 from vftcli.signals.recording import Recording
 
+CONSTANT_SD, SENSOR_SD = 0.03, 0.01
+"""How well drive constants and torque sensors are known: a weighed 2.805 kg reads 2.88 kg through
+the constants of a UR10e's maker. [1]"""
+
 
 def check_joints(recording: Recording, robot: Robot) -> None:
     """Raise a RobotError unless the log and the robot have the same number of joints."""
@@ -30,6 +34,11 @@ def effort_name(recording: Recording, robot: Robot) -> str:
     if uses_current(recording, robot):
         return "current"
     return "torque" if recording.torque is not None else "torque_without_gravity"
+
+
+def gain_sd(recording: Recording, robot: Robot) -> float:
+    """How well a log's torques are known as a whole: a standard deviation over the value. [1]"""
+    return CONSTANT_SD if uses_current(recording, robot) else SENSOR_SD
 
 
 def has_torque(recording: Recording) -> bool:
