@@ -1,5 +1,7 @@
 """Friction shapes: one term each of the friction law, filtered like the torque."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,8 +13,12 @@ from vftcli.identification.friction_shapes import (
     round_digits,
     term_values,
 )
+from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.running_friction import RunningFriction
+from vftcli.robots.writing import robot_toml
+
+PANDA = load_robot("panda")
 
 DQ = np.linspace(-1.0, 1.0, 41)
 LOAD = np.linspace(0.0, 8.0, 41)
@@ -125,3 +131,19 @@ def test_a_point_is_told_by_a_motion_that_goes_a_third_of_the_way_to_it(speed, p
 def test_dry_friction_may_be_all_presliding():
     friction = Shape(("viscous", "presliding")).friction(np.array([1.0, 2.0]))
     assert friction.parameters["coulomb"] == 0.0
+
+
+TERMS = ("coulomb", "viscous", "quadratic", "offset", "load_coulomb", "stribeck", "presliding")
+
+
+@pytest.mark.parametrize("mask", range(1, 2 ** len(TERMS)))
+def test_whatever_was_fitted_is_a_friction_that_a_robot_file_may_have(mask, tmp_path):
+    """A joint without any rise was once written without `viscous`, which no robot file may lack."""
+    terms = tuple(term for k, term in enumerate(TERMS) if mask >> k & 1)
+    fitted = Shape(terms, presliding_length=3e-4).friction(np.full(len(terms), 0.5))
+    robot = replace(PANDA, friction=(fitted,) * PANDA.joints)
+    path = tmp_path / "arm.toml"
+    path.write_text(robot_toml(robot), encoding="utf-8")
+    read = load_robot(path).friction[0]
+    assert read.model == fitted.model
+    assert dict(read.parameters) == dict(fitted.parameters)

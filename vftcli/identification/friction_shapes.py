@@ -12,6 +12,7 @@ import numpy as np
 from vftcli.identification.processing import PreparedLog
 from vftcli.robots.friction import SMOOTHING, bent_line, coulomb_logarithmic
 from vftcli.robots.presliding import play
+from vftcli.robots.profile import FRICTION_KEYS
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
 
@@ -94,14 +95,15 @@ class Shape(NamedTuple):
         """The joint's friction with these coefficients, one a term."""
         parameters = {k: round_digits(float(v)) for k, v in zip(self.terms, values, strict=True)}
         torques = tuple(parameters.pop(term) for term in self.points)
-        if not torques:
-            parameters.setdefault("coulomb", 0.0)  # what slides may be all presliding's
         parameters["smoothing"] = self.smoothing
         for term in ("stribeck", "logarithmic"):
             if term in self.terms:
                 parameters[f"{term}_velocity"] = float(getattr(self, f"{term}_velocity"))
         if "presliding" in self.terms:
             parameters["presliding_length"] = self.presliding_length
+        # What was not fitted, as what slides where all of it is presliding's, is none of it.
+        required, _ = FRICTION_KEYS[self.model]
+        parameters = {**dict.fromkeys(required, 0.0), **parameters}
         return JointFriction(
             model=self.model,
             parameters=parameters,
