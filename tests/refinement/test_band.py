@@ -74,29 +74,30 @@ def test_the_resting_joint_is_named(found: Baseline) -> None:
     assert all(str(remark) for remark in (band, rest))
 
 
-def test_samples_that_a_fit_calls_free_take_the_place_of_the_free_part(found: Baseline) -> None:
+def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found: Baseline) -> None:
     reading = free_reading(found, GMO, GMO.estimate(found.terms))
     quiet = np.arange(found.terms.samples) % 7 == 0
     rests = rests_in(found.motion.log)
-    sd = with_band(corrected(found, quiet), reading).error_sd
-    there = with_band(
-        found, reading._replace(samples=reading.estimate.tau[quiet], resting=rests[quiet])
-    )
-    np.testing.assert_array_equal(sd, there.error_sd)
+    tau = reading.estimate.tau[quiet]
+    fitted = with_band(found, reading._replace(samples=tau, resting=rests[quiet])).error_sd
+    stated = with_band(found, reading).error_sd
+    both = with_band(corrected(found, quiet), reading).error_sd
+    np.testing.assert_array_equal(both, np.maximum(stated, fitted))
+    # Where nothing is stated the samples of the fit stand alone.
+    alone = with_band(replace(corrected(found, quiet), by_fit=True), reading).error_sd
+    np.testing.assert_array_equal(alone, fitted)
     # too few to speak for anything
     few = np.arange(found.terms.samples) < 20
-    np.testing.assert_array_equal(
-        with_band(corrected(found, few), reading).error_sd, with_band(found, reading).error_sd
-    )
+    np.testing.assert_array_equal(with_band(corrected(found, few), reading).error_sd, stated)
 
 
 def test_a_slow_load_that_the_fit_believes_in_is_no_error(found: Baseline) -> None:
     reading = free_reading(found, GMO, GMO.estimate(found.terms))
     pushed = reading._replace(estimate=replace(reading.estimate, tau=reading.estimate.tau + 5.0))
-    known = found.part.own
+    known, alone = found.part.own, replace(found, by_fit=True)
     np.testing.assert_allclose(
-        with_band(corrected(found, known, load=5.0), pushed).error_sd,
-        with_band(corrected(found, known), reading).error_sd,
+        with_band(corrected(alone, known, load=5.0), pushed).error_sd,
+        with_band(corrected(alone, known), reading).error_sd,
         rtol=1e-9,  # 5 is added and taken off again, at errors down to .05
     )
 

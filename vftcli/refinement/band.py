@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.observers.error_band import ENOUGH, error_band, free_error
+from vftcli.observers.error_band import ENOUGH, FreeError, error_band, free_error
 from vftcli.refinement.baseline import Baseline, FreeReading, rests_in
 from vftcli.refinement.whole_log import WholeLogBias
 from vftcli.robots.friction import dry_friction
@@ -18,25 +18,40 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
 
     The band is how far the estimate may be off, as the log itself shows it: see
     `vftcli.observers.error_band`. A Kalman filter's own covariance knows neither model error nor
-    lag: it is the filter's own account, and stands apart (`sd`). Where the bias of the whole log is
-    off, all samples that its fit calls free of contact count as free: a stated free part is short,
-    and often at rest.
+    lag: it is the filter's own account, and stands apart (`sd`).
 
     Args:
         found: The log's baseline, of the terms that the estimate was made from.
         reading: The estimate, and what it reads where nothing touches the arm.
     """
-    off = found.correction
-    if off is not None and np.count_nonzero(off.free) >= ENOUGH:
-        reading = read_where_free(found, reading, off)
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
-    friction = dry_friction(run.robot.friction, run.robot.joints)
     if spectra is None or not len(reading.samples):
         return estimate
-    free = free_error(reading.samples, reading.resting, friction)
+    free = known_error(found, reading)
     response = reading.observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
     sd = error_band(free, spectra.missed(response), rests_in(run), found.correction_sd)
     return replace(estimate, error_sd=handed_over(sd), moving=~found.standing)
+
+
+def known_error(found: Baseline, reading: FreeReading) -> FreeError:
+    """What an estimator reads where nothing touches the arm, as far as the log shows it.
+
+    Where the bias of the whole log was fitted, all samples that its fit calls free of contact speak
+    too: a stated free part is short, and often at rest. The larger of both counts, since the fit
+    may take slow errors for slow loads.
+    """
+    friction = dry_friction(found.motion.log.robot.friction, reading.estimate.joints)
+    stated = free_error(reading.samples, reading.resting, friction)
+    off = found.correction
+    if off is None or np.count_nonzero(off.free) < ENOUGH:
+        return stated
+    fitted = read_where_free(found, reading, off)
+    called = free_error(fitted.samples, fitted.resting, friction)
+    if found.by_fit:  # the free part is these samples, and the loads in them are no error
+        return called
+    moving = np.maximum(stated.moving, called.moving)
+    resting = np.maximum(stated.resting, called.resting)
+    return FreeError(moving, resting, unseen=stated.unseen & called.unseen)
 
 
 def read_where_free(found: Baseline, reading: FreeReading, off: WholeLogBias) -> FreeReading:
