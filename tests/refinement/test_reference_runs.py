@@ -40,17 +40,18 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
     motion = read(log, robot, asked, Models())
     terms, found = motion.log.terms, model(motion, asked)
     assert found is not None
-    observers, _ = asked.observers.build(robot, log.median_step, found.spectra)
+    observers, _ = asked.observers.build(robot, log.median_step, found.shown(gains=False))
     estimates = [observer.estimate(terms) for observer in observers]
     discrete = replace(asked.observers, settings={"kfo": {"noise_convention": "discrete"}})
     quick = [
-        o.estimate(terms) for o in discrete.build(robot, log.median_step, found.spectra)[0][:2]
+        o.estimate(terms)
+        for o in discrete.build(robot, log.median_step, found.shown(gains=False))[0][:2]
     ]
     banded = refine(found, observers, estimates).estimates
     rid = replace(asked, refinement=RefinementChoice(remove_bias="free-cycle"))
     relieved = model(motion, rid)
     assert relieved is not None
-    tuned, _ = rid.observers.build(robot, log.median_step, relieved.spectra)
+    tuned, _ = rid.observers.build(robot, log.median_step, relieved.shown(gains=False))
     raw = [observer.estimate(terms) for observer in tuned]
     unbiased = refine(relieved, tuned, raw, "free-cycle").estimates
     moving = ~found.stuck
