@@ -39,7 +39,9 @@ def test_a_noisy_load_between_two_peaks_is_split_once() -> None:
     load = np.where(np.arange(60) % 10 == 5, 7.0, 9.0)
     size = np.concatenate([np.full(20, 16.0), load, np.full(20, 26.0)])
     (_, valley), (again, end) = split_at_valleys(size, 5, 8.0)
-    assert valley == again and 20 <= valley < 80 and end == 100
+    assert valley == again
+    assert 20 <= valley < 80
+    assert end == 100
     assert split_at_valleys(size, 5, 17.0) == [(0, 100)]  # the first peak cannot be told
 
 
