@@ -209,6 +209,14 @@ def test_the_zero_of_a_free_run_and_its_bias_removal_exclude_each_other(runs: li
         asked("zero", zero=runs[1], refinement=RefinementChoice(remove_bias="model"))
 
 
+def test_what_needs_the_complete_log_does_not_go_with_causal_observers() -> None:
+    online = AnalysisChoice(observers=ObserverChoice(causal=True), wrench=WrenchChoice())
+    with pytest.raises(ParameterError, match="--remove-bias whole-log needs the complete log"):
+        replace(online, refinement=RefinementChoice(remove_bias="whole-log"))
+    with pytest.raises(ParameterError, match="--solver smoother needs the complete log"):
+        replace(online, wrench=WrenchChoice(solver="smoother"))
+
+
 def test_the_pipeline_is_short_and_imports_nothing_on_its_way() -> None:
     """Seven verbs on one screen: no branch of `analyse` imports, and it is at most 25 lines."""
     (function,) = [

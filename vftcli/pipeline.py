@@ -59,6 +59,16 @@ class AnalysisChoice:
                 "--zero LOG and --remove-bias each take off what the observers read untouched, "
                 "together they would take it off twice; give one of them"
             )
+        if self.observers.causal and self.refinement.corrects_all:
+            raise ParameterError(
+                "--remove-bias whole-log needs the complete log, which --causal leaves out; "
+                "give one of them"
+            )
+        if self.observers.causal and self.wrench is not None and self.wrench.looks_back:
+            raise ParameterError(
+                "--solver smoother needs the complete log, which --causal leaves out; "
+                "give another solver, as pinv"
+            )
 
     @property
     def zero_log(self) -> Path | None:

@@ -52,6 +52,8 @@ def test_log_becomes_a_folder(admit: Run, tmp_path: Path) -> None:
     code, out, err = admit(FIXTURE, "--robot", "panda", "-o", folder)
     assert code == 0
     assert "kfo-fe through pinv(Jᵀ)" in err
+    _, _, err = admit(FIXTURE, "--robot", "panda", "--observer", "best")
+    assert "best, smoothed over the whole log, force on the robot" in err
     assert re.search(r"variable\s+6", out)
     assert {p.name for p in folder.iterdir()} == FILES | {"run.json"}
     page = (folder / "index.html").read_text("utf-8")

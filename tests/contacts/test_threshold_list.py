@@ -28,10 +28,21 @@ def test_a_wrench_with_its_prior_is_that_of_the_normal_equations() -> None:
 
 def test_a_valley_below_half_of_both_peaks_splits() -> None:
     size = np.concatenate([np.full(20, 40.0), np.full(6, 10.0), np.full(20, 60.0)])
-    assert [stop for _, stop in split_at_valleys(size, 5)] == [20, 46]
-    assert split_at_valleys(size, 25) == [(0, 46)]
+    assert [stop for _, stop in split_at_valleys(size, 5, 8.0)] == [20, 46]
+    assert split_at_valleys(size, 25, 8.0) == [(0, 46)]
     shallow = np.concatenate([np.full(20, 40.0), np.full(6, 25.0), np.full(20, 60.0)])
-    assert split_at_valleys(shallow, 5) == [(0, 46)]
+    assert split_at_valleys(shallow, 5, 8.0) == [(0, 46)]
+
+
+def test_a_noisy_load_between_two_peaks_is_split_once() -> None:
+    """9 N with dips to 7, below half of both peaks: no dip is a valley of the load itself."""
+    load = np.where(np.arange(60) % 10 == 5, 7.0, 9.0)
+    size = np.concatenate([np.full(20, 16.0), load, np.full(20, 26.0)])
+    (_, valley), (again, end) = split_at_valleys(size, 5, 8.0)
+    assert valley == again
+    assert 20 <= valley < 80
+    assert end == 100
+    assert split_at_valleys(size, 5, 17.0) == [(0, 100)]  # the first peak cannot be told
 
 
 def test_most_pushes_are_told_by_the_drives_friction_alone() -> None:

@@ -19,6 +19,7 @@ from vftcli.contacts.untouched import (
 )
 from vftcli.readers import read
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.smoother.noise import dry_torques
 
 LOG = read(FIXTURES / "ur5_circle.csv")
@@ -57,6 +58,14 @@ def test_what_repeats_nothing_has_no_free_part() -> None:
     assert untouched_motion(motion(short, "ur5"), BLOCK) is None
     with pytest.raises(ParameterError, match="free part"):
         free_part(motion(short, "ur5", "90:95"))
+
+
+def test_cycles_of_which_none_was_recorded_are_no_free_part() -> None:
+    """A pause of the recorder of one whole cycle: no sample of the quietest has a partner."""
+    t = LOG.t - LOG.t[0]
+    keep = (t < 4.79) | (t > 8.79)
+    kept = Recording(t=LOG.t[keep], **{k: LOG.require(k)[keep] for k in ("q", "dq", "current")})
+    assert free_part(motion(kept, "ur5")) is None
 
 
 def test_cycles_that_do_not_exist_are_refused() -> None:

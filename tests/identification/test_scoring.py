@@ -125,6 +125,14 @@ def test_the_share_of_a_repeated_path(prepared, sines):
     assert repeated_share(replace(half, t=t[:0]), whole) == 0.0
 
 
+@pytest.mark.parametrize(("before", "worse"), [(1.9, True), (2.0, False), (3.0, False)])
+def test_a_model_that_leaves_more_than_the_profile_is_told_of(motion, before, worse):
+    left = trace(motion, np.full(motion.q.shape, 2.0), "train")
+    remarks = score_remarks(UR5, [left._replace(before=np.full(6, before))])
+    told = [r.values["profile_Nm"] for r in remarks if r.code == "worse-than-profile"]
+    assert told == pytest.approx([before] if worse else [])
+
+
 def test_a_repeated_log_is_no_test_and_the_training_level_is_said(motion):
     train = trace(motion, np.full(motion.q.shape, 2.0), "train")
     remarks = score_remarks(UR5, [train, trace(motion, np.full(motion.q.shape, 2.0))])

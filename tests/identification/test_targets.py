@@ -63,6 +63,14 @@ def test_rotor_and_gravity_come_from_moments_beyond_the_rigid_body(targets):
     assert gravity.known
 
 
+def test_gravity_that_hardly_changes_tells_no_scale(targets):
+    """20 µN·m beside 1.5 N·m that stay, as at a wrist that keeps level; noise of 10 mN·m."""
+    level = -1.5 + 1e-6 * targets.gravity
+    noise = 0.01 * np.random.default_rng(5).standard_normal(level.shape)
+    _, gravity = rotor_inertia(0, [targets._replace(gravity=level, moment=targets.moment + noise)])
+    assert not gravity.known
+
+
 def test_a_shift_in_time_is_no_inertia(targets):
     late = targets._replace(moment=targets.moment + 0.002 * targets.lead)
     rotor, gravity = rotor_inertia(0, [late])
@@ -211,3 +219,5 @@ def test_gravity_is_averaged_by_its_spread_and_said_where_it_differs():
     assert remark.values["ratio"] == pytest.approx((4 * 1.002 + 1 * 1.0) / 5)
     assert gravity_remarks([model(gravity=Estimate(1.0002, 1e-4, True))]) == []
     assert gravity_remarks([model()]) == []
+    # 0.9995 ± .0007: no difference
+    assert gravity_remarks([model(gravity=Estimate(0.9995, 7e-4, True))]) == []

@@ -57,6 +57,8 @@ def test_who_runs(words: dict[str, Any], names: tuple[str, ...]) -> None:
 def test_what_is_left_out_must_leave_something() -> None:
     with pytest.raises(ParameterError, match="--causal leaves out rts-auto, best"):
         ObserverChoice.parsed(observer=["rts-auto", "best"], causal=True)
+    with pytest.raises(ParameterError, match="leaves out best, which needs the complete log"):
+        ObserverChoice.parsed(observer=["best", "best"], causal=True)
 
 
 def test_beside_a_print_stand_its_own_observers_unless_others_are_named() -> None:

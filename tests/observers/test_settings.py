@@ -149,3 +149,8 @@ def test_the_upper_layer_wins_parameter_by_parameter() -> None:
         "gmo": {"gain": 4.0},
     }
     assert under["kfo"]["r_diag"] == 1.0  # the robot's own is left alone
+
+
+def test_a_word_that_is_no_file_of_gains_says_which_words_there_are(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="--gains takes auto, paper, or a file"):
+        load_gains(tmp_path / "papper", {})

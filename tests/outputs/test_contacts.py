@@ -2,6 +2,7 @@
 
 import csv
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,6 +64,9 @@ def test_the_answer_comes_first() -> None:
     assert "1 contact. The hardest, at 4.7 s: 65 ± 7 N on the wrist." in text
     assert "smallest force this log can tell: 6 N" in text
     assert "no contact listed in its 4 s" in text
+    assert "; 2 contacts listed in its 4 s" in contacts_text(
+        replace(contact_list(), false_on_free=2)
+    )
     assert "caution: the arm stopped abruptly at 17.90 s" in text
     assert "Nothing touched the arm" in contacts_text(contact_list())
     load = contact(is_load=True, mean_force=np.array([0.0, 0.0, -27.0]), peak_force=27.0)

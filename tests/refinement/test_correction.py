@@ -114,6 +114,16 @@ def test_a_log_without_a_free_part_leans_on_what_the_fit_takes_for_free(
     assert rmse(analysis, "best") < 0.5 * rmse(smoothed, "kfo-rts")
 
 
+def test_a_free_part_that_does_not_do_is_dropped_with_a_reason(request_: AnalysisChoice) -> None:
+    """0.1 s are 13 samples, and a spectrum needs 32."""
+    given = replace(request_, free=FreeChoice(spans=((0.0, 0.1),)))
+    analysis = analyse_log(FIXTURE, given)
+    assert "free-by-the-fit" not in codes(analysis)
+    assert analysis.refinement is not None
+    (said,) = (r for r in analysis.refinement.remarks if r.code == "free-by-the-fit-instead")
+    assert "a spectrum needs 32 samples" in str(said)
+
+
 def test_a_short_log_takes_what_is_left(request_: AnalysisChoice) -> None:
     """6 s tell no bias: the free part tunes. 1.5 s tell nothing: the gains of the robot file."""
     six = analyse_log(

@@ -145,7 +145,9 @@ def test_seven_joints_behind_gears_work_too():
 def test_a_short_log_is_refused():
     run = wrong_run(shortened(ur10e(), 3), seconds=9.0)
     found = whole_log_bias(run)
-    assert [r.code for r in found.remarks] == ["whole-log-too-short"]
+    (remark,) = found.remarks
+    assert remark.code == "whole-log-too-short"
+    assert remark.values["duration_s"] == pytest.approx(9.0, abs=STEP)  # it moved all the while
     assert found.free.all()
     for nothing in (found.applied, found.bias, found.sd):
         assert not nothing.any()
@@ -172,8 +174,18 @@ def test_a_held_pose_is_refused():
     # the filter smears each end by some tenths of a second
     assert remark.values["motion_s"] == pytest.approx(2.0, abs=0.5)
     (still,) = whole_log_bias(held(20.0, 0.0)).remarks
-    assert still.code == "whole-log-too-short"
+    assert (still.code, still.values["motion_s"]) == ("whole-log-at-rest", 0.0)
     assert "no whole-log correction" in str(still)
+
+
+def test_a_log_that_moves_only_for_a_while_is_refused():
+    """2 s of motion at the start of 20 s."""
+    run = held(20.0, 2.0)
+    dq = np.where(run.recording.t[:, None] < 10.0, run.recording.require("dq"), 0.0)
+    (remark,) = whole_log_bias(replace(run, recording=replace(run.recording, dq=dq))).remarks
+    assert remark.code == "whole-log-little-motion"
+    # the filter smears its end by some tenths of a second
+    assert remark.values["motion_s"] == pytest.approx(2.0, abs=0.5)
 
 
 def test_what_no_arm_does_is_refused():

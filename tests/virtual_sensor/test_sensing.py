@@ -102,6 +102,15 @@ def test_the_band_says_where_it_comes_from(choice: dict[str, object], code: str)
     assert code in [remark.code for remark in found.remarks]
 
 
+def test_an_unknown_band_is_said_of_those_only_that_are_not_smoothed() -> None:
+    short = analysed("ur5_circle.csv", ("best", "gmo", "fdo"), WrenchChoice(), interval=(0.0, 2.0))
+    found = short.virtual_sensor
+    assert found is not None
+    (unknown,) = [remark for remark in found.remarks if remark.code == "no-wrench-band"]
+    assert unknown.where.about == "gmo, fdo"
+    assert found.wrenches[0].sd is not None
+
+
 def recording(mass: float | None) -> Recording:
     return Recording(t=np.arange(3.0), q=np.zeros((3, 6)), payload_mass=mass)
 

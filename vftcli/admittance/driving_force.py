@@ -34,8 +34,8 @@ class DrivingForce(NamedTuple):
 def observed_force(reading: SensorReading) -> DrivingForce:
     """What the virtual sensor makes of the one observer that ran."""
     wrench = reading.wrenches[0]
-    source = fact("force-of-observer", observer=wrench.name)
-    return DrivingForce(wrench, source, reading.remarks)
+    code = "force-smoothed" if wrench.name in reading.smoothed else "force-of-observer"
+    return DrivingForce(wrench, fact(code, observer=wrench.name), reading.remarks)
 
 
 def stored_force(

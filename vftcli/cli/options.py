@@ -112,7 +112,7 @@ class ObserverOptions(ChoiceBundle["ObserverChoice"]):
     HOME = "observers.choice:ObserverChoice"
 
     observer: Words = option(
-        "--observer", "NAME", "Repeatable. Default: best fdo gmo kfo-fe kfo-zoh."
+        "--observer", "NAME", "Repeatable. Default: best fdo gmo kfo-fe kfo-zoh; of admit: kfo-fe."
     )
     causal: bool = flag(
         "--causal", "Leave out what could not run while the log is written: best, and smoothers."

@@ -60,31 +60,42 @@ def threshold_rows(run: ModelledRun) -> tuple[Contact, ...]:
     J = flange_jacobian(run.robot.loaded_chain, run.recording.q)
     least = max(round(APART / median_step(t)), 1)
     rows: list[Contact] = []
+    told = smallest_told(run)
     for start, stop in runs_of(above):
         span = slice(start, stop)
         size = np.linalg.norm(flange_forces(J[span], torque[span], sd[span])[0][:, :3], axis=1)
-        for first, last in split_at_valleys(size, least):
+        for first, last in split_at_valleys(size, least, told):
             peak = start + first + int(np.argmax(size[first:last]))
             rows.append(peak_row(run, (start + first, start + last), peak, torque, sd))
     return tuple(rows[i].numbered(i + 1) for i in range(len(rows)))
 
 
-def split_at_valleys(size: Array, least: int) -> list[tuple[int, int]]:
+def split_at_valleys(size: Array, least: int, told: float) -> list[tuple[int, int]]:
     """Stretches between which |F| falls below `SPLIT` of the peaks on both sides.
+
+    Deepest valleys first: what lies between two valleys is a stretch of its own only if it rises
+    above both, and to a force that can be told, so that noise does not split a steady load.
 
     Args:
         size: |F| along a contact. (k,) [N]
         least: Fewest samples of a stretch.
+        told: Least peak of a stretch. [N]
     """
-    before = np.maximum.accumulate(size)
-    after = np.maximum.accumulate(size[::-1])[::-1]
-    pieces, first = [], 0
-    for start, stop in runs_of(size < SPLIT * np.minimum(before, after)):
-        valley = start + int(np.argmin(size[start:stop]))
-        if valley - first >= least and len(size) - valley >= least:
-            pieces.append((first, valley))
-            first = valley
-    return [*pieces, (first, len(size))]
+    pieces, asked = [], [(0, len(size))]
+    while asked:
+        first, last = asked.pop()
+        piece = size[first:last]
+        before = np.maximum.accumulate(piece)
+        after = np.maximum.accumulate(piece[::-1])[::-1]
+        lower = np.minimum(before, after)
+        depth = np.where(lower >= told, piece / np.maximum(lower, 1e-12), 1.0)
+        depth = depth[least : len(piece) - least]
+        if len(depth) and depth.min() < SPLIT:
+            valley = first + least + int(np.argmin(depth))
+            asked += [(valley, last), (first, valley)]
+        else:
+            pieces.append((first, last))
+    return pieces
 
 
 def peak_row(

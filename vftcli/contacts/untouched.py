@@ -140,10 +140,10 @@ def free_part(motion: FreeMotion) -> FreePart | None:
 
 
 def repeats(motion: FreeMotion) -> bool:
-    """Whether the log has two cycles at least, of which the quieter may be free."""
+    """Whether the log has two cycles at least, and the quietest of them can be told."""
     try:
-        return motion.cycles.whole >= LEAST_CYCLES
-    except ReferenceTorqueError:
+        return motion.cycles.whole >= LEAST_CYCLES and len(motion.free_cycles.numbers) > 0
+    except ReferenceTorqueError:  # nothing repeats, or too little of it was recorded
         return False
 
 

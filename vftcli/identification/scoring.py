@@ -31,6 +31,9 @@ ENOUGH = 50
 WORSE = 1.5
 """A held-out joint whose residual is this many times the training's is remarked on."""
 
+BEHIND = 1.01
+"""A model that leaves this many times what the profile leaves of a log has made it worse."""
+
 NEAR = 0.01
 """Largest joint distance at which two samples are the same place. [rad]"""
 
@@ -90,10 +93,10 @@ def constant_ratio(profile: Robot, robot: Robot, motion: PreparedLog) -> Array |
 
 
 def score_remarks(robot: Robot, traces: Sequence[Trace]) -> list[Remark]:
-    """What the scores mean: repeated trajectories, and joints that are much worse elsewhere."""
+    """What the scores mean: logs that got worse or repeat others, joints much worse elsewhere."""
     train = [trace for trace in traces if trace.role == "train"]
     held_out = [trace for trace in traces if trace.role == "held-out"]
-    remarks = []
+    remarks = [remark for trace in traces if (remark := worse_remark(trace)) is not None]
     for test in held_out:
         for other in train:
             if (share := repeated_share(other.motion, test.motion)) >= REPEATED:
@@ -109,6 +112,15 @@ def score_remarks(robot: Robot, traces: Sequence[Trace]) -> list[Remark]:
     for test in held_out:
         remarks += held_out_remarks(robot, test, level)
     return [*remarks, fact("training-residual", mean_Nm=float(np.mean(level)))]
+
+
+def worse_remark(trace: Trace) -> Remark | None:
+    """That the profile explains a log better than what was identified, None where it does not."""
+    left, before = float(np.mean(trace.rms)), float(np.mean(trace.before))
+    if not left > BEHIND * before > 0.0:
+        return None
+    where = Where(trace.motion.recording.name)
+    return caution("worse-than-profile", where, identified_Nm=left, profile_Nm=before)
 
 
 def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]:

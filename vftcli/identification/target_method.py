@@ -92,4 +92,5 @@ def gravity_remarks(models: Sequence[ControllerModel]) -> list[Remark]:
     # All joints feel one gravity: their ratios are averaged by the inverse of their variances.
     weights = np.array([1.0 / max(s.sd, 1e-9) ** 2 for s in scales])
     ratio = float(weights @ np.array([s.value for s in scales]) / weights.sum())
-    return [fact("controller-gravity", ratio=ratio)] if abs(ratio - 1.0) >= SAME_GRAVITY else []
+    least = max(SAME_GRAVITY, 2.0 / float(np.sqrt(weights.sum())))
+    return [fact("controller-gravity", ratio=ratio)] if abs(ratio - 1.0) >= least else []

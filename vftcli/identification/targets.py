@@ -268,7 +268,9 @@ def rotor_inertia(j: int, logs: Sequence[Targets]) -> tuple[Estimate, Estimate]:
     plain = solve(rows[:, :-1], rows[:, -1])
     value, sd = float(plain[0]), float(np.hypot(fit.sd[0], 0.5 * (fit.values[0] - plain[0])))
     rotor = Estimate(value, sd, value > 0 and sd <= ROTOR_KNOWN * value)
-    scale, scale_sd = 1.0 + float(plain[1]), float(fit.sd[1])
+    # A joint whose gravity hardly changes tells the constant and the scale only together.
+    scale = 1.0 + float(plain[1])
+    scale_sd = float(np.hypot(fit.sd[1], 0.5 * (fit.values[1] - plain[1])))
     return rotor, Estimate(scale, scale_sd, scale_sd < 1e-3)
 
 

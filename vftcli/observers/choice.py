@@ -64,14 +64,15 @@ class ObserverChoice:
 
     def __post_init__(self) -> None:
         alike = self.as_printed or self.match is not None
-        names = self.names or (PAPER if alike else DEFAULT)
+        names = tuple(dict.fromkeys(self.names)) or (PAPER if alike else DEFAULT)
         for name in names:
             check_known(name, OBSERVERS, f"no observer {name!r}")
         if self.causal:
             online = tuple(name for name in names if OBSERVERS[name].online)
             if not online:
+                needs = "needs" if len(names) == 1 else "need"
                 raise ParameterError(
-                    f"--causal leaves out {', '.join(names)}, which need the complete log; "
+                    f"--causal leaves out {', '.join(names)}, which {needs} the complete log; "
                     f"choose of {', '.join(PAPER)} with --observer"
                 )
             names = online

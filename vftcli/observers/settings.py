@@ -137,6 +137,10 @@ def load_gains(path: Path, sections: Mapping[str, Sequence[str]]) -> Gains:
     """
     try:
         document = toml_tables(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ParameterError(
+            f"{path}: no such file of gains; --gains takes auto, paper, or a file of `vftcli tune`"
+        ) from None
     except OSError as error:
         raise ParameterError(f"{path}: cannot be read as gains ({error.strerror})") from None
     except UnicodeDecodeError:

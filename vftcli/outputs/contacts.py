@@ -223,9 +223,10 @@ def basis(found: ContactList) -> list[str]:
     if found.smallest_force is not None and np.isfinite(found.smallest_force):
         lines.append(f"smallest force this log can tell: {found.smallest_force:.0f} N")
     if found.free:
-        false = "no" if not found.false_on_free else str(found.false_on_free)
+        false = found.false_on_free or "no"
+        ending = "s" if (found.false_on_free or 0) > 1 else ""
         lines.append(
-            f"{free_words(found)}; {false} contact listed in its {found.free_seconds:.0f} s"
+            f"{free_words(found)}; {false} contact{ending} listed in its {found.free_seconds:.0f} s"
         )
     return [*lines, *(f"caution: {sentence(remark)}" for remark in found.remarks)]
 

@@ -86,6 +86,8 @@ def friction_share(dq: Array, tau: Array) -> Array:
 def limits_remark(found: Budget, stuck: Mask) -> Remark:
     """What limits a log: the largest cause of each joint, and how much of the error it makes.
 
+    What stiction may hide is added to the error of a joint that stands, so that it is a part of it.
+
     Args:
         found: The budget.
         stuck: Joints that stand in most samples, where stiction decides. (n,)
@@ -94,7 +96,9 @@ def limits_remark(found: Budget, stuck: Mask) -> Remark:
     largest = [
         max(causes, key=lambda cause: float(found.parts[cause][j])) for j in range(len(stuck))
     ]
-    named = [STICTION if stands else cause for cause, stands in zip(largest, stuck, strict=True)]
+    decided = stuck & (found.parts[STICTION] > 0.0)  # no friction known: nothing known of stiction
+    named = [STICTION if stands else cause for cause, stands in zip(largest, decided, strict=True)]
     size = [float(found.parts[cause][j]) for j, cause in enumerate(named)]
+    total = np.hypot(found.total, np.where(stuck, found.parts[STICTION], 0.0))
     where = Where(about=found.name)
-    return fact("limits", where, causes=named, size_Nm=size, total_Nm=found.total.tolist())
+    return fact("limits", where, causes=named, size_Nm=size, total_Nm=total.tolist())

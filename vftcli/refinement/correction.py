@@ -56,7 +56,12 @@ def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
         quiet: The samples that are taken for free. (T,)
     """
     log = found.motion.log
-    remark = fact("free-by-the-fit", share=float(quiet.mean()))
+    share = float(quiet.mean())
+    remark = fact("free-by-the-fit", share=share)
+    if found.motion.choice.is_given and found.missing is not None:
+        # What was given is dropped, and why has to be said.
+        reason = found.missing.values["reason"]
+        remark = caution("free-by-the-fit-instead", share=share, reason=reason)
     part = FreePart((FreePiece(log, quiet, ()),), quiet, (remark,))
     made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
     try:

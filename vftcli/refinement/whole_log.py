@@ -137,18 +137,19 @@ def rows_of(run: ModelledRun, motion: SmoothMotion, stride: int) -> Rows:
 
 def refusal(run: ModelledRun) -> Remark | None:
     """Why a log does not tell the model's error from a push, None where it may."""
-    t, span, moving = run.recording.t, 0.0, 0.0
-    if t[-1] - t[0] >= LEAST_MOTION:
-        # noise is no motion
-        dq = zero_phase(t, run.recording.require("dq"), CUTOFF)
-        moves = np.any(np.abs(dq) > MOVES, axis=1)
-        moving = float(np.count_nonzero(moves) * median_step(t))
-        span = float(np.ptp(t[moves])) if moves.any() else 0.0
-    if span < LEAST_MOTION:
-        return caution("whole-log-too-short", motion_s=span, least_s=LEAST_MOTION)
-    share = moving / float(t[-1] - t[0])
-    if moving < LEAST_MOTION and share < LEAST_SHARE:
+    t, dq = run.recording.t, run.recording.require("dq")
+    duration = float(t[-1] - t[0])
+    if duration < LEAST_MOTION:
+        return caution("whole-log-too-short", duration_s=duration, least_s=LEAST_MOTION)
+    # noise is no motion
+    moves = np.any(np.abs(zero_phase(t, dq, CUTOFF)) > MOVES, axis=1)
+    moving = float(np.count_nonzero(moves) * median_step(t))
+    span = float(np.ptp(t[moves])) if moves.any() else 0.0
+    share = moving / duration
+    if not moves.any() or (moving < LEAST_MOTION <= span and share < LEAST_SHARE):
         return caution("whole-log-at-rest", motion_s=moving, share=share)
+    if span < LEAST_MOTION:
+        return caution("whole-log-little-motion", motion_s=span, least_s=LEAST_MOTION)
     return None
 
 

@@ -107,6 +107,11 @@ class WrenchChoice:
         """The solver that takes each pose by itself: the one asked for, else least squares."""
         return LEAST_SQUARES if self.solver in {None, SMOOTHER} else str(self.solver)
 
+    @property
+    def looks_back(self) -> bool:
+        """Whether the solver asked for needs the complete log, whichever observers run."""
+        return self.solver == SMOOTHER
+
     def smooths(self, name: str) -> bool:
         """Whether the wrench of the observer of this name is the smoother's."""
         return self.solver == SMOOTHER or (self.solver is None and name in SMOOTHED)

@@ -13,7 +13,7 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Mask
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.free_run_torque import (
@@ -166,9 +166,18 @@ def sense(
 def band_remarks(
     error: TorqueError, wrenches: Sequence[Wrench], smoothed: Collection[str]
 ) -> tuple[Remark, ...]:
-    """Where the wrenches' bands come from: the error of the torques, and each smoother's own."""
+    """Where the wrenches' bands come from: the error of the torques, and each smoother's own.
+
+    Beside a smoothed wrench, what is said of the torques' error names those that it is said of.
+    """
     own = [r for w in wrenches if w.name in smoothed for r in w.remarks]
-    common = error.remarks if len(smoothed) < len(wrenches) else ()
+    others = [w.name for w in wrenches if w.name not in smoothed]
+    if not others:
+        return tuple(own)
+    names = Where(", ".join(others))
+    common = error.remarks
+    if smoothed:
+        common = tuple(replace(r, where=names) if r.where == Where() else r for r in common)
     return (*common, *own)
 
 
