@@ -11,6 +11,7 @@ from vftcli.observers.momentum import MomentumObserver
 from vftcli.readers import read
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
+from vftcli.signals.errors import RobotError
 from vftcli.signals.wrench import WrenchFrame
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
@@ -44,6 +45,11 @@ def test_without_one_a_momentum_observer_of_ten_stands_for_it(ur5: ModelledRun) 
     np.testing.assert_array_equal(found.wrench, wrench.known)
     np.testing.assert_array_equal(found.force[:, 0], np.linalg.norm(found.wrench[:, :3], axis=1))
     assert (found.of_vendor, found.logged_wrench) == (False, False)
+
+
+def test_a_log_of_another_arm_is_refused(panda: ModelledRun, ur5: ModelledRun) -> None:
+    with pytest.raises(RobotError, match="7 joints but robot 'ur5' has 6"):
+        compared_signals(ModelledRun(recording=panda.recording, robot=ur5.robot))
 
 
 def test_an_estimate_that_is_zero_throughout_is_none(panda: ModelledRun) -> None:

@@ -21,8 +21,14 @@ SETTINGS = {
     "drift": ["sensing.clock_drift=0.003"],
 }
 
-OVERSTATED = {("soft", 2): 0.6}
-"""A floor that is stated too large: joint 4 of this one run of fifteen errs by .65 of it."""
+OVERSTATED = pytest.mark.xfail(
+    strict=True, reason="the floor of joint 4 is stated too large there: it errs by .65 of it"
+)
+RUNS = [
+    pytest.param(name, seed, marks=OVERSTATED if (name, seed) == ("soft", 2) else ())
+    for name in SETTINGS
+    for seed in range(1, 6)
+]
 
 
 def error_of(run: Simulation, choice: FreeChoice) -> tuple[Array, Array]:
@@ -36,8 +42,7 @@ def error_of(run: Simulation, choice: FreeChoice) -> tuple[Array, Array]:
 
 
 @pytest.mark.statistical
-@pytest.mark.parametrize("seed", range(1, 6))
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize(("name", "seed"), RUNS)
 def test_required_figures(name: str, seed: int) -> None:
     run = simulate(load_scenario("ur5-circle", SETTINGS[name]), seed)
     wanted = 4.0 * (1.003 if name == "drift" else 1.0)
@@ -47,8 +52,7 @@ def test_required_figures(name: str, seed: int) -> None:
     plain = FreeChoice(period=4.0, alignment="commanded", low_pass=None)
     commanded, _ = error_of(run, plain)
     assert best.mean() <= 0.6 * commanded.mean()
-    least = OVERSTATED.get((name, seed), 0.7)
-    assert np.all((best / floor >= least) & (best / floor <= 1.4)), best / floor
+    assert np.all((best / floor >= 0.7) & (best / floor <= 1.4)), best / floor
 
     for low_pass in (None, 12.0):
         chosen, _ = error_of(run, FreeChoice(period=4.0, low_pass=low_pass))

@@ -11,6 +11,7 @@ import numpy as np
 
 from vftcli.observers.momentum import MomentumObserver
 from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.drive import check_joints
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
@@ -67,7 +68,10 @@ def compared_signals(run: ModelledRun) -> ComparedSignals:
 
     Raises:
         MissingSignalError: If the log has neither an estimate nor what the observer needs.
+        RobotError: If the number of joints differs.
     """
+    # The robot's own estimate asks for no model, which else would check.
+    check_joints(run.recording, run.robot)
     recording, vendor = run.recording, run.recording.tau_ext
     of_vendor = vendor is not None and bool(np.any(vendor))
     if vendor is not None and of_vendor:
