@@ -26,9 +26,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
-    from vftcli.contacts.asking import contacts_of_log as contacts
     from vftcli.evaluation import evaluate, rmse
     from vftcli.evaluation.reference_choice import ReferenceChoice
+    from vftcli.notebook import contacts
     from vftcli.observers import (
         FilteredDynamicsObserver,
         KalmanObserver,

@@ -15,6 +15,7 @@ from vftcli.signals.remarks import Remark
 if TYPE_CHECKING:
     import polars as pl
 
+    from vftcli.contacts.contact_list import ContactList
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.print_table import Comparison
     from vftcli.refinement.baseline import Baseline
@@ -41,7 +42,8 @@ class Analysis:
         virtual_sensor: The wrenches and what is known of them, or None where none was asked for.
         reference: What the estimates are judged by, or None.
         errors: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
-        contacts: How each observer tells contacts, or empty where it was not asked.
+        contacts: What touched the arm, or None where it is not asked or cannot be told.
+        contact_scores: How each observer tells contacts, or empty where it was not asked.
         published: A printed table beside these errors, or None where none was asked for.
         examinations: What is wrong with the log, then with its free runs.
         remarks: What the reader of the numbers should know.
@@ -56,7 +58,8 @@ class Analysis:
     virtual_sensor: "SensorReading | None" = None
     reference: ExternalTorque | None = None
     errors: "pl.DataFrame | None" = None
-    contacts: "tuple[ContactScore, ...]" = ()
+    contacts: "ContactList | None" = None
+    contact_scores: "tuple[ContactScore, ...]" = ()
     published: "Comparison | None" = None
     examinations: "tuple[Examination, ...]" = ()
     remarks: tuple[Remark, ...] = ()

@@ -16,15 +16,17 @@ from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import FreeRun, Models
 from vftcli.robots import Robot
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.errors import ParameterError, VftError
 from vftcli.signals.recording import Recording
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
+    from vftcli.contacts.contact_list import ContactList
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.refinement.baseline import Baseline
     from vftcli.virtual_sensor.choice import WrenchChoice
+    from vftcli.virtual_sensor.smoother.observer_wrench import Gate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +41,7 @@ class AnalysisChoice:
         refinement: What is done with the estimates once the whole log is known.
         wrench: What is asked of the virtual force/torque sensor, None for joint torques alone.
         reference: What the estimates are compared with, or None.
+        contacts: Whether what touched the arm is listed, where the complete log may be used.
         library: Where the logs of the command are read, each once.
         examiner: Who examines them, each once, and says whether results mean anything.
     """
@@ -50,6 +53,7 @@ class AnalysisChoice:
     refinement: RefinementChoice = field(default_factory=RefinementChoice)
     wrench: "WrenchChoice | None" = None
     reference: "ReferenceChoice | None" = None
+    contacts: bool = True
     library: Library = field(default_factory=Library, repr=False, compare=False)
     examiner: Examiner = field(default_factory=Examiner, repr=False, compare=False)
 
@@ -81,6 +85,11 @@ class AnalysisChoice:
         asked = self.refinement.looks_back or self.free.is_asked
         return asked or self.observers.from_spectra
 
+    @property
+    def lists_contacts(self) -> bool:
+        """Whether what touched the arm is listed: that needs the complete log."""
+        return self.contacts and not self.observers.causal
+
 
 def analyse_logs(logs: Iterable[Path], choice: AnalysisChoice) -> Iterator["Analysis"]:
     """Analyse the logs of a command one after the other; what they share is made once.
@@ -91,6 +100,21 @@ def analyse_logs(logs: Iterable[Path], choice: AnalysisChoice) -> Iterator["Anal
     models = Models()
     for recording in choice.library.open_logs(list(logs), choice.read):
         yield analyse(*prepared(recording, choice), choice, models)
+
+
+def contact_lists(logs: Iterable[Path], choice: AnalysisChoice) -> Iterator["ContactList"]:
+    """What touched the arm along each log, without any observer's estimate.
+
+    Raises:
+        VftError: If a log cannot be read, is meaningless with this robot, or named twice.
+    """
+    from vftcli.contacts.listing import list_contacts
+
+    models = Models()
+    for recording in choice.library.open_logs(list(logs), choice.read):
+        motion = read(*prepared(recording, choice), choice, models)
+        examine(motion, choice)
+        yield list_contacts(motion)
 
 
 def prepared(recording: Recording, choice: AnalysisChoice) -> tuple[Recording, Robot]:
@@ -124,6 +148,7 @@ def analyse(
     baseline = model(motion, choice)
     analysis = replace(observe(motion, baseline, choice), examinations=examinations)
     analysis = refine(analysis, baseline, choice)
+    analysis = find_contacts(analysis, choice)
     analysis = sense(analysis, choice)
     return judge(analysis, choice)
 
@@ -197,21 +222,50 @@ def refine(analysis: "Analysis", baseline: "Baseline | None", choice: AnalysisCh
     return replace(analysis, estimates=made.estimates, refinement=made, remarks=remarks)
 
 
-def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
-    """Turn the estimates into wrenches, where they are asked for."""
-    if choice.wrench is None:
+def find_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
+    """List what touched the arm, where that is wanted; a log that tells none says why."""
+    if not choice.lists_contacts:
         return analysis
-    from vftcli.virtual_sensor import sensing
+    from vftcli.contacts.listing import list_contacts
+    from vftcli.signals.remarks import caution
 
+    try:
+        return replace(analysis, contacts=list_contacts(analysis.motion))
+    except VftError as error:
+        reason = caution("contacts-not-told", reason=str(error))
+        return replace(analysis, remarks=(*analysis.remarks, reason))
+
+
+def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
+    """Turn the estimates into wrenches: those asked for, and that of `best` beside its contacts."""
+    asked, names = choice.wrench, tuple(o.name for o in analysis.observers)
+    if asked is None:
+        if analysis.contacts is None or BEST not in names or analysis.robot.joints < 6:
+            return analysis
+        names = (BEST,)
+    from vftcli.virtual_sensor import sensing
+    from vftcli.virtual_sensor.choice import WrenchChoice
+
+    observers = [o for o in analysis.observers if o.name in names]
+    estimates = [e for e in analysis.estimates if e.name in names]
     found = sensing.sense(
         analysis.motion,
-        analysis.observers,
-        analysis.estimates,
-        choice.wrench,
+        observers,
+        estimates,
+        asked or WrenchChoice(),
         analysis.terms_of,
         analysis.smoother_input,
+        gate_of(analysis),
     )
     return replace(analysis, virtual_sensor=found)
+
+
+def gate_of(analysis: "Analysis") -> "Gate | None":
+    """The contacts, outside of which nothing touches; None where the whole log may be one."""
+    found = analysis.contacts
+    if found is None or any(contact.is_load for contact in found.contacts):
+        return None
+    return [(contact.start, contact.stop) for contact in found.contacts]
 
 
 def judge(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
@@ -220,8 +274,10 @@ def judge(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
         return analysis
     from vftcli.evaluation import judgement
 
-    sensed = analysis.virtual_sensor
+    sensed = analysis.virtual_sensor if choice.wrench is not None else None
     found = judgement.judge(analysis.motion, analysis.estimates, sensed, choice.reference)
+    if sensed is None:
+        found = found._replace(virtual_sensor=analysis.virtual_sensor)
     remarks = analysis.remarks
     if choice.observers.of_robot_file:
         remarks = judgement.with_measured_gap(remarks, found.errors, analysis.tunings)

@@ -1,5 +1,6 @@
 """`vftcli compare`: errors of the observers against a reference."""
 
+from dataclasses import replace
 from typing import Annotated
 
 import typer
@@ -62,6 +63,9 @@ def compare(
         "latex": tables.to_latex,
     }[table.form]
     choice = analysis.choice(Library(logs), reference)
+    # The list is for the wrench and for judging contacts; a table of torques needs none.
+    listed = choice.contacts and (analysis.wrench.asks or reference.contacts)
+    choice = replace(choice, contacts=listed)
     analyses = []
     for made in analyse_logs(logs, choice):
         if not table.json:

@@ -38,11 +38,11 @@ def list_contacts(
         raise typer.BadParameter("choose one of --json, --csv")
 
     from vftcli.cli.console import health_of
-    from vftcli.contacts.asking import ContactChoice, contact_lists
+    from vftcli.pipeline import AnalysisChoice, contact_lists
     from vftcli.readers.library import Library
 
     library = Library(logs)
-    choice = ContactChoice(
+    choice = AnalysisChoice(
         read=reading.choice(),
         robot=robot.choice(),
         free=free.choice(),

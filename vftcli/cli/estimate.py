@@ -22,7 +22,8 @@ def estimate(
 ) -> None:
     """Estimate the external joint torques along a log.
 
-    Writes DIR/estimates.parquet (t, q/1…, tau_ext/OBSERVER/1…) and DIR/run.json.
+    Writes DIR/estimates.parquet (t, q/1…, tau_ext/OBSERVER/1…, wrench/best/fx…, contact) and
+    DIR/run.json.
 
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5 -o out
     """
@@ -32,17 +33,21 @@ def estimate(
 
     extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
     # Of a large log only the columns that are looked at are read; outputs show the others too.
-    signals = None if analysis.wrench.asks or extras else EXAMINED
+    causal = analysis.observers.causal or analysis.no_contacts
+    signals = EXAMINED if causal and not (analysis.wrench.asks or extras) else None
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
     reading = Background(lambda: library.open(log, chosen))
 
     from vftcli.cli.console import command_line, say, say_analysis
+    from vftcli.observers.table import BEST
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
     from vftcli.pipeline import analyse, prepared
 
     OutputFolder(output, force, estimate_files(extras)).check()
     choice = analysis.choice(library)
+    # The list comes with the smoothed wrench of best, the observer that sees the complete log.
+    choice = replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
     made = analyse(*prepared(reading.result(), choice), choice)
     record = write_estimate_folder(output, made, command=command_line(), extras=extras, force=force)
     if json:

@@ -280,6 +280,7 @@ class AnalysisOptions(Bundle):
     free: FreeOptions
     refinement: BiasOptions
     wrench: WrenchOptions
+    no_contacts: bool = flag("--no-contacts", "Leave the list of contacts out.")
     anyway: bool = flag(*ANYWAY)
 
     def choice(
@@ -305,6 +306,7 @@ class AnalysisOptions(Bundle):
             refinement=self.refinement.choice(),
             wrench=self.wrench.choice(),
             reference=reference.choice() if reference is not None else None,
+            contacts=not self.no_contacts,
             library=library,
             examiner=health_of(library, anyway=self.anyway),
         )

@@ -1,9 +1,10 @@
 """Contacts: what touched the arm, when, how hard, where, and how sure that is.
 
-The room can be called: ``vft.contacts("log.csv", robot="ur5")`` is `asking.contacts_of_log`.
+The room can be called: ``vft.contacts("log.csv", robot="ur5")`` is `vftcli.notebook.contacts`.
 """
 
 import sys
+from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -15,10 +16,10 @@ class ContactsRoom(ModuleType):
     """This package as a module that can be called: its name is that of the question it answers."""
 
     def __call__(self, *words: Any, **options: Any) -> "ContactList":  # noqa: ANN401
-        """What touched the arm along a log; see `asking.contacts_of_log`."""
-        from vftcli.contacts.asking import contacts_of_log
-
-        return contacts_of_log(*words, **options)
+        """What touched the arm along a log; see `vftcli.notebook.contacts`."""
+        # The call is the notebook's, several floors up; the room itself knows nothing of it.
+        found: ContactList = import_module("vftcli.notebook").contacts(*words, **options)
+        return found
 
 
 contacts = sys.modules[__name__]

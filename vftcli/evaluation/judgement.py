@@ -32,7 +32,7 @@ class Judgement(NamedTuple):
     reference: ExternalTorque
     errors: pl.DataFrame
     virtual_sensor: SensorReading | None
-    contacts: tuple[ContactScore, ...]
+    contact_scores: tuple[ContactScore, ...]
 
 
 def with_measured_gap(
@@ -85,8 +85,10 @@ def judge(
         theirs = reference_wrench(recording, robot, made, sensed.sensor)
         sensed = with_reference(sensed, theirs, of_sensor=choice.name == "sensor")
         errors = with_wrenches(errors, recording.name, sensed)
-    contacts: tuple[ContactScore, ...] = ()
+    scores: tuple[ContactScore, ...] = ()
     if choice.contacts:
-        contacts = judge_contacts(estimates, sensed, reference)
-        errors = with_contacts(errors, recording.name, reference.name, contacts)
-    return Judgement(reference=reference, errors=errors, virtual_sensor=sensed, contacts=contacts)
+        scores = judge_contacts(estimates, sensed, reference)
+        errors = with_contacts(errors, recording.name, reference.name, scores)
+    return Judgement(
+        reference=reference, errors=errors, virtual_sensor=sensed, contact_scores=scores
+    )

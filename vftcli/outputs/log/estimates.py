@@ -18,13 +18,16 @@ from vftcli.signals.wrench import AXES
 if TYPE_CHECKING:
     import polars as pl
 
+    from vftcli.contacts.contact_list import ContactList
+
 
 def estimates_table(analysis: Analysis) -> "pl.DataFrame":
     """Time, motion, every observer's torque and the reference's, one flat column each.
 
     Columns: ``t`` [s]; ``q/1``… [rad]; ``dq/1``… [rad/s]; ``tau_ext/<observer>/1``… [N·m];
     ``sd/<observer>/1``… [N·m] where the observer gives one; ``tau_ext/reference/1``… [N·m];
-    where a wrench is asked for, ``wrench/<observer>/fx``…``mz`` [N, N·m], null where the pose
+    ``contact``, the row's number in the list of contacts or null, where they are listed; where a
+    wrench is asked for, and of ``best`` where contacts are listed, ``wrench/<observer>/fx``…``mz`` [N, N·m], null where the pose
     cannot tell it, ``wrench_sd/<observer>/fx``…, ``null_space/<observer>`` [N·m] and
     ``sigma_min`` [m]; with a bounded solver, what it says of the masked samples stands apart in
     ``wrench_masked/<observer>/fx``….
@@ -34,8 +37,21 @@ def estimates_table(analysis: Analysis) -> "pl.DataFrame":
 
     table = pl.DataFrame(dict(columns(analysis)))
     # Only columns that need it: to fill all of a long log takes longer than to write it.
+    if analysis.contacts is not None:
+        table = table.with_columns(contact_column(analysis.t, analysis.contacts))
     unknown = [s.name for s in table if s.dtype == pl.Float64 and s.is_nan().any()]
     return table.with_columns(pl.col(unknown).fill_nan(None)) if unknown else table
+
+
+def contact_column(t: Array, found: "ContactList") -> "pl.Series":
+    """The number of the contact that each sample lies in, null outside of all. (T,)"""
+    import polars as pl
+
+    number = np.zeros(len(t), dtype=np.int32)
+    for contact in found.contacts:
+        number[(t >= contact.start) & (t <= contact.stop)] = contact.number
+    inside = number > 0
+    return pl.Series("contact", number).set(pl.Series(~inside), None)
 
 
 def columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:

@@ -17,6 +17,7 @@ from vftcli.analysis import Analysis
 from vftcli.observers.auto_tuning import AutoTuned
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.observers.table import BEST
+from vftcli.outputs.contacts import contacts_record
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.files import OutputFolder
 from vftcli.robots.robot import Robot
@@ -71,6 +72,7 @@ def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
             "notes": list(reference.remarks),
         },
         "wrench": wrench_record(analysis),
+        "contacts": None if analysis.contacts is None else contacts_record(analysis.contacts),
         "complete_log": refinement_record(analysis),
         "conventions": CONVENTIONS,
         **log_remarks([analysis.recording]),

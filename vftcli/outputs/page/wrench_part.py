@@ -68,8 +68,8 @@ def wrench_section(analysis: Analysis) -> str:
     if sensed is None or not analysis.wrenches:
         return ""
     grids = [drift_grid(sensed.drifts, spans=True)] if sensed.drifts else []
-    if analysis.contacts:
-        grids += [contact_grid(analysis.contacts), trade_off_grid(analysis.contacts)]
+    if scores := analysis.contact_scores:
+        grids += [contact_grid(scores), trade_off_grid(scores)]
     axes, solver = FRAMES[sensed.sensor.frame], sensed.solver
     return "".join(
         (
