@@ -27,10 +27,10 @@ def estimates_table(analysis: Analysis) -> "pl.DataFrame":
     Columns: ``t`` [s]; ``q/1``… [rad]; ``dq/1``… [rad/s]; ``tau_ext/<observer>/1``… [N·m];
     ``sd/<observer>/1``… [N·m] where the observer gives one; ``tau_ext/reference/1``… [N·m];
     ``contact``, the row's number in the list of contacts or null, where they are listed; where a
-    wrench is asked for, and of ``best`` where contacts are listed, ``wrench/<observer>/fx``…``mz`` [N, N·m], null where the pose
-    cannot tell it, ``wrench_sd/<observer>/fx``…, ``null_space/<observer>`` [N·m] and
-    ``sigma_min`` [m]; with a bounded solver, what it says of the masked samples stands apart in
-    ``wrench_masked/<observer>/fx``….
+    wrench is asked for, and of ``best`` where contacts are listed, ``wrench/<observer>/fx``…``mz``
+    [N, N·m], null where the pose cannot tell it, ``wrench_sd/<observer>/fx``…,
+    ``null_space/<observer>`` [N·m] and ``sigma_min`` [m]; with a bounded solver, what it says of
+    the masked samples stands apart in ``wrench_masked/<observer>/fx``….
     What is not known is null.
     """
     import polars as pl
