@@ -72,18 +72,17 @@ LOGS: tuple[SoundLog, ...] = (
     SoundLog("franka_bags/calib_0108.bag", None, "fr3", ("slow-rate", "zero-wrench")),
     SoundLog("franka_bags/calib_0308.bag", None, "fr3", ("slow-rate",)),
     *(
-        SoundLog(f"ur3/{name}.bag", "-tau=effort", robot, known)
+        SoundLog(f"ur3/{name}.bag", "-tau=effort", robot)
         for name in ("identification", "repeat_a", "repeat_b")
-        for robot, known in (("../robots/ur3.toml", ()), ("", ("no-robot-fits",)))
+        for robot in ("ur3", "")
     ),
     SoundLog("rtde/static_cb3.csv", None, "", ("payload-mismatch", "no-robot-fits")),
-    SoundLog("rtde/ur3e_25hz_cr_line_ends.csv", None, "", ("slow-rate", "no-robot-fits")),
     # It declares a payload that the robot file does not mount.
-    SoundLog(
-        "rtde/ur3e_25hz_cr_line_ends.csv",
-        None,
-        "../robots/ur3e.toml",
-        ("slow-rate", "payload-not-mounted"),
+    *(
+        SoundLog(
+            "rtde/ur3e_25hz_cr_line_ends.csv", None, robot, ("slow-rate", "payload-not-mounted")
+        )
+        for robot in ("ur3e", "")
     ),
     SoundLog("rtde/blank_lines.csv", None, "", ("no-robot-fits",)),  # ten samples at rest
     SoundLog("mujoco_ur5e/circle.csv", None, "mujoco_ur5e/robot.toml"),

@@ -20,14 +20,15 @@ def robots(
     from vftcli.cli.console import say_json
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import robot_row, robot_text, robots_grid
-    from vftcli.robots import PROFILES, load_robot
+    from vftcli.robots import MAKERS, load_robot
 
     if name is None:
-        rows = [robot_row(load_robot(profile)) for profile in PROFILES]
+        rows = {m: [robot_row(load_robot(p)) for p in names] for m, names in MAKERS.items()}
         if json:
-            say_json(rows)
-        else:
-            typer.echo(terminal(robots_grid(rows)), nl=False)
+            say_json([{"maker": maker, **row} for maker in rows for row in rows[maker]])
+            return
+        for maker, each in rows.items():
+            typer.echo(f"{maker}\n{terminal(robots_grid(each))}", nl=False)
         return
     robot = load_robot(name)
     if json:

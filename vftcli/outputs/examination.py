@@ -11,6 +11,9 @@ from vftcli.signals.letters import printable
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
 
+MOST_FITS = 3
+"""Profiles that are shown though they do not fit: the nearest."""
+
 
 def examination_record(examination: Examination) -> dict[str, Any]:
     """Everything the doctor knows, for machines; what the reader warns of is a finding too."""
@@ -74,7 +77,9 @@ def examination_text(examination: Examination) -> str:
         lines.append(f"  payload   {recording.payload_mass:.3g} kg, as the controller was told")
     lines.append(f"  robot     {recording.robot_hint or 'not settled by the log'}")
     lines += [
-        f"  fit       {fit}{'' if fit.fits else ': does not fit'}" for fit in examination.robots
+        f"  fit       {fit}{'' if fit.fits else ': does not fit'}"
+        for k, fit in enumerate(examination.robots)
+        if fit.fits or k < MOST_FITS
     ]
     lines += [f"  repair    {repair}" for repair in source.repairs]
     lines += [f"  suspect   {warning}" for warning in source.warnings]

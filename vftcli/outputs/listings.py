@@ -14,7 +14,7 @@ def robots_grid(rows: Sequence[dict[str, Any]]) -> Grid:
     """The robot profiles, one row each, without a heading."""
     return Grid(
         # The widths keep the columns of one release where they were in the one before.
-        columns=tuple(Column("", words=True, width=width) for width in (6, 27, 9, 11, 0)),
+        columns=tuple(Column("", words=True, width=width) for width in (6, 27, 9, 12, 0)),
         rows=tuple(
             (r["name"], r["title"], f"{r['joints']} joints", r["torque_source"], r["friction"])
             for r in rows

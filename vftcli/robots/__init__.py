@@ -5,11 +5,24 @@ from pathlib import Path
 from vftcli.robots.chain import Chain, Payload
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
 from vftcli.signals.errors import RobotError
-from vftcli.signals.parsing import did_you_mean
+
+MAKERS = {
+    "Universal Robots": (
+        *("ur3", "ur5", "ur10"),
+        *("ur3e", "ur5e", "ur10e", "ur16e", "ur20", "ur30"),
+    ),
+    "Franka Robotics": ("panda", "fr3"),
+    "KUKA": ("iiwa7", "iiwa14"),
+    "Kinova": ("gen3",),
+    "UFACTORY": ("xarm6", "xarm7"),
+    "Doosan Robotics": ("m1013",),
+}
+"""Maker → its built-in profiles."""
 
 PROFILES: dict[str, Path] = {
-    name: Path(__file__).parent / f"{name}.toml"
-    for name in ("ur5", "ur5e", "ur10e", "panda", "fr3")
+    name: Path(__file__).parent / "profiles" / f"{name}.toml"
+    for names in MAKERS.values()
+    for name in names
 }
 """Built-in profile name → its file."""
 
@@ -20,10 +33,10 @@ def load_robot(robot: str | Path) -> Robot:
     Raises:
         RobotError: If there is no such profile or file, or it is not a valid description.
     """
-    if str(robot) in PROFILES:
+    if (name := plain_name(str(robot))) in PROFILES:
         from vftcli.robots.profile import load_profile
 
-        return load_profile(PROFILES[str(robot)])
+        return load_profile(PROFILES[name])
     path = Path(robot)
     if path.suffix.lower() in {".urdf", ".xml"}:
         from vftcli.robots.urdf import load_urdf
@@ -34,9 +47,14 @@ def load_robot(robot: str | Path) -> Robot:
 
         return load_profile(path)
     raise RobotError(
-        f"no robot {str(robot)!r}.{did_you_mean(str(robot).lower(), PROFILES)} "
-        f"Built in: {', '.join(PROFILES)}; or give a FILE.toml or FILE.urdf."
+        f"no robot {str(robot)!r}. Built in: {', '.join(PROFILES)}; "
+        "or give a FILE.toml or FILE.urdf"
     )
+
+
+def plain_name(word: str) -> str:
+    """How a robot's name is written here: ``UR-5e``, ``ur_5e`` and ``UR 5e`` are ``ur5e``."""
+    return "".join(letter for letter in word.lower() if letter not in "-_ ")
 
 
 __all__ = [
