@@ -1,0 +1,98 @@
+"""Xacro, a program that writes a URDF: expanded by the package xacro, which needs no ROS.
+
+Packages that a xacro names with $(find NAME) are looked for beside the file and above it, by their
+`package.xml`.
+"""
+
+import io
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+from vftcli.robots.robot_file import robot_text
+from vftcli.signals.errors import RobotError
+from vftcli.signals.parsing import assignment, did_you_mean
+
+NAMESPACE = re.compile(r"\{[^}]*xacro[^}]*\}")
+"""How the tag of an element of xacro begins."""
+
+ARGUMENT = re.compile(r"<xacro:arg\s[^>]*?name\s*=\s*[\"']([^\"']+)[\"']")
+"""A declaration of an argument."""
+
+FORM = "NAME=VALUE"
+ABOVE = 5
+"""Folders above the file in which packages are looked for."""
+
+
+def has_macros(root: ET.Element) -> bool:
+    """Whether a description still has to be expanded."""
+    return any(NAMESPACE.match(str(element.tag)) for element in root.iter())
+
+
+def urdf_of_xacro(path: Path, root: ET.Element, arguments: Sequence[str]) -> str:
+    """The URDF that a xacro writes.
+
+    Args:
+        path: The file.
+        root: Its first element.
+        arguments: What its arguments shall be, each ``NAME=VALUE``.
+
+    Raises:
+        RobotError: If xacro is not installed, an argument is unknown or missing, or the xacro
+            cannot be expanded.
+    """
+    given = dict(assignment(word, "--robot-arg", FORM) for word in arguments)
+    line = " ".join(["xacro", path.name, *(f"{k}:={v}" for k, v in given.items())])
+    try:
+        import xacro
+        from xacrodoc import packages
+    except ImportError:
+        raise RobotError(
+            f"{path}: a xacro is expanded by a package of its own: pip install 'vftcli[xacro]'; or "
+            f"give the URDF that it writes: {line} > {path.name.split('.')[0]}.urdf"
+        ) from None
+    declared = dict(arguments_of(root))
+    if missing := [name for name, default in declared.items() if not default and name not in given]:
+        raise RobotError(
+            f"{path}: the xacro needs {', '.join(missing)}: give --robot-arg {missing[0]}=VALUE; "
+            f"it takes {', '.join(declared)}"
+        )
+    packages.update_package_cache(dict(packages_near(path)))
+    said = io.StringIO()
+    try:
+        with redirect_stderr(said), redirect_stdout(said):
+            text = str(xacro.process_file(str(path), mappings=dict(given)).toxml())
+    except Exception as error:  # noqa: BLE001 - a xacro is a program: it may raise anything
+        takes = f"; it takes {', '.join(declared)}" if declared else ""
+        why = " ".join(f"{type(error).__name__}: {error}".split())[:400]
+        raise RobotError(f"{path}: the xacro cannot be expanded: {why}{takes}") from None
+    taken = {**declared, **dict.fromkeys(included_arguments(xacro.all_includes))}
+    if unknown := next((name for name in given if name not in taken), None):
+        raise RobotError(
+            f"{path}: the xacro takes no argument {unknown!r}.{did_you_mean(unknown, taken)} "
+            f"It takes {', '.join(taken) or 'none'}"
+        )
+    return text
+
+
+def arguments_of(root: ET.Element) -> Iterator[tuple[str, bool]]:
+    """Each argument that a xacro declares, and whether it has a default."""
+    for element in root.iter():
+        if NAMESPACE.sub("", str(element.tag)) == "arg" and element.get("name"):
+            yield str(element.get("name")), "default" in element.attrib
+
+
+def included_arguments(files: Sequence[str]) -> Iterator[str]:
+    """The arguments that included files declare."""
+    for file in files:
+        yield from ARGUMENT.findall(robot_text(Path(file)))
+
+
+def packages_near(path: Path) -> Iterator[tuple[str, str]]:
+    """Name and folder of the packages above a file and beside these, the nearest last."""
+    for folder in reversed(path.resolve().parents[:ABOVE]):
+        for manifest in (*sorted(folder.glob("*/package.xml")), *folder.glob("package.xml")):
+            if name := re.search(r"<name>\s*([^<\s]+)\s*</name>", robot_text(manifest)):
+                yield name[1], str(manifest.parent)
