@@ -189,7 +189,7 @@ def reduced_model(
     return reduced, np.array([reduced.joints[k].nq for k in range(1, reduced.njoints)])
 
 
-def agrees_with_pinocchio(text: str, robot: Robot, angles: Mapping[str, float] = {}) -> None:  # noqa: B006
+def agrees_with_pinocchio(text: str, robot: Robot, angles: Mapping[str, float] = {}) -> None:
     """Inverse dynamics and the flange of the robot are those of Pinocchio's reduced model."""
     theirs, sizes = reduced_model(text, robot.chain.names, angles)
     ours = robot.chain.to_pinocchio()

@@ -87,7 +87,7 @@ def test_a_toml_beside_the_urdf_adds_drives_friction_and_gains(tmp_path: Path) -
 def test_a_toml_beside_the_urdf_must_match_its_joints(tmp_path: Path) -> None:
     path = written(tmp_path, URDF.format(kind="revolute"))
     written(tmp_path, '[[joints]]\nname = "c"\nrotor_inertia = 1.0\n', "arm.toml")
-    with pytest.raises(RobotError, match="no joint 'c' in arm.urdf; it has a, b"):
+    with pytest.raises(RobotError, match=r"no joint 'c' in arm\.urdf; it has a, b"):
         load_robot(path)
 
 
@@ -199,7 +199,7 @@ def test_what_a_urdf_leaves_out_has_its_default(tmp_path: Path) -> None:
         (
             '<child link="hand"/>',
             '<child link="base"/>',
-            "link 'base' is not connected with 'hand'",
+            "link 'base' is not connected with",
         ),
         ('<axis xyz="0 1 0"/>', "<mimic/>", "joint 'b': <mimic> names no joint"),
     ],

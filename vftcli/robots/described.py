@@ -67,7 +67,7 @@ def load_described(path: Path, tip: str = "", arguments: Sequence[str] = ()) -> 
     root = xml_root(text, path)
     remarks: tuple[Remark, ...] = ()
     if path.suffix.lower() == ".xacro" or has_macros(root):
-        root = xml_root(urdf_of_xacro(path, root, arguments), path)
+        root = xml_root(urdf_of_xacro(path, arguments), path)
         remarks = (fact("xacro-run", file=path.name),)
     elif arguments:
         raise RobotError(f"{path}: --robot-arg {arguments[0]!r} is for a xacro, which this is not")
@@ -84,6 +84,7 @@ def load_described(path: Path, tip: str = "", arguments: Sequence[str] = ()) -> 
     robot = robot_of(lumped, file, beside)
     remarks = (*remarks, *arm_remarks(lumped, robot.chain), *simulator_remarks(lumped))
     endless = [joint.name for joint in lumped.arm.joints if joint.kind == "continuous"]
+    endless += [name for name in robot.endless if name not in endless]
     return replace(
         robot,
         path=path,

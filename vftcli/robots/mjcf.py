@@ -37,6 +37,11 @@ def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
     Raises:
         RobotError: If Pinocchio is not installed, cannot read it, or finds what no robot has.
     """
+    if (part := root.find(".//include")) is not None:
+        raise RobotError(
+            f"{path}: includes {part.get('file')!r}, which Pinocchio would leave out; have MuJoCo "
+            "write it as one file (mj_saveLastXML)"
+        )
     try:
         import pinocchio as pin
     except ImportError:

@@ -123,6 +123,13 @@ class Section(NamedTuple):
         self.check_bounds(key, found)
         return found
 
+    def switch(self, key: str) -> bool:
+        """Return true or false, false if the key is absent, or complain."""
+        value = self.values.get(key, False)
+        if not isinstance(value, bool):
+            self.refuse(f"{key} is {shown(value)}; it must be true or false", key)
+        return value
+
     def text(self, key: str, default: str = "") -> str:
         """Return a word or a sentence, `default` if the key is absent, or complain."""
         value = self.values.get(key, default)

@@ -18,8 +18,11 @@ from vftcli.signals.parsing import assignment, did_you_mean
 NAMESPACE = re.compile(r"\{[^}]*xacro[^}]*\}")
 """How the tag of an element of xacro begins."""
 
-ARGUMENT = re.compile(r"<xacro:arg\s[^>]*?name\s*=\s*[\"']([^\"']+)[\"']")
-"""A declaration of an argument."""
+DECLARED = re.compile(r"<xacro:arg\s[^>]*?name\s*=\s*[\"']([^\"']+)[\"']")
+"""A declaration of an argument, which has a default."""
+
+USED = re.compile(r"\$\(arg\s+([^)\s]+)\s*\)")
+"""A use of an argument; one that is not declared has to be given."""
 
 FORM = "NAME=VALUE"
 ABOVE = 5
@@ -31,12 +34,11 @@ def has_macros(root: ET.Element) -> bool:
     return any(NAMESPACE.match(str(element.tag)) for element in root.iter())
 
 
-def urdf_of_xacro(path: Path, root: ET.Element, arguments: Sequence[str]) -> str:
+def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
     """The URDF that a xacro writes.
 
     Args:
         path: The file.
-        root: Its first element.
         arguments: What its arguments shall be, each ``NAME=VALUE``.
 
     Raises:
@@ -53,41 +55,30 @@ def urdf_of_xacro(path: Path, root: ET.Element, arguments: Sequence[str]) -> str
             f"{path}: a xacro is expanded by a package of its own: pip install 'vftcli[xacro]'; or "
             f"give the URDF that it writes: {line} > {path.name.split('.')[0]}.urdf"
         ) from None
-    declared = dict(arguments_of(root))
-    if missing := [name for name, default in declared.items() if not default and name not in given]:
-        raise RobotError(
-            f"{path}: the xacro needs {', '.join(missing)}: give --robot-arg {missing[0]}=VALUE; "
-            f"it takes {', '.join(declared)}"
-        )
     packages.update_package_cache(dict(packages_near(path)))
-    said = io.StringIO()
+    text, why = "", ""
     try:
-        with redirect_stderr(said), redirect_stdout(said):
+        with redirect_stderr(io.StringIO()), redirect_stdout(io.StringIO()):
             text = str(xacro.process_file(str(path), mappings=dict(given)).toxml())
     except Exception as error:  # noqa: BLE001 - a xacro is a program: it may raise anything
-        takes = f"; it takes {', '.join(declared)}" if declared else ""
         why = " ".join(f"{type(error).__name__}: {error}".split())[:400]
-        raise RobotError(f"{path}: the xacro cannot be expanded: {why}{takes}") from None
-    taken = {**declared, **dict.fromkeys(included_arguments(xacro.all_includes))}
-    if unknown := next((name for name in given if name not in taken), None):
+    sources = [robot_text(Path(file)) for file in (path, *dict.fromkeys(xacro.all_includes))]
+    declared = {name: "" for source in sources for name in DECLARED.findall(source)}
+    used = {name: "" for source in sources for name in USED.findall(source)}
+    takes = f"it takes {', '.join({**used, **declared}) or 'none'}"
+    if unknown := next((name for name in given if name not in {**used, **declared}), None):
+        meant = did_you_mean(unknown, {**used, **declared})
         raise RobotError(
-            f"{path}: the xacro takes no argument {unknown!r}.{did_you_mean(unknown, taken)} "
-            f"It takes {', '.join(taken) or 'none'}"
+            f"{path}: the xacro takes no argument {unknown!r}.{meant} As --robot-arg {takes}"
         )
+    if why and (missing := [name for name in used if name not in {**declared, **given}]):
+        raise RobotError(
+            f"{path}: the xacro needs {', '.join(missing)}: give --robot-arg {missing[0]}=VALUE; "
+            f"{takes}"
+        )
+    if why:
+        raise RobotError(f"{path}: the xacro cannot be expanded: {why}; as --robot-arg {takes}")
     return text
-
-
-def arguments_of(root: ET.Element) -> Iterator[tuple[str, bool]]:
-    """Each argument that a xacro declares, and whether it has a default."""
-    for element in root.iter():
-        if NAMESPACE.sub("", str(element.tag)) == "arg" and element.get("name"):
-            yield str(element.get("name")), "default" in element.attrib
-
-
-def included_arguments(files: Sequence[str]) -> Iterator[str]:
-    """The arguments that included files declare."""
-    for file in files:
-        yield from ARGUMENT.findall(robot_text(Path(file)))
 
 
 def packages_near(path: Path) -> Iterator[tuple[str, str]]:
