@@ -48,8 +48,8 @@ MUTATORS: dict[str, Callable[[Seed, Rng, Path], Mutant]] = {
 }
 WEIGHTS = {
     "table": 20, "lines": 6, "parquet": 10, "npz": 8, "npy": 2, "pickle": 7, "records": 5,
-    "mcap": 13,
-    "bag": 7, "folder": 7, "robot": 6, "urdf": 5, "mjcf": 1, "gains": 1, "scenario": 1, "options": 4,
+    "mcap": 13, "bag": 7, "folder": 7, "robot": 6, "urdf": 5, "mjcf": 1, "gains": 1, "scenario": 1,
+    "options": 4,
 }  # fmt: skip
 """Family → inputs of a hundred."""
 

@@ -77,9 +77,7 @@ def urdf_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
     element = pick(rng, [e for e in root.iter() if e.attrib])
     key = pick(rng, list(element.attrib))
     kind = int(rng.integers(12))
-    if kind >= 8:
-        misname(root, rng, kind - 7)
-    elif kind <= 2:
+    if kind <= 2:
         old = element.get(key, "")
         put = pick(rng, WORDS) if rng.random() < 0.5 else str(pick(rng, NUMBERS))
         words = old.split()
@@ -99,15 +97,22 @@ def urdf_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
         element.tag = pick(
             rng, ("link", "joint", "mass", "axis", "x", "inertial", "robot", "limit")
         )
+    elif kind >= 8:
+        misname(root, rng, kind - 7)
     else:
-        kinds = ("fixed", "prismatic", "floating", "planar", "continuous", "revolute", "screw", "")
-        for joint in root.iter("joint"):
-            if rng.random() < 0.3:
-                joint.set("type", pick(rng, kinds))
+        retype(root, rng)
     text = ET.tostring(root, encoding="unicode")
     clean = "".join(c for c in text if c.isprintable() or c in "\n\t")
     path.write_text(clean, encoding="utf-8", errors="replace")
     return Mutant(f"urdf{kind} {element.tag} {key}")
+
+
+def retype(root: ET.Element, rng: Rng) -> None:
+    """Give joints other types."""
+    kinds = ("fixed", "prismatic", "floating", "planar", "continuous", "revolute", "screw", "")
+    for joint in root.iter("joint"):
+        if rng.random() < 0.3:
+            joint.set("type", pick(rng, kinds))
 
 
 def misname(root: ET.Element, rng: Rng, times: int) -> None:

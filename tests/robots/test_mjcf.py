@@ -64,6 +64,16 @@ def test_a_body_is_a_tip(tmp_path: Path) -> None:
     assert load_robot(path, tip="link4").chain.names[-1] == "joint4"
 
 
+def test_a_pendulum_is_an_arm_of_one_joint(tmp_path: Path) -> None:
+    body = f'<body name="bob">{INERTIAL.format(1)}<joint name="swing" axis="0 1 0"/></body>'
+    text = f"<mujoco><worldbody>{body}</worldbody></mujoco>"
+    np.testing.assert_allclose(
+        load_robot(written(tmp_path, text, "arm.xml")).chain.rotation[0][:, 2],
+        [0, 1, 0],
+        atol=1e-15,
+    )
+
+
 def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path: Path) -> None:
     path = written(tmp_path, mjcf('damping="20" frictionloss="0.3"'), "arm.xml")
     log = Recording(t=np.array([0.0, 0.1]), q=np.zeros((2, 5)))
@@ -81,6 +91,7 @@ def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path: Path) -> No
     ("text", "words"),
     [
         ("<mujoco/>", "no moving joint|Pinocchio can read"),
+        (mjcf('axis="0 0 0"').replace('axis="1 1 0"', "", 1), "'joint2': its axis points nowhere"),
         (mjcf('armature="-1"'), "joint 'joint2': armature is -1"),
         (mjcf().replace('mass="4.0"', 'mass="1e9"'), "'joint1': mass is 1e.09 kg; on a robot"),
         (mjcf(extra='<include file="nowhere.xml"/>'), r"includes 'nowhere\.xml', which Pin"),

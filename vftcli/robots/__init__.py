@@ -5,6 +5,7 @@ from pathlib import Path
 
 from vftcli.robots.chain import Chain, Payload
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
+from vftcli.robots.robot_file import DESCRIPTIONS
 from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import did_you_mean
 
@@ -13,9 +14,6 @@ PROFILES: dict[str, Path] = {
     for name in ("ur5", "ur5e", "ur10e", "panda", "fr3")
 }
 """Built-in profile name → its file."""
-
-DESCRIPTIONS = (".urdf", ".xml", ".xacro", ".mjcf", ".sdf")
-"""Endings of robot descriptions; what they are their content decides."""
 
 
 def load_robot(robot: str | Path, *, tip: str = "", arguments: Sequence[str] = ()) -> Robot:

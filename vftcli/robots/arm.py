@@ -26,7 +26,7 @@ NEAR = 0.8
 """Likeness from which another name is taken for the one that was meant."""
 
 
-class Arm(NamedTuple):
+class TreeArm(NamedTuple):
     """The joints of an arm, and where it ends.
 
     Attributes:
@@ -50,7 +50,7 @@ class ArmSearch:
     tree: BodyTree
     locked: Set[str]
 
-    def find(self, tip: str = "") -> Arm:
+    def find(self, tip: str = "") -> TreeArm:
         """The arm, or the one that a tip names.
 
         Args:
@@ -73,9 +73,9 @@ class ArmSearch:
             count = {2: "two"}.get(len(alike), str(len(alike)))
             joints = f"{longest} joint{'s' if longest > 1 else ''}"
             raise RobotError(f"{self.tree.path}: {count} arms of {joints}: {ends}")
-        return Arm(alike[0], "")
+        return TreeArm(alike[0], "")
 
-    def to(self, tip: str) -> Arm:
+    def to(self, tip: str) -> TreeArm:
         """The arm that ends at a link or a joint.
 
         A link that is fixed to the last one is the flange itself; the last link, or a joint, only
@@ -91,7 +91,9 @@ class ArmSearch:
             raise RobotError(
                 f"{self.tree.path}: --tip {tip!r}: {why}{meant} Tips: {shortened(there)}"
             )
-        return Arm(self.named(tuple(j.name for j in run)), "" if link == run[-1].child else link)
+        return TreeArm(
+            self.named(tuple(j.name for j in run)), "" if link == run[-1].child else link
+        )
 
     def tips(self) -> Iterator[str]:
         """What a tip may be: the last link of every arm, and what is fixed to it at its ends."""

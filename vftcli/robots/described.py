@@ -12,7 +12,6 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from vftcli.robots import DESCRIPTIONS
 from vftcli.robots.arm import ArmSearch, shortened
 from vftcli.robots.bounds import TRAVEL, weightless
 from vftcli.robots.chain import Chain
@@ -22,7 +21,7 @@ from vftcli.robots.mjcf import mjcf_tree
 from vftcli.robots.profile import assemble, column
 from vftcli.robots.regressor import LINK, TENSOR, torque_regressor
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
-from vftcli.robots.robot_file import RobotFile, Section, is_finite, robot_text
+from vftcli.robots.robot_file import DESCRIPTIONS, RobotFile, Section, is_finite, robot_text
 from vftcli.robots.tree import BodyTree
 from vftcli.robots.urdf import urdf_tree
 from vftcli.robots.xacro_text import has_macros, urdf_of_xacro

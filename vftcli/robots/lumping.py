@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vftcli.robots.arm import Arm
+from vftcli.robots.arm import TreeArm
 from vftcli.robots.chain import Chain, improper, merge_bodies, nearest_tensor
 from vftcli.robots.tree import Body, BodyTree, TreeJoint
 from vftcli.signals.arrays import Array
@@ -33,7 +33,7 @@ class LumpedArm:
     """
 
     tree: BodyTree
-    arm: Arm
+    arm: TreeArm
     angles: Mapping[str, float]
 
     @cached_property

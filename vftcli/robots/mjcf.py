@@ -53,7 +53,8 @@ def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
         with parser_words() as words:
             model = pin.buildModelFromMJCF(str(path))
     except (ValueError, RuntimeError, IndexError, TypeError) as error:
-        reason = " ".join([*words, *str(error).split()])
+        # Behind where in its source it stands.
+        reason = " ".join([*words, *str(error).split()]).rpartition("message: ")[2]
         raise RobotError(f"{path}: not an MJCF that Pinocchio can read: {reason}") from None
     names = link_names(model)
     bodies: dict[str, Body | None] = {names[0]: None}
@@ -109,6 +110,9 @@ def checked_body(model: Any, index: int, path: Path) -> Body:  # noqa: ANN401
         RobotError: If a number is not finite, or none that a robot has.
     """
     found = model.inertias[index]
+    R = model.jointPlacements[index].rotation
+    if not np.allclose(R @ R.T, np.eye(3), atol=1e-6):
+        raise RobotError(f"{path}: joint {model.names[index]!r}: its orientation is no rotation")
     body = Body(float(found.mass), np.array(found.lever), np.array(found.inertia))
     place = model.jointPlacements[index].translation
     for key, values in {"mass": [body.mass], "com": body.com, "inertia": body.inertia.ravel(),
@@ -141,12 +145,14 @@ def moving_joint(
     limits = {key: value for key, value in limits.items() if 0 < value < 1e300}
     if kind != "continuous":
         limits |= {"q_min": model.lowerPositionLimit[q], "q_max": model.upperPositionLimit[q]}
-    rotor = float(model.armature[v])
+    axis, rotor = joint_axis(model, index), float(model.armature[v])
+    if not np.isclose(np.linalg.norm(axis), 1.0):
+        raise RobotError(f"{path}: joint {name!r}: its axis points nowhere")
     if why := BOUNDS["rotor_inertia"].broken("armature", [rotor]):
         raise RobotError(f"{path}: joint {name!r}: {why}")
     return TreeJoint(
         **plain,
-        axis=joint_axis(model, index),
+        axis=axis,
         limits={key: float(value) for key, value in limits.items() if math.isfinite(value)},
         rotor_inertia=rotor,
         damping=float(model.damping[v]),
@@ -161,7 +167,8 @@ def joint_axis(model: Any, index: int) -> Array:  # noqa: ANN401
     data = model.createData()
     pin.computeJointJacobians(model, data, pin.neutral(model))
     local = pin.getJointJacobian(model, data, index, pin.ReferenceFrame.LOCAL)
-    column = np.array(local[:, model.joints[index].idx_v])
+    # The Jacobian of a single joint comes without its second axis.
+    column = np.array(local).reshape(6, model.nv)[:, model.joints[index].idx_v]
     axis: Array = column[3:] if np.any(column[3:]) else column[:3]
     return axis
 

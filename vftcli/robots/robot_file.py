@@ -13,6 +13,9 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError, RobotError
 from vftcli.signals.parsing import shown, toml_tables
 
+DESCRIPTIONS = (".urdf", ".xml", ".xacro", ".mjcf", ".sdf")
+"""Endings of robot descriptions; what they are their content decides."""
+
 LARGEST = 16 << 20
 """Largest robot file; one with all its words has a hundredth of it. [B]"""
 
