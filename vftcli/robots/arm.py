@@ -92,7 +92,7 @@ class ArmSearch:
                 f"{self.tree.path}: --tip {tip!r}: {why}{meant} Tips: {shortened(there)}"
             )
         return TreeArm(
-            self.named(tuple(j.name for j in run)), "" if link == run[-1].child else link
+            run, "" if link == run[-1].child else link
         )
 
     def tips(self) -> Iterator[str]:
