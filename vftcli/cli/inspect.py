@@ -22,7 +22,7 @@ def inspect_log(
 
     Example: vftcli inspect fixtures/ur5_circle.csv
     """
-    from vftcli.cli.console import say_json
+    from vftcli.cli.console import say_json, say_robots
     from vftcli.doctor import Examiner, examine
     from vftcli.outputs.examination import examination_record, examination_text
     from vftcli.readers import read_first_recording
@@ -34,6 +34,7 @@ def inspect_log(
     chosen = robot.choice()
     arm = chosen.load(recording) if chosen.name else None
     recording = recording if arm is None else unwound(recording, arm)
+    say_robots([] if arm is None else [arm])
     if choice.effort == "auto":
         examiner = Examiner()
         arm = examiner.robot(recording, chosen)

@@ -82,6 +82,11 @@ class Examiner:
             self._robots[key] = replace(robot, remarks=(*robot.remarks, *remarks))
         return self._robots[key]
 
+    @property
+    def robots(self) -> tuple[Robot, ...]:
+        """All that were loaded, in their order."""
+        return tuple(self._robots.values())
+
     def taken(self, recording: Recording, robot: Robot, choice: ReadChoice) -> Recording:
         """A log with its endless joints unwound, and its effort for what the model explains best.
 

@@ -91,9 +91,7 @@ class ArmSearch:
             raise RobotError(
                 f"{self.tree.path}: --tip {tip!r}: {why}{meant} Tips: {shortened(there)}"
             )
-        return TreeArm(
-            run, "" if link == run[-1].child else link
-        )
+        return TreeArm(run, "" if link == run[-1].child else link)
 
     def tips(self) -> Iterator[str]:
         """What a tip may be: the last link of every arm, and what is fixed to it at its ends."""

@@ -14,7 +14,7 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import IDENTITY, Pose, exp_matrix
 
 MOST = 1000
-"""Joints of a description: a humanoid with two hands has a tenth of it."""
+"""Links and joints of a description: a humanoid with two hands has a fifth of it."""
 
 TURNING = ("revolute", "continuous")
 """Kinds of joints that an arm is made of."""
@@ -101,7 +101,7 @@ class BodyTree:
 
     def __post_init__(self) -> None:
         if len(self.joints) > MOST:
-            raise RobotError(f"{self.path}: has {len(self.joints)} joints; a robot has {MOST}")
+            raise RobotError(f"{self.path}: has {len(self.joints)} joints, more than {MOST}")
         names = sorted(joint.name for joint in self.joints)
         if twice := next((a for a, b in pairwise(names) if a == b), None):
             raise RobotError(f"{self.path}: two joints are named {twice!r}; each needs its own")

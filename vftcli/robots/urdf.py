@@ -10,7 +10,7 @@ import numpy as np
 from vftcli.robots.bounds import BOUNDS
 from vftcli.robots.chain import symmetric
 from vftcli.robots.profile import UPRIGHT
-from vftcli.robots.tree import Body, BodyTree, TreeJoint
+from vftcli.robots.tree import MOST, Body, BodyTree, TreeJoint
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import shown
@@ -41,6 +41,10 @@ def urdf_tree(path: Path, root: ET.Element) -> BodyTree:
     """
     links = [UrdfPart(path, element) for element in root.iterfind("link")]
     joints = [UrdfPart(path, element) for element in root.iterfind("joint")]
+    if max(len(links), len(joints)) > MOST:
+        raise RobotError(
+            f"{path}: has {len(links)} links and {len(joints)} joints; a robot has at most {MOST}"
+        )
     if not links:
         raise RobotError(f"{path}: the <robot> is empty: it has no link and no joint")
     bodies: dict[str, Body | None] = {}
