@@ -184,7 +184,7 @@ def reduced_model(
         one = model.joints[model.getJointId(name)]
         q[one.idx_q : one.idx_q + one.nq] = angle if one.nq == 1 else [np.cos(angle), np.sin(angle)]
     locked = [k for k in range(1, model.njoints) if model.names[k] not in names]
-    reduced = pin.buildReducedModel(model, locked, q)
+    reduced = pin.buildReducedModel(model, locked, q) if locked else model
     assert list(reduced.names)[1:] == list(names)
     return reduced, np.array([reduced.joints[k].nq for k in range(1, reduced.njoints)])
 
@@ -194,7 +194,8 @@ def agrees_with_pinocchio(text: str, robot: Robot, angles: Mapping[str, float] =
     theirs, sizes = reduced_model(text, robot.chain.names, angles)
     ours = robot.chain.to_pinocchio()
     taken = next(r for r in robot.remarks if "flange" in r.values)
-    frame = theirs.getFrameId(taken.values["flange"])
+    # A joint may have a link's name.
+    frame = theirs.getFrameId(taken.values["flange"], pin.FrameType.BODY)
     rng = np.random.default_rng(3)
     for _ in range(10):
         q, v, a = rng.uniform(-2.0, 2.0, (3, robot.joints))

@@ -196,9 +196,9 @@ def test_the_arm_that_was_found_is_what_is_written(tmp_path: Path) -> None:
     np.testing.assert_allclose(inverse_dynamics(again, q, v, a), expected, atol=1e-11)
 
 
-def test_the_sample_with_a_gripper_is_what_it_should_be(logs: Path) -> None:
+def test_the_sample_with_a_gripper_is_what_it_should_be(samples: Path) -> None:
     """Masses and gravity torque stand beside the sample, to 1e-6 N·m."""
-    folder = logs.parent / "samples" / "reach"
+    folder = samples / "reach"
     expected = json.loads((folder / "expected.json").read_text(encoding="utf-8"))
     of_urdf, of_mjcf = expected["arm_with_gripper.urdf"], expected["arm.mjcf.xml"]
     found = load_robot(folder / "arm_with_gripper.urdf")

@@ -4,11 +4,13 @@ It is the extra ``robots-test``: 131 MB.
 """
 
 import importlib.metadata
+import re
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
 import pytest
+from made_urdfs import agrees_with_pinocchio
 
 from vftcli.robots import load_robot
 from vftcli.robots.arm import ArmSearch
@@ -82,6 +84,9 @@ TWO_ARMS = {
 }
 """File → the tips of its two arms of at least five joints."""
 
+SHARED_NAME = "b1_description/urdf/b1-z1"
+"""Pinocchio cannot lock a model in which a joint and a link share a name."""
+
 PERSON = "human_description/robots/human"
 """Its longest runs are two legs: no arm, and refused like two."""
 
@@ -131,6 +136,14 @@ def test_each_of_two_arms_is_taken_by_its_tip(name: str) -> None:
     assert len(one) == len(other) >= 5
     assert one[-1].child == left
     assert other[-1].child == right
+
+
+@pytest.mark.parametrize("name", sorted(LOADED.keys() - {SHARED_NAME}))
+def test_every_arm_is_what_pinocchio_makes_of_the_file(name: str) -> None:
+    text = files()[name].read_text(encoding="utf-8")
+    # Pinocchio takes a text without what says how it is encoded.
+    text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)
+    agrees_with_pinocchio(text, load_robot(files()[name]))
 
 
 def test_an_empty_robot_is_said_to_be_empty() -> None:
