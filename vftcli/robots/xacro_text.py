@@ -7,7 +7,7 @@ Packages that a xacro names with $(find NAME) are looked for beside the file and
 import io
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -23,6 +23,9 @@ DECLARED = re.compile(r"<xacro:arg\s[^>]*?name\s*=\s*[\"']([^\"']+)[\"']")
 
 USED = re.compile(r"\$\(arg\s+([^)\s]+)\s*\)")
 """A use of an argument; one that is not declared has to be given."""
+
+NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
+"""The name of a package in its manifest."""
 
 FORM = "NAME=VALUE"
 ABOVE = 5
@@ -85,5 +88,6 @@ def packages_near(path: Path) -> Iterator[tuple[str, str]]:
     """Name and folder of the packages above a file and beside these, the nearest last."""
     for folder in reversed(path.resolve().parents[:ABOVE]):
         for manifest in (*sorted(folder.glob("*/package.xml")), *folder.glob("package.xml")):
-            if name := re.search(r"<name>\s*([^<\s]+)\s*</name>", robot_text(manifest)):
-                yield name[1], str(manifest.parent)
+            with suppress(RobotError):  # a neighbour's that is no text
+                if name := NAME.search(robot_text(manifest)):
+                    yield name[1], str(manifest.parent)
