@@ -22,9 +22,6 @@ HAND = 0.25
 LISTED = 12
 """Names that a message lists."""
 
-NEAR = 0.8
-"""Likeness from which another name is taken for the one that was meant."""
-
 
 class TreeArm(NamedTuple):
     """The joints of an arm, and where it ends.
@@ -86,7 +83,7 @@ class ArmSearch:
         run = self.longest(self.tree.path_to(link)) if link is not None else ()
         if link is None or not run:
             there = [*self.tips()]
-            meant = did_you_mean(tip, [*self.tree.bodies, *above], NEAR) if link is None else ""
+            meant = did_you_mean(tip, [*self.tree.bodies, *above]) if link is None else ""
             why = "no link or joint of that name." if link is None else "no arm leads there."
             raise RobotError(
                 f"{self.tree.path}: --tip {tip!r}: {why}{meant} Tips: {shortened(there)}"

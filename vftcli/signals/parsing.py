@@ -8,15 +8,9 @@ from typing import Any
 from vftcli.signals.errors import ParameterError
 
 
-def did_you_mean(word: str, known: Iterable[str], likeness: float = 0.6) -> str:
-    """The known name nearest to a word, as a question behind a blank; "" where none is near.
-
-    Args:
-        word: What was said.
-        known: What there is.
-        likeness: From which share of letters in common a name is near.
-    """
-    close = get_close_matches(word, list(known), n=1, cutoff=likeness)
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """The known name nearest to a word, as a question behind a blank; "" where none is near."""
+    close = get_close_matches(word, list(known), n=1)
     return f" Did you mean {close[0]}?" if close else ""
 
 
