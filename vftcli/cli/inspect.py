@@ -22,16 +22,19 @@ def inspect_log(
 
     Example: vftcli inspect fixtures/ur5_circle.csv
     """
-    from vftcli.cli.console import say_json
+    from vftcli.cli.console import say_json, say_robots
     from vftcli.doctor import Examiner, examine
     from vftcli.outputs.examination import examination_record, examination_text
     from vftcli.readers import read_first_recording
+    from vftcli.robots.winding import unwound
 
     choice = reading.choice()
     recording = read_first_recording(log, format=choice.format, columns=choice.columns)
     recording = choice.within(choice.taken(recording))
     chosen = robot.choice()
     arm = chosen.load(recording) if chosen.name else None
+    recording = recording if arm is None else unwound(recording, arm)
+    say_robots([] if arm is None else [arm])
     if choice.effort == "auto":
         examiner = Examiner()
         arm = examiner.robot(recording, chosen)

@@ -11,6 +11,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.drive import effort_name
 from vftcli.robots.robot import Robot
+from vftcli.robots.winding import unwound
 from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, fact
@@ -81,8 +82,17 @@ class Examiner:
             self._robots[key] = replace(robot, remarks=(*robot.remarks, *remarks))
         return self._robots[key]
 
+    @property
+    def robots(self) -> tuple[Robot, ...]:
+        """All that were loaded, in their order."""
+        return tuple(self._robots.values())
+
     def taken(self, recording: Recording, robot: Robot, choice: ReadChoice) -> Recording:
-        """A log with its effort taken for what the robot's model explains best, if it is open."""
+        """A log with its endless joints unwound, and its effort for what the model explains best.
+
+        The latter only if the choice leaves it open.
+        """
+        recording = unwound(recording, robot)
         if choice.effort != "auto":
             return recording
         for finding in examine(recording, robot).findings:
