@@ -119,10 +119,10 @@ def identify_robot(
     # That the profile is not the arm's is what this command is there to change; but the friction
     # method keeps the profile's links.
     examiner = health_of(library, anyway=anyway, fitting=task.method == "friction")
-    profile = examiner.robot(library.open(logs[0], choice), chosen)
+    profile = examiner.robot(next(library.open_each(logs, choice)), chosen)
 
     def opened(paths: list[Path] | tuple[Path, ...], how: "ReadChoice") -> list["Recording"]:
-        return [examiner.taken(library.open(path, how), profile, how) for path in paths]
+        return [examiner.taken(log, profile, how) for log in library.open_each(paths, how)]
 
     train = opened(logs, choice)
     held_out, unloaded = opened(validated, held_out_choice), opened(without_load, choice)
