@@ -31,7 +31,8 @@ def episode_of(
         raise LogError(f"{path}: no episode {number}; it holds {there} (--episode K|all).")
     taken = numbers[0] if number is None else number
     said = number is None and count > 1
-    remarks = (caution("episode-taken", episode=taken, episodes=count),) if said else ()
+    code = "episode-taken" if taken == 0 else "episode-taken-first"
+    remarks = (caution(code, episode=taken, episodes=count),) if said else ()
     return taken, f"episode {taken}" if count > 1 else "", remarks
 
 
