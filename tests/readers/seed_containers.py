@@ -21,14 +21,16 @@ def arrow(path: Path, *, stream: bool = False, codec: str | None = "lz4") -> Pat
     return write_arrow(path, pa.table(held), stream=stream, codec=codec)
 
 
-def write_arrow(path: Path, table: Any, *, stream: bool = False, codec: str | None = None) -> Path:
-    """Write a table in batches of fifty rows."""
+def write_arrow(
+    path: Path, table: Any, *, stream: bool = False, codec: str | None = None, rows: int = 50
+) -> Path:
+    """Write a table in batches of some rows."""
     import pyarrow as pa
 
     options = pa.ipc.IpcWriteOptions(compression=codec)
     make = pa.ipc.new_stream if stream else pa.ipc.new_file
     with path.open("wb") as file, make(file, table.schema, options=options) as writer:
-        writer.write_table(table, max_chunksize=50)
+        writer.write_table(table, max_chunksize=rows)
     return path
 
 

@@ -43,8 +43,8 @@ class ArrowTable(ColumnarTable):
     def _row_count(self) -> int:
         return self._rows_claimed
 
-    def _first_list(self, name: str) -> Any:  # noqa: ANN401 - pyarrow
-        for batch in self._stream([self._schema.names.index(name)]):
+    def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
+        for batch in self._stream([column]):
             batch.validate(full=True)
             if batch.num_rows:
                 return batch.column(0)[0].as_py()

@@ -55,7 +55,7 @@ class ColumnarTable(ABC):
         """Rows that the file claims to have."""
 
     @abstractmethod
-    def _first_list(self, name: str) -> Any:  # noqa: ANN401 - pyarrow
+    def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
         """The value in the first row of a column of lists, None for none."""
 
     @abstractmethod
@@ -86,7 +86,7 @@ class ColumnarTable(ABC):
     def _first_length(self, column: int) -> int:
         """Length of the list in the first row of a column, 0 for an empty one."""
         with guarded(self.path):
-            value = self._first_list(self._schema.names[column])
+            value = self._first_list(column)
         return len(value) if value is not None else 0
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:

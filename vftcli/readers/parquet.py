@@ -22,7 +22,8 @@ class ParquetTable(ColumnarTable):
     def _row_count(self) -> int:
         return int(self._file.metadata.num_rows)
 
-    def _first_list(self, name: str) -> Any:  # noqa: ANN401 - pyarrow
+    def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
+        name = self._schema.names[column]
         batches = self._file.iter_batches(batch_size=1, columns=[name], use_threads=False)
         first = next(iter(batches), None)
         return first.column(name)[0].as_py() if first is not None and first.num_rows else None
