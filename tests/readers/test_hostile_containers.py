@@ -144,7 +144,7 @@ def json_laughs(path: Path) -> Path:
 
 def json_endless_line(path: Path) -> Path:
     """A first line that is an object, and then one without an end."""
-    path.write_bytes(b'{"t": 0, "q": [0]}\n{"t": "' + b"x" * 50_000_000)
+    path.write_bytes(b'{"t": 0, "q": [0, 1]}\n{"t": "' + b"x" * 50_000_000)
     return path
 
 

@@ -95,7 +95,7 @@ def test_all_episodes_are_logs_of_their_own(tmp_path: Path) -> None:
     logs = Library([path]).open_logs([path], ReadChoice(all_episodes=True))
     assert [log.name for log in logs] == ["set episode 0", "set episode 1", "set episode 2"]
     assert [log.samples for log in logs] == list(ROWS)
-    with pytest.raises(ParameterError, match="takes? several logs"):
+    with pytest.raises(ParameterError, match="commands that take several logs"):
         Library([path]).open(path, ReadChoice(all_episodes=True))
     with pytest.raises(ParameterError, match="are the same run"):
         Library([path]).open_logs([path, path], ReadChoice(episode=1))
