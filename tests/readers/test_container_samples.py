@@ -1,4 +1,4 @@
-"""The samples of containers: what `expected.json` beside them says of each, and of the data sets."""
+"""The samples of containers: what `expected.json` says of each, and those of the data sets."""
 
 import json
 from pathlib import Path
