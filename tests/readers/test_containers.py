@@ -104,6 +104,15 @@ def test_a_list_of_objects_and_a_list_of_rows(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read(tmp_path / "rows", columns="t,q:6").q, motion()["q"])
 
 
+def test_a_column_of_wrenches_is_a_wrench(tmp_path: Path) -> None:
+    import pyarrow as pa
+
+    log = motion()
+    held = {"t": log["t"], "q": log["q"].tolist(), "wrench": log["dq"].tolist()}
+    recording = read(seeds.write_arrow(tmp_path / "x", pa.table(held)))
+    np.testing.assert_array_equal(recording.wrench, log["dq"])
+
+
 def test_a_line_that_is_cut_is_dropped_at_the_end_and_refused_elsewhere(tmp_path: Path) -> None:
     path = seeds.json_lines(tmp_path / "x")
     text = path.read_text()

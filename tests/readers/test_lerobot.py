@@ -149,6 +149,7 @@ def test_numbers_of_the_state_are_told_apart_by_their_names(tmp_path: Path) -> N
     np.testing.assert_array_equal(recording.q, LOG["q"][:30])
     np.testing.assert_array_equal(recording.torque, LOG["tau"][:30])
     assert recording.joint_names == tuple(f"joint_{j}" for j in range(7))
+    assert [remark.code for remark in recording.source.remarks] == ["wrench-left-out"]
 
 
 def test_signals_are_laid_together_by_the_joints_names(tmp_path: Path) -> None:
@@ -190,6 +191,15 @@ def test_degrees_are_refused_until_they_are_said(tmp_path: Path) -> None:
         read(path)
     said = read(path, columns="q[deg]=observation.state", episode=0)
     np.testing.assert_allclose(said.q, np.radians(90 * LOG["q"][:30]), rtol=1e-15)
+
+
+def test_a_wrench_is_named_and_taken_where_it_is_said_to_be_one(tmp_path: Path) -> None:
+    path = dataset(tmp_path, USUAL | {"observation.wrench": (LOG["q"][:, :6], None)})
+    (remark,) = read(path, episode=0).source.remarks
+    assert (remark.code, remark.values["features"]) == ("wrench-left-out", "observation.wrench")
+    taken = read(path, columns="wrench[flange]=observation.wrench", episode=0)
+    np.testing.assert_array_equal(taken.wrench, LOG["q"][:30, :6])
+    assert taken.source.remarks == ()
 
 
 def test_columns_say_more_of_one_signal(tmp_path: Path) -> None:

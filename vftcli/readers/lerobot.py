@@ -11,7 +11,7 @@ import numpy as np
 
 from vftcli.readers.aliases import ALIASES
 from vftcli.readers.columnar import EPISODE, episodes_of
-from vftcli.readers.columns import SIGNALS
+from vftcli.readers.columns import SIGNALS, parse_columns
 from vftcli.readers.joints import kinematic_order
 from vftcli.readers.parquet import ParquetTable
 from vftcli.readers.parts import arm_of, episode_of, refuse_arm
@@ -19,7 +19,7 @@ from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, Reader, ope
 from vftcli.readers.table import listed
 from vftcli.readers.tables import described, states_positions
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import Remark, fact
 
 TOLD_LIMIT = 64 * 1024 * 1024
 """Bytes of a description beside the data that are parsed."""
@@ -138,9 +138,11 @@ def columns_of(
     there = [e for name in table.names or () for e in elements_of(name, table, features.get(name))]
     sides = [side for side in ARMS if any(e.side == side and e.signal == "q" for e in there)]
     side = ""
-    remarks: tuple[Remark, ...] = ()
+    taken = request.columns is not None and parse_columns(request.columns).item("wrench")
+    remarks: tuple[Remark, ...] = () if taken else wrenches_left(table, features)
     if len(sides) > 1:
-        side, remarks = arm_of(path, request, sides)
+        side, said = arm_of(path, request, sides)
+        remarks = (*remarks, *said)
         there = [e for e in there if e.side in {side, ""}]
     else:
         refuse_arm(path, request)
@@ -160,6 +162,13 @@ def columns_of(
         if found
     ]
     return ",".join(["t=timestamp", *items]), names, side, remarks
+
+
+def wrenches_left(table: ParquetTable, features: Mapping[str, Any]) -> tuple[Remark, ...]:
+    """A remark on a wrench that is not taken: nothing tells a sensor's from an estimate."""
+    observed = [name for name in table.names or () if name.startswith("observation.")]
+    found = [name for name in observed if "wrench" in f"{name} {features.get(name)}".lower()]
+    return (fact("wrench-left-out", features=listed(found)),) if found else ()
 
 
 def in_order(
