@@ -63,13 +63,18 @@ class ColumnarTable(ABC):
         """Some columns of all rows, as a table."""
 
     @property
+    def _metadata(self) -> Mapping[bytes, bytes]:
+        """What was written beside the columns."""
+        return self._schema.metadata or {}
+
+    @property
     def width(self) -> int:
         """Number of columns."""
         return len(self._schema)
 
     def told(self) -> dict[str, Any]:
         """What vftcli convert wrote beside the columns; nothing for files of other programs."""
-        text = (self._schema.metadata or {}).get(b"vftcli", b"{}")
+        text = self._metadata.get(b"vftcli", b"{}")
         try:
             told = json.loads(text)
         except (ValueError, RecursionError):

@@ -1,6 +1,6 @@
 """Parquet tables."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import BytesIO
 from typing import Any
 
@@ -21,6 +21,10 @@ class ParquetTable(ColumnarTable):
     @property
     def _row_count(self) -> int:
         return int(self._file.metadata.num_rows)
+
+    @property
+    def _metadata(self) -> Mapping[bytes, bytes]:
+        return self._file.metadata.metadata or {}
 
     def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
         name = self._schema.names[column]
