@@ -35,6 +35,8 @@ BAD = {
     "--interval": ("8:4", "is not A:B with A < B"),
     "--format": ("excel", "known formats"),
     "--columns": ("nonsense", "--columns"),
+    "--episode": ("last", "is neither a number, as in 0, nor all"),
+    "--arm": ("middle", "there is left, right"),
     "--effort": ("volts", "there is auto, current, torque, torque-without-gravity"),
     "--robot": ("ur9", "no robot 'ur9'"),
     "--friction": ("some", "there is profile, none, model"),

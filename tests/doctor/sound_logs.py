@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.doctor import examine
-from vftcli.readers import read_first_recording
+from vftcli.readers import ReadChoice, read_first_recording
 from vftcli.robots import Robot, load_robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
@@ -109,7 +109,7 @@ def recording_of(log: SoundLog, folder: Path) -> Recording:
     path = folder / log.path
     if path.is_dir():
         return panda_exciting(path)
-    return read_first_recording(path, columns=log.columns)
+    return read_first_recording(path, ReadChoice(columns=log.columns))
 
 
 def panda_exciting(folder: Path) -> Recording:

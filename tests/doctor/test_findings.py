@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vftcli.doctor import Examination, FindingWords, examine, finding_record, in_words
-from vftcli.readers import read, read_first_recording
+from vftcli.readers import ReadChoice, read, read_first_recording
 from vftcli.robots import Payload, load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
@@ -209,7 +209,7 @@ ARMS = {
 @pytest.mark.parametrize("name", ARMS)
 def test_real_logs_are_assigned_to_their_robot_or_to_none(logs: Path, name: str) -> None:
     columns, robot = ARMS[name]
-    examination = examine(read_first_recording(logs / name, columns=columns))
+    examination = examine(read_first_recording(logs / name, ReadChoice(columns=columns)))
     assert [fit.robot for fit in examination.robots if fit.fits] == ([robot] if robot else [])
     assert ("no-robot-fits" in names(examination)) == (robot is None)
 

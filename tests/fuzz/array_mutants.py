@@ -176,35 +176,9 @@ def parquet_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
         data, how = mutate_bytes(data, rng)
         path.write_bytes(data)
         return Mutant(how)
-    table = pq.read_table(io.BytesIO(data), use_threads=False)
-    k = int(rng.integers(table.num_columns))
-    name, values = table.column_names[k], table.column(k).to_pylist()
-    kind = int(rng.integers(9))
     try:
-        if kind <= 1:
-            table = table.set_column(k, name, pa.array(cells_changed(values, rng)))
-        elif kind == 2:
-            types = (pa.float32(), pa.int8(), pa.string(), pa.list_(pa.float64()), pa.bool_(),
-                     pa.timestamp("us"), pa.decimal128(20, 5), pa.null(), pa.float16(),
-                     pa.list_(pa.float64(), 3), pa.struct([("x", pa.float64())]))  # fmt: skip
-            kind_of = pick(rng, types)
-            table = table.set_column(k, name, pa.array(recast(values, kind_of), kind_of))
-        elif kind == 3:
-            table = table.drop_columns([name])
-        elif kind == 4:
-            other = pick(rng, table.column_names) if rng.random() < 0.4 else pick(rng, WORDS)
-            names = [other[:100] if n == name else n for n in table.column_names]
-            table = table.rename_columns(names)
-        elif kind == 5:
-            table = table.slice(0, int(rng.integers(0, 3)))
-        elif kind == 6:
-            table = table.set_column(k, name, table.column(k).dictionary_encode())
-        elif kind == 7:
-            order = rng.permutation(table.num_rows)
-            table = table.take(pa.array(order[: int(rng.integers(1, len(order) + 1))]))
-        else:
-            put = pick(rng, ([], [[]], None, [None], {}, "x", 3, [[1.0], [2.0]]))
-            table = table.set_column(k, name, pa.array([put] * table.num_rows))
+        table = pq.read_table(io.BytesIO(data), use_threads=False)
+        table, how, same_rows = table_changed(table, rng)
         codec = pick(rng, ("snappy", "zstd", "gzip", "none", "lz4"))
         pq.write_table(
             table, path, compression=codec, row_group_size=int(pick(rng, (7, 100, 10**6)))
@@ -212,8 +186,41 @@ def parquet_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
     except (pa.ArrowException, TypeError, ValueError, OverflowError):
         path.write_bytes(mutate_bytes(data, rng)[0])
         return Mutant("bytes")
-    same_rows = kind in {0, 1, 6}
-    return Mutant(f"parquet{kind} {name}", table.num_rows if same_rows else None)
+    return Mutant(f"parquet {how}", table.num_rows if same_rows else None)
+
+
+def table_changed(table: Any, rng: Rng) -> tuple[Any, str, bool]:
+    """An Arrow table with one column changed, what was done, and whether its rows are the same."""
+    import pyarrow as pa
+
+    k = int(rng.integers(table.num_columns))
+    name, values = table.column_names[k], table.column(k).to_pylist()
+    kind = int(rng.integers(9))
+    if kind <= 1:
+        table = table.set_column(k, name, pa.array(cells_changed(values, rng)))
+    elif kind == 2:
+        types = (pa.float32(), pa.int8(), pa.string(), pa.list_(pa.float64()), pa.bool_(),
+                 pa.timestamp("us"), pa.decimal128(20, 5), pa.null(), pa.float16(),
+                 pa.list_(pa.float64(), 3), pa.struct([("x", pa.float64())]))  # fmt: skip
+        kind_of = pick(rng, types)
+        table = table.set_column(k, name, pa.array(recast(values, kind_of), kind_of))
+    elif kind == 3:
+        table = table.drop_columns([name])
+    elif kind == 4:
+        other = pick(rng, table.column_names) if rng.random() < 0.4 else pick(rng, WORDS)
+        names = [other[:100] if n == name else n for n in table.column_names]
+        table = table.rename_columns(names)
+    elif kind == 5:
+        table = table.slice(0, int(rng.integers(0, 3)))
+    elif kind == 6:
+        table = table.set_column(k, name, table.column(k).dictionary_encode())
+    elif kind == 7:
+        order = rng.permutation(table.num_rows)
+        table = table.take(pa.array(order[: int(rng.integers(1, len(order) + 1))]))
+    else:
+        put = pick(rng, ([], [[]], None, [None], {}, "x", 3, [[1.0], [2.0]]))
+        table = table.set_column(k, name, pa.array([put] * table.num_rows))
+    return table, f"{kind} {name}", kind in {0, 1, 6}
 
 
 def cells_changed(values: list[Any], rng: Rng) -> list[Any]:

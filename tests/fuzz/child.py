@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from array_mutants import archive_mutant, parquet_mutant, record_mutant
+from container_mutants import arrow_mutant, hdf5_mutant, json_mutant, matlab_mutant
 from message_mutants import bag_mutant, folder_mutant, mcap_mutant
 from option_mutants import option_words
 from robot_mutants import toml_mutant, urdf_mutant
@@ -33,6 +34,10 @@ MUTATORS: dict[str, Callable[[Seed, Rng, Path], Mutant]] = {
     "table": table_mutant,
     "lines": lines_mutant,
     "parquet": parquet_mutant,
+    "arrow": arrow_mutant,
+    "json": json_mutant,
+    "mat": matlab_mutant,
+    "hdf5": hdf5_mutant,
     "npz": archive_mutant,
     "npy": archive_mutant,
     "pickle": archive_mutant,
@@ -47,9 +52,9 @@ MUTATORS: dict[str, Callable[[Seed, Rng, Path], Mutant]] = {
     "mjcf": urdf_mutant,
 }
 WEIGHTS = {
-    "table": 20, "lines": 6, "parquet": 10, "npz": 8, "npy": 2, "pickle": 7, "records": 5,
-    "mcap": 13, "bag": 7, "folder": 7, "robot": 6, "urdf": 5, "mjcf": 1, "gains": 1, "scenario": 1,
-    "options": 4,
+    "table": 15, "lines": 5, "parquet": 8, "npz": 6, "npy": 2, "pickle": 5, "records": 4,
+    "mcap": 10, "bag": 6, "folder": 6, "arrow": 5, "json": 3, "mat": 4, "hdf5": 6,
+    "robot": 5, "urdf": 3, "mjcf": 1, "gains": 1, "scenario": 1, "options": 4,
 }  # fmt: skip
 """Family → inputs of a hundred."""
 
@@ -94,7 +99,8 @@ def attempt(
         folder: Where it is written.
     """
     rng = np.random.default_rng([number, index])
-    family = pick(rng, [family for family in families for _ in range(WEIGHTS[family])])
+    there = [family for family in families if family in seeds or family == "options"]
+    family = pick(rng, [family for family in there for _ in range(WEIGHTS[family])])
     command = pick(rng, COMMANDS)
     if family == "options":
         seed = pick(rng, seeds["table"])

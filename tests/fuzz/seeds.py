@@ -5,12 +5,14 @@ import pickle
 import shutil
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 from message_mutants import mcap_messages, shrunk_archive, shrunk_database, shrunk_mcap
 from tokens import Seed
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "readers"))
+import seed_containers
 import seed_logs
 
 MOST = 60
@@ -20,7 +22,10 @@ FAMILIES = {
     "ur-csv": "table", "ur-rtde": "table", "libfranka-csv": "table", "libfranka-csv-old": "table",
     "table": "table", "table-gz": "table", "headerless": "table", "libfranka-json": "lines",
     "ur-binary": "records", "npy": "npy", "npz": "npz", "pickle": "pickle", "parquet": "parquet",
-    "rosbag1": "bag", "rosbag1-lz4": "bag", "db3": "folder", "mcap": "mcap", "mcap-json": "mcap",
+    "arrow": "arrow", "arrow-stream": "arrow", "json": "json", "json-skills": "json",
+    "json-lines": "lines", "mat": "mat", "mat-struct": "mat", "hdf5": "hdf5", "aloha": "hdf5",
+    "robomimic": "hdf5", "rosbag1": "bag", "rosbag1-lz4": "bag", "db3": "folder",
+    "mcap": "mcap", "mcap-json": "mcap",
 }  # fmt: skip
 """Seed of the reader tests → the mutator that knows its structure."""
 
@@ -92,7 +97,9 @@ def make_seeds(folder: Path) -> list[Seed]:
 
 def seeds_in_code(folder: Path) -> Iterator[Seed]:
     for name, family in FAMILIES.items():
-        make, columns = seed_logs.SEEDS[name]
+        if name in seed_containers.NEED_H5PY and find_spec("h5py") is None:
+            continue
+        make, columns = (seed_logs.SEEDS | seed_containers.SEEDS)[name]
         path = folder / name
         made = make(path)
         yield Seed(name, family, made, columns)

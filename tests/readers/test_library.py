@@ -21,13 +21,13 @@ FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 def count(monkeypatch):
     """The paths that were really read, in order."""
     seen = []
-    read = vftcli.readers.read
+    read = vftcli.readers.read_chosen
 
-    def counted(path, **choice):
+    def counted(path, *choice):
         seen.append(Path(path).name)
-        return read(path, **choice)
+        return read(path, *choice)
 
-    monkeypatch.setattr(vftcli.readers, "read", counted)
+    monkeypatch.setattr(vftcli.readers, "read_chosen", counted)
     return seen
 
 

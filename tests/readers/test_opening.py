@@ -59,5 +59,5 @@ def test_the_digest_of_a_folder_is_that_of_its_files_in_name_order(tmp_path):
     (tmp_path / "bag" / "sub").mkdir(parents=True)
     for name, content in {"b": b"2", "a": b"1", "sub/c": b"3"}.items():
         (tmp_path / "bag" / name).write_bytes(content)
-    assert Digest(tmp_path / "bag").hexdigest() == hashlib.sha256(b"123").hexdigest()
-    assert Digest(tmp_path / "bag" / "a").hexdigest() == hashlib.sha256(b"1").hexdigest()
+    assert Digest((tmp_path / "bag",)).hexdigest() == hashlib.sha256(b"123").hexdigest()
+    assert Digest((tmp_path / "bag" / "a",)).hexdigest() == hashlib.sha256(b"1").hexdigest()

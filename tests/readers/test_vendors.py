@@ -241,6 +241,10 @@ def test_lerobot_reads_the_first_episode(tmp_path: Path) -> None:
     assert recording.source.format == "lerobot"
     assert (recording.samples, recording.joints) == (30, 7)
     np.testing.assert_allclose(recording.q, log["q"][:30], atol=1e-7)  # float32
-    assert "took episode 0 of 2" in recording.source.warnings[0]
-    with pytest.raises(LogError, match="holds 2 episodes"):
-        read(data / "file-000.parquet")
+    assert recording.source.warnings[0] == "episode 0 of 2: --episode K|all"
+    second = read(
+        data / "file-000.parquet", columns="t=timestamp,q=observation.state[0:7]", episode=1
+    )
+    np.testing.assert_allclose(second.q, log["q"][30:], atol=1e-7)  # float32
+    with pytest.raises(LogError, match="no episode 2; it holds 2 episodes, 0 to 1"):
+        read(data / "file-000.parquet", episode=2)

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from vftcli.virtual_sensor.sensor_reading import SensorReading
 
 
+PARTS = frozenset({"episode-taken", "episode-taken-first", "arm-taken"})
+"""Remarks that a part of a file was taken which nobody asked for."""
+
+
 def command_line() -> str:
     """The command as the user typed it, for `run.json` and the report."""
     return printable(shlex.join(["vftcli", *sys.argv[1:]]))
@@ -45,7 +49,9 @@ def say_recording(recording: "Recording") -> None:
         f"{recording.name}: {source.format}, {recording.joints} joints, "
         f"{recording.samples} samples, {recording.duration:.1f} s{rate}"
     )
-    for remark in (*source.repairs, *source.warnings):
+    # That a part was taken is said with the health of the log.
+    others = [remark for remark in source.remarks if remark.code not in PARTS]
+    for remark in sorted(others, key=lambda remark: remark.level != "fact"):
         say(f"  note: {remark}")
 
 
@@ -61,11 +67,16 @@ def health_of(library: "Library", *, anyway: bool, fitting: bool = True) -> "Exa
     from vftcli.outputs.examination import health_line
 
     def tell(examination: "Examination") -> None:
+        recording = examination.recording
+        for remark in recording.source.remarks:
+            if remark.code in PARTS:
+                say(f"note: {recording.name}: {remark}")
         if codes := dict.fromkeys(f.code for f in examination.refusals(fitting=fitting)):
             say(f"MEANINGLESS unless this is wrong, and made with --anyway: {', '.join(codes)}")
-        say(health_line(examination, named=len(library) > 1))
+        named = len(library) > 1 or bool(recording.source.part)
+        say(health_line(examination, named=named))
         for assumption in examination.assumptions:
-            say(f"note: {examination.recording.name}: {assumption}")
+            say(f"note: {recording.name}: {assumption}")
 
     return Examiner(anyway=anyway, fitting=fitting, tell=tell)
 

@@ -42,9 +42,12 @@ def convert_log(
             "samples": recording.samples,
             "signals": recording.signals,
             "repairs": [str(repair) for repair in recording.source.repairs],
+            "warnings": [str(warning) for warning in recording.source.warnings],
         }
         say_json(summary)
         return
     for repair in recording.source.repairs:
         say(f"repair: {repair}")
+    for warning in recording.source.warnings:
+        say(f"note: {warning}")
     say(f"wrote {recording.samples} samples of {', '.join(recording.signals)}")

@@ -113,19 +113,21 @@ def identify_robot(
     task = asked.task(output.stem)
     OutputFolder(output.parent, force, [file.name for file in beside(output).values()]).check()
     choice, chosen = reading.choice(), robot.choice()
-    held_out_choice = reading.changed(interval=validation.interval).choice()
+    # An episode is one of LOG's; the others are logs of their own.
+    held_out_choice = reading.changed(interval=validation.interval, episode=None).choice()
+    unloaded_choice = reading.changed(episode=None).choice()
     validated, without_load = validation.validate or [], free.logs(asked.find_payload)
     library = Library([*logs, *validated, *without_load])
     # That the profile is not the arm's is what this command is there to change; but the friction
     # method keeps the profile's links.
     examiner = health_of(library, anyway=anyway, fitting=task.method == "friction")
-    profile = examiner.robot(library.open(logs[0], choice), chosen)
+    profile = examiner.robot(next(library.open_each(logs, choice)), chosen)
 
     def opened(paths: list[Path] | tuple[Path, ...], how: "ReadChoice") -> list["Recording"]:
-        return [examiner.taken(library.open(path, how), profile, how) for path in paths]
+        return [examiner.taken(log, profile, how) for log in library.open_each(paths, how)]
 
     train = opened(logs, choice)
-    held_out, unloaded = opened(validated, held_out_choice), opened(without_load, choice)
+    held_out, unloaded = opened(validated, held_out_choice), opened(without_load, unloaded_choice)
     for recording in (*train, *held_out, *unloaded):
         say_recording(recording)
         examiner.examine(recording, profile)

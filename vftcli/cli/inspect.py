@@ -29,7 +29,7 @@ def inspect_log(
     from vftcli.robots.winding import unwound
 
     choice = reading.choice()
-    recording = read_first_recording(log, format=choice.format, columns=choice.columns)
+    recording = read_first_recording(log, choice)
     recording = choice.within(choice.taken(recording))
     chosen = robot.choice()
     arm = chosen.load(recording) if chosen.name else None

@@ -99,6 +99,10 @@ class ReadOptions(ChoiceBundle["ReadChoice"]):
         "What the log's effort is, whatever it is called; auto takes what the robot's model "
         "explains best, and says so.",
     )
+    episode: str | None = option(
+        "--episode", "K|all", "Of a file that holds several: which, or each as a log of its own."
+    )
+    arm: str | None = option("--arm", "left|right", "Of a log of two arms: which.")
 
 
 class RobotOptions(ChoiceBundle["RobotChoice"]):

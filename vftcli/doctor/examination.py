@@ -11,7 +11,7 @@ from vftcli.doctor.signals import signal_findings, unusable_findings
 from vftcli.doctor.temperature import temperature_findings
 from vftcli.doctor.velocity import velocity_fit
 from vftcli.robots import Robot
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark
 
 NO_FIT = frozenset({"other-robot", "no-robot-fits", "no-robot-fits-any", "no-robot-fits-at-rest"})
@@ -54,7 +54,15 @@ class Examination:
             fitting: Whether the arm must be the one of the model; identification makes it so.
         """
         codes = REFUSING if fitting else REFUSING - NO_FIT
-        return tuple(finding for finding in self.warnings if finding.code in codes)
+        unmeasured = self._unmeasured()
+        return tuple(f for f in self.warnings if f.code in codes or f in unmeasured)
+
+    def _unmeasured(self) -> tuple[Remark, ...]:
+        """The findings that at least half of the joints' effort was not measured, if all agree."""
+        joints, efforts = self.recording.joints, set(EFFORTS) & set(self.recording.signals)
+        zero = [finding for finding in self.warnings if finding.code == "zero-effort"]
+        found = tuple(finding for finding in zero if 2 * len(finding.where.joints) >= joints)
+        return found if len(found) == len(efforts) else ()
 
     @property
     def assumptions(self) -> tuple[Remark, ...]:

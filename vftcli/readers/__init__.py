@@ -1,18 +1,33 @@
 """Readers: a log in any known format becomes a Recording. The content decides, never the name."""
 
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from vftcli.readers import arrays_file, lerobot, libfranka, parquet, pickles, rtde, tables
+from vftcli.readers import (
+    arrays_file,
+    arrow,
+    droid,
+    hdf5_layouts,
+    json_file,
+    lerobot,
+    libfranka,
+    matlab,
+    parquet,
+    pickles,
+    rtde,
+    tables,
+)
 from vftcli.readers.bags import formats as bags
 from vftcli.readers.cleaning import RestartError, cleaned
+from vftcli.readers.foreign import refuse_foreign
 from vftcli.readers.opening import Digest
+from vftcli.readers.parts import refuse_arm
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
-from vftcli.signals.errors import LogError, UnknownFormatError
+from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import warning
 
@@ -30,8 +45,13 @@ READERS: dict[str, Reader] = {
         tables.NPY,
         arrays_file.NPZ,
         pickles.PICKLE,
+        json_file.JSON,
         parquet.PARQUET,
+        arrow.ARROW,
+        matlab.MATLAB,
+        hdf5_layouts.HDF5,
         lerobot.LEROBOT,
+        droid.DROID,
         bags.ROS1,
         bags.ROS2,
         bags.DB3,
@@ -48,52 +68,84 @@ def read(
     columns: str | None = None,
     signals: Collection[str] | None = None,
     label: str = "",
+    episode: int | None = None,
+    arm: str | None = None,
 ) -> Recording:
     """Read a log, recognising its format by content unless one is named.
 
     Args:
-        path: A file or a bag folder.
+        path: A file, a bag folder or a dataset's folder.
         format: Name of a format in READERS.
         columns: Which columns hold which signals, in the grammar of ``--columns``.
         signals: Fields of Recording that are wanted; others may be left unread. None for all.
         label: What to call it in tables; its file's name if "".
+        episode: Which episode of a file that holds several; its first, said in a remark, if None.
+        arm: Which arm of a log of two, ``left`` or ``right``.
 
     Raises:
         UnknownFormatError: If no format fits, or more than one.
-        LogError: If the file cannot be read as what it is.
+        LogError: If the file cannot be read as what it is, or has no such episode or arm.
         ClockError: If its clock stands still, runs backwards or holds no samples.
     """
+    wanted = frozenset(signals) if signals is not None else None
+    choice = ReadChoice(format=format, columns=columns, signals=wanted, episode=episode, arm=arm)
+    return read_chosen(path, choice, label)
+
+
+def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Recording:
+    """Read a log whole, as `read` does, in the way a choice says.
+
+    Raises:
+        VftError: As `read` does; also if all episodes are chosen, for this returns one.
+    """
     path = Path(path)
+    if choice.all_episodes:
+        raise ParameterError(
+            f"{path}: --episode all is for commands that take several logs (compare, report, "
+            "contacts, thresholds, identify); name one: --episode K"
+        )
     file = open_log(path)
-    reader = _reader(file, format, columns)
-    request = ReadChoice(
-        columns=columns, signals=frozenset(signals) if signals is not None else None
-    )
-    digest = Digest(path)
-    if "polars" not in sys.modules:
+    reader = _reader(file, choice.format, choice.columns)
+    if choice.episode is not None and reader.episodes is None:
+        raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
+    if not reader.arms:
+        refuse_arm(path, choice)
+    digest = Digest((path,))
+    if "polars" not in sys.modules and reader.episodes is None:
         digest.start()  # its import takes longer than the hash and leaves a core idle
     with np.errstate(all="ignore"):  # whatever a damaged file holds is judged when it is cleaned
-        raw = reader.read(file, request)
+        raw = reader.read(file, choice)
         raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
-    digest.start()
+    digest = Digest(raw.files) if raw.files else digest
+    if not raw.part:
+        digest.start()  # of one of many parts it may never be asked for
     return cleaned(raw, path, reader.name, digest.hexdigest, label)
 
 
-def read_first_recording(
-    path: str | Path,
-    *,
-    format: str | None = None,
-    columns: str | None = None,
-) -> Recording:
-    """Read a log as `read` does; of a file that holds several recordings, the first.
+def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
+    """The numbers of the episodes that a file holds, rising.
+
+    Raises:
+        LogError: If it is of a format without episodes.
+    """
+    file = open_log(Path(path))
+    reader = _reader(file, choice.format, choice.columns)
+    if reader.episodes is None:
+        raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
+    return reader.episodes(file)
+
+
+def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> Recording:
+    """Read a log as `read` does; of a file that holds several recordings or arms, the first.
 
     For examining a log, where looking at a part and saying so tells more than refusing.
     """
+    choice = replace(choice or ReadChoice(), examining=True)
     try:
-        return read(path, format=format, columns=columns)
+        return read_chosen(path, choice)
     except RestartError as error:
-        segment = f"{columns},segment=1" if columns else "segment=1"
-        first = read(path, format=format, columns=segment)
+        segment = f"{choice.columns},segment=1" if choice.columns else "segment=1"
+        first = read_chosen(path, replace(choice, columns=segment))
         told = warning("time-reset", restarts=len(error.rows), rows=list(error.rows))
         remarks = (told, *first.source.remarks)
         return replace(first, source=replace(first.source, remarks=remarks))
@@ -121,7 +173,8 @@ def _reader(file: LogFile, name: str | None, columns: str | None) -> Reader:
             f"{file.path}: --columns does not apply to {reader.name}, whose signals are known. "
             f"It applies to {takers}."
         )
-    return reader if reader.general or not file.lines else tables.HEADED
+    whole = reader.general or reader.describes or not file.lines
+    return reader if whole else tables.HEADED
 
 
 def _recognise(file: LogFile) -> Reader:
@@ -132,6 +185,7 @@ def _recognise(file: LogFile) -> Reader:
     if len(found) == 1:
         return found[0]
     if not found:
+        refuse_foreign(file)
         raise UnknownFormatError(
             f"{file.path}: not recognised as any of {', '.join(READERS)}. Name its format with "
             "--format, or see docs/formats.md for what each expects."
@@ -147,7 +201,9 @@ __all__ = [
     "RawLog",
     "ReadChoice",
     "Reader",
+    "episode_numbers",
     "read",
+    "read_chosen",
     "read_first_recording",
     "recognise",
 ]

@@ -200,13 +200,16 @@ def vendor_pick(signal: str, name: str, cells: tuple[Cell, ...]) -> Pick:
 
 
 def _wrench(table: Table) -> Pick | None:
-    """The six columns of a wrench, None where one of them is missing."""
+    """The six columns of a wrench, or its column of lists; None where one of them is missing."""
     there = enumerate(table.names or ())
     names = ["" if column in table.lists else name.lower() for column, name in there]
     for text in WRENCHES:
         wanted = text.split()
         if all(names.count(name) == 1 for name in wanted):
             return Pick(signal="wrench", cells=tuple(Cell(names.index(n)) for n in wanted))
+    rows = [c for c, n in enumerate(table.names or ()) if n.lower() == "wrench"]
+    if len(rows) == 1 and table.lists.get(rows[0]) == 6:
+        return Pick(signal="wrench", cells=tuple(Cell(rows[0], k) for k in range(6)))
     return None
 
 

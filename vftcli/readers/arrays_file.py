@@ -2,6 +2,7 @@
 
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from io import BytesIO
 from typing import Any
 
@@ -10,10 +11,15 @@ import numpy as np
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.libfranka import read_array_fields
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.readers.parts import episode_of
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, check_npy_header, from_table, numpy_array
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Remark
+
+SKILL = "skill_state_dict"
+"""What frankapy calls the states of a skill."""
 
 PANDA_PY = ("q", "dq", "tau_J", "tau_ext_hat_filtered", "O_F_ext_hat_K")
 """The fields of libfranka's state that are taken from panda-py's get_log()."""
@@ -50,14 +56,22 @@ def npz_arrays(file: LogFile) -> dict[str, Column]:
     return arrays
 
 
-def read_arrays(file: LogFile, arrays: Mapping[str, Column], request: ReadChoice) -> RawLog:
+def read_arrays(
+    file: LogFile, arrays: Mapping[str, Column], remarks: tuple[Remark, ...], request: ReadChoice
+) -> RawLog:
     """Read named arrays as panda-py's log, by --columns, or by alias.
+
+    Args:
+        file: The file.
+        arrays: Its arrays.
+        remarks: What had to be done to them.
+        request: What is wanted.
 
     Raises:
         LogError: If the arrays differ in length or none is the positions.
     """
     shaped = {name: _shaped(array) for name, array in arrays.items() if array.ndim in {1, 2, 3}}
-    table = ArrayTable(path=file.path, columns=shaped)
+    table = ArrayTable(path=file.path, columns=shaped, remarks=remarks)
     if request.columns is not None and parse_columns(request.columns).named:
         return from_table(table, request)
     if request.columns is not None:
@@ -101,8 +115,56 @@ def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
     return arrays
 
 
+def read_dictionary(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) -> RawLog:
+    """Read a dictionary of arrays or lists: panda-py's get_log(), frankapy's skills, or others.
+
+    Raises:
+        LogError: If nothing in it is an array of numbers, or it has no such episode.
+    """
+    numbers = episodes_of_skills(log)
+    number, part, remarks = episode_of(file.path, request, numbers)
+    if skills := skills_of(log):
+        log = skills[numbers.index(number)]
+        if "time_since_skill_started" in log:
+            raw = _read_frankapy(file, log, request)
+            return replace(raw, part=part, remarks=(*remarks, *raw.remarks))
+    elif len(log) == 1 and isinstance(inner := next(iter(log.values())), dict):
+        log = inner
+    raw = read_arrays(file, arrays_of_lists(file, log), remarks, request)
+    return replace(raw, part=part)
+
+
+def skills_of(log: Any) -> list[dict[Any, Any]]:  # noqa: ANN401 - whatever the file holds
+    """The states that frankapy recorded, one dictionary a skill: {0: {skill_state_dict: {…}}}."""
+    if not isinstance(log, Mapping):
+        return []
+    held = [value.get(SKILL) for value in log.values() if isinstance(value, dict)]
+    return [states for states in held if isinstance(states, dict)]
+
+
+def episodes_of_skills(log: Any) -> tuple[int, ...]:  # noqa: ANN401 - whatever the file holds
+    """The numbers of a log's episodes: its skills counted from 0, 0 alone for any other log."""
+    return tuple(range(len(skills_of(log)))) or (0,)
+
+
+def _read_frankapy(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) -> RawLog:
+    """Read frankapy's trajectory: times in seconds, positions, no torque."""
+    arrays = arrays_of_lists(file, log)
+    if "time_since_skill_started" in arrays:
+        arrays["time"] = arrays["time_since_skill_started"]
+    kept: dict[str, Column] = {
+        name: arrays[name] for name in ("time", "q", "dq", "tau_J") if name in arrays
+    }
+    columns = request.columns or ",".join(
+        f"{signal}={name}"
+        for signal, name in (("t[s]", "time"), ("q[rad]", "q"), ("dq", "dq"), ("tau", "tau_J"))
+        if name in kept
+    )
+    return read_arrays(file, kept, (), replace(request, columns=columns))
+
+
 NPZ = Reader(
     name="npz",
     recognises=lambda file: file.head.startswith(b"PK\x03\x04") and b".npy" in file.head[:4096],
-    read=lambda file, request: read_arrays(file, npz_arrays(file), request),
+    read=lambda file, request: read_arrays(file, npz_arrays(file), (), request),
 )

@@ -85,7 +85,8 @@ def cleaned(
         payload_com=raw.payload_com,
         source=Source(
             path=path,
-            label=label,
+            label=f"{label or path.name} {raw.part}" if raw.part else label,
+            part=raw.part,
             format=format_name,
             sha256=sha256,
             clock=raw.clock,

@@ -1,87 +1,367 @@
 """LeRobot datasets, versions 2 and 3: a folder of Parquet files with meta/info.json."""
 
 import json
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.readers.aliases import ALIASES
+from vftcli.readers.columnar import EPISODE, episodes_of
+from vftcli.readers.columns import SIGNALS, parse_columns
+from vftcli.readers.joints import kinematic_order
 from vftcli.readers.parquet import ParquetTable
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
-from vftcli.readers.tables import from_table
+from vftcli.readers.parts import arm_of, episode_of, refuse_arm
+from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, Reader, open_log
+from vftcli.readers.table import listed
+from vftcli.readers.tables import described, states_positions
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import caution
+from vftcli.signals.remarks import Remark, fact
 
-INFO_LIMIT = 16 * 1024 * 1024
+TOLD_LIMIT = 64 * 1024 * 1024
+"""Bytes of a description beside the data that are parsed."""
+
+FRAME = "frame_index"
+
+CLOCK_SLACK = 1e-3
+"""How far the stamps, 32-bit floats, may lie from frame / fps for that to be taken. [s]"""
+
+STEMS = {
+    "pos": "q", "position": "q", "positions": "q", "vel": "dq", "velocity": "dq",
+    "velocities": "dq", "effort": "torque", "efforts": "torque", "torque": "torque",
+    "torques": "torque", "current": "current", "currents": "current",
+}  # fmt: skip
+"""What an element's name says it measures."""
+
+NAMED = re.compile(rf"(?P<joint>.+)[._/](?P<stem>{'|'.join(STEMS)})")
+"""joint_1.pos"""
+
+COUNTED = re.compile(
+    rf"(?P<joint>.*?joint)[_.](?P<stem>{'|'.join(STEMS)})[_.](?P<number>\d{{1,4}})"
+)
+"""joint_positions.1"""
+
+SIDE = re.compile(rf"(?:^|[._/ ])({'|'.join(ARMS)})(?:$|[._/ ])")
+NO_JOINT = re.compile(r"grip|finger", re.IGNORECASE)
+CARTESIAN = {
+    "x", "y", "z", "roll", "pitch", "yaw", "rx", "ry", "rz", "qx", "qy", "qz", "qw",
+}  # fmt: skip
+"""Names of elements that are a pose's."""
+
+MEASURED = ("q", "dq", "torque", "current", "tau_ext")
+"""Signals that are looked for."""
+
+ROBOTS = ("panda", "fr3", "ur5", "ur5e", "ur10e")
+"""Values of robot_type that are a profile's name."""
+
+EPISODES_TABLE = (
+    EPISODE, "length", "dataset_from_index", "dataset_to_index", "data/chunk_index",
+    "data/file_index",
+)  # fmt: skip
+
+
+class Episode(NamedTuple):
+    """Where an episode is.
+
+    Attributes:
+        number: Its index.
+        length: Its frames, None where that is not told.
+        start: Index of its first frame in the dataset, None where that is not told.
+        file: Its data file by the dataset's usual name, None where that is not told.
+    """
+
+    number: int
+    length: int | None = None
+    start: int | None = None
+    file: Path | None = None
+
+
+class Element(NamedTuple):
+    """One number of an observation: which signal of which joint.
+
+    Attributes:
+        column: Its name for --columns.
+        signal: Field of Recording.
+        joint: The joint's name, "" where the dataset gives none.
+        side: left, right, or "" for neither.
+    """
+
+    column: str
+    signal: str
+    joint: str
+    side: str
 
 
 def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read the first episode of a dataset; which one, of how many, is said.
+    """Read an episode of a dataset.
 
     Raises:
-        LogError: If the folder has no Parquet data or its info cannot be read.
+        LogError: If it has no such episode, its tables contradict one another, or it has no joints.
     """
-    info = _info(file.path)
-    files = sorted((file.path / "data").rglob("*.parquet"))
-    if not files:
-        raise LogError(f"{file.path}: a LeRobot dataset without data/**/*.parquet.")
-    first_file = open_log(files[0])
-    table = ParquetTable(first_file)
-    rows, first = None, 0
-    if (numbers := table.episodes()).size:
-        first = int(numbers[0])
-        rows = np.flatnonzero(numbers == numbers[0])
-    table = ParquetTable(first_file, rows)
-    remark = caution(
-        "episode-taken",
-        episode=first,
-        episodes=str(info.get("total_episodes", "an unknown number"))[:20],
-        rate_Hz=str(info.get("fps", "unknown"))[:20],
+    info = info_of(file.path)
+    episodes = episodes_told(file.path)
+    number, part, remarks = episode_of(file.path, request, [e.number for e in episodes])
+    episode = next(e for e in episodes if e.number == number)
+    path = data_file(file.path, episode)
+    table = rows_of(open_log(path), episode)
+    names: tuple[str, ...] = ()
+    if states_positions(request):
+        refuse_arm(file.path, request)
+        usual, side = "t=timestamp,q=observation.state", ""
+    else:
+        usual, names, side, more = columns_of(file.path, table, features_of(info), request)
+        remarks = (*remarks, *more)
+    raw = described(table, usual, request, joint_names=names, remarks=remarks)
+    robot = str(info.get("robot_type", "")).lower()
+    return replace(
+        by_frames(raw, table, info.get("fps")),
+        part=" ".join(word for word in (part, f"{side} arm" if side else "") if word),
+        files=(file.path / "meta" / "info.json", path),
+        robot_hint=robot if robot in ROBOTS else None,
     )
-    request = replace(request, columns=request.columns or default_columns(table, info))
-    return from_table(table, request, remarks=(remark,))
 
 
-def default_columns(table: ParquetTable, info: dict[str, Any]) -> str:
-    """A --columns text for a dataset's usual names: the first numbers of observation.state.
+def columns_of(
+    path: Path, table: ParquetTable, features: Mapping[str, Any], request: ReadChoice
+) -> tuple[str, tuple[str, ...], str, tuple[Any, ...]]:
+    """Which columns hold which signals of which arm, by the names of features and their elements.
 
-    The state of an arm often ends with its gripper; the names in info.json tell.
+    Returns:
+        The --columns text, the joints' names or none, the arm of two or "", what is to be said.
+
+    Raises:
+        LogError: If there are no joints, an arm has to be chosen, or signals name other joints.
     """
-    names = list(table.names or ())
-    if "observation.state" not in names:
+    there = [e for name in table.names or () for e in elements_of(name, table, features.get(name))]
+    sides = [side for side in ARMS if any(e.side == side and e.signal == "q" for e in there)]
+    side = ""
+    taken = request.columns is not None and parse_columns(request.columns).item("wrench")
+    remarks: tuple[Remark, ...] = () if taken else wrenches_left(table, features)
+    if len(sides) > 1:
+        side, said = arm_of(path, request, sides)
+        remarks = (*remarks, *said)
+        there = [e for e in there if e.side in {side, ""}]
+    else:
+        refuse_arm(path, request)
+    by_signal = {s: [e for e in there if e.signal == s] for s in MEASURED}
+    if not by_signal["q"]:
         raise LogError(
-            f"{table.path}: no observation.state among {', '.join(names[:20])}. Name the columns: "
-            "--columns 't=timestamp,q[rad]=observation.state[0:7]'."
+            f"{path}: no joint positions among {listed(list(table.names or ()))}. Name the columns "
+            "with --columns, as in 'q[rad]=observation.state[0:7]'."
         )
-    length = table.lists.get(names.index("observation.state"), 0)
-    feature = info.get("features", {})
-    feature = feature.get("observation.state", {}) if isinstance(feature, dict) else {}
-    labels = feature.get("names") if isinstance(feature, dict) else None
+    names = tuple(element.joint for element in by_signal["q"])
+    names = names if all(names) and len(set(names)) == len(names) else ()
+    names = tuple(names[k] for k in kinematic_order(names))
+    grammar = {field: word for word, field in SIGNALS.items()}
+    items = [
+        f"{grammar[signal]}={'|'.join(e.column for e in in_order(path, signal, found, names))}"
+        for signal, found in by_signal.items()
+        if found
+    ]
+    return ",".join(["t=timestamp", *items]), names, side, remarks
+
+
+def wrenches_left(table: ParquetTable, features: Mapping[str, Any]) -> tuple[Remark, ...]:
+    """A remark on a wrench that is not taken: nothing tells a sensor's from an estimate."""
+    observed = [name for name in table.names or () if name.startswith("observation.")]
+    found = [name for name in observed if "wrench" in f"{name} {features.get(name)}".lower()]
+    return (fact("wrench-left-out", features=listed(found)),) if found else ()
+
+
+def in_order(
+    path: Path, signal: str, elements: list[Element], names: tuple[str, ...]
+) -> list[Element]:
+    """A signal's elements in the order of the joints, as they stand where they have no names.
+
+    Raises:
+        LogError: If they are of other joints.
+    """
+    by_joint = {element.joint: element for element in elements}
+    if not names or "" in by_joint:
+        return elements
+    if len(by_joint) != len(elements) or set(by_joint) != set(names):
+        raise LogError(
+            f"{path}: {signal} is of the joints {listed(list(by_joint))}, the positions are of "
+            f"{listed(names)}. Name the columns with --columns."
+        )
+    return [by_joint[name] for name in names]
+
+
+def elements_of(name: str, table: ParquetTable, labels: Any) -> Iterable[Element]:  # noqa: ANN401
+    """The joints' elements of a feature; none of a gripper, a pose, an action."""
+    if not name.startswith("observation."):
+        return
+    column = (table.names or ()).index(name)
+    width = table.lists.get(column)
+    last = [part for part in name.lower().split(".") if part not in {"observation", *ARMS}]
+    of_feature = next(
+        (s for s in MEASURED if last and last[-1] in (*ALIASES[s], *(["state"] * (s == "q")))), ""
+    )
     if isinstance(labels, dict):
         labels = next(iter(labels.values()), None)
-    # A gripper ends the state, and is no joint of the arm.
-    joints = length
-    if isinstance(labels, list) and len(labels) == length:
-        fingers = [k for k, label in enumerate(labels) if "grip" in str(label).lower()]
-        joints = min(fingers) if fingers else length
-    return f"t=timestamp,q=observation.state[0:{joints}]"
+    good = isinstance(labels, list) and len(labels) == (width or 1)
+    for k in range(width or 1):
+        label = str(labels[k]) if good else ""
+        signal, joint = measured_by(label) or (of_feature, label)
+        pose = joint.lower().rpartition("_")[2].rpartition(".")[2] in CARTESIAN
+        if signal and not pose and not NO_JOINT.search(joint):
+            side = SIDE.search(label.replace("_", ".")) or SIDE.search(name)
+            yield Element(f"{name}[{k}]" if width else name, signal, joint, side[1] if side else "")
 
 
-def _info(folder: Path) -> dict[str, Any]:
-    """meta/info.json."""
+def measured_by(label: str) -> tuple[str, str] | None:
+    """The signal and the joint that an element's name tells, None for one that tells no signal."""
+    if match := COUNTED.fullmatch(label):
+        return STEMS[match["stem"]], f"{match['joint']}_{match['number']}"
+    if match := NAMED.fullmatch(label):
+        return STEMS[match["stem"]], match["joint"]
+    return None
+
+
+def by_frames(raw: RawLog, table: ParquetTable, fps: Any) -> RawLog:  # noqa: ANN401 - of JSON
+    """The log by its frames' numbers and rate, where its stamps are these rounded to 32 bits."""
+    good = isinstance(fps, int | float) and 0 < fps < 1 / CLOCK_SLACK
+    if not good or FRAME not in (table.names or ()) or raw.clock != "column timestamp":
+        return raw
+    column = (table.names or ()).index(FRAME)
+    frames = table.load([column], column)[column]
+    exact = frames.ndim == 1 and np.all(np.abs(raw.stamps * raw.tick - frames / fps) < CLOCK_SLACK)
+    if frames.dtype.kind != "i" or not exact:
+        return raw
+    return replace(raw, stamps=frames, tick=1 / fps, clock=f"column {FRAME} at {fps:g} Hz")
+
+
+def info_of(folder: Path) -> dict[str, Any]:
+    """meta/info.json.
+
+    Raises:
+        LogError: If it cannot be read.
+    """
     path = folder / "meta" / "info.json"
     try:
-        if path.stat().st_size > INFO_LIMIT:
-            raise LogError(f"{path}: larger than {INFO_LIMIT >> 20} MiB; no description is.")
-        info = json.loads(path.read_text(encoding="utf-8"))
+        info = json.loads(text_of(path))
     except (OSError, ValueError, RecursionError):
         raise LogError(f"{path}: not a readable description of a dataset") from None
     return info if isinstance(info, dict) else {}
+
+
+def text_of(path: Path) -> str:
+    """The text of a description beside the data.
+
+    Raises:
+        LogError: If it is too large to be one.
+    """
+    if path.stat().st_size > TOLD_LIMIT:
+        raise LogError(f"{path}: larger than {TOLD_LIMIT >> 20} MiB; no description is.")
+    return path.read_text(encoding="utf-8")
+
+
+def features_of(info: dict[str, Any]) -> dict[str, Any]:
+    """Feature → the names of its elements, as info.json tells them."""
+    features = info.get("features")
+    there = features.items() if isinstance(features, dict) else ()
+    return {name: told.get("names") for name, told in there if isinstance(told, dict)}
+
+
+def episodes_told(folder: Path) -> list[Episode]:
+    """The episodes of a dataset, rising.
+
+    Raises:
+        LogError: If its table of episodes cannot be read, or it has none and no data either.
+    """
+    tables = sorted((folder / "meta" / "episodes").rglob("*.parquet"))
+    lines = folder / "meta" / "episodes.jsonl"
+    if tables:
+        found = [episode for path in tables for episode in episodes_of_table(folder, path)]
+    elif lines.is_file():
+        found = list(episodes_of_lines(lines))
+    else:
+        files = sorted((folder / "data").rglob("*.parquet"))
+        each = (episodes_of(ParquetTable(open_log(path)).episodes()) for path in files)
+        found = [Episode(number) for numbers in each for number in numbers]
+    if not found:
+        raise LogError(f"{folder}: a LeRobot dataset without data/**/*.parquet.")
+    by_number = {episode.number: episode for episode in found}
+    return [by_number[number] for number in sorted(by_number)]
+
+
+def episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
+    """The episodes of a table of version 3."""
+    table = ParquetTable(open_log(path))
+    names = list(table.names or ())
+    if missing := [name for name in EPISODES_TABLE if name not in names]:
+        raise LogError(f"{path}: no column {missing[0]}; a table of episodes has one.")
+    loaded = table.load([names.index(name) for name in EPISODES_TABLE], None)
+    columns = [loaded[names.index(name)] for name in EPISODES_TABLE]
+    if not all(column.ndim == 1 and np.isfinite(column).all() for column in columns):
+        raise LogError(f"{path}: a row of the table of episodes lacks a number.")
+    for row in zip(*columns, strict=True):
+        number, length, start, end, chunk, file = (int(value) for value in row)
+        if end - start != length:
+            raise LogError(f"{path}: episode {number} has {length} frames and spans {end - start}.")
+        place = folder / "data" / f"chunk-{chunk:03d}" / f"file-{file:03d}.parquet"
+        yield Episode(number, length, start, place)
+
+
+def episodes_of_lines(path: Path) -> Iterable[Episode]:
+    """The episodes of a table of version 2, one object a line."""
+    for line in filter(str.strip, text_of(path).splitlines()):
+        try:
+            told = json.loads(line)
+            yield Episode(int(told[EPISODE]), int(told["length"]))
+        except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
+            raise LogError(f"{path}: a line that tells no episode: {line[:60]!r}.") from None
+
+
+def data_file(folder: Path, episode: Episode) -> Path:
+    """The data file of an episode: where the table says, by its name, or the one that holds it.
+
+    Raises:
+        LogError: If there is none.
+    """
+    if episode.file is not None and episode.file.is_file():
+        return episode.file
+    files = sorted((folder / "data").rglob("*.parquet"))
+    own = [path for path in files if path.name == f"episode_{episode.number:06d}.parquet"]
+    for path in own or files:
+        if own or episode.number in episodes_of(ParquetTable(open_log(path)).episodes()):
+            return path
+    raise LogError(f"{folder}: no file of data/**/*.parquet holds episode {episode.number}.")
+
+
+def rows_of(file: LogFile, episode: Episode) -> ParquetTable:
+    """The rows of an episode in its data file, checked against the table of episodes.
+
+    Raises:
+        LogError: If the two differ.
+    """
+    table = ParquetTable(file)
+    numbers = table.episodes()
+    if not numbers.size:
+        return table
+    rows = np.flatnonzero(numbers == episode.number)
+    names = list(table.names or ())
+    differs = episode.length is not None and len(rows) != episode.length
+    if "index" in names and episode.start is not None and not differs:
+        index = names.index("index")
+        told = episode.start + np.arange(len(rows))
+        differs = not np.array_equal(table.load([index], index)[index][rows], told)
+    if differs:
+        raise LogError(
+            f"{file.path}: the rows of episode {episode.number} are not those that the table of "
+            "episodes tells; the dataset is damaged or was edited."
+        )
+    table.keep(rows if len(rows) != len(numbers) else None)
+    return table
 
 
 LEROBOT = Reader(
     name="lerobot",
     recognises=lambda file: "meta" in file.entries and (file.path / "meta" / "info.json").is_file(),
     read=read_lerobot,
+    episodes=lambda file: [episode.number for episode in episodes_told(file.path)],
+    arms=True,
 )

@@ -1,7 +1,8 @@
 """Library: the logs of one command, each read once and each under a label of its own."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from vftcli.readers.reader import ReadChoice
@@ -32,19 +33,28 @@ class Library:
         Raises:
             VftError: As `vftcli.readers.read` does, or if the interval holds no samples.
         """
-        from vftcli.readers import read
+        from vftcli.readers import read_chosen
 
         choice, at, label = choice or ReadChoice(), absolute(path), self.label(path)
-        if (at, choice.whole) not in self._recordings:
-            found = read(
-                path,
-                format=choice.format,
-                columns=choice.columns,
-                signals=choice.signals,
-                label=label,
-            )
-            self._recordings[at, choice.whole] = choice.taken(found)
-        return choice.within(self._recordings[at, choice.whole])
+        read = replace(choice, interval=None)
+        if (at, read) not in self._recordings:
+            self._recordings[at, read] = read.taken(read_chosen(path, read, label))
+        return choice.within(self._recordings[at, read])
+
+    def open_each(self, paths: Iterable[str | Path], choice: ReadChoice) -> Iterator[Recording]:
+        """Read some logs, each episode as a log of its own where all are chosen.
+
+        Raises:
+            LogError: If all episodes are chosen, of a log that has none.
+        """
+        from vftcli.readers import episode_numbers
+
+        for path in paths:
+            if not choice.all_episodes:
+                yield self.open(path, choice)
+                continue
+            for number in episode_numbers(path, choice):
+                yield self.open(path, replace(choice, episode=number, all_episodes=False))
 
     def label(self, path: str | Path) -> str:
         """What a log is called, a name that no other log of the command has."""
@@ -58,7 +68,7 @@ class Library:
         Raises:
             ParameterError: If two of them are the same run.
         """
-        logs = tuple(self.open(path, choice) for path in paths)
+        logs = tuple(self.open_each(paths, choice))
         refuse_repeated_logs(logs)
         return logs
 

@@ -4,7 +4,7 @@ import hashlib
 import mmap
 import threading
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Literal
@@ -148,15 +148,20 @@ class Unpacker:
             self.ended = unpacker.eof
 
 
+def files_of(path: Path) -> list[Path]:
+    """A file, or all files of a folder in name order."""
+    return sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+
+
 class Digest:
-    """SHA-256 of a file, or of all files of a folder in name order, computed beside other work.
+    """SHA-256 of files, of a folder all in name order, computed beside other work.
 
     It keeps a core busy, so it should start while the reader's own libraries are being imported,
     or else when the reader is done with the cores.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._paths = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+    def __init__(self, paths: Iterable[Path]) -> None:
+        self._paths = [file for path in paths for file in files_of(path)]
         self._sum = hashlib.sha256()
         # hashlib releases the interpreter for large pieces, so a thread is enough.
         self._thread = threading.Thread(target=self._run, daemon=True)

@@ -1,222 +1,45 @@
-"""Parquet tables: flat columns, or columns of lists as LeRobot writes them."""
+"""Parquet tables."""
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
-from functools import cached_property
+from collections.abc import Mapping, Sequence
 from io import BytesIO
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Column
-from vftcli.readers.tables import from_table
-from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark
-from vftcli.signals.wrench import WrenchFrame
-
-EPISODE = "episode_index"
+from vftcli.readers.columnar import ColumnarTable, episodes_of, read_columns
+from vftcli.readers.reader import LogFile, Reader
 
 
-class ParquetTable:
-    """A Parquet file; only the columns asked for are decoded, and nothing is ever mended.
+class ParquetTable(ColumnarTable):
+    """A Parquet file."""
 
-    pyarrow decodes it: on a damaged page polars would end the whole process.
-
-    Attributes:
-        path: The file.
-        names: Column names.
-    """
-
-    remarks: tuple[Remark, ...] = ()
-
-    def __init__(self, file: LogFile, rows: Any = None) -> None:  # noqa: ANN401 - numbers of rows
+    def _opened(self, file: LogFile) -> Any:  # noqa: ANN401 - pyarrow
         import pyarrow.parquet as pq
 
-        self.path = path = file.path
-        self._rows = rows
-        self._size = path.stat().st_size
-        with guarded(self.path):
-            self._file = pq.ParquetFile(
-                file.direct or BytesIO(file.content), memory_map=file.direct is not None
-            )
-            self._schema = self._file.schema_arrow
-            if self._file.metadata.num_rows == 0:
-                raise LogError(f"{path}: the table has no rows; nothing was recorded into it.")
-        self.names: tuple[str, ...] | None = tuple(self._schema.names)
+        source = file.direct or BytesIO(file.content)
+        self._file = pq.ParquetFile(source, memory_map=file.direct is not None)
+        return self._file.schema_arrow
 
     @property
-    def width(self) -> int:
-        """Number of columns."""
-        return len(self._schema)
+    def _row_count(self) -> int:
+        return int(self._file.metadata.num_rows)
 
-    def told(self) -> dict[str, Any]:
-        """What vftcli convert wrote beside the columns; nothing for files of other programs."""
-        text = (self._file.metadata.metadata or {}).get(b"vftcli", b"{}")
-        try:
-            told = json.loads(text)
-        except (ValueError, RecursionError):
-            return {}
-        good = isinstance(told, dict) and isinstance(told.get("joint_names", []), list)
-        return told if good else {}
+    @property
+    def _metadata(self) -> Mapping[bytes, bytes]:
+        return self._file.metadata.metadata or {}
 
-    @cached_property
-    def lists(self) -> Mapping[int, int]:
-        """Columns of lists and their length in the first row."""
-        kinds = list(enumerate(self._schema.types))
-        return {k: self._first_length(k) for k, kind in kinds if is_list(kind)}
+    def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
+        name = self._schema.names[column]
+        batches = self._file.iter_batches(batch_size=1, columns=[name], use_threads=False)
+        first = next(iter(batches), None)
+        return first.column(name)[0].as_py() if first is not None and first.num_rows else None
 
-    def _first_length(self, column: int) -> int:
-        """Length of the list in the first row of a column, 0 for an empty one."""
-        with guarded(self.path):
-            batches = self._file.iter_batches(
-                batch_size=1, columns=[self._schema.names[column]], use_threads=False
-            )
-            first = next(iter(batches), None)
-            if first is None or first.num_rows == 0:
-                return 0
-            value = first.column(self._schema.names[column])[0].as_py()
-        return len(value) if value is not None else 0
-
-    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
-        """Decode some columns.
-
-        Raises:
-            LogError: If a column holds no numbers or its lists differ in length.
-        """
+    def _decoded(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
         names = self._schema.names
-        # pyarrow would hand over both under one name.
-        if any(names.count(names[c]) > 1 for c in columns):
-            raise LogError(f"{self.path}: two columns have one name; rename one of them.")
-        self._check_size(columns)
-        with guarded(self.path):
-            table = self._file.read(columns=[names[c] for c in columns], use_threads=False)
-            if self._rows is not None:
-                table = table.take(self._rows)
-            return {c: self._numbers(table.column(names[c]), c, clock) for c in columns}
-
-    def _check_size(self, columns: Sequence[int]) -> None:
-        """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
-
-        The rows are asked for, not the pages: on a damaged page's description pyarrow ends the
-        whole process.
-
-        Raises:
-            LogError: If they hold more numbers than a log of this size can.
-        """
-        limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * self._size)
-        width = sum(self.lists.get(column, 1) for column in columns)
-        if 8 * width * self._file.metadata.num_rows > limit:
-            raise LogError(
-                f"{self.path}: its columns unpack to more than {limit >> 20} MiB, more than a log "
-                "of this size can hold. It is damaged or made to fill memory."
-            )
-
-    def episodes(self) -> Column:
-        """The episode of each row, as datasets of LeRobot number them; none elsewhere. (T,)"""
-        if self.names is None or EPISODE not in self.names:
-            return np.empty(0)
-        column = self.names.index(EPISODE)
-        numbers = self.load([column], None)[column]
-        if numbers.ndim != 1 or not np.isfinite(numbers).all():
-            raise LogError(f"{self.path}: {EPISODE} is not a number in every row.")
-        return numbers
-
-    def _numbers(self, values: Any, column: int, clock: int | None) -> Column:  # noqa: ANN401
-        """A column as numbers; whole stamps stay whole, times become nanoseconds."""
-        import pyarrow as pa
-
-        if column in self.lists:
-            return self._matrix(values, column)
-        kind, name = values.type, self._schema.names[column]
-        if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-            unit = pa.timestamp("ns") if pa.types.is_timestamp(kind) else pa.duration("ns")
-            values = values.cast(unit).cast(pa.int64())
-        elif pa.types.is_boolean(kind):
-            values = values.cast(pa.uint8())
-        elif not is_number(kind):
-            raise LogError(f"{self.path}: column {name} holds {kind}, not numbers.")
-        whole = column == clock and pa.types.is_integer(values.type) and not values.null_count
-        target = np.int64 if whole else np.float64
-        return np.asarray(values.to_numpy()).astype(target)
-
-    def _matrix(self, values: Any, column: int) -> Column:  # noqa: ANN401 - pyarrow
-        """A column of lists of one length. (T, k)"""
-        length, name = self.lists[column], self._schema.names[column]
-        values = values.combine_chunks()
-        if hasattr(values, "chunks"):  # pyarrow keeps an empty or split column as chunks
-            values = values.chunk(0) if values.num_chunks else values
-        flat = values.flatten()
-        even = np.all(np.asarray(values.value_lengths()) == length) if len(values) else True
-        if values.null_count or not even or len(flat) != length * len(values):
-            raise LogError(f"{self.path}: the lists of {name} are not all {length} long.")
-        if not is_number(flat.type):
-            raise LogError(f"{self.path}: the lists of {name} hold {flat.type}.")
-        numbers = np.asarray(flat.to_numpy(zero_copy_only=False)).astype(np.float64)
-        return numbers.reshape(len(values), length)
-
-
-def is_list(kind: Any) -> bool:  # noqa: ANN401 - a pyarrow type
-    """Whether a column holds lists."""
-    import pyarrow as pa
-
-    tests = (pa.types.is_list, pa.types.is_large_list, pa.types.is_fixed_size_list)
-    return any(test(kind) for test in tests)
-
-
-def is_number(kind: Any) -> bool:  # noqa: ANN401 - a pyarrow type
-    """Whether a column holds numbers."""
-    import pyarrow as pa
-
-    return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
-
-
-@contextmanager
-def guarded(path: Path) -> Iterator[None]:
-    """Turn the errors of the Parquet decoder into a LogError that names the file."""
-    import pyarrow as pa
-
-    try:
-        yield
-    except (
-        pa.ArrowException, OSError, ValueError, KeyError, MemoryError, OverflowError,
-    ) as error:  # fmt: skip
-        reason = str(error).split("\n")[0][:120]
-        raise LogError(f"{path}: a damaged Parquet file ({reason})") from None
-
-
-def read_parquet(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read a Parquet file: ours, a user's, or one file of a LeRobot dataset."""
-    table = ParquetTable(file)
-    refuse_episodes(table)
-    raw = from_table(table, request)
-    told = table.told()
-    names = tuple(str(name) for name in told.get("joint_names") or ())
-    return replace(
-        raw,
-        wrench_frame=raw.wrench_frame or WrenchFrame.of_conversion(told.get("wrench_frame")),
-        joint_names=raw.joint_names or names,
-        robot_hint=raw.robot_hint or told.get("robot"),
-    )
-
-
-def refuse_episodes(table: ParquetTable) -> None:
-    """Raise a LogError if the file holds more than one episode: each has its own clock.
-
-    Raises:
-        LogError: With the episodes' number and what to do.
-    """
-    if (number := len(np.unique(table.episodes()))) > 1:
-        raise LogError(
-            f"{table.path}: holds {number} episodes, each with its own clock. Give the dataset's "
-            "folder (its first episode is read), or save one episode to its own file."
-        )
+        return self._file.read(columns=[names[c] for c in columns], use_threads=False)
 
 
 PARQUET = Reader(
-    name="parquet", recognises=lambda file: file.head.startswith(b"PAR1"), read=read_parquet
+    name="parquet",
+    recognises=lambda file: file.head.startswith(b"PAR1"),
+    read=lambda file, request: read_columns(ParquetTable(file), request),
+    episodes=lambda file: episodes_of(ParquetTable(file).episodes()),
 )

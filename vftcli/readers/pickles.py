@@ -6,14 +6,12 @@ import pickletools
 import re
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from vftcli.readers.arrays_file import arrays_of_lists, read_arrays
+from vftcli.readers.arrays_file import episodes_of_skills, read_dictionary
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
 
 PICKLE_LIMIT = 512 * 1024 * 1024
@@ -274,35 +272,12 @@ def read_pickle(file: LogFile, request: ReadChoice) -> RawLog:
         LogError: If it holds anything but arrays, or no positions and times.
     """
     log = load_arrays_only(file)
-    if (
-        isinstance(log, dict)
-        and len(log) == 1
-        and isinstance(inner := next(iter(log.values())), dict)
-    ):
-        log = inner.get("skill_state_dict", inner)  # frankapy: {0: {skill_state_dict: {…}}}
-        if isinstance(log, dict) and "time_since_skill_started" in log:
-            log = {**log, "time": log["time_since_skill_started"]}
-            return _read_frankapy(file, log, request)
     if not isinstance(log, dict):
         raise LogError(
             f"{file.path}: the pickle holds a {type(log).__name__}, not a dictionary of arrays. "
             "Save the log with np.savez."
         )
-    return read_arrays(file, arrays_of_lists(file, log), request)
-
-
-def _read_frankapy(file: LogFile, log: dict[Any, Any], request: ReadChoice) -> RawLog:
-    """Read frankapy's trajectory: times in seconds, positions, no torque."""
-    arrays = arrays_of_lists(file, log)
-    kept: dict[str, Column] = {
-        name: arrays[name] for name in ("time", "q", "dq", "tau_J") if name in arrays
-    }
-    columns = request.columns or ",".join(
-        f"{signal}={name}"
-        for signal, name in (("t[s]", "time"), ("q[rad]", "q"), ("dq", "dq"), ("tau", "tau_J"))
-        if name in kept
-    )
-    return read_arrays(file, kept, replace(request, columns=columns))
+    return read_dictionary(file, log, request)
 
 
 PICKLE = Reader(
@@ -311,4 +286,5 @@ PICKLE = Reader(
         file.head[:1] == b"\x80" and file.head[1:2] in {b"\2", b"\3", b"\4", b"\5"}
     ),
     read=read_pickle,
+    episodes=lambda file: episodes_of_skills(load_arrays_only(file)),
 )

@@ -1,7 +1,8 @@
 """Reader: what a log format is to this package, and the file a reader is handed."""
 
+import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
 from vftcli.signals.arrays import Array
+from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
 from vftcli.signals.wrench import WrenchFrame
@@ -104,6 +106,8 @@ class RawLog:
         constants: Last values of further columns that the reader asked for.
         payload_mass: Mass the controller was told of. [kg]
         payload_com: Its centre of mass in flange axes. (3,) [m]
+        part: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
+        files: The files of a folder that it was read from; () for all.
     """
 
     stamps: Array
@@ -121,7 +125,12 @@ class RawLog:
     constants: tuple[float, ...] = ()
     payload_mass: float | None = None
     payload_com: tuple[float, ...] | None = None
+    part: str = ""
+    files: tuple[Path, ...] = ()
 
+
+ARMS = ("left", "right")
+"""Values of ``--arm``."""
 
 EFFORT = {
     "auto": None,
@@ -143,9 +152,14 @@ class ReadChoice:
         interval: The span that is used, from the first sample, None for all of it. [s]
         effort: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the
             robot; None to take what it is called.
+        episode: Number of the episode of a file that holds several, None to leave it to the reader.
+        all_episodes: Whether each episode is wanted, as a log of its own.
+        arm: Which arm of a log of two, a member of `ARMS`; None for the only one.
+        examining: Whether the log is only looked at, where a part and a word say more than a
+            refusal.
 
     Raises:
-        ParameterError: If the effort is none of these.
+        ParameterError: If the effort or the arm is none of these.
     """
 
     format: str | None = None
@@ -153,8 +167,14 @@ class ReadChoice:
     signals: frozenset[str] | None = None
     interval: tuple[float, float] | None = None
     effort: str | None = None
+    episode: int | None = None
+    all_episodes: bool = False
+    arm: str | None = None
+    examining: bool = False
 
     def __post_init__(self) -> None:
+        if self.arm is not None:
+            parsing.check_known(self.arm, ARMS, f"--arm {self.arm!r}")
         if self.effort is not None:
             parsing.check_known(self.effort, tuple(EFFORT), f"--effort {self.effort!r}")
 
@@ -166,19 +186,32 @@ class ReadChoice:
         columns: str | None = None,
         interval: str | None = None,
         effort: str | None = None,
+        episode: str | None = None,
+        arm: str | None = None,
     ) -> "ReadChoice":
-        """The choice that ``--format``, ``--columns``, ``--interval A:B`` and ``--effort`` state.
+        """The choice that the options of these names state, as ``--interval A:B``, ``--episode K``.
 
         Raises:
-            ParameterError: If the interval is malformed.
+            ParameterError: If the interval or the episode is malformed.
         """
         span = parsing.interval(interval) if interval is not None else None
-        return cls(format=format, columns=columns, interval=span, effort=effort)
+        number = None if episode in {None, "all"} else str(episode)
+        if number is not None and not re.fullmatch(r"[0-9]{1,9}", number):
+            raise ParameterError(f"--episode {episode!r} is neither a number, as in 0, nor all")
+        return cls(
+            format=format,
+            columns=columns,
+            interval=span,
+            effort=effort,
+            episode=int(number) if number is not None else None,
+            all_episodes=episode == "all",
+            arm=arm,
+        )
 
     @property
     def whole(self) -> "ReadChoice":
-        """The same without its interval: a free run is read whole."""
-        return replace(self, interval=None)
+        """The same without its interval and episode: a free run is a log of its own, read whole."""
+        return replace(self, interval=None, episode=None, all_episodes=False)
 
     def taken(self, recording: Recording) -> Recording:
         """A recording with its effort taken for what it is said to be.
@@ -212,6 +245,9 @@ class Reader:
         read: Reads it.
         general: Whether it takes any table, and is asked only if no other format fits.
         columns: Whether the columns may be described by ``--columns``.
+        describes: Whether it reads ``--columns`` itself where its files are text.
+        episodes: The numbers of a file's episodes, None for a format that holds one recording.
+        arms: Whether a log may be of two arms.
     """
 
     name: str
@@ -219,6 +255,9 @@ class Reader:
     read: Callable[[LogFile, ReadChoice], RawLog] = field(repr=False)
     general: bool = False
     columns: bool = True
+    describes: bool = False
+    episodes: Callable[[LogFile], Sequence[int]] | None = field(default=None, repr=False)
+    arms: bool = False
 
     @property
     def words(self) -> Mapping[str, str]:

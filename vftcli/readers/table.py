@@ -164,7 +164,7 @@ def _stamps(
                 "order), or say the rate of a log without one: t@125Hz."
             )
         rows = len(next(iter(loaded.values())))
-        return np.arange(rows), 1 / picks.rate, f"none: {picks.rate:g} Hz as stated"
+        return np.arange(rows), 1 / picks.rate, rate_words(picks.rate)
     cell = picks.clock.cells[0]
     column = loaded[cell.column]
     stamps = column if cell.element is None else column[:, cell.element]
@@ -178,6 +178,11 @@ def _stamps(
         return stamps, picks.clock.factor, f"{words} [{picks.clock.unit}]"
     tick, unit = tick_of(stamps, name)
     return stamps, tick, words if unit == "s" else f"{words}, taken as {unit}"
+
+
+def rate_words(rate: float) -> str:
+    """What the clock of a table without one is, given its rate. [Hz]"""
+    return f"none: {rate:g} Hz as stated"
 
 
 def tick_of(stamps: Column, name: str) -> tuple[float, str]:

@@ -1,8 +1,9 @@
 """Generic tables: headed by aliases or described by --columns; text, npy, npz and Parquet."""
 
+import math
 import tokenize
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -10,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.aliases import picks_by_alias
-from vftcli.readers.columns import parse_columns
+from vftcli.readers.columns import ColumnSpec, Item, parse_columns
 from vftcli.readers.delimited import TextTable, as_number
 from vftcli.readers.joints import robot_of
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Column, Table, picked, picks_of
+from vftcli.readers.table import Column, Table, missing_column, picked, picks_of
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark
 
@@ -61,6 +62,55 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
         robot_hint=robot_of(joints),
         **more,
     )
+
+
+def states_positions(request: ReadChoice) -> bool:
+    """Whether a --columns text says which columns the positions are."""
+    return request.columns is not None and parse_columns(request.columns).item("q") is not None
+
+
+def described(table: Table, usual: str, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
+    """Read a table whose columns are known, but for what a --columns text says of them.
+
+    Args:
+        table: The table.
+        usual: What the columns are, as a --columns text by name.
+        request: What is wanted. A text with positions replaces the usual one but for its clock.
+        more: Further fields of the RawLog.
+
+    Raises:
+        LogError: If a column that is named is not there.
+    """
+    known = parse_columns(usual)
+    stated = parse_columns(request.columns) if request.columns is not None else None
+    if stated is not None and stated.items and not stated.named:
+        return from_table(table, request, **more)
+    items = {item.signal: item for item in known.items}
+    if stated is not None and stated.item("q") is not None:
+        items = {signal: item for signal, item in items.items() if signal == "t"}
+    for item in stated.items if stated is not None else ():
+        items[item.signal] = restated(table, item, items.get(item.signal))
+    spec = ColumnSpec(
+        items=tuple(items.values()), named=True, segment=stated.segment if stated else None
+    )
+    unit = items["q"].unit if "q" in items else None
+    more = {"segment": spec.segment, "degrees_possible": unit is None, **more}
+    return picked(table, picks_of(table, spec), request, **more)
+
+
+def restated(table: Table, item: Item, usual: Item | None) -> Item:
+    """An item of a --columns text, its columns the usual ones where it names none.
+
+    Raises:
+        LogError: If it names none and there are none.
+    """
+    if item.pattern is not None or item.rate is not None:
+        return item
+    if usual is None:
+        raise missing_column(table, item.signal, item.signal)
+    scale = usual.factor if item.unit is None else math.copysign(1.0, usual.factor)
+    factor = item.factor * scale
+    return replace(usual, factor=factor, unit=item.unit or usual.unit)
 
 
 @dataclass

@@ -11,12 +11,12 @@ def same_run(one: Recording, other: Recording) -> bool:
     """Whether two recordings were read from equal bytes, whatever the files are called.
 
     A span of a recording is the same run as the whole. Two recordings that one file holds one
-    after the other are two runs if its clock tells them apart.
+    after the other are two runs if its clock tells them apart, or if they are two of its parts.
     """
     if one is other:
         return True
     mine, theirs = one.source, other.source
-    if (mine.rows, mine.t0) != (theirs.rows, theirs.t0):
+    if (mine.rows, mine.t0, mine.part) != (theirs.rows, theirs.t0, theirs.part):
         return False  # so that nobody waits for the digest of a large file to hear this
     return bool(mine.sha256) and mine.sha256 == theirs.sha256
 

@@ -77,6 +77,7 @@ class Source:
         duplicates: Rows dropped because their stamp repeated the one before.
         remarks: Facts on what was dropped, turned or derived; cautions and warnings on what looks
             suspicious but was left as it is.
+        part: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
     """
 
     path: Path | None = None
@@ -89,6 +90,7 @@ class Source:
     rows: int = 0
     duplicates: int = 0
     remarks: tuple[Remark, ...] = ()
+    part: str = ""
 
     def __post_init__(self) -> None:
         if not self.label and self.path is not None:

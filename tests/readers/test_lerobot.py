@@ -1,0 +1,222 @@
+"""LeRobot datasets: which episode, which joints, which arm; and what contradicts itself."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from seed_logs import motion
+
+from vftcli.readers import read
+from vftcli.readers.library import Library
+from vftcli.readers.reader import ReadChoice
+from vftcli.signals.errors import LogError, ParameterError
+
+JOINTS = [f"joint_{j}" for j in range(1, 8)]
+ROWS = (30, 20, 25)
+FPS = 25
+LOG = motion(7, rows=sum(ROWS), step=1 / FPS)
+STATE = [*(f"{joint}.pos" for joint in JOINTS), "gripper.pos"]
+
+Features = dict[str, tuple[np.ndarray, Any]]
+"""Feature → its numbers, and its elements' names."""
+
+USUAL: Features = {
+    "observation.state": (np.hstack([LOG["q"], np.full((sum(ROWS), 1), 9.0)]), STATE),
+    "observation.velocity": (LOG["dq"], [f"{joint}.vel" for joint in JOINTS]),
+    "observation.effort": (LOG["tau"], [f"{joint}.effort" for joint in JOINTS]),
+    "action": (LOG["q"], STATE[:7]),
+}
+
+
+def dataset(
+    folder: Path,
+    features: Features = USUAL,
+    *,
+    version: int = 3,
+    files: tuple[int, ...] = (0, 0, 1),
+) -> Path:
+    """A dataset of three episodes, in data files of these numbers (version 3) or one each."""
+    import pyarrow as pa
+    from pyarrow.parquet import write_table
+
+    index = np.arange(sum(ROWS))
+    episode = np.repeat(np.arange(3), ROWS)
+    first = np.cumsum([0, *ROWS[:-1]])
+    frame = index - first[episode]
+    columns = {name: list(numbers) for name, (numbers, _) in features.items()}
+    columns |= {"timestamp": (frame / FPS).astype(np.float32), "frame_index": frame}
+    table = pa.table(columns | {"episode_index": episode, "index": index})
+    place = {k: f"file-{files[k]:03d}" if version == 3 else f"episode_{k:06d}" for k in range(3)}
+    data = folder / "data" / "chunk-000"
+    (folder / "meta" / "episodes" / "chunk-000").mkdir(parents=True)
+    data.mkdir(parents=True)
+    for name in set(place.values()):
+        rows = np.flatnonzero([place[k] == name for k in episode])
+        write_table(table.take(rows), data / f"{name}.parquet")
+    if version == 3:
+        told = {
+            "episode_index": range(3), "length": ROWS, "dataset_from_index": first,
+            "dataset_to_index": first + ROWS, "data/chunk_index": [0] * 3,
+            "data/file_index": files,
+        }  # fmt: skip
+        write_table(
+            pa.table({name: list(values) for name, values in told.items()}),
+            folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet",
+        )
+    else:
+        lines = [json.dumps({"episode_index": k, "tasks": [], "length": ROWS[k]}) for k in range(3)]
+        (folder / "meta" / "episodes.jsonl").write_text("\n".join(lines) + "\n")
+    info = {
+        "codebase_version": f"v{version}.0", "robot_type": "fr3", "fps": FPS, "total_episodes": 3,
+        "features": {name: {"names": names} for name, (_, names) in features.items()},
+    }  # fmt: skip
+    (folder / "meta" / "info.json").write_text(json.dumps(info))
+    return folder
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("episode", [0, 1, 2])
+def test_an_episode_is_its_rows(version: int, episode: int, tmp_path: Path) -> None:
+    recording = read(dataset(tmp_path, version=version), episode=episode)
+    rows = slice(sum(ROWS[:episode]), sum(ROWS[: episode + 1]))
+    np.testing.assert_array_equal(recording.q, LOG["q"][rows])
+    np.testing.assert_array_equal(recording.dq, LOG["dq"][rows])
+    np.testing.assert_array_equal(recording.torque, LOG["tau"][rows])
+    # frame_index / fps, not its rounding to 32 bits.
+    np.testing.assert_array_equal(recording.t, np.arange(ROWS[episode]) * (1 / FPS))
+    assert recording.joint_names == tuple(JOINTS)
+    assert (recording.robot_hint, recording.source.remarks) == ("fr3", ())
+
+
+def test_all_episodes_are_logs_of_their_own(tmp_path: Path) -> None:
+    path = dataset(tmp_path / "set")
+    logs = Library([path]).open_logs([path], ReadChoice(all_episodes=True))
+    assert [log.name for log in logs] == ["set episode 0", "set episode 1", "set episode 2"]
+    assert [log.samples for log in logs] == list(ROWS)
+    with pytest.raises(ParameterError, match="commands that take several logs"):
+        Library([path]).open(path, ReadChoice(all_episodes=True))
+    with pytest.raises(ParameterError, match="are the same run"):
+        Library([path]).open_logs([path, path], ReadChoice(episode=1))
+
+
+def test_the_first_is_taken_and_said(tmp_path: Path) -> None:
+    recording = read(dataset(tmp_path / "set"))
+    assert recording.source.warnings == ("episode 0 of 3: --episode K|all",)
+    assert recording.name == "set episode 0"
+    with pytest.raises(LogError, match="no episode 3; it holds 3 episodes, 0 to 2"):
+        read(tmp_path / "set", episode=3)
+
+
+def test_a_free_run_is_not_the_log_s_episode() -> None:
+    choice = ReadChoice(episode=2, arm="left", interval=(0.0, 1.0))
+    assert choice.whole == ReadChoice(arm="left")
+
+
+def test_a_file_elsewhere_than_the_table_says_is_found(tmp_path: Path) -> None:
+    path = dataset(tmp_path)
+    data = path / "data" / "chunk-000"
+    (data / "file-001.parquet").rename(data / "episode_000002.parquet")
+    np.testing.assert_array_equal(read(path, episode=2).q, LOG["q"][50:])
+
+
+@pytest.mark.parametrize("column", ["length", "dataset_from_index"])
+def test_a_table_that_the_data_contradict_is_refused(column: str, tmp_path: Path) -> None:
+    import pyarrow.parquet as pq
+
+    path = dataset(tmp_path)
+    table = path / "meta" / "episodes" / "chunk-000" / "file-000.parquet"
+    told = pq.read_table(table).to_pydict()
+    told["dataset_to_index" if column == "length" else column][1] += 1
+    told["length"][1] += 1 if column == "length" else -1
+    import pyarrow as pa
+
+    pq.write_table(pa.table(told), table)
+    with pytest.raises(LogError, match="are not those that the table of episodes tells"):
+        read(path, episode=1)
+
+
+def test_numbers_of_the_state_are_told_apart_by_their_names(tmp_path: Path) -> None:
+    """One state for all, joints in no order, a wrist's wrench behind them."""
+    order = [3, 0, 6, 1, 5, 2, 4]
+    parts = {"positions": LOG["q"], "velocities": LOG["dq"], "efforts": LOG["tau"]}
+    names = [f"joint_{kind}.{j}" for kind in parts for j in order]
+    state = np.hstack([numbers[:, order] for numbers in parts.values()] + [LOG["q"][:, :3]])
+    names += [f"wrist_wrench.force.{axis}" for axis in "xyz"]
+    path = dataset(tmp_path, {"observation.state": (state, {"motors": names})})
+    recording = read(path, episode=0)
+    np.testing.assert_array_equal(recording.q, LOG["q"][:30])
+    np.testing.assert_array_equal(recording.torque, LOG["tau"][:30])
+    assert recording.joint_names == tuple(f"joint_{j}" for j in range(7))
+    assert [remark.code for remark in recording.source.remarks] == ["wrench-left-out"]
+
+
+def test_signals_are_laid_together_by_the_joints_names(tmp_path: Path) -> None:
+    turned = {"observation.effort": (LOG["tau"][:, ::-1], [f"{j}.effort" for j in JOINTS[::-1]])}
+    recording = read(dataset(tmp_path, USUAL | turned), episode=0)
+    np.testing.assert_array_equal(recording.torque, LOG["tau"][:30])
+    other = {"observation.effort": (LOG["tau"], [f"axis_{k}.effort" for k in range(7)])}
+    with pytest.raises(LogError, match="torque is of the joints axis_0"):
+        read(dataset(tmp_path / "other", USUAL | other))
+
+
+def test_two_arms_are_told_apart(tmp_path: Path) -> None:
+    names = [f"{side}_{joint}.pos" for side in ("left", "right") for joint in JOINTS]
+    features: Features = {
+        "observation.state": (np.hstack([LOG["q"], -LOG["q"]]), names),
+        "observation.torque.left": (LOG["tau"], None),
+        "observation.torque.right": (-LOG["tau"], None),
+    }
+    path = dataset(tmp_path / "set", features)
+    with pytest.raises(LogError, match="two arms; say which with --arm left or --arm right"):
+        read(path)
+    right = read(path, arm="right", episode=1)
+    np.testing.assert_array_equal(right.q, -LOG["q"][30:50])
+    np.testing.assert_array_equal(right.torque, -LOG["tau"][30:50])
+    assert right.name == "set episode 1 right arm"
+
+
+def test_a_pose_is_no_joints(tmp_path: Path) -> None:
+    names = ["x", "y", "z", "roll", "pitch", "yaw", "gripper"]
+    path = dataset(tmp_path, {"observation.state": (LOG["q"], names)})
+    with pytest.raises(LogError, match=r"no joint positions among observation\.state"):
+        read(path)
+
+
+def test_degrees_are_refused_until_they_are_said(tmp_path: Path) -> None:
+    names = [f"{name}.pos" for name in ("pan", "lift", "elbow", "flex", "roll_", "turn", "end")]
+    path = dataset(tmp_path, {"observation.state": (90 * LOG["q"], names)})
+    with pytest.raises(LogError, match="degrees"):
+        read(path)
+    said = read(path, columns="q[deg]=observation.state", episode=0)
+    np.testing.assert_allclose(said.q, np.radians(90 * LOG["q"][:30]), rtol=1e-15)
+
+
+def test_a_wrench_is_named_and_taken_where_it_is_said_to_be_one(tmp_path: Path) -> None:
+    path = dataset(tmp_path, USUAL | {"observation.wrench": (LOG["q"][:, :6], None)})
+    (remark,) = read(path, episode=0).source.remarks
+    assert (remark.code, remark.values["features"]) == ("wrench-left-out", "observation.wrench")
+    taken = read(path, columns="wrench[flange]=observation.wrench", episode=0)
+    np.testing.assert_array_equal(taken.wrench, LOG["q"][:30, :6])
+    assert taken.source.remarks == ()
+
+
+def test_columns_say_more_of_one_signal(tmp_path: Path) -> None:
+    recording = read(dataset(tmp_path), columns="-tau", episode=0)
+    np.testing.assert_array_equal(recording.torque, -LOG["tau"][:30])
+    np.testing.assert_array_equal(recording.q, LOG["q"][:30])
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("info.json", "{", "not a readable description"),
+        ("episodes.jsonl", '{"episode_index": 0}\n', "a line that tells no episode"),
+    ],
+)
+def test_a_damaged_description_is_refused(name: str, text: str, words: str, tmp_path: Path) -> None:
+    path = dataset(tmp_path, version=2)
+    (path / "meta" / name).write_text(text)
+    with pytest.raises(LogError, match=words):
+        read(path)

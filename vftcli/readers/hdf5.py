@@ -1,0 +1,180 @@
+"""HDF5 files as tables: their datasets of numbers by path, read within bounds by h5py."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.readers.reader import LogFile
+from vftcli.readers.table import Column, listed
+from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Remark
+
+MAGIC = b"\x89HDF\r\n\x1a\n"
+
+MOST_OBJECTS, DEEPEST = 100_000, 32
+"""Groups and datasets that are looked at, and groups inside groups; a log has some hundred."""
+
+
+def is_hdf5(head: bytes) -> bool:
+    """Whether a file is HDF5: from its start, or behind a user block of 512 bytes or more."""
+    places = [0, *(512 << k for k in range(7))]
+    return any(head[place : place + len(MAGIC)] == MAGIC for place in places)
+
+
+@contextmanager
+def opened(file: LogFile) -> Iterator[Any]:
+    """The file as h5py opens it, its errors turned into one that names the file.
+
+    Raises:
+        LogError: If h5py is not installed, or the file is damaged.
+    """
+    try:
+        import h5py
+    except ImportError:
+        raise LogError(
+            f"{file.path}: an HDF5 file, which h5py reads: pip install 'vftcli[hdf5]'."
+        ) from None
+    try:
+        with h5py.File(file.direct or BytesIO(file.content), "r") as content:
+            yield content
+    except (
+        OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError,
+        NotImplementedError, AttributeError, SystemError,
+    ) as error:  # fmt: skip
+        reason = str(error).split("\n")[0][:120]
+        raise LogError(f"{file.path}: a damaged HDF5 file ({reason})") from None
+
+
+class Hdf5Table:
+    """The datasets of numbers in an open HDF5 file, or in one group of it, each a column.
+
+    Images, texts, references, links to other files and what claims more than it stores are left
+    out; nothing is read before it is asked for.
+
+    Attributes:
+        path: The file.
+        remarks: Nothing: whoever reads it knows what there is to say.
+    """
+
+    remarks: tuple[Remark, ...] = ()
+
+    def __init__(self, path: Path, datasets: Mapping[str, Any]) -> None:
+        self.path: Path | str = path
+        self._datasets = dict(datasets)
+
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        """The datasets' paths."""
+        return tuple(self._datasets)
+
+    @property
+    def width(self) -> int:
+        """Number of datasets."""
+        return len(self._datasets)
+
+    @property
+    def lists(self) -> Mapping[int, int]:
+        """Datasets of rows, and the length of a row."""
+        kinds = enumerate(self._datasets.values())
+        return {k: data.shape[1] for k, data in kinds if data.ndim == 2 and data.shape[1] != 1}
+
+    def within(self, group: str, also: Sequence[str] = ()) -> "Hdf5Table":
+        """The datasets below a group, by their paths from there on, and others by theirs."""
+        below = {n.removeprefix(group): d for n, d in self._datasets.items() if n.startswith(group)}
+        return Hdf5Table(Path(self.path), {name: self._datasets[name] for name in also} | below)
+
+    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
+        """Read datasets as float64; whole stamps stay whole.
+
+        Raises:
+            LogError: If they differ in length, or claim too much.
+        """
+        self.check_size(columns)
+        names, datasets = list(self._datasets), list(self._datasets.values())
+        if len({datasets[c].shape[0] for c in columns}) > 1:
+            told = ", ".join(f"{names[c]} {datasets[c].shape[0]}" for c in columns)
+            raise LogError(f"{self.path}: the datasets differ in length: {told} rows.")
+        return {c: self._numbers(datasets[c], c == clock) for c in columns}
+
+    def check_size(self, columns: Sequence[int]) -> None:
+        """Check that datasets may be read: a kilobyte may claim any size, and costs nothing.
+
+        Raises:
+            LogError: If they claim more numbers than what is stored of them can hold.
+        """
+        names, datasets = list(self._datasets), list(self._datasets.values())
+        stored = sum(datasets[c].id.get_storage_size() for c in columns)
+        limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * stored)
+        if 8 * sum(datasets[c].size for c in columns) > limit:
+            raise LogError(
+                f"{self.path}: {listed([names[c] for c in columns])} unpack to more than "
+                f"{limit >> 20} MiB, more than the {stored} bytes that are stored of them can hold."
+            )
+
+    def _numbers(self, dataset: Any, is_clock: bool) -> Column:  # noqa: ANN401 - h5py
+        """One dataset. (T,) or (T, k)"""
+        whole = is_clock and dataset.dtype.kind in "iu" and dataset.dtype.itemsize == 8
+        numbers: Column = np.asarray(dataset[()]).astype(np.int64 if whole else np.float64)
+        return numbers[:, 0] if numbers.ndim == 2 and numbers.shape[1] == 1 else numbers
+
+
+def table_of(path: Path, content: Any, fewest_rows: int = 2) -> Hdf5Table:  # noqa: ANN401 - h5py
+    """The datasets of numbers of an open file that have some rows.
+
+    Raises:
+        LogError: If there is none.
+    """
+    found = {name: d for name, d in datasets_of(path, content) if is_signal(d, fewest_rows)}
+    if not found:
+        raise LogError(f"{path}: an HDF5 file without datasets of numbers, so no log.")
+    return Hdf5Table(path, dict(sorted(found.items(), key=lambda item: natural(item[0]))))
+
+
+def datasets_of(path: Path, content: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 - h5py
+    """Every dataset of an open file by its path, links to elsewhere and second ways left out.
+
+    Raises:
+        LogError: If there are too many objects to be a log.
+    """
+    import h5py
+
+    seen: set[int] = set()
+    waiting = [("", content["/"], 0)]
+    while waiting:
+        prefix, group, depth = waiting.pop()
+        for name in group:
+            # Soft and external links may lead anywhere, also out of the file.
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                continue
+            item = group.get(name)
+            address = h5py.h5o.get_info(item.id).addr
+            if address in seen:
+                continue
+            seen.add(address)
+            if len(seen) > MOST_OBJECTS:
+                raise LogError(f"{path}: more than {MOST_OBJECTS} groups and datasets; no log is.")
+            if isinstance(item, h5py.Dataset):
+                yield f"{prefix}{name}", item
+            elif isinstance(item, h5py.Group) and depth < DEEPEST:
+                waiting.append((f"{prefix}{name}/", item, depth + 1))
+
+
+def is_signal(dataset: Any, fewest_rows: int) -> bool:  # noqa: ANN401 - h5py
+    """Whether a dataset may be a signal: numbers of the file's own, one or many a row."""
+    if dataset.dtype.kind not in "fiub" or dataset.shape is None or dataset.ndim not in {1, 2}:
+        return False
+    if dataset.shape[0] < fewest_rows or not all(dataset.shape):
+        return False
+    return not dataset.is_virtual and not dataset.external
+
+
+def natural(name: str) -> list[tuple[int, int, str]]:
+    """A key that puts demo_2 before demo_10."""
+    parts = re.split(r"(\d{1,9})", name)
+    return [(1, int(p), "") if p.isdecimal() else (0, 0, p) for p in parts]

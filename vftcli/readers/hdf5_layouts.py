@@ -1,0 +1,265 @@
+"""HDF5 logs: the layouts of ALOHA, robomimic, roboset and DROID, and any other by its paths."""
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.readers.aliases import ALIASES
+from vftcli.readers.hdf5 import Hdf5Table, is_hdf5, natural, opened, table_of
+from vftcli.readers.parts import arm_of, episode_of, refuse_arm
+from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.table import Column, listed, rate_words
+from vftcli.readers.tables import ArrayTable, described, from_table, states_positions
+from vftcli.signals.errors import LogError, UnknownFormatError
+from vftcli.signals.remarks import fact
+
+ALOHA_RATE = 50.0
+"""ALOHA's recorder steps by DT = 0.02 s and stores no clock. [Hz]"""
+
+ALOHA_WIDTH, ALOHA_ARM = 14, 7
+"""Two arms of six joints, a gripper behind each."""
+
+ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"
+"""ALOHA's positions and efforts."""
+
+FASTEST = 1e6
+"""Highest rate that is believed. [Hz]"""
+
+DROID_STATE = "observation/robot_state/"
+DROID_TIME = "observation/timestamp/robot_state/robot_timestamp_"
+DROID_TORQUE, DROID_COMPUTED = "motor_torques_measured", "joint_torques_computed"
+"""What DROID measures, gravity included, and what its controller commands, without gravity."""
+
+ROBOSUITE = {"panda": "panda", "ur5e": "ur5e"}
+"""robosuite's name of a robot in lower case → profile."""
+
+FRANKA = ("panda", "fr3")
+"""Profiles that the serial number of a robot starts with, as in panda-295341-1325480."""
+
+TOLD_LIMIT = 1 << 20
+"""Letters of a description beside the numbers that are parsed."""
+
+
+class Layout(NamedTuple):
+    """How a project lays its episodes out.
+
+    Attributes:
+        name: The project.
+        anchor: Path of the positions, below the group of an episode.
+        beside: Further paths that make it this layout.
+        read: Reads one episode of an open file: its table, the file's attributes, the request.
+    """
+
+    name: str
+    anchor: str
+    beside: tuple[str, ...]
+    read: Callable[[Hdf5Table, Any, ReadChoice], RawLog]
+
+    def groups(self, names: Sequence[str]) -> tuple[str, ...]:
+        """The groups of its episodes, in their order; none where the file is laid out otherwise."""
+        there = set(names)
+        ends = [n.removesuffix(self.anchor) for n in names if n.endswith(self.anchor)]
+        found = [e for e in ends if (not e or e.endswith("/"))]
+        found = [e for e in found if all(e + name in there for name in self.beside)]
+        return tuple(sorted(found, key=natural))
+
+
+def read_aloha(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
+    """ALOHA: two arms of six joints and a gripper side by side, no clock, efforts in mA."""
+    names = table.names or ()
+    if table.lists.get(names.index(ALOHA), 1) != ALOHA_WIDTH:
+        return read_any(table, None, request)
+    if stated := states_positions(request):
+        refuse_arm(table.path, request)
+    told = "left: columns 0-5, right: columns 7-12"
+    arm, remarks = (ARMS[0], ()) if stated else arm_of(table.path, request, ARMS, told)
+    first = ALOHA_ARM * ARMS.index(arm)
+    span = f"[{first}:{first + ALOHA_ARM - 1}]"
+    usual = f"t@{ALOHA_RATE:g}Hz,q[rad]={ALOHA}{span}"
+    usual += f",dq=observations/qvel{span}" if "observations/qvel" in names else ""
+    usual += f",current[mA]={DYNAMIXEL}{span}" if DYNAMIXEL in names else ""
+    if DYNAMIXEL in names and not stated:
+        remarks = (*remarks, fact("effort-of-dynamixel"))
+    raw = described(table, usual, request, remarks=remarks)
+    clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention"
+    own = raw.clock == rate_words(ALOHA_RATE)
+    return replace(raw, clock=clock if own else raw.clock, part="" if stated else f"{arm} arm")
+
+
+def read_robomimic(table: Hdf5Table, group: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401
+    """robomimic: positions and velocities, the rate and the robot in env_args, no torque."""
+    refuse_arm(table.path, request)
+    told = environment(group)
+    rate, robots = told.get("control_freq"), told.get("robots")
+    usual = "q[rad]=obs/robot0_joint_pos"
+    usual += ",dq=obs/robot0_joint_vel" if "obs/robot0_joint_vel" in (table.names or ()) else ""
+    good = isinstance(rate, int | float) and 0 < rate < FASTEST
+    usual = f"t@{rate:.9g}Hz,{usual}" if good else usual
+    robot = robots[0] if isinstance(robots, list) and robots else robots
+    raw = described(table, usual, request, robot_hint=ROBOSUITE.get(str(robot).lower()))
+    own = good and raw.clock == rate_words(float(f"{rate:.9g}"))
+    return replace(raw, clock=f"none: {rate:g} Hz, env_args' control_freq") if own else raw
+
+
+def environment(group: Any) -> dict[str, Any]:  # noqa: ANN401 - h5py
+    """env_kwargs of the env_args beside an episode of robomimic, {} where there are none."""
+    text = group.parent.attrs.get("env_args", "{}")
+    if not isinstance(text, str | bytes) or len(text) > TOLD_LIMIT:
+        return {}
+    try:
+        told = json.loads(text)
+        told = told.get("env_kwargs", {})
+    except (ValueError, RecursionError, AttributeError):
+        return {}
+    return told if isinstance(told, dict) else {}
+
+
+def read_roboset(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
+    """Roboset of RoboHive: positions, velocities and a clock of its own."""
+    refuse_arm(table.path, request)
+    return described(table, "t=time,q[rad]=qp_arm,dq=qv_arm", request)
+
+
+def read_droid(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
+    """DROID: the robot state's own clock, and motor_torques_measured, libfranka's tau_J."""
+    refuse_arm(table.path, request)
+    if states_positions(request):
+        return from_table(table, request)
+    names = list(table.names or ())
+    signals = {"q[rad]": "joint_positions", "dq": "joint_velocities", "tau": DROID_TORQUE}
+    there = {s: DROID_STATE + name for s, name in signals.items() if DROID_STATE + name in names}
+    times = [DROID_TIME + name for name in ("seconds", "nanos")]
+    if not set(times) <= set(names):
+        raise LogError(f"{table.path}: a DROID log without {' and '.join(times)}, its clock.")
+    wanted = [names.index(name) for name in (*there.values(), *times)]
+    loaded = table.load(wanted, None)
+    columns: dict[str, Column] = {names[k]: column for k, column in loaded.items()}
+    seconds, nanos = (columns.pop(name).astype(np.int64) for name in times)
+    columns["robot_timestamp"] = seconds * 1_000_000_000 + nanos
+    usual = ",".join(["t[ns]=robot_timestamp", *(f"{s}={name}" for s, name in there.items())])
+    remarks = (fact("computed-torque-left-out"),) if DROID_STATE + DROID_COMPUTED in names else ()
+    raw = described(ArrayTable(path=table.path, columns=columns), usual, request, remarks=remarks)
+    return replace(raw, robot_hint=robot_of(Path(table.path).parent))
+
+
+def robot_of(folder: Path) -> str | None:
+    """The profile that the serial number in a DROID episode's metadata settles."""
+    for path in sorted(folder.glob("metadata_*.json"))[:1]:
+        try:
+            with path.open("rb") as metadata:
+                told = json.loads(metadata.read(TOLD_LIMIT))
+            serial = str(told.get("robot_serial", "")).lower()
+        except (OSError, ValueError, RecursionError, AttributeError):
+            return None
+        return next((name for name in FRANKA if serial.startswith(f"{name}-")), None)
+    return None
+
+
+def read_any(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
+    """Any other file: by --columns, or by alias among the datasets of one group."""
+    refuse_arm(table.path, request)
+    return from_table(table if states_positions(request) else leveled(table), request)
+
+
+def leveled(table: Hdf5Table) -> Hdf5Table:
+    """The datasets of the one group that has positions by name, and those at the top.
+
+    Raises:
+        LogError: If several groups have them.
+    """
+    names = table.names or ()
+    prefix = level_of(table.path, names, "/")
+    return table.within(prefix, [name for name in names if "/" not in name])
+
+
+def level_of(path: Path | str, names: Sequence[str], separator: str) -> str:
+    """The beginning that the names of one group share, the one with positions; "" for the top.
+
+    Raises:
+        LogError: If several groups have positions.
+    """
+    levels: dict[str, str] = {}
+    for name in names:
+        prefix, found, last = name.rpartition(separator)
+        if re.sub(r"[_.\[]?\d{1,9}\]?$", "", last.lower()) in ALIASES["q"]:
+            levels.setdefault(prefix + found, name)
+    if len(levels) > 1 and "" not in levels:
+        raise LogError(
+            f"{path}: {listed(list(levels.values()))} could each be the positions. Say which with "
+            f"--columns, as in t=…,q={next(iter(levels.values()))}."
+        )
+    return "" if "" in levels or not levels else next(iter(levels))
+
+
+LAYOUTS = (
+    Layout("ALOHA", ALOHA, (), read_aloha),
+    Layout("robomimic", "obs/robot0_joint_pos", (), read_robomimic),
+    Layout("roboset", "qp_arm", ("qv_arm", "time"), read_roboset),
+    Layout("DROID", f"{DROID_STATE}joint_positions", (), read_droid),
+)
+"""The layouts that are known."""
+
+ANY = Layout("HDF5", "", (), read_any)
+
+
+def layout_of(table: Hdf5Table) -> tuple[Layout, tuple[str, ...]]:
+    """How a file is laid out, and the groups of its episodes.
+
+    Raises:
+        UnknownFormatError: If two layouts fit.
+    """
+    found = [(x, groups) for x in LAYOUTS if (groups := x.groups(table.names or ()))]
+    if len(found) > 1:
+        raise UnknownFormatError(
+            f"{table.path}: laid out as {' and as '.join(x.name for x, _ in found)}. Say what is "
+            "what with --columns, as in t=…,q=PATH/OF/POSITIONS."
+        )
+    return found[0] if found else (ANY, ("",))
+
+
+def numbers_of(groups: Sequence[str]) -> tuple[int, ...]:
+    """The episodes' numbers: those their groups' names end with, else counted from 0."""
+    ends = [re.search(r"(\d{1,9})\D*$", group) for group in groups]
+    numbers = [int(end[1]) for end in ends if end]
+    rising = all(a < b for a, b in pairwise(numbers))
+    return tuple(numbers) if len(numbers) == len(groups) and rising else tuple(range(len(groups)))
+
+
+def read_hdf5(file: LogFile, request: ReadChoice) -> RawLog:
+    """Read an HDF5 log, or one episode of it.
+
+    Raises:
+        LogError: If h5py is not installed, the file is damaged, or it has no such episode or arm.
+    """
+    with opened(file) as content:
+        table = table_of(file.path, content)
+        layout, groups = layout_of(table)
+        numbers = numbers_of(groups)
+        number, part, remarks = episode_of(file.path, request, numbers)
+        group = groups[numbers.index(number)]
+        if part:
+            remarks = (*remarks, fact("episode-place", place=group.rstrip("/")))
+        raw = layout.read(table.within(group), content[group or "/"], request)
+        parts = " ".join(word for word in (part, raw.part) if word)
+        return replace(raw, part=parts, remarks=(*remarks, *raw.remarks))
+
+
+def episodes_in(file: LogFile) -> tuple[int, ...]:
+    """The numbers of the episodes of an HDF5 file."""
+    with opened(file) as content:
+        return numbers_of(layout_of(table_of(file.path, content))[1])
+
+
+HDF5 = Reader(
+    name="hdf5",
+    recognises=lambda file: is_hdf5(file.head) and not file.head.startswith(b"MATLAB"),
+    read=read_hdf5,
+    episodes=episodes_in,
+    arms=True,
+)

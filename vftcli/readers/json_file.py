@@ -1,0 +1,204 @@
+"""JSON logs: an object a line, a list of objects, or one object of arrays (panda-py, frankapy)."""
+
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from vftcli.readers.arrays_file import (
+    arrays_of_lists,
+    episodes_of_skills,
+    read_arrays,
+    read_dictionary,
+)
+from vftcli.readers.parts import episode_of
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.table import Column
+from vftcli.readers.tables import ArrayTable, from_table
+from vftcli.signals.errors import LogError
+from vftcli.signals.letters import printable
+from vftcli.signals.remarks import Remark, fact
+
+MEMORY_LIMIT = 768 * 1024 * 1024
+"""Bytes of objects that a document may be parsed into; one a line may be of any length."""
+
+COSTS = {b"[": 64, b"{": 72, b",": 40, b":": 110}
+"""Letter → bytes of the object that it begins, at most."""
+
+LONGEST_LINE = 1 << 20
+"""Letters of one sample."""
+
+CHUNK_LINES = 8192
+"""Lines whose objects are in memory at a time."""
+
+Objects = list[dict[str, Any]]
+
+
+def read_json(file: LogFile, request: ReadChoice) -> RawLog:
+    """Read a JSON log, of whichever of the shapes.
+
+    Raises:
+        LogError: If it is not JSON, too large for it, or holds no arrays of numbers.
+    """
+    if is_lines(file):
+        episode_of(file.path, request, (0,))
+        return read_arrays(file, *columns_of_lines(file), request)
+    return read_document(file, parsed(file), request)
+
+
+def read_document(file: LogFile, log: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401
+    """Read one JSON value: an object of arrays, a list of objects, or a list of rows."""
+    if isinstance(log, dict):
+        return read_dictionary(file, log, request)
+    episode_of(file.path, request, (0,))
+    if log and all(isinstance(row, dict) for row in log):
+        return read_arrays(file, columns_of(file, log, 1), (), request)
+    rows = arrays_of_lists(file, {"rows": log})["rows"]
+    if rows.ndim != 2:
+        raise LogError(f"{file.path}: a JSON list that is neither of objects nor of rows; no log.")
+    columns = {str(k): rows[:, k] for k in range(rows.shape[1])}
+    return from_table(ArrayTable(path=file.path, columns=columns, headed=False), request)
+
+
+def is_lines(file: LogFile) -> bool:
+    """Whether a file is one object a line: its first line is one by itself, and is not all."""
+    first = file.first_line.strip()
+    return len(file.lines) > 1 and first.startswith(b"{") and first.endswith(b"}")
+
+
+def columns_of_lines(file: LogFile) -> tuple[dict[str, Column], tuple[Remark, ...]]:
+    """The fields of the objects, one a line, and what is to be said of the last one.
+
+    Raises:
+        LogError: If a line holds no object, or lacks a field of the first.
+    """
+    blocks: list[dict[str, Column]] = []
+    objects: Objects = []
+    waiting: int | None = None
+    first = number = 1
+    for number, line in lines_of(file.content):
+        if waiting is not None:
+            raise LogError(f"{file.path}: line {waiting} is not one JSON object.")
+        if (found := object_in(line)) is None:
+            waiting = number
+            continue
+        objects.append(found)
+        if len(objects) == CHUNK_LINES:
+            blocks.append(columns_of(file, objects, first))
+            objects, first = [], number + 1
+    if objects:
+        blocks.append(columns_of(file, objects, first))
+    if not blocks:
+        raise LogError(f"{file.path}: no line holds a JSON object.")
+    if any(block.keys() != blocks[0].keys() for block in blocks):
+        raise LogError(f"{file.path}: its lines do not hold the same fields.")
+    try:
+        columns = {name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]}
+    except ValueError:
+        raise LogError(f"{file.path}: a field differs in length from line to line.") from None
+    return columns, (fact("line-cut"),) if waiting is not None else ()
+
+
+def lines_of(content: memoryview) -> Iterator[tuple[int, bytes]]:
+    """The lines that are not empty, with their numbers from 1."""
+    start, number = 0, 0
+    data: Any = content.obj
+    while start < len(content):
+        number += 1
+        end = data.find(b"\n", start)
+        end = len(content) if end < 0 else end
+        line = bytes(content[start : min(end, start + LONGEST_LINE + 1)]).strip()
+        if line:
+            yield number, line
+        start = end + 1
+
+
+def object_in(line: bytes) -> dict[str, Any] | None:
+    """The object that a line holds, the fields of those in it as outer.inner; None for none."""
+    if len(line) > LONGEST_LINE:
+        return None
+    try:
+        found = json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(found, dict):
+        return None
+    flat: dict[str, Any] = {}
+    for name, value in found.items():
+        inner = value.items() if isinstance(value, dict) else ()
+        flat |= {f"{name}.{key}": v for key, v in inner} if inner else {name: value}
+    return flat
+
+
+def columns_of(file: LogFile, objects: Objects, first: int) -> dict[str, Column]:
+    """The numeric fields of some objects, a row an object.
+
+    Args:
+        file: The file, for messages.
+        objects: The objects.
+        first: Number of the first, for messages.
+
+    Raises:
+        LogError: If one lacks a field of the first, or has it in another length.
+    """
+    columns: dict[str, Column] = {}
+    for name, value in objects[0].items():
+        if not is_numeric(value):
+            continue
+        try:
+            column = np.array([entry[name] for entry in objects], dtype=np.float64)
+        except (KeyError, ValueError, TypeError, OverflowError):
+            shown = printable(name[:40])
+            raise LogError(
+                f"{file.path}: {shown} is not the same numbers in each of the objects from "
+                f"{first} to {first + len(objects) - 1}."
+            ) from None
+        columns[name] = column
+    return columns
+
+
+def is_numeric(value: Any) -> bool:  # noqa: ANN401 - of JSON
+    """Whether a value is a number, or a list of them."""
+    if isinstance(value, list):
+        return bool(value) and all(isinstance(v, int | float) for v in value)
+    return isinstance(value, int | float)
+
+
+def parsed(file: LogFile) -> Any:  # noqa: ANN401 - of JSON
+    """The one value of a file: an object or a list.
+
+    Raises:
+        LogError: If it is none, is nested too deeply, or would fill memory.
+    """
+    content = bytes(file.content)
+    if sum(cost * content.count(letter) for letter, cost in COSTS.items()) > MEMORY_LIMIT:
+        raise LogError(
+            f"{file.path}: a JSON document of {len(file.content) >> 20} MiB, too many values to "
+            "hold. Save the log with np.savez, or an object a line."
+        )
+    try:
+        return json.loads(content)
+    except RecursionError:
+        raise LogError(f"{file.path}: JSON nested too deeply to be a log.") from None
+    except ValueError as error:
+        reason = printable(str(error).split("\n")[0][:120])
+        raise LogError(f"{file.path}: looks like JSON and is not ({reason}).") from None
+
+
+def is_json(file: LogFile) -> bool:
+    """Whether a text begins as JSON does; libfranka's states have a reader of their own."""
+    first = b"".join(file.first_line.split())[:12]
+    if not first and file.lines:
+        return False
+    opening = first[:1] == b"{" and (first[1:2] in {b'"', b"}", b""})
+    listing = first[:1] == b"[" and (first[1:2] in {b"{", b"["} or first[1:2] == b"")
+    return (opening or listing) and not first.startswith(b'{"O_T_EE"')
+
+
+def episodes_in(file: LogFile) -> Sequence[int]:
+    """The numbers of the skills in frankapy's log, 0 alone elsewhere."""
+    return (0,) if is_lines(file) else episodes_of_skills(parsed(file))
+
+
+JSON = Reader(name="json", recognises=is_json, read=read_json, describes=True, episodes=episodes_in)
