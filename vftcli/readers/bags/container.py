@@ -115,7 +115,7 @@ def _batch(found: tuple[Channel, list[int], list[bytes]]) -> Batch:
         buffer=np.frombuffer(b"".join(contents), dtype=np.uint8),
         offsets=ends - lengths,
         lengths=lengths,
-        times=np.array(times, dtype=np.int64),
+        times=np.array(times).astype(np.int64),  # recorders that count past 2⁶³ wrap
     )
 
 
@@ -179,8 +179,11 @@ class Census:
 USUAL_RATIO = 15
 """Recorded numbers shrink by 3 to 15."""
 
-SPARE_READS = 8_000_000
-"""Pieces of chunks that shrank more, some seven a message: some seconds of a library's work."""
+SPARE_PIECES, PIECES_PER_BYTE = 1_000_000, 2
+"""Pieces that libraries may read of chunks that shrank more: some seconds of their work.
+
+They read some seven a message, and no recorded message takes less than some bytes.
+"""
 
 
 @dataclass
@@ -192,17 +195,30 @@ class Ingest:
         size: Its size. [B]
         remarks: What was left behind.
         unpacked: Bytes that were unpacked.
-        reads: Pieces of chunks that shrank more than usual that libraries may still read.
+        pieces: What libraries may still read of chunks that shrank more than usual.
     """
 
     path: Path
     size: int
     remarks: list[Remark] = field(default_factory=list)
     unpacked: int = 0
-    reads: int = 0
+    pieces: int = 0
 
     def __post_init__(self) -> None:
-        self.reads = SPARE_READS + self.size
+        self.pieces = SPARE_PIECES + PIECES_PER_BYTE * self.size
+
+    def spend(self, pieces: int) -> None:
+        """Count pieces that a library is about to read.
+
+        Raises:
+            LogError: If there are more than a log of its size can hold.
+        """
+        self.pieces -= pieces
+        if self.pieces < 0:
+            raise LogError(
+                f"{self.path}: its chunks hold more records than a log of this size can. It is "
+                "damaged or made to fill time."
+            )
 
     def claim(self, size: int) -> None:
         """Count bytes that are about to be unpacked.
@@ -309,14 +325,8 @@ class _Counted(io.BytesIO):
         self.ingest = ingest
 
     def read(self, size: int | None = -1) -> bytes:
-        """Read as every file does.
-
-        Raises:
-            LogError: If a file of this size cannot hold so many pieces.
-        """
-        self.ingest.reads -= 1
-        if self.ingest.reads < 0:
-            raise LogError(f"{self.ingest.path}: more records than a log of its size can hold.")
+        """Read as every file does."""
+        self.ingest.spend(1)
         return super().read(size)
 
 

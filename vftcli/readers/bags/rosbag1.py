@@ -29,6 +29,10 @@ from vftcli.readers.bags.container import (
 from vftcli.signals.errors import LogError
 
 MESSAGE, CONNECTION = bytes([RecordType.MSGDATA]), bytes([RecordType.CONNECTION])
+ROWS = 65_536
+"""Heads that are gathered at once."""
+BYTES_PER_FIELD = 8
+"""What a field of a header takes at least, but for those that no recorder writes."""
 
 
 def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
@@ -39,28 +43,31 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
     """
     bag, file = _Bag(ingest), file_of(content)
     end = file.seek(len(ROSBAG1))
-    while (whole := _whole(file)) is not None:
-        yield from bag.take(*whole)
+    while True:
+        try:
+            header, data = _record(file, ingest)
+        except ReaderError:  # the content ends before or inside it
+            break
+        yield from bag.take(header, data)
         end = file.tell()
     yield from bag.last_chunk()
     bag.census.tell(ingest, len(content) - end, "its index")
 
 
-def record(file: BinaryIO) -> tuple[Header, bytes]:
+def _record(file: BinaryIO, ingest: Ingest) -> tuple[Header, bytes]:
     """The header and the data of the next record.
 
     Raises:
         ReaderError: If the file ends before or inside it.
     """
-    return Header.read(file), read_bytes(file, read_uint32(file))
+    fields = read_bytes(file, read_uint32(file))
+    ingest.spend(1 + len(fields) // BYTES_PER_FIELD)
+    return _header(fields), read_bytes(file, read_uint32(file))
 
 
-def _whole(file: BinaryIO) -> tuple[Header, bytes] | None:
-    """The next record, None where the file ends before or inside it."""
-    try:
-        return record(file)
-    except ReaderError:
-        return None
+def _header(fields: bytes) -> Header:
+    """The fields of a header."""
+    return Header.read(io.BytesIO(len(fields).to_bytes(4, "little") + fields))
 
 
 class _Bag:
@@ -71,7 +78,8 @@ class _Bag:
         channels: Connection → topic.
         chunk: The last chunk, until its messages were yielded.
         starts: Where messages begin in it, as the records behind it say.
-        listed: Chunks that the index at the end lists, and the messages it counts.
+        listed: Chunks that the index at the end lists.
+        counted: Messages that it counts.
     """
 
     def __init__(self, ingest: Ingest) -> None:
@@ -80,7 +88,7 @@ class _Bag:
         self.channels: dict[bytes, Channel] = {}
         self.chunk: io.BytesIO | None = None
         self.starts: list[Integers] = []
-        self.listed = [0, 0]
+        self.listed = self.counted = 0
 
     def take(self, header: Header, data: bytes) -> Iterator[Batch]:
         """Take up a record; the messages of the chunk before it, if it is another.
@@ -99,9 +107,9 @@ class _Bag:
         elif op == RecordType.CONNECTION:
             self._connect(header, data)
         elif op == RecordType.CHUNK_INFO:
-            self.listed[0] += 1
-            self.listed[1] += int(np.frombuffer(data, dtype="<u4")[1::2].sum())
-            census.counted = self.listed[1] if self.listed[0] == census.counted_chunks else None
+            self.listed += 1
+            self.counted += int(np.frombuffer(data, dtype="<u4")[1::2].sum())
+            census.counted = self.counted if self.listed == census.counted_chunks else None
         elif op == RecordType.BAGHEADER:
             if header.get("encryptor"):
                 raise LogError(f"{self.ingest.path}: the bag is encrypted. Decrypt it first.")
@@ -112,7 +120,7 @@ class _Bag:
 
     def _connect(self, header: Header, data: bytes) -> None:
         """Take up a connection record."""
-        about = Header.read(io.BytesIO(len(data).to_bytes(4, "little") + data))
+        about = _header(data)
         self.channels[header["conn"]] = Channel(
             topic=printable(header["topic"].decode("utf-8", "replace")),
             type=type_name(about.get_string("type")),
@@ -131,33 +139,27 @@ class _Bag:
             return
         self.chunk, self.starts = None, []
         buffer = np.frombuffer(chunk.getbuffer(), dtype=np.uint8)
-        begins = np.sort(np.concatenate(starts)) if starts else _begins(chunk, len(buffer))
+        begins = (
+            np.sort(np.concatenate(starts)) if starts else _begins(chunk, len(buffer), self.ingest)
+        )
         self.census.chunks += 1
         self.census.kept += len(begins)
         if not begins.size:
             return
         heads = _heads(buffer, begins)
-        lengths = _words(heads, heads.shape[1] - 4)[:, 0]
-        data = begins + heads.shape[1]
+        size = heads.shape[1]
+        lengths, data = _words(heads, size - 4)[:, 0], begins + size
         self._between(chunk, np.append(0, data + lengths), np.append(begins, len(buffer)))
         first = heads[0].tobytes()
         conn, time = first.find(b"conn=") + 5, first.find(b"time=") + 5
-        numbers, seconds = _words(heads, conn)[:, 0], _words(heads, time, 2) @ (10**9, 1)
-        varied = [
-            *range(conn, conn + 4),
-            *range(time, time + 8),
-            *range(len(first) - 4, len(first)),
-        ]
-        alike = np.delete(heads, varied, axis=1)
-        header = Header.read(io.BytesIO(first))
+        varied = np.r_[conn : conn + 4, time : time + 8, size - 4 : size]
+        alike, header = np.delete(heads, varied, axis=1), _header(first[4:-4])
         settled = MESSAGE, first[conn : conn + 4], first[time : time + 8]
         if (header["op"], header["conn"], header["time"]) != settled or (alike != alike[0]).any():
-            raise LogError(
-                f"{self.ingest.path}: messages of a chunk differ in form; it is damaged."
-            )
+            raise LogError(f"{self.ingest.path}: heads of a chunk's messages differ; damaged.")
+        numbers, times = _words(heads, conn)[:, 0], _words(heads, time, 2) @ (10**9, 1)
         for place in np.sort(np.unique(numbers, return_index=True)[1]):
-            rows = numbers == numbers[place]
-            number = heads[place, conn : conn + 4].tobytes()
+            number, rows = heads[place, conn : conn + 4].tobytes(), numbers == numbers[place]
             if number not in self.channels:
                 raise LogError(f"{self.ingest.path}: messages of an unknown topic; damaged.")
             yield Batch(
@@ -165,7 +167,7 @@ class _Bag:
                 buffer=buffer,
                 offsets=data[rows],
                 lengths=lengths[rows],
-                times=seconds[rows],
+                times=times[rows],
             )
 
     def _between(self, chunk: io.BytesIO, starts: Integers, ends: Integers) -> None:
@@ -177,7 +179,7 @@ class _Bag:
         for start, end in np.stack([starts, ends], axis=1)[starts != ends].tolist():
             chunk.seek(start)
             while chunk.tell() < end:
-                header, data = record(chunk)
+                header, data = _record(chunk, self.ingest)
                 if header["op"] == CONNECTION:
                     self._connect(header, data)
                 else:
@@ -188,22 +190,27 @@ class _Bag:
                 )
 
 
-def _begins(chunk: io.BytesIO, end: int) -> Integers:
+def _begins(chunk: io.BytesIO, end: int, ingest: Ingest) -> Integers:
     """Where messages begin in a chunk of which the index is lost."""
     begins, place = [], 0
     while place < end:
-        if record(chunk)[0]["op"] == MESSAGE:
+        if _record(chunk, ingest)[0]["op"] == MESSAGE:
             begins.append(place)
         place = chunk.tell()
     return np.array(begins, dtype=np.int64)
 
 
 def _heads(buffer: Bytes, begins: Integers) -> Bytes:
-    """The heads of messages, as long as the first one's, with their data's lengths. (k, size)"""
+    """The heads of messages, as long as the first one's, with their data's lengths. (k, size)
+
+    Raises:
+        ReaderError: If they do not lie in the chunk side by side.
+    """
     size = 8 + int(buffer[begins[0] : begins[0] + 4].view("<u4")[0])
-    if begins[-1] + size > len(buffer):
-        raise ReaderError("an index that points outside its chunk")
-    return strided(buffer, begins, 0, size)
+    if max(int(begins[-1]) + size, size * len(begins)) > len(buffer):
+        raise ReaderError("the index of a chunk points outside it")
+    pieces = np.array_split(begins, 1 + len(begins) // ROWS)
+    return np.concatenate([strided(buffer, piece, 0, size) for piece in pieces])
 
 
 def _words(heads: Bytes, start: int, count: int = 1) -> Integers:
