@@ -11,20 +11,22 @@ from pathlib import Path
 import numpy as np
 from seed_logs import ROWS, bare_mcap, motion, rosbag1
 
-from vftcli.readers.bags.rosbag1 import OP_CHUNK, record_at
-
 JOINTS = 7
 
 
 def bag_cut_at_record(path: Path, compression: str = "") -> Path:
     """A closed bag of which all behind its second chunk and that one's index is gone."""
-    content = memoryview(rosbag1(path, compression=compression).read_bytes())
-    position, chunks = len(b"#ROSBAG V2.0\n"), 0
+    from rosbags.rosbag1.reader import Header, RecordType, read_bytes, read_uint32
+
+    content = rosbag1(path, compression=compression).read_bytes()
+    file, chunks = io.BytesIO(content), 0
+    position = file.seek(len(b"#ROSBAG V2.0\n"))
     while chunks < 3:
-        record = record_at(content, position)
-        chunks += record.op == OP_CHUNK
+        header = Header.read(file)
+        read_bytes(file, read_uint32(file))
+        chunks += header.get_uint8("op") == RecordType.CHUNK
         if chunks < 3:
-            position = record.end
+            position = file.tell()
     path.write_bytes(content[:position])
     return path
 

@@ -314,6 +314,44 @@ def test_unclosed_ros1_bags_are_read(tmp_path: Path) -> None:
     assert any("not closed by its recorder" in told for told in recording.source.warnings)
 
 
+def changed_index(path: Path, entry: Callable[[bytes], bytes]) -> Path:
+    """A closed ROS 1 bag whose records behind each chunk, its index, are changed."""
+    content = path.read_bytes()
+    place, out = len(b"#ROSBAG V2.0\n"), [content[:13]]
+    while place < len(content):
+        head = place + 4 + int.from_bytes(content[place : place + 4], "little")
+        end = head + 4 + int.from_bytes(content[head : head + 4], "little")
+        record = content[place:end]
+        out.append(entry(record) if b"op=\x04" in record[:60] else record)
+        place = end
+    path.write_bytes(b"".join(out))
+    return path
+
+
+def test_a_bag_without_the_index_of_its_chunks_is_read(tmp_path: Path) -> None:
+    """A recorder that stopped between a chunk and its index."""
+    assert_is_the_motion(read(changed_index(rosbag1(tmp_path / "x"), lambda _: b"")))
+
+
+@pytest.mark.parametrize("by", [1, 100, 2**31])
+def test_an_index_that_points_elsewhere_is_damage(tmp_path: Path, by: int) -> None:
+    def moved(record: bytes) -> bytes:
+        place = int.from_bytes(record[-4:], "little") + by
+        return record[:-4] + place.to_bytes(4, "little")
+
+    with pytest.raises(LogError, match="damaged"):
+        read(changed_index(rosbag1(tmp_path / "x"), moved))
+
+
+def test_messages_that_an_index_leaves_out_are_damage(tmp_path: Path) -> None:
+    def shortened(record: bytes) -> bytes:
+        size = int.from_bytes(record[51:55], "little") - 12
+        return record[:51] + size.to_bytes(4, "little") + record[55:-12]
+
+    with pytest.raises(LogError, match="a chunk and its index count differently"):
+        read(changed_index(rosbag1(tmp_path / "x"), shortened))
+
+
 def test_databases_without_definitions_know_the_usual_types(tmp_path: Path) -> None:
     import sqlite3
 

@@ -35,6 +35,7 @@ from reading_child import read_apart
 from seed_logs import ROWS, bare_db3, bare_mcap, motion, rosbag1, ur_csv
 
 from vftcli.readers import read
+from vftcli.readers.bags import container
 from vftcli.signals.errors import LogError, VftError
 
 
@@ -66,6 +67,30 @@ def test_a_chunk_that_claims_too_much_is_refused(tmp_path: Path) -> None:
     path.write_bytes(content)
     with pytest.raises(LogError, match="claim to unpack to more than"):
         read(path)
+
+
+def test_chunks_of_more_records_than_a_log_can_hold_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Libraries take a microsecond or more a record: 100 MB of empty ones fit into 10 kB."""
+    from mcap.writer import Writer
+
+    def made(name: str, rows: int) -> Path:
+        with (tmp_path / name).open("wb") as file:
+            writer = Writer(file)
+            writer.start()
+            channel = writer.register_channel("/j", "json", 0)
+            for _ in range(rows):
+                writer.add_message(channel, 0, b"{}", 0, 0)
+            writer.finish()
+        return tmp_path / name
+
+    monkeypatch.setattr(container, "SPARE_PIECES", 3000)  # some 8 a message
+    monkeypatch.setattr(container, "PIECES_PER_BYTE", 0)
+    with pytest.raises(LogError, match="more records than a log of this size can"):
+        read(made("many", 1000))
+    with pytest.raises(LogError, match="no joint positions"):
+        read(made("few", 200))
 
 
 def test_damaged_chunks_do_not_pass_their_checksum(tmp_path: Path) -> None:

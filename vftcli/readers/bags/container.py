@@ -1,10 +1,10 @@
 """Containers of messages: their files on disk, and the channels and batches that each yields."""
 
-import struct
-from collections.abc import Callable, Sequence
+import io
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, BinaryIO, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
 from vftcli.readers.reader import LogFile
 from vftcli.signals import letters
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import Remark, caution, fact, warning
 
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]
@@ -48,11 +48,11 @@ class Channel:
 
 @dataclass(frozen=True, kw_only=True)
 class Batch:
-    """Messages of one channel that lie in one buffer.
+    """Messages of one channel, one behind the other.
 
     Attributes:
         channel: Whose messages they are.
-        buffer: The bytes they lie in.
+        buffer: Their bytes.
         offsets: Where each begins. (k,)
         lengths: How long each is. (k,)
         times: When each was recorded. (k,) [ns]
@@ -65,51 +65,125 @@ class Batch:
     times: Integers
 
 
-class MessageRun(NamedTuple):
-    """Messages of one channel that follow one another at one stride, so are equally long.
+class Run(NamedTuple):
+    """Messages of one channel as a library hands them out.
 
     Attributes:
-        start: Where the first one's data begin.
-        stride: From one to the next.
-        messages: How many.
-        length: Of each one's data.
-        back: How far before its data the receive time of each stands.
+        channel: Whose they are, None where the file does not say.
+        times: When each was recorded. (k,) [ns]
+        contents: The bytes of each.
     """
 
-    start: int
-    stride: int
-    messages: int
-    length: int
-    back: int
+    channel: Channel | None
+    times: list[int]
+    contents: list[bytes]
 
 
-RUN_AFTER = 3
-"""Messages of one kind in a row after which a longer run is looked for at once."""
+BATCH_BYTES = 16 * 1024 * 1024
+MESSAGE_COST = 128
+"""Memory that a message takes beside its bytes. [B]"""
 
 
-def batch_of(
-    channel: Channel, buffer: Bytes, runs: Sequence[MessageRun], nanoseconds: bool
-) -> Batch:
-    """One batch of all runs of a channel.
+def batched(runs: Iterable[Run], ingest: "Ingest") -> Iterator[Batch]:
+    """Messages by channel, some megabytes at a time, channels in the order of their first ones.
 
-    Args:
-        channel: Whose messages they are.
-        buffer: The bytes they lie in.
-        runs: Where they lie.
-        nanoseconds: Whether a receive time is one count of nanoseconds, or seconds and the rest.
+    Raises:
+        LogError: If messages belong to no channel: they would be lost without a word.
     """
-    counts = [run.messages for run in runs]
-    offsets = np.concatenate([run.start + run.stride * np.arange(run.messages) for run in runs])
-    back = np.repeat([run.back for run in runs], counts)
-    stamps = buffer[(offsets - back)[:, None] + np.arange(8)]
-    words = stamps.view("<u8" if nanoseconds else "<u4").astype(np.int64)
+    found: dict[int, tuple[Channel, list[int], list[bytes]]] = {}
+    held = 0
+    for channel, times, contents in runs:
+        if channel is None:
+            raise LogError(f"{ingest.path}: messages of an unknown topic; the file is damaged.")
+        _, all_times, all_contents = found.setdefault(id(channel), (channel, [], []))
+        all_times.extend(times)
+        all_contents.extend(contents)
+        held += sum(map(len, contents)) + MESSAGE_COST * len(contents)
+        if held > BATCH_BYTES:
+            yield from map(_batch, found.values())
+            found, held = {}, 0
+    yield from map(_batch, found.values())
+
+
+def _batch(found: tuple[Channel, list[int], list[bytes]]) -> Batch:
+    """Messages of one channel as a batch."""
+    channel, times, contents = found
+    ends = np.cumsum([len(content) for content in contents])
+    lengths = np.diff(ends, prepend=0)
     return Batch(
         channel=channel,
-        buffer=buffer,
-        offsets=offsets,
-        lengths=np.repeat([run.length for run in runs], counts),
-        times=words[:, 0] if nanoseconds else words[:, 0] * 1_000_000_000 + words[:, 1],
+        buffer=np.frombuffer(b"".join(contents), dtype=np.uint8),
+        offsets=ends - lengths,
+        lengths=lengths,
+        times=np.array(times).astype(np.int64),  # recorders that count past 2⁶³ wrap
     )
+
+
+@dataclass
+class Census:
+    """What a container says of its messages, and what was found.
+
+    Attributes:
+        kept: Messages found.
+        chunks: Chunks found.
+        counted: Messages that it counts, None where it does not say.
+        counted_chunks: Chunks that it counts, None where it does not say.
+        data_end: Where its messages end, 0 where that is not known. [B]
+        missing: Bytes of messages that should stand before that place. [B]
+        closed: Whether its recorder closed it.
+    """
+
+    kept: int = 0
+    chunks: int = 0
+    counted: int | None = None
+    counted_chunks: int | None = None
+    data_end: int = 0
+    missing: int = 0
+    closed: bool = False
+
+    def tell(self, ingest: "Ingest", left: int, counter: str) -> None:
+        """Say so if the container is cut, and how much of it was kept.
+
+        Args:
+            ingest: Where it is said.
+            left: Bytes behind the last whole record.
+            counter: What counts its messages.
+
+        Raises:
+            LogError: If it holds more messages than it counts.
+        """
+        kept, chunks, missing = self.kept, self.chunks, self.missing
+        if self.counted is not None and kept > self.counted:
+            raise LogError(
+                f"{ingest.path}: {counter} counts {self.counted} messages, the chunks hold {kept}; "
+                "the file is damaged."
+            )
+        if self.counted is not None and kept < self.counted:
+            told = warning("messages-missing", kept=kept, counted=self.counted, by=counter)
+        elif self.counted_chunks is not None and chunks != self.counted_chunks:
+            told = warning("chunks-missing", kept=kept, chunks=chunks, counted=self.counted_chunks)
+        elif self.counted is None and missing > 0:
+            size = self.data_end + missing
+            told = warning("bytes-missing", kept=kept, missing_bytes=missing, bytes=size)
+        elif left and self.closed:
+            told = fact("index-cut", kept=kept, chunks=chunks)
+        elif left:
+            told = warning("chunks-cut", kept=kept, rest_bytes=left)
+        elif not self.closed:
+            told = caution("recorder-stopped", kept=kept)
+        else:
+            return
+        ingest.note(told)
+
+
+USUAL_RATIO = 15
+"""Recorded numbers shrink by 3 to 15."""
+
+SPARE_PIECES, PIECES_PER_BYTE = 1_000_000, 2
+"""Pieces that libraries may read of chunks that shrank more: some seconds of their work.
+
+They read some seven a message, and no recorded message takes less than some bytes.
+"""
 
 
 @dataclass
@@ -120,12 +194,31 @@ class Ingest:
         path: The file, for messages.
         size: Its size. [B]
         remarks: What was left behind.
+        unpacked: Bytes that were unpacked.
+        pieces: What libraries may still read of chunks that shrank more than usual.
     """
 
     path: Path
     size: int
     remarks: list[Remark] = field(default_factory=list)
     unpacked: int = 0
+    pieces: int = 0
+
+    def __post_init__(self) -> None:
+        self.pieces = SPARE_PIECES + PIECES_PER_BYTE * self.size
+
+    def spend(self, pieces: int) -> None:
+        """Count pieces that a library is about to read.
+
+        Raises:
+            LogError: If there are more than a log of its size can hold.
+        """
+        self.pieces -= pieces
+        if self.pieces < 0:
+            raise LogError(
+                f"{self.path}: its chunks hold more records than a log of this size can. It is "
+                "damaged or made to fill time."
+            )
 
     def claim(self, size: int) -> None:
         """Count bytes that are about to be unpacked.
@@ -175,92 +268,66 @@ def type_name(name: str) -> str:
     return f"{parts[0]}/{parts[-1]}" if len(parts) > 1 else name
 
 
-def unpack_chunk(ingest: Ingest, name: str, packed: memoryview, size: int) -> memoryview:
+def unpack_chunk(ingest: Ingest, name: str, packed: bytes, size: int) -> bytes:
     """Unpack one chunk of a bag or MCAP, bounded by the size that it claims.
 
     Raises:
         LogError: If the compression is unknown or the chunk is damaged.
     """
+    import bz2
+
+    import lz4.frame
+    import zstandard
+
     if name in {"", "none"}:
         return packed
-    unpacker = UNPACKERS.get(name)
-    if unpacker is None:
-        raise LogError(f"{ingest.path}: unknown chunk compression {name[:20]!r}.")
     ingest.claim(size)
-    content = unpacker(packed, size)
-    if content is None or len(content) != size:
+    content: bytes
+    if name == "lz4":
+        content = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
+    elif name == "bz2":
+        content = bz2.BZ2Decompressor().decompress(packed, max_length=size + 1)
+    elif name == "zstd":
+        content = zstandard.ZstdDecompressor().stream_reader(packed).read(size + 1)
+    else:
+        raise LogError(f"{ingest.path}: unknown chunk compression {name[:20]!r}.")
+    if len(content) != size:
         raise LogError(f"{ingest.path}: a {name} chunk is damaged; it does not unpack to {size} B.")
-    return memoryview(content)
-
-
-def _unlz4(packed: memoryview, size: int) -> bytes | None:
-    """Unpack lz4 up to a size; None if damaged."""
-    import lz4.frame
-
-    try:
-        unpacker = lz4.frame.LZ4FrameDecompressor()
-        content: bytes = unpacker.decompress(bytes(packed), max_length=size + 1)
-        while len(content) <= size and not unpacker.eof and not unpacker.needs_input:
-            content += unpacker.decompress(b"", max_length=size + 1 - len(content))
-    except (RuntimeError, EOFError, ValueError):
-        return None
     return content
 
 
-def _unbz2(packed: memoryview, size: int) -> bytes | None:
-    """Unpack bz2 up to a size; None if damaged."""
-    import bz2
-
-    try:
-        return bz2.BZ2Decompressor().decompress(bytes(packed), max_length=size + 1)
-    except (OSError, ValueError, EOFError):
-        return None
-
-
-def _unzstd(packed: memoryview, size: int) -> bytes | None:
-    """Unpack zstd up to a size; None if damaged."""
-    import zstandard
-
-    try:
-        with zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(
-            bytes(packed), read_across_frames=True
-        ) as reader:
-            content = b""
-            while len(content) <= size and (piece := reader.read(size + 1 - len(content))):
-                content += piece
-            return content
-    except zstandard.ZstdError:
-        return None
+def file_of(content: memoryview) -> BinaryIO:
+    """A log's content as a file that libraries read, from its start, without a copy."""
+    whole: Any = content.obj
+    if isinstance(whole, bytes):
+        return io.BytesIO(whole)
+    whole.seek(0)  # a mapped file
+    mapped: BinaryIO = whole
+    return mapped
 
 
-UNPACKERS: dict[str, Callable[[memoryview, int], bytes | None]] = {
-    "lz4": _unlz4,
-    "bz2": _unbz2,
-    "zstd": _unzstd,
-}
-"""Name of a chunk's compression → a function that unpacks at most the stated size."""
+def chunk_file(ingest: Ingest, name: str, packed: bytes, size: int) -> io.BytesIO:
+    """One chunk of a bag or MCAP, unpacked, as a file that libraries read.
 
-
-def equal_rows(buffer: Bytes, start: int, stride: int, ranges: Sequence[tuple[int, int]]) -> int:
-    """How many records of one stride in a row repeat the first one's bytes in some ranges.
-
-    Records of one topic are as long as one another, so a long run is found by comparing a few
-    columns of a matrix laid over the buffer instead of parsing every record.
+    Raises:
+        LogError: If the compression is unknown or the chunk is damaged.
     """
-    total = (len(buffer) - start) // stride
-    count, step = 1, 16
-    # Ever longer steps: a short run costs little, a long one few comparisons.
-    while count < total:
-        rows = min(step, total - count)
-        view = np.ndarray((rows, stride), np.uint8, buffer, start + count * stride, (stride, 1))
-        same = np.ones(rows, dtype=bool)
-        for a, b in ranges:
-            same &= (view[:, a:b] == buffer[start + a : start + b]).all(axis=1)
-        if not same.all():
-            return count + int(np.argmin(same))
-        count += rows
-        step *= 8
-    return count
+    content = unpack_chunk(ingest, name, packed, size)
+    usual = len(content) <= USUAL_RATIO * len(packed)
+    return io.BytesIO(content) if usual else _Counted(content, ingest)
+
+
+class _Counted(io.BytesIO):
+    """A chunk that shrank more than recorded numbers do: what it costs to read is bounded."""
+
+    def __init__(self, content: bytes, ingest: Ingest) -> None:
+        super().__init__(content)
+        self.ingest = ingest
+
+    def read(self, size: int | None = -1) -> bytes:
+        """Read as every file does."""
+        self.ingest.spend(1)
+        return super().read(size)
 
 
 def strided(buffer: Bytes, offsets: Integers, a: int, b: int) -> Bytes:
@@ -273,13 +340,3 @@ def strided(buffer: Bytes, offsets: Integers, a: int, b: int) -> Bytes:
             )
     picked: Bytes = buffer[offsets[:, None] + np.arange(a, b)]
     return picked
-
-
-def u32(content: Any, offset: int) -> int:  # noqa: ANN401 - any buffer
-    """A little-endian 32-bit count."""
-    return int(struct.unpack_from("<I", content, offset)[0])
-
-
-def u64(content: Any, offset: int) -> int:  # noqa: ANN401
-    """A little-endian 64-bit count."""
-    return int(struct.unpack_from("<Q", content, offset)[0])

@@ -4,8 +4,16 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-from vftcli.readers.bags import db3, mcap_file, rosbag1
-from vftcli.readers.bags.container import MCAP, ROSBAG1, SQLITE, Batch, Ingest, storage_files
+from vftcli.readers.bags import db3
+from vftcli.readers.bags.container import (
+    MCAP,
+    ROSBAG1,
+    SQLITE,
+    Batch,
+    Ingest,
+    printable,
+    storage_files,
+)
 from vftcli.readers.bags.decode import Decoder
 from vftcli.readers.bags.documents import Documents, read_documents
 from vftcli.readers.bags.topics import aligned
@@ -63,15 +71,37 @@ def _batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
 
 
 def _file_batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
+    """The messages of one file; whatever a library raises on it is told in one line.
+
+    Raises:
+        LogError: If it is no container, or damaged.
+    """
+    try:
+        yield from _container(file, ingest)
+    except LogError:
+        raise
+    except MemoryError:
+        raise LogError(
+            f"{ingest.path}: a part of it claims more memory than the file holds; it is damaged."
+        ) from None
+    except Exception as error:  # noqa: BLE001 - libraries document none of what damage raises
+        reason = printable(f"{type(error).__name__}: {error}")[:100]
+        raise LogError(f"{ingest.path}: not a readable bag; it is damaged ({reason}).") from None
+
+
+def _container(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
     """The messages of one file, by the container that its first bytes tell."""
     if file.head.startswith(ROSBAG1):
-        yield from rosbag1.batches(file.content, ingest)
-    elif file.head.startswith(MCAP):
-        yield from mcap_file.batches(file.content, ingest)
-    elif file.head.startswith(SQLITE):
-        yield from db3.batches(file, ingest)
-    else:
-        raise LogError(f"{file.path}: neither a ROS bag nor an MCAP file.")
+        from vftcli.readers.bags import rosbag1
+
+        return rosbag1.batches(file.content, ingest)
+    if file.head.startswith(MCAP):
+        from vftcli.readers.bags import mcap_file
+
+        return mcap_file.batches(file.content, ingest)
+    if file.head.startswith(SQLITE):
+        return db3.batches(file, ingest)
+    raise LogError(f"{file.path}: neither a ROS bag nor an MCAP file.")
 
 
 def _check_count(file: LogFile, messages: int, ingest: Ingest) -> None:

@@ -3,7 +3,6 @@
 Bags of ROS 2 Humble and older hold no definitions, and a bag that is written needs them.
 """
 
-import re
 import struct
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -25,9 +24,6 @@ ROS, FRANKA = tomllib.loads(MESSAGES.read_text(encoding="utf-8")).values()
 DEFINITIONS: dict[str, str] = {**ROS, **FRANKA}
 """Message type as package/Name → its definition."""
 
-LINE = re.compile(r"(?P<type>[\w/]+)(?:\[(?P<many>\d*)\])? (?P<name>\w+)")
-"""A field in a definition; lines that set a constant do not match."""
-
 
 def long_name(kind: str) -> str:
     """A type's name as ROS 2 has it: std_msgs/Header → std_msgs/msg/Header."""
@@ -37,14 +33,10 @@ def long_name(kind: str) -> str:
 @cache
 def own_types() -> dict[str, tuple[Field, ...]]:
     """The fields of every type of `DEFINITIONS`."""
-    return {
-        kind: tuple(
-            Field(m["name"], m["type"], None if m["many"] is None else int(m["many"] or -1))
-            for m in map(LINE.fullmatch, text.splitlines())
-            if m is not None
-        )
-        for kind, text in DEFINITIONS.items()
-    }
+    found: dict[str, tuple[Field, ...]] = {}
+    for kind, text in DEFINITIONS.items():
+        found |= types_of(text, long_name(kind), idl=False)
+    return found
 
 
 def schema_text(kind: str) -> str:
