@@ -31,9 +31,8 @@ def inspect_log(
     recording = read_first_recording(log, format=choice.format, columns=choice.columns)
     recording = choice.within(choice.taken(recording))
     chosen = robot.choice()
-    arm = chosen.load(recording) if chosen.name else None
-    if choice.effort == "auto":
-        examiner = Examiner()
+    examiner, arm = Examiner(), None
+    if chosen.name or choice.effort == "auto":
         arm = examiner.robot(recording, chosen)
         recording = examiner.taken(recording, arm, choice)
     examination = examine(recording, arm)

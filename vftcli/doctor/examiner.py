@@ -10,6 +10,7 @@ from vftcli.doctor.fit import guess_robot
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.drive import effort_name
+from vftcli.robots.pairing import paired
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.recording import EFFORTS, Recording
@@ -82,7 +83,12 @@ class Examiner:
         return self._robots[key]
 
     def taken(self, recording: Recording, robot: Robot, choice: ReadChoice) -> Recording:
-        """A log with its effort taken for what the robot's model explains best, if it is open."""
+        """A log laid on its robot, its effort taken for what the model explains best if it is open.
+
+        Raises:
+            RobotError: If the names of its joints are not the robot's.
+        """
+        recording = paired(recording, robot)
         if choice.effort != "auto":
             return recording
         for finding in examine(recording, robot).findings:
