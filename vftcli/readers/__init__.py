@@ -7,7 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.readers import arrays_file, lerobot, libfranka, parquet, pickles, rtde, tables
+from vftcli.readers import (
+    arrays_file,
+    lerobot,
+    libfranka,
+    parquet,
+    pickles,
+    ros_text,
+    rtde,
+    tables,
+)
 from vftcli.readers.bags import formats as bags
 from vftcli.readers.cleaning import RestartError, cleaned
 from vftcli.readers.opening import Digest
@@ -25,6 +34,7 @@ READERS: dict[str, Reader] = {
         libfranka.NEW,
         libfranka.OLD,
         libfranka.STATES,
+        *ros_text.READERS,
         tables.HEADED,
         tables.HEADERLESS,
         tables.NPY,
@@ -121,7 +131,8 @@ def _reader(file: LogFile, name: str | None, columns: str | None) -> Reader:
             f"{file.path}: --columns does not apply to {reader.name}, whose signals are known. "
             f"It applies to {takers}."
         )
-    return reader if reader.general or not file.lines else tables.HEADED
+    takes_some = reader.general or reader in ros_text.READERS or not file.lines
+    return reader if takes_some else tables.HEADED
 
 
 def _recognise(file: LogFile) -> Reader:

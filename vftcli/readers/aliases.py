@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -23,8 +23,17 @@ from vftcli.readers.table import (
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
-CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "seconds")
+CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "%time", "seconds")
 """Names of the clock; a unit may follow, as in time_ms."""
+
+NANOSECONDS = re.compile(r"(?P<stem>.*?)(nsecs?|nanosecs?|nanos|nanoseconds|ns)")
+"""The nanoseconds beside a column of seconds whose name has the same stem."""
+
+HEADER_STAMP = re.compile(r"(?:.*[./])?header[./]stamp(?:[./]\w+)?")
+"""A message's own stamp, or a part of it."""
+
+RECORDED = ("time", "%time", "__time")
+"""When a recorder took a message, in tables that may hold the message's own stamp too."""
 
 OWN_STAMPS = "t_src_ns"
 """The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes them."""
@@ -52,6 +61,9 @@ INDEXED = re.compile(
     r"(?P<stem>.*?)[_./ ]?(?:(?:joint|j)_?(?P<a>\d{1,9})|\[(?P<b>\d{1,9})\]|(?P<c>\d{1,9}))",
     re.IGNORECASE,
 )  # a number of any length would be tried from each of its digits on
+FIELD = re.compile(r"field\.|/?joint_states?[./]")
+"""What ROS tools put before the fields of a JointState."""
+
 JOINT_FIRST = re.compile(
     r"(?:.*/)?(?P<joint>[A-Za-z][\w ]*)[/.](?P<stem>position|velocity|effort)(?:\[\])?"
 )
@@ -133,9 +145,8 @@ def grouped(table: Table) -> dict[str, Group]:
             by_joint.setdefault(match["stem"], {})[match["joint"]] = Cell(column)
         elif match := INDEXED.fullmatch(name):
             index = int(match["a"] or match["b"] or match["c"])
-            if found.setdefault(match["stem"].lower(), {}).setdefault(index, Cell(column)) != Cell(
-                column
-            ):
+            stem = FIELD.sub("", match["stem"].lower(), count=1)
+            if found.setdefault(stem, {}).setdefault(index, Cell(column)) != Cell(column):
                 raise LogError(
                     f"{table.path}: two columns could be {match['stem']} of index {index}: "
                     f"{name!r} and another. Name the columns with --columns."
@@ -211,19 +222,43 @@ def _wrench(table: Table) -> Pick | None:
 
 
 def _clock(table: Table) -> Pick | None:
-    """The column of time, None where none bears a name of it."""
+    """The columns of time, None where none bears a name of it: one, or seconds and nanoseconds.
+
+    A message's own stamp goes before the time at which a recorder took it.
+
+    Raises:
+        LogError: If several could be.
+    """
     names = [name.lower() for name in table.names or ()]
+    pairs = [*_second_pairs(names)]
+    in_pair = {column for pair in pairs for column in pair}
     bare = [re.sub(r"[_ ]?[\[(]?(?<=[_\[( ])(s|ms|us|ns)[\])]?$", "", name) for name in names]
     found = [
-        column for column, name in enumerate(names) if name in CLOCKS or bare[column] in CLOCKS[:4]
+        (column,)
+        for column, name in enumerate(names)
+        if column not in in_pair
+        and (name in CLOCKS or bare[column] in CLOCKS[:4] or HEADER_STAMP.fullmatch(name))
     ]
+    found = [*pairs, *found]
+    own = [columns for columns in found if HEADER_STAMP.match(names[columns[0]])]
+    found = own or [c for c in found if names[c[0]] not in RECORDED or len(found) == 1] or found
     if len(found) > 1:
-        there = listed([(table.names or ())[column] for column in found])
+        there = listed(["|".join((table.names or ())[c] for c in columns) for columns in found])
         raise LogError(
             f"{table.path}: {there} could each be the clock. Say which with --columns, as in "
-            f"t={(table.names or ())[found[0]]},q=…"
+            f"t={'|'.join((table.names or ())[c] for c in found[0])},q=…"
         )
-    return Pick(signal="t", cells=(table_clock(table, found[0]),)) if found else None
+    return Pick(signal="t", cells=tuple(table_clock(table, c) for c in found[0])) if found else None
+
+
+def _second_pairs(names: Sequence[str]) -> Iterator[tuple[int, int]]:
+    """The columns of whole seconds and of the nanoseconds within them, as ROS writes its stamps."""
+    for column, name in enumerate(names):
+        if match := NANOSECONDS.fullmatch(name):
+            wanted = {match["stem"] + word for word in ("sec", "secs", "second", "seconds", "s")}
+            there = [k for k, other in enumerate(names) if other in wanted]
+            if len(there) == 1:
+                yield there[0], column
 
 
 def table_clock(table: Table, column: int) -> Cell:

@@ -11,7 +11,7 @@ from vftcli.readers.aliases import RESIDUAL_TURNED
 from vftcli.readers.bags.container import Integers
 from vftcli.readers.bags.decode import Stream
 from vftcli.readers.columns import SIGNALS, parse_columns
-from vftcli.readers.joints import UR_NAMES, robot_of
+from vftcli.readers.joints import effort_of, robot_of
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
@@ -153,10 +153,9 @@ class Gathering:
             code = "field-taken-turned" if factor < 0 else "field-taken"
             self.remarks.append(fact(code, field=last, signal=signal))
         if "effort" in self.signals:
-            names = lead.names
-            is_ur = len(names) == len(UR_NAMES) and all(name.endswith(UR_NAMES) for name in names)
-            self.signals["current" if is_ur else "torque"] = self.signals.pop("effort")
-            if is_ur:
+            kind = effort_of(lead.names)
+            self.signals[kind] = self.signals.pop("effort")
+            if kind == "current":
                 self.remarks.append(fact("effort-is-current"))
 
     def take(self, stream: Stream) -> None:
