@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers.columns import SIGNALS, Item
-from vftcli.readers.joints import kinematic_order
+from vftcli.readers.joints import effort_of, kinematic_order
 from vftcli.readers.table import (
     Cell,
     Pick,
@@ -21,6 +21,7 @@ from vftcli.readers.table import (
     pick_of,
 )
 from vftcli.signals.errors import LogError
+from vftcli.signals.recording import EFFORTS
 from vftcli.signals.remarks import fact
 
 CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "%time", "seconds")
@@ -69,6 +70,19 @@ JOINT_FIRST = re.compile(
 )
 """A joint's name before the signal's, as PlotJuggler exports JointState topics."""
 
+SIGNAL_WORDS = "pos|position|vel|velocity|eff|effort|tau|torque|current"
+SIGNAL_OF_JOINT = (
+    re.compile(rf"(?P<stem>{SIGNAL_WORDS})[_./ ](?P<joint>[A-Za-z][\w ]*)", re.IGNORECASE),
+    re.compile(rf"(?P<joint>[A-Za-z][\w ]*?)[_./ ](?P<stem>{SIGNAL_WORDS})", re.IGNORECASE),
+)
+"""A signal's name before or behind a joint's, as in pos_elbow and elbow_joint_vel."""
+
+NUMBERED_JOINT = re.compile(r"(joint|j)?_?\d+", re.IGNORECASE)
+AXES = re.compile(r"r?[xyz]|q[wxyz]|roll|pitch|yaw", re.IGNORECASE)
+"""What a pose has in place of joints."""
+
+FEWEST_JOINTS = 3
+
 RESIDUAL_TURNED = fact("residual-turned")
 """Said wherever libfranka's residual is taken."""
 
@@ -110,7 +124,17 @@ def picks_by_alias(table: Table, stated: Sequence[Item] = ()) -> tuple[Picks, tu
     origin = None if origin in table.lists else origin
     picks = checked(table, Picks(signals=tuple(signals), clock=clock, origin=origin))
     names = next((g.joints for g in groups.values() if g.joints), ())
+    if effort_of(names) == "current" and not known & set(EFFORTS):
+        picks = replace(picks, signals=tuple(_as_driven(pick, groups) for pick in picks.signals))
     return picks, names
+
+
+def _as_driven(pick: Pick, groups: dict[str, Group]) -> Pick:
+    """The effort of UR's drivers as the current that it is, other picks as they are."""
+    efforts = [groups[name].cells for name in ("effort", "eff") if name in groups]
+    if pick.signal != "torque" or pick.cells not in efforts:
+        return pick
+    return replace(pick, signal="current", remark=fact("effort-is-current"))
 
 
 def stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
@@ -136,8 +160,11 @@ def stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
 def grouped(table: Table) -> dict[str, Group]:
     """The columns of a table by name without index, in lower case."""
     found: dict[str, dict[int, Cell]] = {}
-    by_joint: dict[str, dict[str, Cell]] = {}
+    by_joint = joint_columns(table)
+    in_joints = {cell.column for cells in by_joint.values() for cell in cells.values()}
     for column, name in enumerate(table.names or ()):
+        if column in in_joints:
+            continue
         if column in table.lists:
             cells = {k: Cell(column, k) for k in range(table.lists[column])}
             found.setdefault(name.lower(), {}).update(cells)
@@ -162,6 +189,28 @@ def grouped(table: Table) -> dict[str, Group]:
         cells_in_order = tuple(cells_of[name] for name in names)
         groups[stem] = Group(cells_in_order, tuple(range(len(names))), names)
     return groups
+
+
+def joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
+    """Columns that bear a signal's name beside a joint's: signal → joint → cell.
+
+    Names are only taken apart so where two signals have the same joints, and are no axes.
+    """
+    found: dict[str, dict[str, Cell]] = {}
+    for column, name in enumerate(table.names or ()):
+        match = next((m for p in SIGNAL_OF_JOINT if (m := p.fullmatch(name))), None)
+        # pos_joint1 is found by its number, as pos_1 is.
+        counted = match and name.endswith(match["joint"]) and NUMBERED_JOINT.fullmatch(match["joint"])
+        if match is not None and not counted and column not in table.lists:
+            found.setdefault(match["stem"].lower(), {})[match["joint"]] = Cell(column)
+    joints = {stem: frozenset(cells) for stem, cells in found.items()}
+    return {
+        stem: cells
+        for stem, cells in found.items()
+        if len(cells) >= FEWEST_JOINTS
+        and list(joints.values()).count(joints[stem]) > 1
+        and not any(AXES.fullmatch(joint) for joint in cells)
+    }
 
 
 def _pick_of(table: Table, signal: str, groups: dict[str, Group]) -> Pick | None:
