@@ -88,6 +88,12 @@ class ReadOptions(ChoiceBundle["ReadChoice"]):
         "What the log's effort is, whatever it is called; auto takes what the robot's model "
         "explains best, and says so.",
     )
+    derive: str | None = option(
+        "--derive",
+        "dq|none",
+        "Velocities of a log that has none, from its positions over the complete log; from 50 Hz "
+        "on they are derived unasked, and that is said.",
+    )
 
 
 class RobotOptions(ChoiceBundle["RobotChoice"]):

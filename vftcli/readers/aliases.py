@@ -33,9 +33,6 @@ NANOSECONDS = re.compile(r"(?P<stem>.*?)(nsecs?|nanosecs?|nanos|nanoseconds|ns)"
 HEADER_STAMP = re.compile(r"(?:.*[./])?header[./]stamp(?:[./]\w+)?")
 """A message's own stamp, or a part of it."""
 
-RECORDED = ("time", "%time", "__time")
-"""When a recorder took a message, in tables that may hold the message's own stamp too."""
-
 OWN_STAMPS = "t_src_ns"
 """The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes them."""
 
@@ -199,9 +196,10 @@ def joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
     found: dict[str, dict[str, Cell]] = {}
     for column, name in enumerate(table.names or ()):
         match = next((m for p in SIGNAL_OF_JOINT if (m := p.fullmatch(name))), None)
+        if match is None or column in table.lists:
+            continue
         # pos_joint1 is found by its number, as pos_1 is.
-        counted = match and name.endswith(match["joint"]) and NUMBERED_JOINT.fullmatch(match["joint"])
-        if match is not None and not counted and column not in table.lists:
+        if not (name.endswith(match["joint"]) and NUMBERED_JOINT.fullmatch(match["joint"])):
             found.setdefault(match["stem"].lower(), {})[match["joint"]] = Cell(column)
     joints = {stem: frozenset(cells) for stem, cells in found.items()}
     return {
@@ -290,7 +288,7 @@ def _clock(table: Table) -> Pick | None:
     ]
     found = [*pairs, *found]
     own = [columns for columns in found if HEADER_STAMP.match(names[columns[0]])]
-    found = own or [c for c in found if names[c[0]] not in RECORDED or len(found) == 1] or found
+    found = own or found
     if len(found) > 1:
         there = listed(["|".join((table.names or ())[c] for c in columns) for columns in found])
         raise LogError(

@@ -9,6 +9,7 @@ from pathlib import Path
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
 from vftcli.signals.arrays import Array
+from vftcli.signals.derivation import is_fast, with_velocity
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
 from vftcli.signals.wrench import WrenchFrame
@@ -131,6 +132,9 @@ EFFORT = {
 }
 """Value of ``--effort`` → field of Recording; None where the robot's model has to decide."""
 
+DERIVE = ("dq", "none")
+"""Values of ``--derive``: the signal that is derived where the log lacks it, or none."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ReadChoice:
@@ -143,9 +147,11 @@ class ReadChoice:
         interval: The span that is used, from the first sample, None for all of it. [s]
         effort: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the
             robot; None to take what it is called.
+        derive: "dq" to derive velocities that a log lacks, "none" never to; None to do so where it
+            is fast enough.
 
     Raises:
-        ParameterError: If the effort is none of these.
+        ParameterError: If the effort or the derived signal is none of these.
     """
 
     format: str | None = None
@@ -153,8 +159,11 @@ class ReadChoice:
     signals: frozenset[str] | None = None
     interval: tuple[float, float] | None = None
     effort: str | None = None
+    derive: str | None = None
 
     def __post_init__(self) -> None:
+        if self.derive is not None:
+            parsing.check_known(self.derive, DERIVE, f"--derive {self.derive!r}")
         if self.effort is not None:
             parsing.check_known(self.effort, tuple(EFFORT), f"--effort {self.effort!r}")
 
@@ -166,14 +175,15 @@ class ReadChoice:
         columns: str | None = None,
         interval: str | None = None,
         effort: str | None = None,
+        derive: str | None = None,
     ) -> "ReadChoice":
-        """The choice that ``--format``, ``--columns``, ``--interval A:B`` and ``--effort`` state.
+        """The choice that ``--format``, ``--columns``, ``--interval A:B``, … state.
 
         Raises:
             ParameterError: If the interval is malformed.
         """
         span = parsing.interval(interval) if interval is not None else None
-        return cls(format=format, columns=columns, interval=span, effort=effort)
+        return cls(format=format, columns=columns, interval=span, effort=effort, derive=derive)
 
     @property
     def whole(self) -> "ReadChoice":
@@ -181,13 +191,17 @@ class ReadChoice:
         return replace(self, interval=None)
 
     def taken(self, recording: Recording) -> Recording:
-        """A recording with its effort taken for what it is said to be.
+        """A recording with its effort taken for what it is said to be, its velocities derived.
 
         Raises:
             MissingSignalError: If the log has no such effort.
         """
         kind = EFFORT[self.effort] if self.effort is not None else None
-        return recording if kind is None else recording.with_effort(kind)
+        if kind is not None:
+            recording = recording.with_effort(kind)
+        if self.derive == "dq" or (self.derive is None and is_fast(recording)):
+            recording = with_velocity(recording)
+        return recording
 
     def within(self, recording: Recording) -> Recording:
         """The part of a recording that lies in the interval.

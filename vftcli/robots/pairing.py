@@ -1,6 +1,5 @@
 """Pairing a log with its robot: the joints by their names, the motor's side of a gear taken off."""
 
-import os
 import re
 from collections.abc import Sequence
 
@@ -73,7 +72,7 @@ def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | 
     """
     there, wanted = [plain(name) for name in logged], [plain(name) for name in joints]
     # What all of the robot's names share up to a separator says nothing of a joint.
-    own = re.sub(r"[^_]*$", "", os.path.commonprefix(wanted))
+    own = shared_prefix(wanted)
     bare = [name.removeprefix(own) for name in wanted]
     if all(name.isdigit() for name in bare):
         return None
@@ -86,6 +85,15 @@ def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | 
     if len(fits) != 1:
         return None
     return tuple(there.index(fits[0] + name) for name in bare)
+
+
+def shared_prefix(names: Sequence[str]) -> str:
+    """What all names begin with, up to and with a `_`."""
+    parts = [name.split("_")[:-1] for name in names]
+    count = 0
+    while all(len(p) > count and p[: count + 1] == parts[0][: count + 1] for p in parts):
+        count += 1
+    return "".join(f"{part}_" for part in parts[0][:count])
 
 
 def numbered(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:

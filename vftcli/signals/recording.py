@@ -75,6 +75,7 @@ class Source:
         t0_ns: The same stamp in whole nanoseconds where the log counts them. [ns]
         rows: Samples the file held before any were dropped.
         duplicates: Rows dropped because their stamp repeated the one before.
+        derived: Signals that were made of others here and stand in no log.
         remarks: Facts on what was dropped, turned or derived; cautions and warnings on what looks
             suspicious but was left as it is.
     """
@@ -88,6 +89,7 @@ class Source:
     t0_ns: int | None = None
     rows: int = 0
     duplicates: int = 0
+    derived: tuple[str, ...] = ()
     remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
@@ -208,9 +210,11 @@ class Recording:
         """
         value: Array | None = getattr(self, name)
         if value is None:
+            derive = ", or derive them from the positions: --derive dq" if name == "dq" else ""
             raise MissingSignalError(
                 f"{self.name}: the log has no {MEANINGS[name]} ({name}); it has "
-                f"{', '.join(self.signals)}. Record them, or name their columns with --columns."
+                f"{', '.join(self.signals)}. Record them, or name their columns with --columns"
+                f"{derive}."
             )
         return value
 
@@ -268,8 +272,8 @@ class Recording:
     def behind_gear(self, gear: Array, efficiency: Array) -> "Recording":
         """Return the recording of the links where it was logged at the motors.
 
-        q = q_m / N, τ = N η τ_m: positions and velocities are divided by the gear's ratio N, torques
-        multiplied with it and its efficiency η. Currents and the vendor's estimate stay.
+        q = q_m / N, τ = N η τ_m: positions and velocities are divided by the gear's ratio N,
+        torques multiplied with it and its efficiency η. Currents and the vendor's estimate stay.
 
         Args:
             gear: Ratio of each joint, negative where the motor turns the other way. (n,)
