@@ -2,6 +2,7 @@
 
 import tokenize
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -12,17 +13,22 @@ import numpy as np
 from vftcli.readers.aliases import picks_by_alias
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable, as_number
+from vftcli.readers.headless import guessed
 from vftcli.readers.joints import robot_of
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Column, Table, picked, picks_of
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import Remark, fact
 
 NOT_AN_ARRAY = (
     ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError, KeyError, OverflowError,
     RecursionError, tokenize.TokenError,
 )  # fmt: skip
 """What NumPy raises for a header or content that is no array."""
+
+
+WIDEST = 200
+"""Columns beyond which a table without a header is not looked through."""
 
 
 def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
@@ -47,10 +53,7 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
             "files into one table, or build the log through the API: vftcli.Recording(t=…, q=…)."
         )
     if table.names is None:
-        raise LogError(
-            f"{table.path}: a table of {table.width} columns without a header. Say what they are "
-            "with --columns, in file order, as in t,q:6,dq:6,current:6 (_:13 skips 13 columns)."
-        )
+        return read_by_values(table, request, **more)
     picks, joints = picks_by_alias(table, items)
     return picked(
         table,
@@ -61,6 +64,32 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
         robot_hint=robot_of(joints),
         **more,
     )
+
+
+def read_by_values(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
+    """Read a table without a header whose values settle what its columns are, and say it.
+
+    Raises:
+        LogError: If they do not; with the lines that fit, where some do.
+    """
+    columns: dict[int, Column] = {}
+    if 1 < table.width <= WIDEST and not table.lists:
+        with suppress(LogError):  # what is no number somewhere is no clue
+            columns = table.load(range(table.width), 0)
+    found = guessed(list(columns.values())) if columns else None
+    if found is None or found.others:
+        likely = "as in t,q:6,dq:6,current:6 (_:13 skips 13 columns)."
+        if found is not None:
+            likely = f"by its values {found.columns} or {' or '.join(found.others)}."
+        raise LogError(
+            f"{table.path}: a table of {table.width} columns without a header. Say what they are "
+            f"with --columns, in file order, {likely}"
+        )
+    told = fact("columns-by-value", count=table.width, columns=found.columns, why=found.why)
+    named = {str(k): column for k, column in columns.items()}
+    loaded = ArrayTable(path=table.path, columns=named, headed=False, remarks=table.remarks)
+    picks = picks_of(loaded, parse_columns(found.columns))
+    return picked(loaded, picks, request, degrees_possible=True, remarks=(told,), **more)
 
 
 @dataclass
