@@ -21,6 +21,7 @@ from vftcli.readers.bags import formats as bags
 from vftcli.readers.cleaning import RestartError, cleaned
 from vftcli.readers.opening import Digest
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
+from vftcli.readers.unrecognised import description
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import warning
@@ -143,10 +144,7 @@ def _recognise(file: LogFile) -> Reader:
     if len(found) == 1:
         return found[0]
     if not found:
-        raise UnknownFormatError(
-            f"{file.path}: not recognised as any of {', '.join(READERS)}. Name its format with "
-            "--format, or see docs/formats.md for what each expects."
-        )
+        raise UnknownFormatError(f"{file.path}: not recognised as a log: {description(file)}.")
     raise UnknownFormatError(
         f"{file.path}: could be {' or '.join(r.name for r in found)}. Say which with --format."
     )

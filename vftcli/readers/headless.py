@@ -1,4 +1,4 @@
-"""Tables without a header whose values say what their columns are, or what could be said of them."""
+"""Tables without a header whose values say what their columns are, or what they may be."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -80,10 +80,8 @@ def guessed(columns: Sequence[Array]) -> Guess | None:
     if not left and len(found) == 1:
         return Guess(f"{known}{worded(found[0], joints)}", even + why)
     if not found:
-        candidates = [
-            f"{known},{name}:{joints},_:{(blocks - 1) * joints + left}" for name in SINGLE
-        ]
-        texts = [text.removesuffix(",_:0") for text in candidates]
+        skipped = f",_:{(blocks - 1) * joints + left}".removesuffix(",_:0")
+        texts = [f"{known},{name}:{joints}{skipped}" for name in SINGLE]
         return Guess(texts[0], even, tuple(texts[1:]))
     rest = f",_:{left}" if left else ""
     texts = [f"{known}{worded(names, joints)}{rest}" for names in found]
@@ -128,9 +126,8 @@ def is_layout(matches: Mask, table: Array, joints: int) -> bool:
         return False
     positions = table[:, 1 : 1 + joints]
     moves = np.ptp(positions, axis=0) > STILL
-    return bool(
-        matches[np.arange(1, 1 + joints), np.arange(1 + joints, 1 + 2 * joints)][moves].all()
-    )
+    places = np.arange(1, 1 + joints)[moves]
+    return bool(matches[places, places + joints].all())
 
 
 def derivatives(t: Array, table: Array) -> Mask:
@@ -192,6 +189,8 @@ def driven(
     """
     for torque, current in ((a, b) for a in range(len(parts)) for b in range(len(parts)) if a != b):
         size = np.sqrt(np.mean(parts[current] ** 2, axis=0))
+        if np.abs(parts[torque]).max() < CONSTANTS[0] * np.abs(parts[current]).max():
+            continue
         live = np.flatnonzero(size > 2e-3 * size.max())
         fits = [fitted(parts[torque][:, j], parts[current][:, j], dq[:, j]) for j in live]
         constants = tuple(constant for constant, _ in fits)
