@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -98,32 +99,72 @@ def picks_by_alias(table: Table, stated: Sequence[Item] = ()) -> tuple[Picks, tu
     Args:
         table: The table.
         stated: What a --columns text says of some signals; their columns are no other signal's.
+            Where it names the positions, only the clock, velocities and an effort are added.
 
     Raises:
         LogError: If two groups of columns could be the same signal, or none is the positions.
     """
     groups = grouped(table)
-    told = {item.signal: stated_pick(table, item, groups) for item in stated}
-    clock = told.pop("t", None) or _clock(table)
+    rate = next((item.rate for item in stated if item.rate is not None), None)
+    named = [item for item in stated if item.rate is None and item.signal != "_"]
+    told = {item.signal: stated_pick(table, item, groups) for item in named}
+    clock = told.pop("t", None) or (None if rate is not None else _clock(table))
     signals = list(told.values())
-    known, taken = {pick.signal for pick in signals}, {c for pick in signals for c in pick.cells}
-    for signal in ALIASES:
-        if signal not in known and (pick := _pick_of(table, signal, groups)) is not None:
-            signals += [pick] if taken.isdisjoint(pick.cells) else []
-    if "wrench" not in known and (wrench := _wrench(table)) is not None:
-        signals.append(wrench)
+    whole = not any(pick.signal == "q" for pick in signals)
+    signals += (
+        found_picks(table, groups, signals) if whole else missing_picks(table, groups, signals)
+    )
     joints = next((len(p.cells) for p in signals if p.signal == "q"), 0)
     # A group of another width is about something else: a gripper, a base.
-    also = {"q", "wrench", *known}
+    also = {"q", "wrench", *(pick.signal for pick in told.values())}
     signals = [p for p in signals if len(p.cells) == joints or p.signal in also]
     names_there = table.names or ()
     origin = names_there.index(OWN_STAMPS) if names_there.count(OWN_STAMPS) == 1 else None
     origin = None if origin in table.lists else origin
-    picks = checked(table, Picks(signals=tuple(signals), clock=clock, origin=origin))
-    names = next((g.joints for g in groups.values() if g.joints), ())
-    if effort_of(names) == "current" and not known & set(EFFORTS):
+    picks = checked(table, Picks(signals=tuple(signals), clock=clock, rate=rate, origin=origin))
+    q = next(pick.cells for pick in signals if pick.signal == "q")
+    names = next((g.joints for g in groups.values() if g.joints and g.cells == q), ())
+    if effort_of(names) == "current" and not {pick.signal for pick in told.values()} & set(EFFORTS):
         picks = replace(picks, signals=tuple(_as_driven(pick, groups) for pick in picks.signals))
     return picks, names
+
+
+def found_picks(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> list[Pick]:
+    """All signals that are found by their names beside those that are stated.
+
+    Raises:
+        LogError: If two groups of columns could be one of them.
+    """
+    known, taken = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
+    found = []
+    for signal in ALIASES:
+        if signal not in known and (pick := _pick_of(table, signal, groups)) is not None:
+            found += [pick] if taken.isdisjoint(pick.cells) else []
+    if "wrench" not in known and (wrench := _wrench(table)) is not None:
+        found.append(wrench)
+    return found
+
+
+def missing_picks(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> list[Pick]:
+    """What a text that names the positions leaves out and no estimate can do without.
+
+    Velocities, and an effort where it names none; what two groups could be is left out.
+    """
+    known, taken = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
+    joints = next(len(pick.cells) for pick in stated if pick.signal == "q")
+    found = []
+    for wanted in (("dq",), EFFORTS):
+        picks = []
+        for signal in wanted if known.isdisjoint(wanted) else ():
+            with suppress(LogError):
+                picks.append(_pick_of(table, signal, groups))
+        fitting = [p for p in picks if p is not None and len(p.cells) == joints]
+        fitting = [pick for pick in fitting if taken.isdisjoint(pick.cells)]
+        if len(fitting) == 1:
+            columns = (table.names or ())[fitting[0].cells[0].column]
+            told = fact("signal-by-name", signal=fitting[0].signal, column=columns)
+            found.append(replace(fitting[0], remark=told))
+    return found
 
 
 def _as_driven(pick: Pick, groups: dict[str, Group]) -> Pick:

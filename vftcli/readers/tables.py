@@ -34,7 +34,7 @@ WIDEST = 200
 def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
     """Read a table by its --columns text, else by the aliases of its column names.
 
-    A text that names other signals but no positions says something of these alone.
+    A text that names signals says something of these; what it leaves out is found by name.
 
     Raises:
         LogError: If the columns cannot be told.
@@ -43,9 +43,8 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
     if spec is not None:
         more["segment"] = spec.segment
     items = spec.items if spec is not None else ()
-    partial = table.names is not None and spec is not None and spec.partial
-    if spec is not None and items and not partial:
-        stated = (item := spec.item("q")) is not None and item.unit is not None
+    stated = spec is not None and (item := spec.item("q")) is not None and item.unit is not None
+    if spec is not None and items and (table.names is None or not spec.named):
         return picked(table, picks_of(table, spec), request, degrees_possible=not stated, **more)
     if table.names is None and table.width == 1:
         raise LogError(
@@ -59,7 +58,7 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
         table,
         picks,
         request,
-        degrees_possible=True,
+        degrees_possible=not stated,
         joint_names=joints,
         robot_hint=robot_of(joints),
         **more,
