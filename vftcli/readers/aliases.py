@@ -110,10 +110,8 @@ def picks_by_alias(table: Table, stated: Sequence[Item] = ()) -> tuple[Picks, tu
     told = {item.signal: stated_pick(table, item, groups) for item in named}
     clock = told.pop("t", None) or (None if rate is not None else _clock(table))
     signals = list(told.values())
-    whole = not any(pick.signal == "q" for pick in signals)
-    signals += (
-        found_picks(table, groups, signals) if whole else missing_picks(table, groups, signals)
-    )
+    find = missing_picks if any(pick.signal == "q" for pick in signals) else found_picks
+    signals += find(table, groups, signals)
     joints = next((len(p.cells) for p in signals if p.signal == "q"), 0)
     # A group of another width is about something else: a gripper, a base.
     also = {"q", "wrench", *(pick.signal for pick in told.values())}
@@ -318,16 +316,16 @@ def _clock(table: Table) -> Pick | None:
         LogError: If several could be.
     """
     names = [name.lower() for name in table.names or ()]
-    pairs = [*_second_pairs(names)]
+    pairs: list[tuple[int, ...]] = [*_second_pairs(names)]
     in_pair = {column for pair in pairs for column in pair}
     bare = [re.sub(r"[_ ]?[\[(]?(?<=[_\[( ])(s|ms|us|ns)[\])]?$", "", name) for name in names]
-    found = [
+    single: list[tuple[int, ...]] = [
         (column,)
         for column, name in enumerate(names)
         if column not in in_pair
         and (name in CLOCKS or bare[column] in CLOCKS[:4] or HEADER_STAMP.fullmatch(name))
     ]
-    found = [*pairs, *found]
+    found = [*pairs, *single]
     own = [columns for columns in found if HEADER_STAMP.match(names[columns[0]])]
     found = own or found
     if len(found) > 1:

@@ -151,7 +151,8 @@ def derivatives(t: Array, table: Array) -> Mask:
     best[0] = best[:, 0] = np.inf
     np.fill_diagonal(best, np.inf)
     # A slow joint's change may look like the integral of several columns: the nearest is its own.
-    return (best < OPEN**2) & (best == best.min(axis=1, keepdims=True))
+    alike: Mask = (best < OPEN**2) & (best == best.min(axis=1, keepdims=True))
+    return alike
 
 
 def efforts(parts: Sequence[Array], dq: Array) -> tuple[list[tuple[str, ...]], str]:

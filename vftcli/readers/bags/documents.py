@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.bags.container import Batch, Channel, Ingest
-from vftcli.readers.joints import in_order, kinematic_order, robot_of
+from vftcli.readers.bags.decode import Stream
+from vftcli.readers.bags.json_messages import message_streams
+from vftcli.readers.columns import parse_columns
+from vftcli.readers.joints import laid_along
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import fact
 
 FOXGLOVE = "foxglove.JointStates"
 MAX_BYTES = 1 << 20
@@ -56,6 +60,19 @@ class Documents:
                 ) from None
             times.append(int(time))
         return True
+
+    def streams(self, request: ReadChoice) -> list[Stream]:
+        """The channels that hold ROS messages, unless --columns speaks of other fields."""
+        items = parse_columns(request.columns).items if request.columns is not None else ()
+        fields = {(item.pattern or "").rpartition(".")[2] for item in items}
+        if not fields <= {"", "position", "velocity", "effort"}:
+            return []
+        found = (
+            stream
+            for channel, rows in self.rows.items()
+            for stream in message_streams(channel, rows, self.times[channel])
+        )
+        return list(found)
 
 
 def _document(message: bytes, *, json_like: bool) -> Any:  # noqa: ANN401
@@ -178,9 +195,13 @@ def read_documents(file: LogFile, documents: Documents, request: ReadChoice) -> 
     failures = []
     for channel, rows in documents.rows.items():
         try:
-            return _read(file, channel, rows, documents.times[channel], request)
+            raw = _read(file, channel, rows, documents.times[channel], request)
         except LogError as error:
             failures.append((len(rows), error))
+            continue
+        left = sorted({other.topic for other in documents.rows} - {channel.topic})
+        told = [fact("topics-left-out", topics=tuple(left[:6]))] if left else []
+        return replace(raw, remarks=(*raw.remarks, *told))
     if not failures:
         raise LogError(f"{file.path}: no messages of a kind that is known.")
     # The fullest channel is the one that was meant; what it lacks is what the user can mend.
@@ -196,12 +217,11 @@ def _read(
 ) -> RawLog:
     """The documents of one channel as a table, read by aliases or by --columns."""
     names = _names(rows[0])
-    order = kinematic_order(names)
     columns: dict[str, Column] = {}
     for key, first in rows[0].items():
         column = _column(first, [row.get(key) for row in rows])
         if column is not None and not key.lower().startswith(("timestamp", "stamp", "header")):
-            columns[key] = in_order(column, order, len(names)) if names else column
+            columns[key] = column
     clock = "log time of the recorder"
     if (stamps := _stamps(rows)) is not None:
         clock = f"stamps in the messages of {channel.topic}"
@@ -210,10 +230,9 @@ def _read(
         columns["timestamp_ns"] = np.array(times, dtype=np.int64)
     table = ArrayTable(path=f"{file.path}: topic {channel.topic}", columns=columns)
     raw = from_table(table, request, clock_name=clock)
-    if request.columns is not None or not names:
+    if len(names) != raw.signals["q"].shape[1]:
         return raw
-    ordered = tuple(names[k] for k in order)
-    return replace(raw, joint_names=ordered, robot_hint=robot_of(ordered))
+    return laid_along(raw, names, request)
 
 
 def _names(row: dict[str, Any]) -> tuple[str, ...]:
