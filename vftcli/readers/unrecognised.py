@@ -43,10 +43,8 @@ KINDS = tuple(
         (rb"PK\x03\x04", "a zip archive; unpack it and give the log inside"),
         (rb"(7z\xbc\xaf|Rar!|BZh|\xfd7zXZ)", "an archive; unpack it and give the log inside"),
         (rb".{257}ustar", "a tar archive; unpack it and give the log inside"),
-        (
-            rb"schema\s*=|\[\[?[a-z_.]+\]\]?\s*\n",
-            "a TOML file, no log; a robot file goes to --robot",
-        ),
+        (rb"\xff\xfe|\xfe\xff", "a text in UTF-16; save it as UTF-8 (plain CSV)"),
+        (rb"schema\s*=|\[\[?[a-z_.]+\]\]?\s*\n", "a TOML file; a robot file goes to --robot"),
     )
 )
 """Kinds of files that users give by mistake, by their first bytes."""

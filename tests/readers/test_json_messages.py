@@ -1,0 +1,83 @@
+"""JointState and WrenchStamped as JSON documents in an MCAP: the rules of every other bag."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vftcli.readers import read
+from vftcli.readers.joints import UR_NAMES
+
+ROWS, START = 25, 1_750_000_000_000_000_001
+ALPHABETICAL = sorted(UR_NAMES)
+Q = 0.1 * np.arange(6) + 0.01 * np.arange(ROWS)[:, None]
+"""Positions, base to tip. (25, 6) [rad]"""
+
+
+def stamp(k: int) -> dict[str, Any]:
+    whole = START + k * 8_000_000
+    return {"sec": whole // 10**9, "nanosec": whole % 10**9}
+
+
+def joint_state(k: int) -> dict[str, Any]:
+    values = Q[k, [UR_NAMES.index(name) for name in ALPHABETICAL]]
+    return {
+        "header": {"stamp": stamp(k), "frame_id": ""},
+        "name": ALPHABETICAL,
+        "position": values.tolist(),
+        "velocity": (1 + values).tolist(),
+        "effort": (2 + values).tolist(),
+    }
+
+
+def wrench(k: int) -> dict[str, Any]:
+    axes = dict(zip("xyz", (1.0 + k, 2.0, 3.0), strict=True))
+    return {
+        "header": {"stamp": stamp(k), "frame_id": "tool0"},
+        "wrench": {"force": axes, "torque": {axis: -value for axis, value in axes.items()}},
+    }
+
+
+def mcap(path: Path, **topics: Any) -> Path:
+    """An MCAP whose topics hold JSON documents: what a function makes of the sample's number."""
+    from mcap.writer import Writer
+
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="", library="test")
+        channels = {name: writer.register_channel(f"/{name}", "json", 0) for name in topics}
+        for k in range(ROWS):
+            time = START + k * 8_000_000
+            for name, make in topics.items():
+                writer.add_message(channels[name], time, json.dumps(make(k)).encode(), time, k)
+        writer.finish()
+    return path
+
+
+def test_effort_names_and_wrench_are_taken_as_from_ros_messages(tmp_path: Path) -> None:
+    log = read(mcap(tmp_path / "x", joint_states=joint_state, ft=wrench))
+    assert log.joint_names == UR_NAMES
+    np.testing.assert_array_equal(log.q, Q)
+    np.testing.assert_array_equal(log.require("current"), 2 + Q)
+    assert log.torque is None
+    np.testing.assert_allclose(log.require("wrench")[:, 0], 1.0 + np.arange(ROWS), rtol=1e-12)
+    np.testing.assert_array_equal(
+        log.require("wrench")[:, 1:], [[2, 3, -1 - k, -2, -3] for k in range(ROWS)]
+    )
+    assert str(log.wrench_frame).startswith("tool0 axes at tool0")
+    assert log.source.t0_ns == START
+
+
+def test_columns_say_what_the_effort_is(tmp_path: Path) -> None:
+    log = read(mcap(tmp_path / "x", joint_states=joint_state), columns="tau=effort")
+    np.testing.assert_array_equal(log.require("torque"), 2 + Q)
+    assert log.current is None
+
+
+@pytest.mark.parametrize("state", [joint_state, lambda k: {"q": Q[k].tolist()}])
+def test_a_wrench_that_is_not_taken_is_named(tmp_path: Path, state: Any) -> None:
+    path = mcap(tmp_path / "x", joints=state, wrench_of_hand=lambda k: {"force": [k, 0.0, 0.0]})
+    (left,) = [r for r in read(path).source.remarks if r.code == "topics-left-out"]
+    assert left.values["topics"] == ("/wrench_of_hand",)
