@@ -18,6 +18,9 @@ from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import WrenchFrame
 
+JACOBIAN = re.compile(r"(?i)jac(obian)?_\d_\d")
+"""A cell of a Jacobian among the columns."""
+
 Column = NDArray[Any]
 """One column as it is stored: (T,) numbers, or (T, k) for a column of lists."""
 
@@ -363,6 +366,13 @@ def checked(table: Table, picks: Picks) -> Picks:
     joints = next((len(p.cells) for p in picks.signals if p.signal == "q"), 0)
     if joints == 0:
         there = listed(table.names) if table.names else f"{table.width} columns without names"
+        if any(JACOBIAN.match(name) for name in table.names or ()):
+            raise LogError(
+                f"{table.path}: no joint positions (q), but a vendor's estimate beside its "
+                "Jacobian: no observer can run on that, and q cannot be told from a Jacobian in "
+                "axes of its own. The vendor's wrench is pinv(Jᵀ) tau_ext of each row, in the "
+                "log's axes. Record q, dq and torques beside them."
+            )
         raise LogError(
             f"{table.path}: no joint positions (q) among {there}. Name their columns with "
             "--columns, as in q=joint_pos_{i}; a table without positions is no log of an arm "

@@ -15,7 +15,7 @@ LOGS = (".csv", ".tsv", ".txt", ".gz", ".zst", ".npy", ".npz", ".parquet", ".bag
 SHOWN = 4
 
 
-class Kind(NamedTuple):
+class FileKind(NamedTuple):
     """A kind of file that is no log.
 
     Attributes:
@@ -28,7 +28,7 @@ class Kind(NamedTuple):
 
 
 KINDS = tuple(
-    Kind(re.compile(begins, re.DOTALL), told)
+    FileKind(re.compile(begins, re.DOTALL), told)
     for begins, told in (
         (rb"\x89PNG|\xff\xd8\xff|GIF8|BM....\0\0\0\0", "a picture; give the log it was drawn from"),
         (rb"....ftyp|\x1aE\xdf\xa3|RIFF....AVI", "a video; give the log that was recorded with it"),
