@@ -34,6 +34,14 @@ def test_a_slow_swing_is_derived(rate: float, cutoff: float) -> None:
     np.testing.assert_allclose(error, lost * 2 * np.pi * f, rtol=0.15, atol=2e-3)
 
 
+def test_a_joint_that_is_logged_within_a_turn_has_no_jumps_in_its_velocity() -> None:
+    t = np.arange(0, 20, 0.01)
+    turning = np.outer(t, [1.0, 30.0])
+    turning[:, 0] = np.angle(np.exp(1j * turning[:, 0]))  # the second is a motor's count
+    derived = with_velocity(Recording(t=t, q=turning)).require("dq")
+    np.testing.assert_allclose(derived, np.broadcast_to([1.0, 30.0], derived.shape), rtol=1e-9)
+
+
 def test_what_a_log_has_is_kept() -> None:
     log, truth = swinging(100.0)
     log = replace(log, dq=truth)

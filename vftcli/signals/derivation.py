@@ -20,6 +20,9 @@ OF_NYQUIST = 0.4
 BLUNTED = 0.48
 """Cutoff times length of the pushes below which the filter blunts them: 40 ms at 12 Hz."""
 
+ONE_TURN = 2 * np.pi + 0.1
+"""How far positions travel at most that are logged within a turn. [rad]"""
+
 RATE = 50.0
 """Rate from which velocities are derived without being asked for. [Hz]"""
 
@@ -32,7 +35,10 @@ def with_velocity(recording: Recording) -> Recording:
     if recording.dq is not None or recording.samples < 3:
         return recording
     cutoff = min(CUTOFF, OF_NYQUIST * 0.5 / recording.median_step)
-    slopes = np.gradient(recording.q, recording.t, axis=0)
+    # An endless joint that is logged within one turn jumps by it; a motor's count does not.
+    within = np.ptp(recording.q, axis=0) < ONE_TURN
+    q = np.where(within, np.unwrap(recording.q, axis=0), recording.q)
+    slopes = np.gradient(q, recording.t, axis=0)
     told = caution("derived-velocity", cutoff_Hz=cutoff, blunted_ms=1e3 * BLUNTED / cutoff)
     source = recording.source
     source = replace(source, derived=("dq",), remarks=(*source.remarks, told))
