@@ -12,6 +12,7 @@ from vftcli.admittance.choice import (
     split_settings,
 )
 from vftcli.robots import load_robot
+from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, RobotError
 
 UR5 = load_robot("ur5")
@@ -82,5 +83,5 @@ def test_a_slip_is_refused_before_a_log_is_read(words: dict[str, object], messag
 
 def test_a_release_needs_an_arm() -> None:
     with pytest.raises(RobotError, match="a release needs an arm"):
-        released_robot(None)
-    assert released_robot("panda").name == "panda"
+        released_robot(RobotChoice())
+    assert released_robot(RobotChoice(name="panda")).name == "panda"

@@ -44,11 +44,12 @@ MUTATORS: dict[str, Callable[[Seed, Rng, Path], Mutant]] = {
     "gains": toml_mutant,
     "scenario": toml_mutant,
     "urdf": urdf_mutant,
+    "mjcf": urdf_mutant,
 }
 WEIGHTS = {
     "table": 20, "lines": 6, "parquet": 10, "npz": 8, "npy": 2, "pickle": 7, "records": 5,
-    "mcap": 13,
-    "bag": 7, "folder": 7, "robot": 6, "urdf": 3, "gains": 1, "scenario": 1, "options": 4,
+    "mcap": 13, "bag": 7, "folder": 7, "robot": 6, "urdf": 5, "mjcf": 1, "gains": 1, "scenario": 1,
+    "options": 4,
 }  # fmt: skip
 """Family → inputs of a hundred."""
 
@@ -56,7 +57,8 @@ COMMANDS = (*["inspect"] * 9, *["convert"] * 7, *["estimate"] * 3, "compare")
 ANALYSES = {"estimate", "compare"}
 REFERENCES = ("zero", "vendor", "two-cycle", "sensor", "zero", "x")
 
-ENDINGS = {"robot": ".toml", "gains": ".toml", "scenario": ".toml", "urdf": ".urdf"}
+ENDINGS = {"robot": ".toml", "gains": ".toml", "scenario": ".toml", "urdf": ".urdf",
+           "mjcf": ".xml"}  # fmt: skip
 LARGEST_TORQUE = 1e9
 """An external torque beyond it, from a sound log and a robot file, is none that a robot has."""
 
@@ -189,7 +191,7 @@ def odd_numbers(made: Attempt, folder: Path) -> str:
         if np.isinf(values).any() or (name.startswith("tau_ext/") and np.isnan(values).any()):
             return f"not finite: {name}"
         beyond = bool(np.any(np.abs(values) > LARGEST_TORQUE)) and name.startswith("tau_ext/")
-        if beyond and made.family in {"robot", "urdf", "gains"}:
+        if beyond and made.family in {"robot", "urdf", "mjcf", "gains"}:
             return f"beyond any robot: {name} {np.nanmax(np.abs(values)):.3g}"
     return ""
 

@@ -1,4 +1,4 @@
-"""Mutations of the files a user writes: robots as TOML and URDF, gains, scenarios."""
+"""Mutations of the files a user writes: robots as TOML, URDF and MJCF, gains, scenarios."""
 
 import re
 from pathlib import Path
@@ -66,7 +66,7 @@ def new_value(old: str, rng: Rng) -> str:
 
 
 def urdf_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
-    """A URDF with an attribute or an element changed."""
+    """A URDF or MJCF with an attribute, an element or names changed."""
     data = seed.path.read_bytes()
     if rng.random() < 0.15:
         data, how = mutate_bytes(data, rng)
@@ -76,7 +76,7 @@ def urdf_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
     parents = [element for element in root.iter() if len(element)]
     element = pick(rng, [e for e in root.iter() if e.attrib])
     key = pick(rng, list(element.attrib))
-    kind = int(rng.integers(8))
+    kind = int(rng.integers(12))
     if kind <= 2:
         old = element.get(key, "")
         put = pick(rng, WORDS) if rng.random() < 0.5 else str(pick(rng, NUMBERS))
@@ -97,12 +97,29 @@ def urdf_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
         element.tag = pick(
             rng, ("link", "joint", "mass", "axis", "x", "inertial", "robot", "limit")
         )
+    elif kind >= 8:
+        misname(root, rng, kind - 7)
     else:
-        kinds = ("fixed", "prismatic", "floating", "planar", "continuous", "revolute", "screw", "")
-        for joint in root.iter("joint"):
-            if rng.random() < 0.3:
-                joint.set("type", pick(rng, kinds))
+        retype(root, rng)
     text = ET.tostring(root, encoding="unicode")
     clean = "".join(c for c in text if c.isprintable() or c in "\n\t")
     path.write_text(clean, encoding="utf-8", errors="replace")
     return Mutant(f"urdf{kind} {element.tag} {key}")
+
+
+def retype(root: ET.Element, rng: Rng) -> None:
+    """Give joints other types."""
+    kinds = ("fixed", "prismatic", "floating", "planar", "continuous", "revolute", "screw", "")
+    for joint in root.iter("joint"):
+        if rng.random() < 0.3:
+            joint.set("type", pick(rng, kinds))
+
+
+def misname(root: ET.Element, rng: Rng, times: int) -> None:
+    """Give elements names of others: two of a name, circles, branches, followers of themselves."""
+    named = [e for e in root.iter() if {"name", "link", "joint"} & e.attrib.keys()]
+    for _ in range(times):
+        element, other = pick(rng, named), pick(rng, named)
+        own = next(k for k in ("link", "joint", "name") if k in element.attrib)
+        theirs = next(k for k in ("name", "link", "joint") if k in other.attrib)
+        element.set(own, other.attrib[theirs])

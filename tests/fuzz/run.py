@@ -116,8 +116,8 @@ def import_all(folder: Path, seeds: list[Seed]) -> None:
     tried = [("inspect", str(s.path), "--json") for s in {s.family: s for s in seeds}.values()]
     tried += [
         ("estimate", table, "--robot", "ur5", "-o", str(folder / "warm/o"), "--anyway", "--wrench"),
-        ("estimate", table, "--robot", str(next(s.path for s in seeds if s.family == "urdf")),
-         "-o", str(folder / "warm/o"), "--anyway"),
+        *[("estimate", table, "--robot", str(next(s.path for s in seeds if s.family == family)),
+           "-o", str(folder / "warm/o"), "--anyway") for family in ("urdf", "mjcf")],
         ("convert", table, "-o", str(folder / "warm/o.parquet")),
         ("compare", table, "--robot", "ur5", "--reference", "zero", "--anyway", "--json"),
         ("simulate", scenario, "-o", str(folder / "warm/o.csv"), "--set", "duration=0.1"),

@@ -51,6 +51,35 @@ def urdf(joints: int = 6) -> str:
     return "\n".join([*parts, "</robot>"])
 
 
+def with_hand() -> str:
+    """The arm with a hand of two sliding fingers, the second a follower, and a head beside it."""
+    parts = [f'<link name="{name}"/>' for name in ("tool0", "head")]
+    held = '<joint name="mount" type="fixed"><parent link="l6"/><child link="tool0"/></joint>'
+    parts += [
+        held,
+        '<joint name="pan" type="revolute"><parent link="l0"/><child link="head"/></joint>',
+    ]
+    for k, follows in (("left", ""), ("right", '<mimic joint="left" multiplier="-1" offset="0"/>')):
+        parts.append(
+            f'<link name="{k}_finger"><inertial><mass value="0.05"/><inertia {TENSOR}/></inertial>'
+            f'</link><joint name="{k}" type="prismatic"><parent link="tool0"/>'
+            f'<child link="{k}_finger"/><axis xyz="0 1 0"/>{follows}</joint>'
+        )
+    return urdf().replace("</robot>", "\n".join([*parts, "</robot>"]))
+
+
+def mjcf(joints: int = 6) -> str:
+    """The same arm in the language of MuJoCo."""
+    body = (
+        '<body name="b{0}" pos="0 0 0.3" quat="1 0.1 0 0"><inertial mass="1.5" pos="0 0 0.1" '
+        'diaginertia="0.02 0.02 0.02"/><joint name="j{0}" axis="0 {1} {2}" armature="0.1" '
+        'damping="1" range="-6 6"/>'
+    )
+    arm = "".join(body.format(k, k % 2, 1 - k % 2) for k in range(1, joints + 1))
+    site = '<site name="attachment_site" pos="0 0 0.1"/>'
+    return f'<mujoco model="arm"><worldbody>{arm}{site}{"</body>" * joints}</worldbody></mujoco>'
+
+
 def make_seeds(folder: Path) -> list[Seed]:
     """Write every seed into a folder; polars runs here, so call it in a process of its own."""
     seeds = [*seeds_in_code(folder), *robot_seeds(folder)]
@@ -83,6 +112,10 @@ def robot_seeds(folder: Path) -> Iterator[Seed]:
         yield Seed(f"robot-{name}", "robot", path)
     (folder / "arm.urdf").write_text(urdf(), encoding="utf-8")
     yield Seed("urdf", "urdf", folder / "arm.urdf")
+    (folder / "hand.urdf").write_text(with_hand(), encoding="utf-8")
+    yield Seed("urdf-hand", "urdf", folder / "hand.urdf")
+    (folder / "arm.mjcf.xml").write_text(mjcf(), encoding="utf-8")
+    yield Seed("mjcf", "mjcf", folder / "arm.mjcf.xml")
     (folder / "gains.toml").write_text(GAINS, encoding="utf-8")
     yield Seed("gains", "gains", folder / "gains.toml")
     for name in ("ur5-circle", "panda-bearing", "ur5-sensor"):

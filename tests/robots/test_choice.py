@@ -1,9 +1,11 @@
 """RobotChoice: the arm that is named, or the one the log settles."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from made_urdfs import two_armed, written
 
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, RobotError
@@ -45,6 +47,15 @@ def test_another_friction_is_refused_before_a_log_is_read() -> None:
 def test_a_payload_that_the_file_has_not_is_refused() -> None:
     with pytest.raises(RobotError, match="no payload 'bucket'"):
         RobotChoice(name="ur5", payload="bucket").load(log())
+
+
+def test_the_tip_and_the_arguments_of_a_description_are_part_of_the_choice(tmp_path: Path) -> None:
+    path = written(tmp_path, two_armed())
+    choice = RobotChoice.parsed(robot=str(path), tip="left_tool0")
+    assert choice.load(log(7)).chain.names[0] == "left_joint1"
+    assert hash(choice) == hash(RobotChoice(name=str(path), tip="left_tool0"))
+    with pytest.raises(ParameterError, match="--robot-arg 'ur5e' is not NAME=VALUE"):
+        RobotChoice.parsed(robot="ur.xacro", robot_arg=["ur5e"])
 
 
 def test_the_payload_that_the_log_declares_is_mounted() -> None:

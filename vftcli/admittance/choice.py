@@ -15,7 +15,8 @@ from vftcli.admittance.parameters import (
     parse_settings,
     release_deviation,
 )
-from vftcli.robots import PROFILES, Robot, load_robot
+from vftcli.robots import PROFILES, Robot
+from vftcli.robots.choice import RobotChoice
 from vftcli.robots.profile import checked_admittance
 from vftcli.robots.robot_file import RobotFile
 from vftcli.signals import parsing
@@ -155,15 +156,15 @@ class ReleaseChoice:
         return np.array(start, dtype=np.float64)
 
 
-def released_robot(name: str | None) -> Robot:
+def released_robot(choice: RobotChoice) -> Robot:
     """The arm of a release, which no log settles.
 
     Raises:
         RobotError: If none is named, or there is none of that name.
     """
-    if name is None:
+    if choice.name is None:
         raise RobotError(f"a release needs an arm: --robot {'|'.join(PROFILES)}, or a file")
-    return load_robot(name)
+    return choice.named()
 
 
 def listed(text: str, option: str) -> tuple[float, ...]:

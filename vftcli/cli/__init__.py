@@ -18,6 +18,9 @@ import typer
 from vftcli.signals.errors import VftError
 from vftcli.signals.letters import printable
 
+PACKAGES = {"pinocchio": "pin"}
+"""Module of a dependency that some platforms lack → the package that holds it."""
+
 
 class ListedCommand(NamedTuple):
     """One command: where it is, and its first sentence, so that --help need not load it.
@@ -154,6 +157,10 @@ def main() -> None:
         make_app({asked})()
     except VftError as error:
         fail(str(error))
+    except ModuleNotFoundError as error:
+        if (package := PACKAGES.get(error.name or "")) is None:
+            raise
+        fail(f"vftcli {asked} needs {package}, which is not installed here: pip install {package}")
     except MemoryError:
         fail("out of memory; use --interval to take a part of the log")
     except OSError as error:

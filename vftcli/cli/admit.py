@@ -177,7 +177,7 @@ def released(
     from vftcli.admittance.replay import replay_release
 
     choice = ReleaseChoice.parsed(**release.words())
-    arm = released_robot(chosen(analysis).robot.name)
+    arm = released_robot(chosen(analysis).robot)
     settings = control.parameters(arm)
     return replay_release(
         choice.deviation,

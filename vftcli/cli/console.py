@@ -10,9 +10,12 @@ import typer
 from vftcli.signals.letters import printable, printable_lines
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from vftcli.analysis import Analysis
     from vftcli.doctor import Examination, Examiner
     from vftcli.readers.library import Library
+    from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
     from vftcli.virtual_sensor.sensor_reading import SensorReading
 
@@ -65,6 +68,12 @@ def health_of(library: "Library", *, anyway: bool, fitting: bool = True) -> "Exa
             say(f"note: {examination.recording.name}: {assumption}")
 
     return Examiner(anyway=anyway, fitting=fitting, tell=tell)
+
+
+def say_robots(robots: "Iterable[Robot]") -> None:
+    """What a user of the robots' numbers should know."""
+    for remark in dict.fromkeys(str(remark) for robot in robots for remark in robot.remarks):
+        say(f"note: {remark}")
 
 
 def say_analysis(analysis: "Analysis") -> None:

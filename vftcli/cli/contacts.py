@@ -37,7 +37,7 @@ def list_contacts(
     if form.json and form.csv:
         raise typer.BadParameter("choose one of --json, --csv")
 
-    from vftcli.cli.console import health_of
+    from vftcli.cli.console import health_of, say_robots
     from vftcli.contacts.asking import ContactChoice, contact_lists
     from vftcli.readers.library import Library
 
@@ -49,7 +49,9 @@ def list_contacts(
         library=library,
         examiner=health_of(library, anyway=anyway),
     )
-    show(list(contact_lists(logs, choice)), form)
+    found = list(contact_lists(logs, choice))
+    say_robots(choice.examiner.robots)
+    show(found, form)
 
 
 def show(found: "list[ContactList]", form: ListOptions) -> None:

@@ -103,7 +103,7 @@ def identify_robot(
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
-    from vftcli.cli.console import command_line, health_of, say, say_recording
+    from vftcli.cli.console import command_line, health_of, say, say_recording, say_robots
     from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.identification.files import beside, write_identification
@@ -131,6 +131,7 @@ def identify_robot(
         examiner.examine(recording, profile)
     found = identify(train, profile, task, held_out, unloaded[0] if unloaded else None)
     record = write_identification(output, found, examiner.examinations, command_line(), force)
+    say_robots(examiner.robots)
     for remark in found.remarks:
         say(f"note: {remark}")
     say(f"wrote {', '.join(str(file) for file in beside(output).values())}")

@@ -22,7 +22,7 @@ def inspect_log(
 
     Example: vftcli inspect fixtures/ur5_circle.csv
     """
-    from vftcli.cli.console import say_json
+    from vftcli.cli.console import say_json, say_robots
     from vftcli.doctor import Examiner, examine
     from vftcli.outputs.examination import examination_record, examination_text
     from vftcli.readers import read_first_recording
@@ -35,6 +35,7 @@ def inspect_log(
     if chosen.name or choice.effort == "auto":
         arm = examiner.robot(recording, chosen)
         recording = examiner.taken(recording, arm, choice)
+    say_robots(examiner.robots)
     examination = examine(recording, arm)
     if json:
         say_json(examination_record(examination))

@@ -5,9 +5,19 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.bundles import Bundle, option, taken_apart
 
 
+class DescriptionOptions(Bundle):
+    """Which arm of a description is shown."""
+
+    tip: str | None = option(*opt.TIP)
+    robot_arg: opt.Words = option(*opt.ROBOT_ARG)
+
+
+@taken_apart
 def robots(
+    described: DescriptionOptions,
     name: Annotated[
         str | None, typer.Argument(metavar="[NAME|FILE]", help="Show one robot in full.")
     ] = None,
@@ -21,6 +31,7 @@ def robots(
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import robot_row, robot_text, robots_grid
     from vftcli.robots import PROFILES, load_robot
+    from vftcli.robots.choice import RobotChoice
 
     if name is None:
         rows = [robot_row(load_robot(profile)) for profile in PROFILES]
@@ -29,7 +40,7 @@ def robots(
         else:
             typer.echo(terminal(robots_grid(rows)), nl=False)
         return
-    robot = load_robot(name)
+    robot = RobotChoice.parsed(robot=name, **described.words()).named()
     if json:
         say_json(robot.document or robot_row(robot))
     else:

@@ -49,7 +49,18 @@ Anyway = Annotated[bool, typer.Option(ANYWAY[0], help=ANYWAY[1])]
 Words = list[str] | None
 """The values of an option that may be repeated."""
 
-ROBOT = ("--robot", "NAME|FILE", "Profile, FILE.toml or FILE.urdf.")
+ROBOT = ("--robot", "NAME|FILE", "Profile, FILE.toml, or a URDF, xacro or MJCF.")
+TIP = (
+    "--tip",
+    "FRAME",
+    "Link or joint at the arm's end, in a description with hands or several arms; the wrench "
+    "stands at a link that is fixed to the last one.",
+)
+ROBOT_ARG = (
+    "--robot-arg",
+    "NAME=VALUE",
+    "An argument of a xacro, which is a program. Repeatable.",
+)
 FREE = (
     "--free",
     "LOG|A:B",
@@ -103,13 +114,17 @@ class RobotOptions(ChoiceBundle["RobotChoice"]):
 
     robot: str | None = option(*ROBOT)
     friction: str | None = option(
-        "--friction", "profile|none", "The robot's friction model (default), or none."
+        "--friction",
+        "profile|none|model",
+        "The robot file's friction (default), none, or what an MJCF gives for simulation.",
     )
     payload: str | None = option(
         "--payload",
         "NAME",
         "Mount a [payload.NAME] of the robot file; log: the one that the log declares.",
     )
+    tip: str | None = option(*TIP)
+    robot_arg: Words = option(*ROBOT_ARG)
 
 
 class ObserverOptions(ChoiceBundle["ObserverChoice"]):

@@ -50,7 +50,7 @@ def contact_thresholds(
 
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
-    from vftcli.cli.console import health_of, say, say_json, say_recording
+    from vftcli.cli.console import health_of, say, say_json, say_recording, say_robots
     from vftcli.contacts.caught import check_contacts
     from vftcli.contacts.compared_signals import check_alike, compared_signals
     from vftcli.contacts.thresholds import find_thresholds, left_out
@@ -90,6 +90,7 @@ def contact_thresholds(
         return
     for run in free:
         say_recording(run.recording)
+    say_robots(choice.examiner.robots)
     for remark in (*remarks, *(checked.remarks if checked else ())):
         say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
     typer.echo(thresholds_text(thresholds, counted, checked), nl=False)

@@ -91,7 +91,7 @@ def tune_gains(
         say_json({"goal": goal, "examination": health, "notes": notes, "observers": rows})
         return
     say_recording(recording)
-    for note in notes:
+    for note in (*arm.remarks, *notes):
         say(f"note: {note}")
     typer.echo(terminal(tuned_grid(tuned, wanted.threshold is not None)).rstrip("\n"))
     say(f"wrote {output}: use it with --gains {output}")

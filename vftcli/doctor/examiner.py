@@ -12,6 +12,7 @@ from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.drive import effort_name
 from vftcli.robots.pairing import paired
 from vftcli.robots.robot import Robot
+from vftcli.robots.winding import unwound
 from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, fact
@@ -82,13 +83,20 @@ class Examiner:
             self._robots[key] = replace(robot, remarks=(*robot.remarks, *remarks))
         return self._robots[key]
 
+    @property
+    def robots(self) -> tuple[Robot, ...]:
+        """All that were loaded, in their order."""
+        return tuple(self._robots.values())
+
     def taken(self, recording: Recording, robot: Robot, choice: ReadChoice) -> Recording:
         """A log laid on its robot, its effort taken for what the model explains best if it is open.
+
+        Joints are taken by name, endless ones unwound.
 
         Raises:
             RobotError: If the names of its joints are not the robot's.
         """
-        recording = paired(recording, robot)
+        recording = unwound(paired(recording, robot), robot)
         if choice.effort != "auto":
             return recording
         for finding in examine(recording, robot).findings:

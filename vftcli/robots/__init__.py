@@ -1,9 +1,11 @@
-"""Robots: the built-in profiles, and the loaders of users' own TOML and URDF files."""
+"""Robots: the built-in profiles, and the loaders of users' own files."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from vftcli.robots.chain import Chain, Payload
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
+from vftcli.robots.robot_file import DESCRIPTIONS
 from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import did_you_mean
 
@@ -14,25 +16,30 @@ PROFILES: dict[str, Path] = {
 """Built-in profile name → its file."""
 
 
-def load_robot(robot: str | Path) -> Robot:
-    """Load a robot by profile name, TOML file or URDF file.
+def load_robot(robot: str | Path, *, tip: str = "", arguments: Sequence[str] = ()) -> Robot:
+    """Load a robot by profile name, from a robot file (TOML) or a description (URDF, xacro, MJCF).
+
+    Args:
+        robot: The name, or the file.
+        tip: The link or joint at the arm's end in a description with hands or several arms.
+        arguments: Arguments of a xacro, each ``NAME=VALUE``.
 
     Raises:
         RobotError: If there is no such profile or file, or it is not a valid description.
     """
-    if str(robot) in PROFILES:
+    path = PROFILES.get(str(robot), Path(robot))
+    ending = path.suffix.lower()
+    if ending == ".toml":
         from vftcli.robots.profile import load_profile
 
-        return load_profile(PROFILES[str(robot)])
-    path = Path(robot)
-    if path.suffix.lower() in {".urdf", ".xml"}:
-        from vftcli.robots.urdf import load_urdf
-
-        return load_urdf(path)
-    if path.suffix.lower() == ".toml":
-        from vftcli.robots.profile import load_profile
-
+        for option, given in (("--tip", tip), ("--robot-arg", arguments)):
+            if given:
+                raise RobotError(f"{option} is for a URDF, xacro or MJCF; {robot} is a robot file")
         return load_profile(path)
+    if ending in DESCRIPTIONS:
+        from vftcli.robots.described import load_described
+
+        return load_described(path, tip, arguments)
     raise RobotError(
         f"no robot {str(robot)!r}.{did_you_mean(str(robot).lower(), PROFILES)} "
         f"Built in: {', '.join(PROFILES)}; or give a FILE.toml or FILE.urdf."

@@ -164,17 +164,43 @@ def unphysical(mass: float, inertia: Array) -> str:
     A tensor of a real mass distribution has non-negative principal moments, none larger than the
     sum of the other two. Published tables are rounded, so 1e-6 of the largest moment is let pass.
     """
-    if not np.isfinite(mass) or mass < 0:
-        return f"mass is {mass:g} kg; it must be zero or positive"
-    if not np.all(np.isfinite(inertia)):
-        return "inertia is not finite"
+    if why := improper(mass, inertia):
+        return why
     low, middle, high = np.linalg.eigvalsh(inertia)
-    slack = 1e-6 * max(abs(high), abs(low), 1e-12)
-    if low < -slack:
-        return f"inertia has the negative principal moment {low:.4g} kg·m²"
-    if high > low + middle + slack:
+    if high > low + middle + slack_of(inertia):
         return (
             f"inertia breaks the triangle inequality: principal moment {high:.4g} is larger than "
             f"{low:.4g} + {middle:.4g} kg·m²"
         )
     return ""
+
+
+def improper(mass: float, inertia: Array) -> str:
+    """Say why these are no mass and no tensor at all: not finite, or below zero; or ""."""
+    if not np.isfinite(mass) or mass < 0:
+        return f"mass is {mass:g} kg; it must be zero or positive"
+    if not np.all(np.isfinite(inertia)):
+        return "inertia is not finite"
+    low = float(np.linalg.eigvalsh(inertia)[0])
+    if low < -slack_of(inertia):
+        return f"inertia has the negative principal moment {low:.4g} kg·m²"
+    return ""
+
+
+def slack_of(inertia: Array) -> float:
+    """How far a rounded tensor may be beyond what a body can have. [kg·m²]"""
+    return 1e-6 * max(float(np.max(np.abs(np.linalg.eigvalsh(inertia)))), 1e-12)
+
+
+def nearest_tensor(inertia: Array) -> Array:
+    """The tensor itself if a body can have it, else the nearest that one can. (3, 3) [kg·m²]
+
+    The second moments Σ = ½ tr(I) 1 − I of a body's mass have no negative eigenvalue; those that
+    are negative become zero.
+    """
+    if not unphysical(0.0, inertia):
+        return inertia
+    moments, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+    second: Array = (axes * np.maximum(moments, 0.0)) @ axes.T
+    nearest: Array = np.trace(second) * np.eye(3) - second
+    return nearest

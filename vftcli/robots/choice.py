@@ -1,16 +1,17 @@
 """What a user may choose of the robot: which arm, its friction model, what it carries."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vftcli.robots import PROFILES, Payload, Robot, load_robot
 from vftcli.signals.errors import RobotError
-from vftcli.signals.parsing import check_known
+from vftcli.signals.parsing import assignment, check_known
 from vftcli.signals.recording import Recording
 
-FRICTION = ("profile", "none")
-"""Values of ``--friction``: the model of the robot file, or none at all."""
+FRICTION = ("profile", "none", "model")
+"""Values of ``--friction``: the robot file's, none at all, or that of a simulator's description."""
 DECLARED = "log"
 """Value of ``--payload``: what the log says that the controller was told of."""
 
@@ -20,28 +21,46 @@ class RobotChoice:
     """Which arm made a log, and how it is modelled.
 
     Attributes:
-        name: Profile name, TOML or URDF file, None to take what the log settles.
-        friction: "profile" or "none".
+        name: Profile name, robot file or description, None to take what the log settles.
+        friction: "profile", "none" or "model".
         payload: Name of a ``[payload.NAME]`` of the robot file to mount, "log" for the payload that
             the log says the controller was told of, or None.
+        tip: The link or joint at the arm's end in a description, "" where that is not said.
+        arguments: Arguments of a xacro, each ``NAME=VALUE``.
 
     Raises:
-        ParameterError: If friction is neither of the two.
+        ParameterError: If friction is none of these, or an argument no NAME=VALUE.
     """
 
     name: str | None = None
     friction: str = "profile"
     payload: str | None = None
+    tip: str = ""
+    arguments: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_known(self.friction, FRICTION, f"--friction {self.friction!r}")
+        for word in self.arguments:
+            assignment(word, "--robot-arg", "NAME=VALUE")
 
     @classmethod
     def parsed(
-        cls, *, robot: str | None = None, friction: str | None = None, payload: str | None = None
+        cls,
+        *,
+        robot: str | None = None,
+        friction: str | None = None,
+        payload: str | None = None,
+        tip: str | None = None,
+        robot_arg: Sequence[str] | None = None,
     ) -> "RobotChoice":
-        """The choice that ``--robot``, ``--friction`` and ``--payload`` state."""
-        return cls(name=robot, friction=friction or "profile", payload=payload)
+        """The choice that ``--robot`` and what goes with it state."""
+        return cls(
+            name=robot,
+            friction=friction or "profile",
+            payload=payload,
+            tip=tip or "",
+            arguments=tuple(robot_arg or ()),
+        )
 
     def load(self, recording: Recording, otherwise: str | None = None) -> Robot:
         """Load the robot that is chosen, or the one that the log says.
@@ -58,12 +77,22 @@ class RobotChoice:
             raise RobotError(
                 f"{recording.name} does not say which arm it is; {choices_for(recording)}"
             )
-        robot = load_robot(name)
+        robot = replace(self, name=name).named()
         if self.payload == DECLARED:
             robot = robot.with_payload(declared_payload(recording))
         elif self.payload is not None:
             robot = robot.with_payload(self.payload)
+        if self.friction == "model":
+            return robot.with_simulated_friction()
         return robot.without_friction() if self.friction == "none" else robot
+
+    def named(self) -> Robot:
+        """The robot of the name, as it is described; it must have one.
+
+        Raises:
+            RobotError: If there is no such robot.
+        """
+        return load_robot(self.name or "", tip=self.tip, arguments=self.arguments)
 
 
 def choices_for(recording: Recording) -> str:

@@ -1,8 +1,8 @@
 """Robot files: TOML, schema 1, read and checked, every complaint with the line that is wrong."""
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +73,7 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
     }
     noise = {name: column(joints, f"noise_{name}") for name in SensorNoise.__dataclass_fields__}
     friction, limits = checked_friction(joints), checked_limits(joints)
+    endless = [joint.switch("endless") for joint in joints]
     notes = [fact("robot-file-note", text=text) for text in root.texts("notes")]
     return Robot(
         name=(name := root.text("name", root.file.path.stem)),
@@ -82,6 +83,7 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
         torque_constant=checked_torque_constant(joints, source),
         gear=checked_gear(joints, "gear"),
         efficiency=checked_gear(joints, "gear_efficiency"),
+        endless=tuple(itertools.compress(chain.names, endless)),
         friction=friction,
         limits=limits,
         noise=SensorNoise(**noise),
@@ -242,7 +244,7 @@ def checked_points(section: Section) -> dict[str, tuple[float, ...]]:
     speeds, torques = section.numbers("speeds", 2), section.numbers("torques", 2)
     if len(torques) != len(speeds):
         section.refuse(f"there are {len(torques)} torques for {len(speeds)} speeds", "torques")
-    if any(fast <= slow for slow, fast in pairwise(speeds)):
+    if any(fast <= slow for slow, fast in itertools.pairwise(speeds)):
         section.refuse(f"speeds is {shown(list(speeds))}; each lies above the one before", "speeds")
     return {"speeds": speeds, "torques": torques}
 

@@ -124,6 +124,9 @@ class Robot:
         sample_rate_hz: The vendor's own rate, NaN if not given. [Hz]
         ros_state: ROS 2 message in which its driver publishes the whole state, "" where it has none
             but JointState.
+        endless: Names of joints that turn on and on: their positions may be logged within a turn.
+        simulated_friction: The friction that a simulator's description gives the joints, for
+            ``--friction model``; empty where there is none.
         payload: The load mounted on the flange, or None.
         payloads: Further loads by name, for ``--payload NAME``.
         gains: Observer name → parameter → number, list or word, as in ``[observers.*]``.
@@ -149,6 +152,8 @@ class Robot:
     noise: SensorNoise
     sample_rate_hz: float = float("nan")
     ros_state: str = ""
+    endless: tuple[str, ...] = ()
+    simulated_friction: tuple[JointFriction, ...] = ()
     payload: Payload | None = None
     payloads: Mapping[str, Payload] = field(default_factory=dict)
     gains: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -209,3 +214,16 @@ class Robot:
     def without_friction(self) -> "Robot":
         """Return the robot with no friction model, for ``--friction none``."""
         return replace(self, friction=())
+
+    def with_simulated_friction(self) -> "Robot":
+        """Return the robot with the friction of a simulator, for ``--friction model``.
+
+        Raises:
+            RobotError: If its description gives none.
+        """
+        if not self.simulated_friction:
+            raise RobotError(
+                f"{self.name}: --friction model is what an MJCF gives its joints (damping, "
+                "frictionloss); this robot's description gives none"
+            )
+        return replace(self, friction=self.simulated_friction)

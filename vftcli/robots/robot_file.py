@@ -13,6 +13,9 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError, RobotError
 from vftcli.signals.parsing import shown, toml_tables
 
+DESCRIPTIONS = (".urdf", ".xml", ".xacro", ".mjcf", ".sdf")
+"""Endings of robot descriptions; what they are their content decides."""
+
 LARGEST = 16 << 20
 """Largest robot file; one with all its words has a hundredth of it. [B]"""
 
@@ -122,6 +125,13 @@ class Section(NamedTuple):
         found = tuple(float(item) for item in value)
         self.check_bounds(key, found)
         return found
+
+    def switch(self, key: str) -> bool:
+        """Return true or false, false if the key is absent, or complain."""
+        value = self.values.get(key, False)
+        if not isinstance(value, bool):
+            self.refuse(f"{key} is {shown(value)}; it must be true or false", key)
+        return value
 
     def text(self, key: str, default: str = "") -> str:
         """Return a word or a sentence, `default` if the key is absent, or complain."""

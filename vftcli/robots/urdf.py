@@ -1,176 +1,200 @@
-"""Robots from URDF files, through Pinocchio; drives, friction and gains from a TOML beside them."""
+"""URDF: links and joints as a tree, every number checked; the file may come out of a xacro."""
 
 import re
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import NoReturn
+from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from vftcli.robots.bounds import weightless
-from vftcli.robots.chain import Chain, unphysical
-from vftcli.robots.profile import UPRIGHT, assemble, column
-from vftcli.robots.robot import Limits, Robot, SensorNoise
-from vftcli.robots.robot_file import RobotFile, Section
-from vftcli.robots.urdf_text import checked_urdf, parser_words
+from vftcli.robots.bounds import BOUNDS
+from vftcli.robots.chain import symmetric
+from vftcli.robots.profile import UPRIGHT
+from vftcli.robots.tree import MOST, Body, BodyTree, TreeJoint
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
-from vftcli.signals.pose import rotation_onto
-from vftcli.signals.remarks import caution
+from vftcli.signals.parsing import shown
+from vftcli.signals.pose import Pose, rpy_matrix
 
-UNBOUNDED = ("JointModelRUB", "JointModelRevoluteUnbounded")
-"""How Pinocchio's names of revolute joints without position limits begin."""
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+MOVING = ("revolute", "continuous", "prismatic", "planar")
+"""Types of joints that have an axis."""
 
-FLANGE_NAMES = ("flange", "tool0", "link8", "ee_link", "tcp")
+KINDS = (*MOVING, "fixed", "floating")
+"""Types of joints."""
+
+LIMITS = {"lower": "q_min", "upper": "q_max", "velocity": "qd_max", "effort": "tau_max"}
+"""Attribute of <limit> → field of `vftcli.robots.robot.Limits`."""
 
 
-def load_urdf(path: Path) -> Robot:
-    """Read a revolute serial arm from a URDF, and what a URDF cannot say from a TOML beside it.
+def urdf_tree(path: Path, root: ET.Element) -> BodyTree:
+    """The tree that a URDF describes.
 
-    The TOML has the same name with the ending ``.toml``; its ``[[joints]]`` are matched by name and
-    may give `torque_constant`, `rotor_inertia`, `friction`, noise and limits.
+    Args:
+        path: The file.
+        root: Its element <robot>.
 
     Raises:
-        RobotError: If the file is no URDF, the arm is not serial and revolute, or unphysical.
+        RobotError: If it is empty, links and joints make no tree, or a number is missing, no
+            number, or none that a robot has; the message names the link or the joint.
     """
-    import pinocchio as pin
-
-    text = checked_urdf(path)
-    try:
-        with parser_words() as words:
-            model = pin.buildModelFromXML(text)
-    except (ValueError, RuntimeError) as error:
-        reason = " ".join([*words, *str(error).split()])
-        raise RobotError(f"{path}: not a URDF that Pinocchio can read: {reason}") from None
-    chain = chain_from_model(model, str(path))
-    beside = path.with_suffix(".toml")
-    limits = urdf_limits(model)
-    if not beside.is_file():
-        nothing = np.full(chain.joints, np.nan)
-        return Robot(
-            name=model.name or path.stem,
-            title=model.name or path.stem,
-            chain=chain,
-            limits=limits,
-            noise=SensorNoise(current=nothing, tau=nothing, q=nothing, qd=nothing),
-            remarks=(caution("urdf-alone", file=beside.name),),
-            path=path,
-        )
-    root = RobotFile(beside).root
-    joints = matched_joints(root, chain)
-    rotor = column(joints, "rotor_inertia", default=0.0)
-    gravity = root.vector("gravity", 3, UPRIGHT)
-    chain = replace(chain, rotor_inertia=rotor + chain.rotor_inertia, gravity=gravity)
-    robot = assemble(root, joints, chain)
-    known = {
-        name: np.where(np.isnan(mine := getattr(robot.limits, name)), getattr(limits, name), mine)
-        for name in Limits.__dataclass_fields__
-    }
-    return replace(robot, limits=Limits(**known), path=path)
-
-
-def matched_joints(root: Section, chain: Chain) -> list[Section]:
-    """Return the ``[[joints]]`` of the TOML beside a URDF in the chain's order, matched by name."""
-    tables = {str(table.get("name")): table for table in root.tables("joints")}
-    if unknown := [name for name in tables if name not in chain.names]:
+    links = [UrdfPart(path, element) for element in root.iterfind("link")]
+    joints = [UrdfPart(path, element) for element in root.iterfind("joint")]
+    if max(len(links), len(joints)) > MOST:
         raise RobotError(
-            f"{root.file.path}: no joint {unknown[0]!r} in the URDF; "
-            f"it has {', '.join(chain.names)}"
+            f"{path}: has {len(links)} links and {len(joints)} joints; a robot has at most {MOST}"
         )
-    return [
-        Section(root.file, tables.get(name, {"name": name}), "joints", j)
-        for j, name in enumerate(chain.names)
-    ]
-
-
-def chain_from_model(model: Any, owner: str) -> Chain:  # noqa: ANN401 - Pinocchio is untyped
-    """Take a chain's constants out of a Pinocchio model, turning each frame so that z is the axis.
-
-    Raises:
-        RobotError: If a joint is not revolute, the arm branches, or a body is unphysical.
-    """
-    names = [str(name) for name in model.names[1:]]
-    if not names:
-        raise RobotError(f"{owner}: the model has no moving joint; an arm needs revolute ones")
-    turn_before = np.eye(3)
-    rotations, translations, masses, coms, inertias = [], [], [], [], []
-    turn = turn_before
-    for k, name in enumerate(names, start=1):
-        if model.parents[k] != k - 1:
-            raise RobotError(
-                f"{owner}: joint {name!r} branches off {model.names[model.parents[k]]!r}; only "
-                "serial arms are supported. Remove the gripper or lock its joints (type fixed)."
-            )
-        turn = rotation_onto(joint_axis(model, k, owner))
-        place = model.jointPlacements[k]
-        rotations.append(turn_before.T @ place.rotation @ turn)
-        translations.append(turn_before.T @ place.translation)
-        body = model.inertias[k]
-        if why := unphysical(float(body.mass), np.array(body.inertia)):
-            raise RobotError(f"{owner}: the link of joint {name!r} is unphysical: {why}")
-        masses.append(float(body.mass))
-        coms.append(turn.T @ body.lever)
-        inertias.append(turn.T @ body.inertia @ turn)
-        turn_before = turn
-    if why := weightless(sum(masses)):
-        raise RobotError(f"{owner}: {why}")
-    flange = flange_placement(model, len(names))
-    armature = np.array(model.armature)
-    slots = [model.joints[k].idx_v for k in range(1, len(names) + 1)]
-    return Chain(
-        names=tuple(names),
-        rotation=np.array(rotations),
-        translation=np.array(translations),
-        mass=np.array(masses),
-        com=np.array(coms),
-        inertia=np.array(inertias),
-        rotor_inertia=armature[slots],
-        gravity=np.array(model.gravity.linear),
-        flange_rotation=turn.T @ flange.rotation,
-        flange_translation=turn.T @ flange.translation,
+    if not links:
+        raise RobotError(f"{path}: the <robot> is empty: it has no link and no joint")
+    bodies: dict[str, Body | None] = {}
+    for link in links:
+        if link.name in bodies:
+            link.refuse("another link has this name; each needs its own")
+        bodies[link.name] = link.body()
+    return BodyTree(
+        name=root.get("name", "") or path.stem,
+        path=path,
+        bodies=bodies,
+        joints=[joint.joint() for joint in joints],
+        gravity=np.array(UPRIGHT),
     )
 
 
-def joint_axis(model: Any, index: int, owner: str) -> Array:  # noqa: ANN401
-    """The unit axis of a revolute joint in its own frame. (3,)"""
-    import pinocchio as pin
+class UrdfPart:
+    """A link or a joint of a URDF, read number by number.
 
-    joint = model.joints[index]
-    kind = joint.shortname()
-    if aligned := re.fullmatch("JointModelR(?:UB)?([XYZ])", kind):
-        return np.array(np.eye(3)["XYZ".index(aligned[1])])
-    if not kind.startswith("JointModelRevolute"):
-        raise RobotError(
-            f"{owner}: joint {model.names[index]!r} is a {kind.removeprefix('JointModel')}, not "
-            "revolute; only arms of revolute joints are supported. Lock it (type fixed) if it "
-            "belongs to a gripper."
+    Attributes:
+        path: The file.
+        element: The link or the joint.
+    """
+
+    def __init__(self, path: Path, element: ET.Element) -> None:
+        self.path = path
+        self.element = element
+
+    @property
+    def name(self) -> str:
+        """Its name.
+
+        Raises:
+            RobotError: If it has none.
+        """
+        if not (name := self.element.get("name", "")):
+            self.refuse("it needs a name")
+        return name
+
+    def refuse(self, message: str) -> NoReturn:
+        """Raise a RobotError that names the file and the link or joint."""
+        name = self.element.get("name", "without a name")
+        raise RobotError(f"{self.path}: {self.element.tag} {name!r}: {message}")
+
+    def body(self) -> Body | None:
+        """The link's inertia in its axes, None where it has none."""
+        inertial = self.element.find("inertial")
+        if inertial is None:
+            return None
+        mass = self.bounded(inertial, "mass", "value", 1, "mass")[0]
+        tensor = [self.bounded(inertial, "inertia", key, 1, "inertia")[0] for key in TENSOR]
+        R, com = self.origin(inertial)
+        return Body(mass, com, R @ symmetric(tensor) @ R.T)
+
+    def joint(self) -> TreeJoint:
+        """The joint."""
+        kind = self.element.get("type", "")
+        if kind not in KINDS:
+            self.refuse(f"type is {shown(kind)}; it is one of {', '.join(KINDS)}")
+        mimic = self.element.find("mimic")
+        known = {} if mimic is None else mimic.attrib
+        follows = known.get("joint", "")
+        if mimic is not None and not follows:
+            self.refuse("<mimic> names no joint")
+        return TreeJoint(
+            name=self.name,
+            kind=kind,
+            parent=self.link("parent"),
+            child=self.link("child"),
+            placement=self.origin(self.element),
+            axis=self.axis() if kind in MOVING else np.array([1.0, 0.0, 0.0]),
+            limits=self.limits(endless=kind == "continuous"),
+            follows=follows,
+            **{
+                key: self.numbers(mimic, key, 1)[0]
+                for key in ("multiplier", "offset")
+                if mimic is not None and key in known
+            },
         )
-    data = model.createData()
-    pin.computeJointJacobians(model, data, pin.neutral(model))
-    local = pin.getJointJacobian(model, data, index, pin.ReferenceFrame.LOCAL)
-    return np.array(local[3:, joint.idx_v])
 
+    def link(self, tag: str) -> str:
+        """The link that <parent> or <child> names."""
+        found = self.element.find(tag)
+        if found is None or not (name := found.get("link", "")):
+            self.refuse(f"<{tag}> is missing, or names no link")
+        return name
 
-def flange_placement(model: Any, last: int) -> Any:  # noqa: ANN401
-    """The flange in the last joint's frame: a frame of a usual name, else the farthest one."""
-    frames = [f for f in model.frames if int(f.parentJoint) == last]
-    for wanted in FLANGE_NAMES:
-        for frame in frames:
-            if frame.name == wanted or frame.name.endswith(f"_{wanted}"):
-                return frame.placement
-    return max(frames, key=lambda f: float(np.linalg.norm(f.placement.translation))).placement
+    def axis(self) -> Array:
+        """The unit axis; x where none is given. (3,)"""
+        axis = self.element.find("axis")
+        if axis is None:
+            return np.array([1.0, 0.0, 0.0])
+        vector = np.array(self.numbers(axis, "xyz", 3))
+        # An axis is normalised: shorter, it is rounding, longer, its square overflows.
+        if not 1e-9 < np.max(np.abs(vector)) < 1e9:
+            self.refuse(f"axis is {axis.get('xyz')!r}; it must point somewhere")
+        unit: Array = vector / np.linalg.norm(vector)
+        return unit
 
+    def limits(self, *, endless: bool) -> dict[str, float]:
+        """What <limit> gives: positions where the joint has an end, speed and torque above zero."""
+        found = self.element.find("limit")
+        if found is None:
+            return {}
+        values = {
+            field: self.numbers(found, key, 1)[0]
+            for key, field in LIMITS.items()
+            if key in found.attrib
+        }
+        ends = set() if endless else {"q_min", "q_max"}
+        return {k: v for k, v in values.items() if k in ends or (k[:2] != "q_" and v > 0)}
 
-def urdf_limits(model: Any) -> Limits:  # noqa: ANN401
-    """The URDF's joint limits; NaN where it gives none or the joint is continuous."""
-    n = model.njoints - 1
-    limits = {name: np.full(n, np.nan) for name in Limits.__dataclass_fields__}
-    for k in range(1, n + 1):
-        joint = model.joints[k]
-        speed, effort = model.velocityLimit[joint.idx_v], model.effortLimit[joint.idx_v]
-        limits["qd_max"][k - 1] = speed if 0 < speed < 1e300 else np.nan
-        limits["tau_max"][k - 1] = effort if 0 < effort < 1e300 else np.nan
-        if not joint.shortname().startswith(UNBOUNDED):
-            limits["q_min"][k - 1] = model.lowerPositionLimit[joint.idx_q]
-            limits["q_max"][k - 1] = model.upperPositionLimit[joint.idx_q]
-    return Limits(**limits)
+    def origin(self, parent: ET.Element) -> Pose:
+        """The pose that <origin> gives; both of its keys may be left out."""
+        found = parent.find("origin")
+        xyz, rpy = (
+            self.bounded(parent, "origin", key, 3, key)
+            if found is not None and key in found.attrib
+            else [0.0, 0.0, 0.0]
+            for key in ("xyz", "rpy")
+        )
+        return Pose(rpy_matrix(rpy), np.array(xyz))
+
+    def bounded(
+        self, parent: ET.Element, tag: str, key: str, length: int, bound: str
+    ) -> list[float]:
+        """The numbers of an attribute of an element below `parent`, held to a robot file's bound.
+
+        Args:
+            parent: What holds the element.
+            tag: What it is called.
+            key: The attribute.
+            length: How many numbers it has.
+            bound: Key of `vftcli.robots.bounds.BOUNDS`.
+        """
+        found = parent.find(tag)
+        if found is None:
+            self.refuse(f"<{parent.tag}> has no <{tag}>")
+        if key not in found.attrib:
+            self.refuse(f"<{tag}> has no {key}")
+        values = self.numbers(found, key, length)
+        if why := BOUNDS[bound].broken(f"{tag} {key}", values):
+            self.refuse(why)
+        return values
+
+    def numbers(self, element: ET.Element, key: str, length: int) -> list[float]:
+        """The numbers of an attribute. (length,)"""
+        text = element.get(key, "")
+        words = text.split()
+        if len(words) != length or not all(NUMBER.fullmatch(word) for word in words):
+            due = "a number" if length == 1 else f"{length} numbers"
+            self.refuse(f"{element.tag} {key} is {shown(text)}; it must be {due}")
+        return [float(word) for word in words]

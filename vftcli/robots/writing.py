@@ -99,8 +99,12 @@ def xyz_rpy_document(robot: Robot) -> Table:
         rpy = list(rpy_angles(chain.rotation[j]))
         known = {key: float(of[j]) for key, of in figures.items() if math.isfinite(of[j])}
         joints.append({"name": name, "xyz": chain.translation[j].tolist(), "rpy": rpy, **known})
+        if name in robot.endless:
+            joints[-1]["endless"] = True
+    # Which arm of a description it is and what is locked is settled: the chain is the arm's.
+    settled = {"joints", "tip", "lock"}
     return {
-        **{key: value for key, value in robot.document.items() if key != "joints"},
+        **{key: value for key, value in robot.document.items() if key not in settled},
         "convention": "xyz-rpy",
         "ee_xyz": chain.flange_translation.tolist(),
         "ee_rpy": list(rpy_angles(chain.flange_rotation)),

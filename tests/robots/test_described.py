@@ -1,0 +1,242 @@
+"""Robots from descriptions: the TOML beside them, and what is said of their inertia."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from made_urdfs import (
+    agrees_with_pinocchio,
+    arm,
+    clawed,
+    fingered,
+    joint,
+    knuckled,
+    link,
+    mobile,
+    robot,
+    two_armed,
+    written,
+)
+
+from vftcli.robots import Robot, load_robot
+from vftcli.robots.kernels import momentum_terms
+from vftcli.robots.writing import robot_toml
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import RobotError
+from vftcli.signals.remarks import Remark
+
+
+def said(robot: Robot, code: str) -> Remark:
+    (remark,) = (remark for remark in robot.remarks if remark.code == code)
+    return remark
+
+
+def beside(folder: Path, text: str, toml: str) -> Path:
+    written(folder, toml, "arm.toml")
+    return written(folder, text)
+
+
+def test_the_toml_beside_says_which_arm_and_how_the_rest_is_held(tmp_path: Path) -> None:
+    path = beside(
+        tmp_path, two_armed(), 'tip = "right_link7"\n[[joints]]\nname = "right_joint2"\n'
+        'rotor_inertia = 0.5\n[[joints]]\nname = "left_joint2"\nrotor_inertia = 9.0\n',
+    )  # fmt: skip
+    found = load_robot(path)
+    assert found.chain.names[0] == "right_joint1"
+    np.testing.assert_array_equal(found.chain.rotor_inertia, [0, 0.5, 0, 0, 0, 0, 0])
+    assert load_robot(path, tip="left_tool0").chain.names[0] == "left_joint1"  # the option wins
+
+
+@pytest.mark.parametrize(
+    ("text", "angles"),
+    [
+        (fingered(), {"finger_joint1": 0.03, "finger_joint2": 0.01}),
+        (clawed(), {"finger_1": 0.7, "fingertip_1": -0.4, "finger_3": 0.2}),
+        (mobile(), {"x_joint": 0.4, "yaw_joint": 0.8, "lift_joint": 0.3, "piston_joint": -0.5}),
+    ],
+    ids=["fingered", "clawed", "mobile"],
+)
+def test_what_is_locked_at_an_angle_is_where_pinocchio_holds_it(
+    text: str, angles: dict[str, float], tmp_path: Path
+) -> None:
+    table = ", ".join(f"{name} = {angle}" for name, angle in angles.items())
+    found = load_robot(beside(tmp_path, text, f"lock = {{{table}}}\n"))
+    agrees_with_pinocchio(text, found, angles)
+    assert all(f"{name} at {angle:g}" in str(found.remarks[0]) for name, angle in angles.items())
+
+
+def test_a_joint_that_follows_a_locked_one_goes_with_it(tmp_path: Path) -> None:
+    """The URDF's multiplier −1 and offset 0.1."""
+    found = load_robot(beside(tmp_path, knuckled(), "lock = {finger_joint = 0.3}\n"))
+    followers = [
+        f"{side}_{bone}_joint" for side in ("left", "right") for bone in ("knuckle", "tip")
+    ]
+    angles = {"finger_joint": 0.3, **dict.fromkeys(followers, -0.2)}
+    agrees_with_pinocchio(knuckled(), found, angles)
+
+
+def test_a_joint_of_the_arm_may_be_locked(tmp_path: Path) -> None:
+    """A torso that the arm stands on, held."""
+    text = robot(link("base"), arm(7))
+    found = load_robot(beside(tmp_path, text, "lock = {joint1 = 0.4}\n"))
+    assert found.chain.names == tuple(f"joint{k}" for k in range(2, 8))
+    agrees_with_pinocchio(text, found, {"joint1": 0.4})
+
+
+@pytest.mark.parametrize(
+    ("toml", "words"),
+    [
+        ("lock = {finger = 1}", r"line 1: lock: no joint 'finger'\. Did you mean .* There is jo"),
+        ("lock = {finger_joint1 = true}", "finger_joint1 is True; it must be a finite number"),
+        ("lock = {finger_joint1 = 1e9}", "finger_joint1 is 1e.09; on a robot|must be a finite"),
+        ("lock = 3", r"lock must be a section \[lock\]"),
+        ("tip = 3", "tip is 3; it must be text in quotes"),
+        ('tip = "nowhere"', "--tip 'nowhere': no link or joint of that name"),
+        ('[[joints]]\nname = "joint9"', r"no joint 'joint9' in arm\.urdf; it has joint1, joint2"),
+        ('[[joints]]\nname = "joint1"\nendless = 1', "endless is 1; it must be true or false"),
+    ],
+)
+def test_a_toml_that_does_not_fit_is_refused(tmp_path: Path, toml: str, words: str) -> None:
+    with pytest.raises(RobotError, match=words):
+        load_robot(beside(tmp_path, fingered(), toml))
+
+
+def flattened(urdf: str, name: str, moments: tuple[float, float, float]) -> str:
+    """The URDF with other principal moments of one link."""
+    bad = link(name, 1.0, (moments[0], 0, 0, moments[1], 0, moments[2]))
+    before, after = urdf.split(f'<link name="{name}">')
+    return before + bad + after.partition("</link>")[2]
+
+
+def inverse_dynamics(robot: Robot, q: Array, v: Array, a: Array) -> Array:
+    model = robot.chain.to_pinocchio()
+    return np.array(pin.rnea(model, model.createData(), q, v, a))
+
+
+def test_a_tensor_that_no_body_has_is_projected_and_its_effect_said(tmp_path: Path) -> None:
+    """Principal moments 1, 2, 4 g·m²: second moments −.5 + … → (2.5, 1.5, 0), so 1.5, 2.5, 4."""
+    text = flattened(robot(link("base"), arm(6)), "link4", (1e-3, 2e-3, 4e-3))
+    found = load_robot(written(tmp_path, text))
+    remark = said(found, "tensors-changed")
+    assert remark.where.joints == (4,)
+    assert remark.values["links"] == ["link4"]
+    np.testing.assert_allclose(
+        np.linalg.eigvalsh(found.chain.inertia[3]), [1.5e-3, 2.5e-3, 4e-3], rtol=1e-12
+    )
+    # What Pinocchio makes of the file as it is differs by what is said, at 1 rad/s and 2 rad/s².
+    model, rng, worst = pin.buildModelFromXML(text), np.random.default_rng(5), 0.0
+    for _ in range(300):
+        q = rng.uniform(-np.pi, np.pi, 6)
+        v, a = rng.choice([-1.0, 1.0], 6), 2.0 * rng.choice([-1.0, 1.0], 6)
+        theirs = pin.rnea(model, model.createData(), q, v, a)
+        worst = max(worst, float(np.max(np.abs(inverse_dynamics(found, q, v, a) - theirs))))
+    assert remark.values["worst_Nm"] == pytest.approx(worst, rel=0.3)  # of 64 poses and of 300
+    assert "J4: the inertia of link4 breaks the triangle inequality" in str(remark)
+
+
+def test_a_file_that_gives_only_the_moment_about_the_axis_keeps_it(tmp_path: Path) -> None:
+    text = flattened(robot(link("base"), arm(6)), "link1", (0.0, 0.0, 4e-3))
+    moments = np.linalg.eigvalsh(load_robot(written(tmp_path, text)).chain.inertia[0])
+    np.testing.assert_allclose(moments, [2e-3, 2e-3, 4e-3], rtol=1e-12)
+
+
+def test_a_negative_moment_is_refused(tmp_path: Path) -> None:
+    text = flattened(robot(link("base"), arm(6)), "link2", (-1e-3, 2e-3, 2e-3))
+    with pytest.raises(RobotError, match="joint 'joint2' is unphysical: inertia has the negative"):
+        load_robot(written(tmp_path, text))
+
+
+def without_inertia(urdf: str, *names: str) -> str:
+    """The URDF without what these links weigh."""
+    for name in names:
+        before, after = urdf.split(f'<link name="{name}">')
+        urdf = f'{before}<link name="{name}"/>{after.partition("</link>")[2]}'
+    return urdf
+
+
+def test_an_arm_without_mass_is_refused(tmp_path: Path) -> None:
+    """Three fingers without mass are a hand all the same."""
+    bones = [f"{bone}{k}" for bone in ("finger", "fingertip") for k in (1, 2, 3)]
+    text = without_inertia(clawed(), *(f"link{k}" for k in range(1, 7)), *bones)
+    with pytest.raises(RobotError, match=r"weigh 0 kg, less than 0\.05 kg.*maker's dynamic desc"):
+        load_robot(written(tmp_path, text))
+
+
+def test_a_link_without_mass_is_said(tmp_path: Path) -> None:
+    text = robot(link("base"), arm(6))
+    between = load_robot(written(tmp_path, without_inertia(text, "link3")))
+    assert said(between, "links-without-mass").where.joints == (3,)
+    assert "mass-matrix-singular" not in {remark.code for remark in between.remarks}
+    at_the_end = load_robot(written(tmp_path, without_inertia(text, "link6")))
+    assert said(at_the_end, "mass-matrix-singular")
+    terms = momentum_terms(at_the_end.chain, np.zeros((1, 6)), np.ones((1, 6)))
+    assert np.all(np.isfinite(terms.p))
+
+
+def test_the_base_s_place_is_in_the_chain_and_gravity_is_said(tmp_path: Path) -> None:
+    """A mount that the URDF tilts: gravity stays the root's; one that it does not know is given."""
+    tilted = robot(link("world", 0.0), joint("mount", "world", "base", "fixed", rpy="1.2 0 0"),
+                   link("base"), arm(5))  # fmt: skip
+    agrees_with_pinocchio(tilted, load_robot(written(tmp_path, tilted)))
+    wall = beside(tmp_path, robot(link("base"), arm(5)), "gravity = [0, -9.81, 0]\n")
+    assert said(load_robot(wall), "arm-taken").values["gravity_m_s2"] == [0.0, -9.81, 0.0]
+
+
+def test_the_arm_that_was_found_is_what_is_written(tmp_path: Path) -> None:
+    """Where `tip` and `lock` chose it, and its endless joints, the chain says it all."""
+    path = beside(tmp_path, knuckled(), 'tip = "gripper"\nlock = {finger_joint = 0.3}\n')
+    found = load_robot(path)
+    again = load_robot(written(tmp_path, robot_toml(found), "again.toml"))
+    assert again.endless == found.endless == found.chain.names
+    q, v, a = np.random.default_rng(2).uniform(-2, 2, (3, 7))
+    # rpy and back: rounding
+    expected = inverse_dynamics(found, q, v, a)
+    np.testing.assert_allclose(inverse_dynamics(again, q, v, a), expected, atol=1e-11)
+
+
+def test_the_sample_with_a_gripper_is_what_it_should_be(samples: Path) -> None:
+    """Masses and gravity torque stand beside the sample, to 1e-6 N·m."""
+    folder = samples / "reach"
+    expected = json.loads((folder / "expected.json").read_text(encoding="utf-8"))
+    of_urdf, of_mjcf = expected["arm_with_gripper.urdf"], expected["arm.mjcf.xml"]
+    found = load_robot(folder / "arm_with_gripper.urdf")
+    values = said(found, "arm-and-locked-taken").values
+    assert list(found.chain.names) == of_urdf["joints"]
+    assert sorted(values["locked"]) == sorted(of_urdf["locked"])
+    assert values["flange"] == of_urdf["flange"]
+    np.testing.assert_allclose(found.chain.mass, of_urdf["link_masses"], rtol=1e-12)
+    q = np.array([of_urdf["gravity_torque"]["q"]])
+    gravity = momentum_terms(found.chain, q, np.zeros((1, 6))).gravity[0]
+    np.testing.assert_allclose(gravity, of_urdf["gravity_torque"]["N·m"], atol=1e-6)
+    again = load_robot(folder / "arm.mjcf.xml")
+    assert again.remarks[0].values["flange"] == of_mjcf["flange"]
+    motion = of_mjcf["inverse_dynamics"]
+    torque = inverse_dynamics(again, *(np.array(motion[key]) for key in ("q", "v", "a")))
+    np.testing.assert_allclose(torque, motion["N·m"], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("arm.sdf", "<sdf version='1.9'/>", "an SDF; take the robot's URDF, or convert it"),
+        ("arm.xml", "<mujocoinclude/>", "a part of an MJCF; take the file that includes it"),
+        ("arm.urdf", "<COLLADA/>", "a mesh; take the URDF that names it"),
+    ],
+)
+def test_what_is_no_description_is_told_what_it_is(
+    name: str, text: str, words: str, tmp_path: Path
+) -> None:
+    with pytest.raises(RobotError, match=words):
+        load_robot(written(tmp_path, text, name))
+
+
+def test_options_of_descriptions_are_refused_where_they_mean_nothing(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match="--tip is for a URDF, xacro or MJCF; ur5 is a robot file"):
+        load_robot("ur5", tip="tool0")
+    with pytest.raises(RobotError, match="--robot-arg is for a URDF, xacro or MJCF; ur5"):
+        load_robot("ur5", arguments=["name=ur"])
+    path = written(tmp_path, fingered())
+    with pytest.raises(RobotError, match="--robot-arg 'name=ur' is for a xacro, which this is not"):
+        load_robot(path, arguments=["name=ur"])

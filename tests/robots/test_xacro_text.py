@@ -1,0 +1,115 @@
+"""Xacro: expanded with arguments, its packages found, and what is refused."""
+
+import sys
+from pathlib import Path
+
+import pytest
+from made_urdfs import arm, fixed, link, robot, written
+
+from vftcli.robots import load_robot
+from vftcli.signals.errors import ParameterError, RobotError
+
+HEAD = """<robot name="$(arg name)" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="gripper" default="false"/>
+<xacro:property name="mass" value="${2 * 0.5}"/>
+"""
+
+
+def xacro(inside: str = "") -> str:
+    hand = f'<xacro:if value="$(arg gripper)">{fixed("hand", "link5", 0.5)}</xacro:if>'
+    body = link("base") + arm(5).replace('mass value="5.0"', 'mass value="${mass}"')
+    return f"{HEAD}{body}{hand}{inside}</robot>"
+
+
+@pytest.fixture
+def _xacro_installed() -> None:
+    pytest.importorskip("xacro", reason="the extra vftcli[xacro] is not installed")
+    pytest.importorskip("xacrodoc", reason="the extra vftcli[xacro] is not installed")
+
+
+@pytest.mark.usefixtures("_xacro_installed")
+def test_a_xacro_is_expanded_with_its_arguments(tmp_path: Path) -> None:
+    path = written(tmp_path, xacro(), "arm.urdf.xacro")
+    bare = load_robot(path, arguments=["name=made"])
+    assert (bare.name, bare.joints, bare.chain.mass[0]) == ("made", 5, 1.0)
+    held = load_robot(path, arguments=["name=made", "gripper=true"])
+    assert held.chain.mass[-1] - bare.chain.mass[-1] == pytest.approx(0.5)
+    assert bare.remarks[0].code == "xacro-run"
+
+
+@pytest.mark.usefixtures("_xacro_installed")
+def test_a_file_that_holds_macros_is_a_xacro_whatever_it_is_called(tmp_path: Path) -> None:
+    assert load_robot(written(tmp_path, xacro()), arguments=["name=made"]).name == "made"
+
+
+@pytest.mark.usefixtures("_xacro_installed")
+def test_packages_beside_the_file_and_above_it_are_found(tmp_path: Path) -> None:
+    parts, own = tmp_path / "parts_description", tmp_path / "own_description" / "urdf"
+    parts.mkdir()
+    own.mkdir(parents=True)
+    written(parts, "<package><name>other_parts</name></package>", "package.xml")
+    argument = '<xacro:arg name="far" default="1"/>'
+    part = f'<robot xmlns:xacro="http://xacro">{argument}{fixed("far_link", "link5", 0.2)}</robot>'
+    written(parts, part, "part.xacro")
+    include = '<xacro:include filename="$(find other_parts)/part.xacro"/>'
+    path = written(own, xacro(include), "arm.xacro")
+    found = load_robot(path, arguments=["name=made", "far=2"])
+    assert found.chain.mass[-1] == pytest.approx(1.2)
+
+
+@pytest.mark.usefixtures("_xacro_installed")
+@pytest.mark.parametrize(
+    ("text", "arguments", "words"),
+    [
+        (xacro(), [], "the xacro needs name: give --robot-arg name=VALUE; it takes name, gripper"),
+        (
+            xacro(),
+            ["name=made", "griper=true"],
+            r"no argument 'griper'\. Did you mean gripper\? As --robot-arg it takes name, gri",
+        ),
+        (xacro("$(arg tool)"), ["name=made"], "the xacro needs tool: give --robot-arg tool=VALUE"),
+        (
+            xacro('<xacro:include filename="$(find nowhere)/x.xacro"/>'),
+            ["name=made"],
+            "cannot be expanded: .*nowhere",
+        ),
+        (xacro("${1 / 0}"), ["name=made"], "cannot be expanded: .*division by zero"),
+        (xacro("${__import__('os')}"), ["name=made"], "cannot be expanded: "),
+        (xacro('<xacro:include filename="arm.xacro"/>'), ["name=made"], "cannot be expanded: "),
+    ],
+)
+def test_a_xacro_that_cannot_be_expanded_says_why_on_one_line(
+    text: str,
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(RobotError, match=words) as caught:
+        load_robot(written(tmp_path, text, "arm.xacro"), arguments=arguments)
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_without_the_package_the_line_that_expands_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "xacro", None)
+    path = written(tmp_path, xacro(), "arm.urdf.xacro")
+    with pytest.raises(
+        RobotError,
+        match=r"pip install 'vftcli\[xacro\]'.*xacro arm\.urdf\.xacro name:=made > arm\.urdf$",
+    ):
+        load_robot(path, arguments=["name=made"])
+
+
+def test_an_argument_is_a_name_and_a_value(tmp_path: Path) -> None:
+    path = written(tmp_path, xacro(), "arm.xacro")
+    with pytest.raises(ParameterError, match="--robot-arg 'name' is not NAME=VALUE"):
+        load_robot(path, arguments=["name"])
+
+
+def test_what_only_names_the_language_is_a_urdf(tmp_path: Path) -> None:
+    """Expanded files keep the declaration of its namespace."""
+    text = robot(link("base"), arm(5)).replace("<robot", '<robot xmlns:xacro="http://xacro"', 1)
+    assert load_robot(written(tmp_path, text)).joints == 5

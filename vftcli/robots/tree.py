@@ -1,0 +1,180 @@
+"""A robot as URDF and MJCF describe it: links in a tree, a joint between each and its parent."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import RobotError
+from vftcli.signals.pose import IDENTITY, Pose, exp_matrix
+
+MOST = 1000
+"""Links and joints of a description: a humanoid with two hands has a fifth of it."""
+
+TURNING = ("revolute", "continuous")
+"""Kinds of joints that an arm is made of."""
+
+
+class Body(NamedTuple):
+    """The inertia of a link: mass [kg], centre [m] and tensor about it [kg·m²], in its own axes."""
+
+    mass: float
+    com: Array
+    inertia: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TreeJoint:
+    """A joint between two links.
+
+    Attributes:
+        name: Its name.
+        kind: "revolute", "continuous", "prismatic", "fixed", or another kind, which cannot move
+            within an arm.
+        parent: The link that carries it.
+        child: The link that it moves; its frame is the joint's.
+        placement: Pose of the child's frame in the parent's at zero.
+        axis: Unit axis in the child's frame. (3,)
+        limits: Fields of `vftcli.robots.robot.Limits` that the description gives.
+        follows: The joint whose position this one's follows, "" for one of its own.
+        multiplier: How far it goes of the other's position.
+        offset: Where it is when the other is at zero. [rad or m]
+        rotor_inertia: Reflected rotor inertia. [kg·m²]
+        damping: Viscous friction that a simulator uses. [N·m·s/rad]
+        dry_friction: Dry friction that a simulator uses. [N·m]
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    placement: Pose = IDENTITY
+    axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    limits: Mapping[str, float] = field(default_factory=dict)
+    follows: str = ""
+    multiplier: float = 1.0
+    offset: float = 0.0
+    rotor_inertia: float = 0.0
+    damping: float = 0.0
+    dry_friction: float = 0.0
+
+    @property
+    def turns(self) -> bool:
+        """Whether it may be a joint of an arm."""
+        return self.kind in TURNING and not self.follows
+
+    def at(self, position: float) -> Pose:
+        """Pose of the child's frame in the parent's at a position. [rad or m]"""
+        if position == 0.0:
+            return self.placement
+        along = position * self.axis
+        if self.kind == "prismatic":
+            return self.placement @ Pose(np.eye(3), along)
+        return self.placement @ Pose(exp_matrix(along), np.zeros(3))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyTree:
+    """Links and joints of a description.
+
+    Attributes:
+        name: The robot's name.
+        path: The file.
+        bodies: Each link's inertia, None where the description gives none.
+        joints: The joints.
+        gravity: Gravity in the root's axes. (3,) [m/s²]
+
+    Raises:
+        RobotError: If two links or joints share a name, or they do not make one tree.
+    """
+
+    name: str
+    path: Path
+    bodies: Mapping[str, Body | None]
+    joints: Sequence[TreeJoint]
+    gravity: Array
+
+    def __post_init__(self) -> None:
+        if len(self.joints) > MOST:
+            raise RobotError(f"{self.path}: has {len(self.joints)} joints, more than {MOST}")
+        names = sorted(joint.name for joint in self.joints)
+        if twice := next((a for a, b in pairwise(names) if a == b), None):
+            raise RobotError(f"{self.path}: two joints are named {twice!r}; each needs its own")
+        for joint in self.joints:
+            for link in (joint.parent, joint.child):
+                if link not in self.bodies:
+                    raise RobotError(f"{self.path}: joint {joint.name!r}: no link {link!r}")
+        children = sorted(joint.child for joint in self.joints)
+        if twice := next((a for a, b in pairwise(children) if a == b), None):
+            raise RobotError(f"{self.path}: link {twice!r} hangs on two joints; a tree's has one")
+        if missed := sorted(self.bodies.keys() - set(self.links)):
+            raise RobotError(
+                f"{self.path}: link {missed[0]!r} is not connected with {self.root!r}; "
+                "the joints must make one tree"
+            )
+
+    @cached_property
+    def above(self) -> dict[str, TreeJoint]:
+        """Link → the joint that moves it; the root has none."""
+        return {joint.child: joint for joint in self.joints}
+
+    @cached_property
+    def below(self) -> dict[str, list[TreeJoint]]:
+        """Link → the joints that it carries, by name: the order in a file has no meaning."""
+        found: dict[str, list[TreeJoint]] = {link: [] for link in self.bodies}
+        for joint in sorted(self.joints, key=lambda joint: joint.name):
+            found[joint.parent].append(joint)
+        return found
+
+    @cached_property
+    def root(self) -> str:
+        """The link that no joint moves."""
+        root = next((link for link in self.bodies if link not in self.above), None)
+        if root is None:
+            raise RobotError(f"{self.path}: no link is the root: the joints make a circle")
+        return root
+
+    @cached_property
+    def links(self) -> tuple[str, ...]:
+        """The links below the root and it, each behind its parent, one branch after the other."""
+        order, waiting = [], [self.root]
+        while waiting:
+            order.append(link := waiting.pop())
+            waiting += [joint.child for joint in reversed(self.below[link])]
+        return tuple(order)
+
+    def path_to(self, link: str) -> list[TreeJoint]:
+        """The joints from the root to a link."""
+        path = []
+        while link in self.above:
+            path.append(self.above[link])
+            link = self.above[link].parent
+        return path[::-1]
+
+    def mass(self, link: str) -> float:
+        """Mass of a link, zero where none is given. [kg]"""
+        body = self.bodies[link]
+        return 0.0 if body is None else body.mass
+
+    @cached_property
+    def mass_beyond(self) -> dict[str, float]:
+        """Link → mass of it and all that it carries. [kg]"""
+        found = {link: self.mass(link) for link in self.links}
+        for link in reversed(self.links):
+            if link in self.above:
+                found[self.above[link].parent] += found[link]
+        return found
+
+    def rigid_links(self, link: str) -> Iterator[tuple[str, Pose]]:
+        """The links fixed to one, itself first, and their poses in its frame."""
+        waiting = [(link, IDENTITY)]
+        while waiting:
+            here, pose = waiting.pop()
+            yield here, pose
+            fixed = [joint for joint in self.below[here] if joint.kind == "fixed"]
+            waiting += [(joint.child, pose @ joint.placement) for joint in reversed(fixed)]
