@@ -7,6 +7,7 @@ stand beside them.
 import ast
 import gzip
 import inspect
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +29,7 @@ from vftcli.repetition import alignment, free_run
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian
-from vftcli.signals.errors import ParameterError, RobotError
+from vftcli.signals.errors import MissingSignalError, ParameterError, RobotError
 from vftcli.signals.remarks import Remark
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 
@@ -215,6 +216,27 @@ def test_what_needs_the_complete_log_does_not_go_with_causal_observers() -> None
         replace(online, refinement=RefinementChoice(remove_bias="whole-log"))
     with pytest.raises(ParameterError, match="--solver smoother needs the complete log"):
         replace(online, wrench=WrenchChoice(solver="smoother"))
+
+
+def test_what_is_derived_from_the_complete_log_is_said_and_kept_from_what_runs_online(
+    tmp_path: Path,
+) -> None:
+    kept = {f"actual_{name}_{j}": f"{name}_{j}" for name in ("q", "current") for j in range(6)}
+    table = pl.read_csv(FIXTURE, separator=" ").rename({"timestamp": "t", **kept})
+    path = tmp_path / "log.csv"
+    table.select("t", *kept.values()).write_csv(path)
+    words = [str(path), "--robot", "ur5", "--observer", "gmo"]
+    made = CliRunner().invoke(app, ["estimate", *words, "-o", str(tmp_path / "out")])
+    assert made.exit_code == 0, made.output
+    record = json.loads((tmp_path / "out" / "run.json").read_text("utf-8"))
+    assert record["input"]["derived"] == ["dq"]
+    assert "derived-velocity" in {w["code"] for w in record["warnings"]}
+    for command in (["estimate", *words, "--causal", "-o", str(tmp_path / "o")], ["admit", *words]):
+        with pytest.raises(MissingSignalError, match="need the complete log"):
+            CliRunner().invoke(app, command, catch_exceptions=False)
+    never = ["estimate", *words, "--derive", "none", "-o", str(tmp_path / "o")]
+    with pytest.raises(MissingSignalError, match="--derive dq"):
+        CliRunner().invoke(app, never, catch_exceptions=False)
 
 
 def test_the_pipeline_is_short_and_imports_nothing_on_its_way() -> None:

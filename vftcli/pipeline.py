@@ -18,7 +18,7 @@ from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import FreeRun, Models
 from vftcli.robots import Robot
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.errors import ParameterError, VftError
+from vftcli.signals.errors import MissingSignalError, ParameterError, VftError
 from vftcli.signals.recording import Recording
 
 if TYPE_CHECKING:
@@ -127,7 +127,22 @@ def prepared(recording: Recording, choice: AnalysisChoice) -> tuple[Recording, R
         RobotError: If no robot is chosen and the log does not settle it.
     """
     robot = choice.examiner.robot(recording, choice.robot)
+    if choice.observers.causal:
+        check_logged(recording, "--causal leaves out what looks ahead")
     return choice.examiner.taken(recording, robot, choice.read), robot
+
+
+def check_logged(recording: Recording, why: str) -> None:
+    """Check that no signal of a log was derived from the complete log.
+
+    Raises:
+        MissingSignalError: If one was, with the reason why that will not do.
+    """
+    if recording.source.derived:
+        raise MissingSignalError(
+            f"{recording.name}: the log has no joint velocities (dq), and those derived from its "
+            f"positions need the complete log; {why}. Record the velocities"
+        )
 
 
 def analyse_log(path: Path, choice: AnalysisChoice) -> "Analysis":

@@ -61,6 +61,7 @@ BAD = {
     "--sensor-pose": ("hand", "--sensor-pose"),
     "--zero": ("nowhere", "is neither A:B in seconds, nor start, nor a log that exists"),
     "--torque-sd": ("some", "--torque-sd"),
+    "--derive": ("tau", "--derive 'tau'"),
     "--reference": ("magic", "no reference 'magic'"),
 }
 """Shared option → a value it does not take, and what the one line on it says."""

@@ -1,5 +1,6 @@
 """Cleaning: what is dropped at the start, where a clock jumps, and what cannot be radians."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -90,3 +91,26 @@ def test_a_span_wider_than_two_turns_is_refused_too():
     log = RawLog(stamps=np.arange(10.0), clock="test", signals={"q": q}, degrees_possible=True)
     with pytest.raises(LogError, match=r"travel 13\.6"):
         cleaned(log, Path("x"), "test")
+
+
+def test_a_named_joint_without_numbers_is_left_out_and_said():
+    """A gripper's effort is NaN throughout; of a whole signal that is NaN no joint is left out."""
+    q, effort = np.full((ROWS, 3), 0.5), np.full((ROWS, 3), 2.0)
+    effort[:, 1] = np.nan
+    log = RawLog(
+        stamps=np.arange(ROWS) * 0.01,
+        clock="test",
+        signals={"q": q, "torque": effort},
+        joint_names=("a", "finger", "b"),
+    )
+    found = cleaned(log, Path("log"), "test")
+    assert found.joint_names == ("a", "b")
+    assert found.q.shape == (ROWS, 2)
+    assert [(r.code, r.values["joints"]) for r in found.source.remarks] == [
+        ("joints-empty", ["finger"])
+    ]
+    with pytest.raises(LogError, match="torque of joint 2 holds no numbers"):
+        cleaned(replace(log, joint_names=()), Path("log"), "test")
+    effort[:] = np.nan
+    with pytest.raises(LogError, match="torque of joint 1 holds no numbers"):
+        cleaned(log, Path("log"), "test")

@@ -340,7 +340,7 @@ def xlsx(path: Path) -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (xlsx, "an Excel workbook. Save the sheet as CSV"),
+        (xlsx, "an Excel workbook; save the sheet as CSV"),
         (lambda path: path.write_bytes(b"ULog\x01\x12\x35\x01" + bytes(99)), "a PX4 ULog"),
     ],
 )

@@ -251,7 +251,7 @@ def test_format_skips_recognition(tmp_path: Path) -> None:
     with pytest.raises(UnknownFormatError, match="known formats: ur-csv"):
         read(path, format="nonsense")
     columns = "t=timestamp,q=actual_q_{i}"
-    assert read(path, format="table", columns=columns).dq is None
+    assert read(path, format="table", columns=columns).target_q is None
 
 
 def test_one_sample_is_a_recording(tmp_path: Path) -> None:

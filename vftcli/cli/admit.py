@@ -195,7 +195,7 @@ def replayed(
 ) -> "tuple[Replay, Recording, tuple[Examination, ...]]":
     """A log's force through every controller."""
     from vftcli.admittance.replay import replay
-    from vftcli.pipeline import prepared
+    from vftcli.pipeline import check_logged, prepared
     from vftcli.readers.estimates import estimates_columns
 
     stored, observers = None, analysis.observers
@@ -208,6 +208,7 @@ def replayed(
             analysis = analysis.changed(reading=reading, observers=observers)
     choice = chosen(analysis, log)
     recording, arm = prepared(choice.library.open(log, choice.read), choice)
+    check_logged(recording, "admit runs a controller that must not see the future")
     if stored is None:  # estimates of an earlier run were examined in it
         choice.examiner.examine(recording, arm)
     settings = control.parameters(arm)

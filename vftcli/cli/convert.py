@@ -1,5 +1,6 @@
 """`vftcli convert`: any readable log as a table or an MCAP."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -29,9 +30,13 @@ def convert_log(
     from vftcli.outputs.examination import health_line
     from vftcli.outputs.log.conversion import check_conversion, convert
     from vftcli.readers.library import Library
+    from vftcli.signals.errors import ParameterError
 
     check_conversion(output, force)
-    recording = Library().open(log, reading.choice())
+    choice = reading.choice()
+    if choice.derive == "dq":
+        raise ParameterError("convert writes what was logged; --derive dq belongs to an estimate")
+    recording = Library().open(log, replace(choice, derive="none"))
     convert(recording, output, force=force)
     # A table may be made of any log, also of one that no estimate should be made of.
     say(health_line(examine(recording)))

@@ -26,19 +26,16 @@ def inspect_log(
     from vftcli.doctor import Examiner, examine
     from vftcli.outputs.examination import examination_record, examination_text
     from vftcli.readers import read_first_recording
-    from vftcli.robots.winding import unwound
 
     choice = reading.choice()
     recording = read_first_recording(log, choice)
     recording = choice.within(choice.taken(recording))
     chosen = robot.choice()
-    arm = chosen.load(recording) if chosen.name else None
-    recording = recording if arm is None else unwound(recording, arm)
-    say_robots([] if arm is None else [arm])
-    if choice.effort == "auto":
-        examiner = Examiner()
+    examiner, arm = Examiner(), None
+    if chosen.name or choice.effort == "auto":
         arm = examiner.robot(recording, chosen)
         recording = examiner.taken(recording, arm, choice)
+    say_robots(examiner.robots)
     examination = examine(recording, arm)
     if json:
         say_json(examination_record(examination))

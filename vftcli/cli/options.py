@@ -103,6 +103,12 @@ class ReadOptions(ChoiceBundle["ReadChoice"]):
         "--episode", "K|all", "Of a file that holds several: which, or each as a log of its own."
     )
     arm: str | None = option("--arm", "left|right", "Of a log of two arms: which.")
+    derive: str | None = option(
+        "--derive",
+        "dq|none",
+        "Velocities of a log that has none, from its positions over the complete log; from 50 Hz "
+        "on they are derived unasked, and that is said.",
+    )
 
 
 class RobotOptions(ChoiceBundle["RobotChoice"]):

@@ -21,7 +21,7 @@ REFUSING = NO_FIT | {
     "effort-sign", "effort-sign-by-work", "joint-sign", "effort-order", "joint-order",
     "torque-without-gravity", "torque-with-gravity", "current-without-gravity",
     "current-as-torque", "torque-as-current", "milliamperes",
-    "upside-down", "tilted-base", "time-unit",
+    "upside-down", "tilted-base", "time-unit", "velocity-unit",
 }  # fmt: skip
 """Findings that make every result meaningless. A load or a contact is never one of them."""
 

@@ -10,6 +10,7 @@ from vftcli.doctor.fit import guess_robot
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.drive import effort_name
+from vftcli.robots.pairing import paired
 from vftcli.robots.robot import Robot
 from vftcli.robots.winding import unwound
 from vftcli.signals.errors import ExaminationError, RobotError
@@ -88,11 +89,14 @@ class Examiner:
         return tuple(self._robots.values())
 
     def taken(self, recording: Recording, robot: Robot, choice: ReadChoice) -> Recording:
-        """A log with its endless joints unwound, and its effort for what the model explains best.
+        """A log laid on its robot, its effort taken for what the model explains best if it is open.
 
-        The latter only if the choice leaves it open.
+        Joints are taken by name, endless ones unwound.
+
+        Raises:
+            RobotError: If the names of its joints are not the robot's.
         """
-        recording = unwound(recording, robot)
+        recording = unwound(paired(recording, robot), robot)
         if choice.effort != "auto":
             return recording
         for finding in examine(recording, robot).findings:

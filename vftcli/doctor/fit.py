@@ -6,6 +6,7 @@ cent open. An unknown load on the flange is fitted where the poses vary enough t
 """
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,8 @@ from vftcli.doctor.case import Case, size_of
 from vftcli.doctor.effort import case_of
 from vftcli.doctor.windows import Windows, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
+from vftcli.robots.pairing import paired
+from vftcli.signals.errors import RobotError
 from vftcli.signals.recording import EFFORTS, Recording
 
 CLOSE = 1.3
@@ -92,11 +95,12 @@ def ranking(recording: Recording, robots: Mapping[str, Robot]) -> tuple[RobotMat
     """
     if not is_judgeable(recording):
         return ()
-    fits = [
-        fit
-        for name, robot in robots.items()
-        if robot.joints == recording.joints and (fit := match_of(recording, name, robot))
-    ]
+    fits = []
+    for name, robot in robots.items():
+        with suppress(RobotError):  # joints of other names are another arm's
+            log = paired(recording, robot)
+            if log.joints == robot.joints and (fit := match_of(log, name, robot)):
+                fits.append(fit)
     fits.sort(key=lambda fit: (not fit.fits, fit.misfit))
     return tuple(
         replace(fit, fits=fit.fits and fit.misfit <= CLOSE * fits[0].misfit) for fit in fits

@@ -28,6 +28,7 @@ def examination_record(examination: Examination) -> dict[str, Any]:
         "rate_hz": rate_of(recording),
         "max_gap_s": largest_step(recording),
         "duplicates": source.duplicates,
+        **({"derived": list(source.derived)} if source.derived else {}),
         "rows": source.rows,
         "repairs": list(source.repairs),
         "warnings": [

@@ -18,15 +18,16 @@ from vftcli.readers import (
     matlab,
     parquet,
     pickles,
+    ros_text,
     rtde,
     tables,
 )
 from vftcli.readers.bags import formats as bags
 from vftcli.readers.cleaning import RestartError, cleaned
-from vftcli.readers.foreign import refuse_foreign
 from vftcli.readers.opening import Digest
 from vftcli.readers.parts import refuse_arm
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
+from vftcli.readers.unrecognised import description
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import warning
@@ -40,6 +41,7 @@ READERS: dict[str, Reader] = {
         libfranka.NEW,
         libfranka.OLD,
         libfranka.STATES,
+        *ros_text.READERS,
         tables.HEADED,
         tables.HEADERLESS,
         tables.NPY,
@@ -185,11 +187,7 @@ def _recognise(file: LogFile) -> Reader:
     if len(found) == 1:
         return found[0]
     if not found:
-        refuse_foreign(file)
-        raise UnknownFormatError(
-            f"{file.path}: not recognised as any of {', '.join(READERS)}. Name its format with "
-            "--format, or see docs/formats.md for what each expects."
-        )
+        raise UnknownFormatError(f"{file.path}: not recognised as a log: {description(file)}.")
     raise UnknownFormatError(
         f"{file.path}: could be {' or '.join(r.name for r in found)}. Say which with --format."
     )

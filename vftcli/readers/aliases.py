@@ -2,13 +2,14 @@
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers.columns import SIGNALS, Item
-from vftcli.readers.joints import kinematic_order
+from vftcli.readers.joints import effort_of, kinematic_order
 from vftcli.readers.table import (
     Cell,
     Pick,
@@ -21,10 +22,17 @@ from vftcli.readers.table import (
     pick_of,
 )
 from vftcli.signals.errors import LogError
+from vftcli.signals.recording import EFFORTS
 from vftcli.signals.remarks import fact
 
-CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "seconds")
+CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "%time", "seconds")
 """Names of the clock; a unit may follow, as in time_ms."""
+
+NANOSECONDS = re.compile(r"(?P<stem>.*?)(nsecs?|nanosecs?|nanos|nanoseconds|ns)")
+"""The nanoseconds beside a column of seconds whose name has the same stem."""
+
+HEADER_STAMP = re.compile(r"(?:.*[./])?header[./]stamp(?:[./]\w+)?")
+"""A message's own stamp, or a part of it."""
 
 OWN_STAMPS = "t_src_ns"
 """The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes them."""
@@ -52,10 +60,26 @@ INDEXED = re.compile(
     r"(?P<stem>.*?)[_./ ]?(?:(?:joint|j)_?(?P<a>\d{1,9})|\[(?P<b>\d{1,9})\]|(?P<c>\d{1,9}))",
     re.IGNORECASE,
 )  # a number of any length would be tried from each of its digits on
+FIELD = re.compile(r"field\.|/?joint_states?[./]")
+"""What ROS tools put before the fields of a JointState."""
+
 JOINT_FIRST = re.compile(
     r"(?:.*/)?(?P<joint>[A-Za-z][\w ]*)[/.](?P<stem>position|velocity|effort)(?:\[\])?"
 )
 """A joint's name before the signal's, as PlotJuggler exports JointState topics."""
+
+SIGNAL_WORDS = "pos|position|vel|velocity|eff|effort|tau|torque|current"
+SIGNAL_OF_JOINT = (
+    re.compile(rf"(?P<stem>{SIGNAL_WORDS})[_./ ](?P<joint>[A-Za-z][\w ]*)", re.IGNORECASE),
+    re.compile(rf"(?P<joint>[A-Za-z][\w ]*?)[_./ ](?P<stem>{SIGNAL_WORDS})", re.IGNORECASE),
+)
+"""A signal's name before or behind a joint's, as in pos_elbow and elbow_joint_vel."""
+
+NUMBERED_JOINT = re.compile(r"(joint|j)?_?\d+", re.IGNORECASE)
+AXES = re.compile(r"r?[xyz]|q[wxyz]|roll|pitch|yaw", re.IGNORECASE)
+"""What a pose has in place of joints."""
+
+FEWEST_JOINTS = 3
 
 RESIDUAL_TURNED = fact("residual-turned")
 """Said wherever libfranka's residual is taken."""
@@ -75,30 +99,78 @@ def picks_by_alias(table: Table, stated: Sequence[Item] = ()) -> tuple[Picks, tu
     Args:
         table: The table.
         stated: What a --columns text says of some signals; their columns are no other signal's.
+            Where it names the positions, only the clock, velocities and an effort are added.
 
     Raises:
         LogError: If two groups of columns could be the same signal, or none is the positions.
     """
     groups = grouped(table)
-    told = {item.signal: stated_pick(table, item, groups) for item in stated}
-    clock = told.pop("t", None) or _clock(table)
+    rate = next((item.rate for item in stated if item.rate is not None), None)
+    named = [item for item in stated if item.rate is None and item.signal != "_"]
+    told = {item.signal: stated_pick(table, item, groups) for item in named}
+    clock = told.pop("t", None) or (None if rate is not None else _clock(table))
     signals = list(told.values())
-    known, taken = {pick.signal for pick in signals}, {c for pick in signals for c in pick.cells}
-    for signal in ALIASES:
-        if signal not in known and (pick := _pick_of(table, signal, groups)) is not None:
-            signals += [pick] if taken.isdisjoint(pick.cells) else []
-    if "wrench" not in known and (wrench := _wrench(table)) is not None:
-        signals.append(wrench)
+    find = missing_picks if any(pick.signal == "q" for pick in signals) else found_picks
+    signals += find(table, groups, signals)
     joints = next((len(p.cells) for p in signals if p.signal == "q"), 0)
     # A group of another width is about something else: a gripper, a base.
-    also = {"q", "wrench", *known}
+    also = {"q", "wrench", *(pick.signal for pick in told.values())}
     signals = [p for p in signals if len(p.cells) == joints or p.signal in also]
     names_there = table.names or ()
     origin = names_there.index(OWN_STAMPS) if names_there.count(OWN_STAMPS) == 1 else None
     origin = None if origin in table.lists else origin
-    picks = checked(table, Picks(signals=tuple(signals), clock=clock, origin=origin))
-    names = next((g.joints for g in groups.values() if g.joints), ())
+    picks = checked(table, Picks(signals=tuple(signals), clock=clock, rate=rate, origin=origin))
+    q = next(pick.cells for pick in signals if pick.signal == "q")
+    names = next((g.joints for g in groups.values() if g.joints and g.cells == q), ())
+    if effort_of(names) == "current" and not {pick.signal for pick in told.values()} & set(EFFORTS):
+        picks = replace(picks, signals=tuple(_as_driven(pick, groups) for pick in picks.signals))
     return picks, names
+
+
+def found_picks(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> list[Pick]:
+    """All signals that are found by their names beside those that are stated.
+
+    Raises:
+        LogError: If two groups of columns could be one of them.
+    """
+    known, taken = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
+    found = []
+    for signal in ALIASES:
+        if signal not in known and (pick := _pick_of(table, signal, groups)) is not None:
+            found += [pick] if taken.isdisjoint(pick.cells) else []
+    if "wrench" not in known and (wrench := _wrench(table)) is not None:
+        found.append(wrench)
+    return found
+
+
+def missing_picks(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> list[Pick]:
+    """What a text that names the positions leaves out and no estimate can do without.
+
+    Velocities, and an effort where it names none; what two groups could be is left out.
+    """
+    known, taken = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
+    joints = next(len(pick.cells) for pick in stated if pick.signal == "q")
+    found = []
+    for wanted in (("dq",), EFFORTS):
+        picks = []
+        for signal in wanted if known.isdisjoint(wanted) else ():
+            with suppress(LogError):
+                picks.append(_pick_of(table, signal, groups))
+        fitting = [p for p in picks if p is not None and len(p.cells) == joints]
+        fitting = [pick for pick in fitting if taken.isdisjoint(pick.cells)]
+        if len(fitting) == 1:
+            columns = (table.names or ())[fitting[0].cells[0].column]
+            told = fact("signal-by-name", signal=fitting[0].signal, column=columns)
+            found.append(replace(fitting[0], remark=told))
+    return found
+
+
+def _as_driven(pick: Pick, groups: dict[str, Group]) -> Pick:
+    """The effort of UR's drivers as the current that it is, other picks as they are."""
+    efforts = [groups[name].cells for name in ("effort", "eff") if name in groups]
+    if pick.signal != "torque" or pick.cells not in efforts:
+        return pick
+    return replace(pick, signal="current", remark=fact("effort-is-current"))
 
 
 def stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
@@ -124,8 +196,11 @@ def stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
 def grouped(table: Table) -> dict[str, Group]:
     """The columns of a table by name without index, in lower case."""
     found: dict[str, dict[int, Cell]] = {}
-    by_joint: dict[str, dict[str, Cell]] = {}
+    by_joint = joint_columns(table)
+    in_joints = {cell.column for cells in by_joint.values() for cell in cells.values()}
     for column, name in enumerate(table.names or ()):
+        if column in in_joints:
+            continue
         if column in table.lists:
             cells = {k: Cell(column, k) for k in range(table.lists[column])}
             found.setdefault(name.lower(), {}).update(cells)
@@ -133,9 +208,8 @@ def grouped(table: Table) -> dict[str, Group]:
             by_joint.setdefault(match["stem"], {})[match["joint"]] = Cell(column)
         elif match := INDEXED.fullmatch(name):
             index = int(match["a"] or match["b"] or match["c"])
-            if found.setdefault(match["stem"].lower(), {}).setdefault(index, Cell(column)) != Cell(
-                column
-            ):
+            stem = FIELD.sub("", match["stem"].lower(), count=1)
+            if found.setdefault(stem, {}).setdefault(index, Cell(column)) != Cell(column):
                 raise LogError(
                     f"{table.path}: two columns could be {match['stem']} of index {index}: "
                     f"{name!r} and another. Name the columns with --columns."
@@ -151,6 +225,29 @@ def grouped(table: Table) -> dict[str, Group]:
         cells_in_order = tuple(cells_of[name] for name in names)
         groups[stem] = Group(cells_in_order, tuple(range(len(names))), names)
     return groups
+
+
+def joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
+    """Columns that bear a signal's name beside a joint's: signal → joint → cell.
+
+    Names are only taken apart so where two signals have the same joints, and are no axes.
+    """
+    found: dict[str, dict[str, Cell]] = {}
+    for column, name in enumerate(table.names or ()):
+        match = next((m for p in SIGNAL_OF_JOINT if (m := p.fullmatch(name))), None)
+        if match is None or column in table.lists:
+            continue
+        # pos_joint1 is found by its number, as pos_1 is.
+        if not (name.endswith(match["joint"]) and NUMBERED_JOINT.fullmatch(match["joint"])):
+            found.setdefault(match["stem"].lower(), {})[match["joint"]] = Cell(column)
+    joints = {stem: frozenset(cells) for stem, cells in found.items()}
+    return {
+        stem: cells
+        for stem, cells in found.items()
+        if len(cells) >= FEWEST_JOINTS
+        and list(joints.values()).count(joints[stem]) > 1
+        and not any(AXES.fullmatch(joint) for joint in cells)
+    }
 
 
 def _pick_of(table: Table, signal: str, groups: dict[str, Group]) -> Pick | None:
@@ -214,19 +311,43 @@ def _wrench(table: Table) -> Pick | None:
 
 
 def _clock(table: Table) -> Pick | None:
-    """The column of time, None where none bears a name of it."""
+    """The columns of time, None where none bears a name of it: one, or seconds and nanoseconds.
+
+    A message's own stamp goes before the time at which a recorder took it.
+
+    Raises:
+        LogError: If several could be.
+    """
     names = [name.lower() for name in table.names or ()]
+    pairs: list[tuple[int, ...]] = [*_second_pairs(names)]
+    in_pair = {column for pair in pairs for column in pair}
     bare = [re.sub(r"[_ ]?[\[(]?(?<=[_\[( ])(s|ms|us|ns)[\])]?$", "", name) for name in names]
-    found = [
-        column for column, name in enumerate(names) if name in CLOCKS or bare[column] in CLOCKS[:4]
+    single: list[tuple[int, ...]] = [
+        (column,)
+        for column, name in enumerate(names)
+        if column not in in_pair
+        and (name in CLOCKS or bare[column] in CLOCKS[:4] or HEADER_STAMP.fullmatch(name))
     ]
+    found = [*pairs, *single]
+    own = [columns for columns in found if HEADER_STAMP.match(names[columns[0]])]
+    found = own or found
     if len(found) > 1:
-        there = listed([(table.names or ())[column] for column in found])
+        there = listed(["|".join((table.names or ())[c] for c in columns) for columns in found])
         raise LogError(
             f"{table.path}: {there} could each be the clock. Say which with --columns, as in "
-            f"t={(table.names or ())[found[0]]},q=…"
+            f"t={'|'.join((table.names or ())[c] for c in found[0])},q=…"
         )
-    return Pick(signal="t", cells=(table_clock(table, found[0]),)) if found else None
+    return Pick(signal="t", cells=tuple(table_clock(table, c) for c in found[0])) if found else None
+
+
+def _second_pairs(names: Sequence[str]) -> Iterator[tuple[int, int]]:
+    """The columns of whole seconds and of the nanoseconds within them, as ROS writes its stamps."""
+    for column, name in enumerate(names):
+        if match := NANOSECONDS.fullmatch(name):
+            wanted = {match["stem"] + word for word in ("sec", "secs", "second", "seconds", "s")}
+            there = [k for k, other in enumerate(names) if other in wanted]
+            if len(there) == 1:
+                yield there[0], column
 
 
 def table_clock(table: Table, column: int) -> Cell:

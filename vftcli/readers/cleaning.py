@@ -53,9 +53,9 @@ def cleaned(
 ) -> Recording:
     """Make a Recording of what a reader found.
 
-    In order: garbage of a misaligned packet at the start is dropped, values that are no numbers are
-    refused, repeated stamps are dropped, a clock that runs backwards is refused, gaps are counted,
-    and positions that can only be degrees are refused.
+    In order: joints without a signal are left out, garbage of a misaligned packet at the start is
+    dropped, values that are no numbers are refused, repeated stamps are dropped, a clock that runs
+    backwards is refused, gaps are counted, and positions that can only be degrees are refused.
 
     Raises:
         LogError: If a signal holds NaN or infinity, or its unit cannot be radians.
@@ -66,7 +66,7 @@ def cleaned(
         raise ClockError(f"{path}: no samples; the log holds a header only.")
     if raw.segment is not None:
         raw = segment_of(raw, raw.segment, path)
-    raw = without_leading_garbage(raw)
+    raw = without_leading_garbage(without_empty_joints(raw))
     refuse_unknown_numbers(raw, path)
     refuse_backward_steps(raw, path)
     refuse_standing_clock(raw, path)
@@ -120,6 +120,29 @@ def kept(raw: RawLog, keep: Mask | slice, *remarks: Remark) -> RawLog:
         stamps=raw.stamps[keep],
         signals={name: value[keep] for name, value in raw.signals.items()},
         remarks=(*raw.remarks, *remarks),
+    )
+
+
+def without_empty_joints(raw: RawLog) -> RawLog:
+    """Leave out named joints of which a signal is NaN throughout, as a gripper's effort is."""
+    names, width = raw.joint_names, raw.signals["q"].shape[1]
+    if len(names) != width:
+        return raw
+    empty = np.zeros(width, dtype=bool)
+    joints = [name for name, v in raw.signals.items() if name != "wrench" and v.shape[1] == width]
+    for value in (raw.signals[name] for name in joints):
+        if np.isnan(value[0]).any():
+            missing = np.isnan(value).all(axis=0)
+            empty |= missing & ~missing.all()
+    if not empty.any() or empty.all():
+        return raw
+    keep = np.flatnonzero(~empty)
+    told = fact("joints-empty", joints=[names[k] for k in np.flatnonzero(empty)])
+    return replace(
+        raw,
+        signals={n: v[:, keep] if n in joints else v for n, v in raw.signals.items()},
+        joint_names=tuple(names[k] for k in keep),
+        remarks=(*raw.remarks, told),
     )
 
 

@@ -88,11 +88,6 @@ class ColumnSpec:
         return next((item for item in self.items if item.signal == signal), None)
 
     @property
-    def partial(self) -> bool:
-        """Whether it says something of some signals and leaves the others to their names."""
-        return self.named and self.item("q") is None
-
-    @property
     def width(self) -> int:
         """Number of columns that a counting text describes."""
         return sum(item.count for item in self.items if item.rate is None)
@@ -110,10 +105,7 @@ def parse_columns(text: str) -> ColumnSpec:
     items = tuple(_parse_item(part) for part in parts)
     signals = {item.signal for item in items}
     # Nothing can be counted without positions: what is left says a unit or a sign.
-    alone = all(item.count == 1 and item.rate is None for item in items) and not signals & {
-        "q",
-        "_",
-    }
+    alone = all(item.count == 1 for item in items) and not signals & {"q", "_"}
     named = alone or any(item.pattern is not None for item in items)
     for item in items:
         if named and not alone and item.pattern is None and item.rate is None:

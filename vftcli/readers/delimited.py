@@ -3,6 +3,7 @@
 import csv
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import takewhile
@@ -146,6 +147,20 @@ class TextTable:
             if not self._has_blank_rows(frame):
                 return {c: _numbers(frame[str(c)], self.path) for c in columns}
         raise self._diagnosed(kinds)
+
+    def words(self, column: int) -> tuple[str, ...]:
+        """The different texts that a column holds, in the order in which they come.
+
+        Raises:
+            LogError: If the table cannot be parsed.
+        """
+        import polars as pl
+
+        for text in (self._text, self._mended):
+            with suppress(pl.exceptions.PolarsError):
+                found = self._parse(text(), {column: pl.String})[str(column)]
+                return tuple(str(word or "").strip() for word in found.unique(maintain_order=True))
+        raise self._diagnosed({})
 
     def _parse(self, source: Any, kinds: Mapping[int, Any]) -> Any:  # noqa: ANN401 - polars lazily
         """The rows by polars, every wanted column with its type."""

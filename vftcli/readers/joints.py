@@ -2,8 +2,14 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
+from vftcli.readers.columns import SIGNALS, parse_columns
+from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
+from vftcli.signals.errors import LogError
+from vftcli.signals.recording import EFFORTS
+from vftcli.signals.remarks import fact
 
 UR_NAMES = (
     "shoulder_pan_joint",
@@ -48,6 +54,53 @@ def in_order(column: Array, order: Sequence[int], names: int) -> Array:
     if column.ndim != 2 or column.shape[1] != names:
         return column
     return column[:, list(order)]
+
+
+def effort_of(names: Sequence[str]) -> str:
+    """What a JointState's effort is by its joints' names: UR's drivers publish motor currents.
+
+    Returns:
+        "current" or "torque".
+    """
+    is_ur = len(names) == len(UR_NAMES) and all(name.endswith(UR_NAMES) for name in names)
+    return "current" if is_ur else "torque"
+
+
+def laid_along(raw: RawLog, names: Sequence[str], request: ReadChoice) -> RawLog:
+    """A log of JointState messages with its joints base to tip, its effort by their names.
+
+    Args:
+        raw: The log; what was found as effort is its torque.
+        names: The joints' names in the order of its columns.
+        request: What --columns names one by one keeps its order, and an effort it names its kind.
+
+    Raises:
+        LogError: If there are not as many names as columns.
+    """
+    stated = parse_columns(request.columns).items if request.columns is not None else ()
+    if any("|" in (item.pattern or "") for item in stated):
+        return raw
+    width = raw.signals["q"].shape[1]
+    if len(names) != width:
+        raise LogError(f"{len(names)} names of joints for {width} positions: {', '.join(names)}")
+    order = kinematic_order(names)
+    ordered = tuple(names[k] for k in order)
+    signals = {
+        signal: value if signal == "wrench" else in_order(value, order, width)
+        for signal, value in raw.signals.items()
+    }
+    remarks = raw.remarks
+    told = {SIGNALS.get(item.signal) for item in stated}
+    if effort_of(ordered) == "current" and "torque" in signals and not told & set(EFFORTS):
+        signals["current"] = signals.pop("torque")
+        remarks = (*remarks, fact("effort-is-current"))
+    return replace(
+        raw,
+        signals=signals,
+        joint_names=ordered,
+        robot_hint=robot_of(ordered),
+        remarks=remarks,
+    )
 
 
 def _franka_order(names: Sequence[str]) -> tuple[int, ...]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
 from vftcli.signals.arrays import Array
+from vftcli.signals.derivation import is_fast, with_velocity
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
@@ -140,6 +141,9 @@ EFFORT = {
 }
 """Value of ``--effort`` → field of Recording; None where the robot's model has to decide."""
 
+DERIVE = ("dq", "none")
+"""Values of ``--derive``: the signal that is derived where the log lacks it, or none."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ReadChoice:
@@ -152,6 +156,8 @@ class ReadChoice:
         interval: The span that is used, from the first sample, None for all of it. [s]
         effort: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the
             robot; None to take what it is called.
+        derive: "dq" to derive velocities that a log lacks, "none" never to; None to do so where it
+            is fast enough.
         episode: Number of the episode of a file that holds several, None to leave it to the reader.
         all_episodes: Whether each episode is wanted, as a log of its own.
         arm: Which arm of a log of two, a member of `ARMS`; None for the only one.
@@ -159,7 +165,7 @@ class ReadChoice:
             refusal.
 
     Raises:
-        ParameterError: If the effort or the arm is none of these.
+        ParameterError: If the effort, the derived signal or the arm is none of these.
     """
 
     format: str | None = None
@@ -167,6 +173,7 @@ class ReadChoice:
     signals: frozenset[str] | None = None
     interval: tuple[float, float] | None = None
     effort: str | None = None
+    derive: str | None = None
     episode: int | None = None
     all_episodes: bool = False
     arm: str | None = None
@@ -175,6 +182,8 @@ class ReadChoice:
     def __post_init__(self) -> None:
         if self.arm is not None:
             parsing.check_known(self.arm, ARMS, f"--arm {self.arm!r}")
+        if self.derive is not None:
+            parsing.check_known(self.derive, DERIVE, f"--derive {self.derive!r}")
         if self.effort is not None:
             parsing.check_known(self.effort, tuple(EFFORT), f"--effort {self.effort!r}")
 
@@ -186,10 +195,11 @@ class ReadChoice:
         columns: str | None = None,
         interval: str | None = None,
         effort: str | None = None,
+        derive: str | None = None,
         episode: str | None = None,
         arm: str | None = None,
     ) -> "ReadChoice":
-        """The choice that the options of these names state, as ``--interval A:B``, ``--episode K``.
+        """The choice that ``--format``, ``--columns``, ``--interval A:B``, … state.
 
         Raises:
             ParameterError: If the interval or the episode is malformed.
@@ -203,6 +213,7 @@ class ReadChoice:
             columns=columns,
             interval=span,
             effort=effort,
+            derive=derive,
             episode=int(number) if number is not None else None,
             all_episodes=episode == "all",
             arm=arm,
@@ -214,13 +225,17 @@ class ReadChoice:
         return replace(self, interval=None, episode=None, all_episodes=False)
 
     def taken(self, recording: Recording) -> Recording:
-        """A recording with its effort taken for what it is said to be.
+        """A recording with its effort taken for what it is said to be, its velocities derived.
 
         Raises:
             MissingSignalError: If the log has no such effort.
         """
         kind = EFFORT[self.effort] if self.effort is not None else None
-        return recording if kind is None else recording.with_effort(kind)
+        if kind is not None:
+            recording = recording.with_effort(kind)
+        if self.derive == "dq" or (self.derive is None and is_fast(recording)):
+            recording = with_velocity(recording)
+        return recording
 
     def within(self, recording: Recording) -> Recording:
         """The part of a recording that lies in the interval.

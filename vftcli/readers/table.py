@@ -18,6 +18,9 @@ from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import WrenchFrame
 
+JACOBIAN = re.compile(r"(?i)jac(obian)?_\d_\d")
+"""A cell of a Jacobian among the columns."""
+
 Column = NDArray[Any]
 """One column as it is stored: (T,) numbers, or (T, k) for a column of lists."""
 
@@ -116,8 +119,8 @@ def picked(
     clock = picks.clock.cells[0] if picks.clock else None
     wanted = {cell.column for pick in signals for cell in pick.cells} | set(picks.constants)
     wanted |= set() if picks.origin is None else {picks.origin}
-    if clock is not None:
-        wanted.add(clock.column)
+    if picks.clock is not None:
+        wanted |= {cell.column for cell in picks.clock.cells}
     loaded = table.load(sorted(wanted), clock.column if clock else None)
     arrays = {pick.signal: _stacked(pick, loaded) for pick in signals}
     stamps, tick, words = _stamps(table, picks, loaded, clock_name)
@@ -174,6 +177,8 @@ def _stamps(
         raise LogError(
             f"{table.path}: --columns turns the sign of the clock; time cannot run back."
         )
+    if len(picks.clock.cells) == 2:
+        return _of_pair(table, stamps, loaded[picks.clock.cells[1].column]), 1e-9, words
     if picks.clock.unit is not None:
         return stamps, picks.clock.factor, f"{words} [{picks.clock.unit}]"
     tick, unit = tick_of(stamps, name)
@@ -183,6 +188,21 @@ def _stamps(
 def rate_words(rate: float) -> str:
     """What the clock of a table without one is, given its rate. [Hz]"""
     return f"none: {rate:g} Hz as stated"
+
+
+def _of_pair(table: Table, seconds: Column, rest: Column) -> Column:
+    """Stamps of a column of whole seconds and one of the nanoseconds within them. (T,) [ns]
+
+    Raises:
+        LogError: If they are no such pair: seconds with a fraction, or a second too many.
+    """
+    whole = all(bool(np.all(np.mod(part, 1) == 0)) for part in (seconds, rest))
+    if not whole or not np.all((rest >= 0) & (rest < 1e9) & (np.abs(seconds) < 9e9)):
+        raise LogError(
+            f"{table.path}: the two columns of the clock are no whole seconds and the nanoseconds "
+            "within them. Name one column of time with --columns, as in t=…"
+        )
+    return seconds.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
 
 
 def tick_of(stamps: Column, name: str) -> tuple[float, str]:
@@ -351,6 +371,13 @@ def checked(table: Table, picks: Picks) -> Picks:
     joints = next((len(p.cells) for p in picks.signals if p.signal == "q"), 0)
     if joints == 0:
         there = listed(table.names) if table.names else f"{table.width} columns without names"
+        if any(JACOBIAN.match(name) for name in table.names or ()):
+            raise LogError(
+                f"{table.path}: no joint positions (q), but a vendor's estimate beside its "
+                "Jacobian: no observer can run on that, and q cannot be told from a Jacobian in "
+                "axes of its own. The vendor's wrench is pinv(Jᵀ) tau_ext of each row, in the "
+                "log's axes. Record q, dq and torques beside them."
+            )
         raise LogError(
             f"{table.path}: no joint positions (q) among {there}. Name their columns with "
             "--columns, as in q=joint_pos_{i}; a table without positions is no log of an arm "
@@ -364,6 +391,9 @@ def checked(table: Table, picks: Picks) -> Picks:
                 + ("a wrench has 6" if pick.signal == "wrench" else f"q has {joints}")
                 + ". Check --columns."
             )
-    if picks.clock is not None and len(picks.clock.cells) != 1:
-        raise LogError(f"{table.path}: t must be one column, not {len(picks.clock.cells)}.")
+    if picks.clock is not None and not 1 <= len(picks.clock.cells) <= 2:
+        raise LogError(
+            f"{table.path}: t must be one column, or one of seconds and one of nanoseconds, not "
+            f"{len(picks.clock.cells)}."
+        )
     return picks

@@ -3,6 +3,7 @@
 import math
 import tokenize
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
@@ -13,11 +14,12 @@ import numpy as np
 from vftcli.readers.aliases import picks_by_alias
 from vftcli.readers.columns import ColumnSpec, Item, parse_columns
 from vftcli.readers.delimited import TextTable, as_number
+from vftcli.readers.headless import guessed
 from vftcli.readers.joints import robot_of
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Column, Table, missing_column, picked, picks_of
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import Remark, fact
 
 NOT_AN_ARRAY = (
     ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError, KeyError, OverflowError,
@@ -26,10 +28,14 @@ NOT_AN_ARRAY = (
 """What NumPy raises for a header or content that is no array."""
 
 
+WIDEST = 200
+"""Columns beyond which a table without a header is not looked through."""
+
+
 def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
     """Read a table by its --columns text, else by the aliases of its column names.
 
-    A text that names other signals but no positions says something of these alone.
+    A text that names signals says something of these; what it leaves out is found by name.
 
     Raises:
         LogError: If the columns cannot be told.
@@ -38,9 +44,8 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
     if spec is not None:
         more["segment"] = spec.segment
     items = spec.items if spec is not None else ()
-    partial = table.names is not None and spec is not None and spec.partial
-    if spec is not None and items and not partial:
-        stated = (item := spec.item("q")) is not None and item.unit is not None
+    stated = spec is not None and (item := spec.item("q")) is not None and item.unit is not None
+    if spec is not None and items and (table.names is None or not spec.named):
         return picked(table, picks_of(table, spec), request, degrees_possible=not stated, **more)
     if table.names is None and table.width == 1:
         raise LogError(
@@ -48,16 +53,13 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
             "files into one table, or build the log through the API: vftcli.Recording(t=…, q=…)."
         )
     if table.names is None:
-        raise LogError(
-            f"{table.path}: a table of {table.width} columns without a header. Say what they are "
-            "with --columns, in file order, as in t,q:6,dq:6,current:6 (_:13 skips 13 columns)."
-        )
+        return read_by_values(table, request, **more)
     picks, joints = picks_by_alias(table, items)
     return picked(
         table,
         picks,
         request,
-        degrees_possible=True,
+        degrees_possible=not stated,
         joint_names=joints,
         robot_hint=robot_of(joints),
         **more,
@@ -111,6 +113,32 @@ def restated(table: Table, item: Item, usual: Item | None) -> Item:
     scale = usual.factor if item.unit is None else math.copysign(1.0, usual.factor)
     factor = item.factor * scale
     return replace(usual, factor=factor, unit=item.unit or usual.unit)
+
+
+def read_by_values(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
+    """Read a table without a header whose values settle what its columns are, and say it.
+
+    Raises:
+        LogError: If they do not; with the lines that fit, where some do.
+    """
+    columns: dict[int, Column] = {}
+    if 1 < table.width <= WIDEST and not table.lists:
+        with suppress(LogError):  # what is no number somewhere is no clue
+            columns = table.load(range(table.width), 0)
+    found = guessed(list(columns.values())) if columns else None
+    if found is None or found.others:
+        likely = "as in t,q:6,dq:6,current:6 (_:13 skips 13 columns)."
+        if found is not None:
+            likely = f"by its values {found.columns} or {' or '.join(found.others)}."
+        raise LogError(
+            f"{table.path}: a table of {table.width} columns without a header. Say what they are "
+            f"with --columns, in file order, {likely}"
+        )
+    told = fact("columns-by-value", count=table.width, columns=found.columns, why=found.why)
+    named = {str(k): column for k, column in columns.items()}
+    loaded = ArrayTable(path=table.path, columns=named, headed=False, remarks=table.remarks)
+    picks = picks_of(loaded, parse_columns(found.columns))
+    return picked(loaded, picks, request, degrees_possible=True, remarks=(told,), **more)
 
 
 @dataclass

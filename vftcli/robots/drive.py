@@ -6,7 +6,7 @@ from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, RobotError
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 
 CONSTANT_SD, SENSOR_SD = 0.03, 0.01
 """How well drive constants and torque sensors are known: a weighed 2.805 kg reads 2.88 kg through
@@ -59,6 +59,12 @@ def drive_torque(recording: Recording, robot: Robot) -> Array:
         RobotError: If the number of joints differs.
     """
     check_joints(recording, robot)
+    if all(getattr(recording, name) is None for name in EFFORTS):
+        raise MissingSignalError(
+            f"{recording.name}: the log has no joint torques and no motor currents, and "
+            f"positions alone carry no force; it has {', '.join(recording.signals)}. Record "
+            "them, or name their columns with --columns"
+        )
     name = effort_name(recording, robot)
     if name == "torque_without_gravity" and recording.torque_without_gravity is not None:
         still = np.zeros_like(recording.q)

@@ -81,6 +81,8 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
         chain=chain,
         torque_source=source,
         torque_constant=checked_torque_constant(joints, source),
+        gear=checked_gear(joints, "gear"),
+        efficiency=checked_gear(joints, "gear_efficiency"),
         endless=tuple(itertools.compress(chain.names, endless)),
         friction=friction,
         limits=limits,
@@ -186,6 +188,18 @@ def checked_torque_constant(joints: Sequence[Section], source: str) -> Array | N
             "torque_constant is missing; torque_source = current needs it in every joint"
         )
     return column(joints, "torque_constant")
+
+
+def checked_gear(joints: Sequence[Section], key: str) -> Array | None:
+    """Return the numbers of a gear between log and joint, 1 where a joint has none, else None."""
+    if not any(key in joint.values for joint in joints):
+        return None
+    found = column(joints, key, default=1.0)
+    for joint, value in zip(joints, found, strict=True):
+        if value == 0 or (key == "gear_efficiency" and not 0 < value <= 1):
+            allowed = "any number but 0" if key == "gear" else "above 0, at most 1"
+            joint.refuse(f"{key} is {value:g}; it is {allowed}", key)
+    return found
 
 
 def checked_friction(joints: Sequence[Section]) -> tuple[JointFriction, ...]:

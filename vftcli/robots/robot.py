@@ -115,6 +115,9 @@ class Robot:
         chain: Geometry and inertia of the bare arm.
         torque_source: What a log of this arm measures: "current", "link_torque" or "joint_torque".
         torque_constant: Joint torque per motor current, gear included. (n,) [N·m/A]
+        gear: Motor turns per turn of the joint, for a log of the motors' side; None for one of the
+            joints. (n,)
+        efficiency: Share of the motors' torque that arrives behind it, None for all. (n,)
         friction: One model a joint.
         limits: Joint limits.
         noise: Measurement noise.
@@ -142,6 +145,8 @@ class Robot:
     title: str = ""
     torque_source: str = "joint_torque"
     torque_constant: Array | None = None
+    gear: Array | None = None
+    efficiency: Array | None = None
     friction: tuple[JointFriction, ...] = ()
     limits: Limits
     noise: SensorNoise
@@ -163,9 +168,10 @@ class Robot:
 
     def __post_init__(self) -> None:
         n = self.joints
-        if self.torque_constant is not None:
-            seal(self, "torque_constant")
-            check_shape(self.torque_constant, (n,), "torque_constant", self.name)
+        for key in ("torque_constant", "gear", "efficiency"):
+            if (value := getattr(self, key)) is not None:
+                seal(self, key)
+                check_shape(value, (n,), key, self.name)
         if self.friction and len(self.friction) != n:
             raise RobotError(f"{self.name}: {len(self.friction)} friction models for {n} joints")
         if self.torque_source not in TORQUE_SOURCES:

@@ -1,6 +1,6 @@
 """Recording: one log, in SI units, on one strictly increasing clock."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -75,6 +75,7 @@ class Source:
         t0_ns: The same stamp in whole nanoseconds where the log counts them. [ns]
         rows: Samples the file held before any were dropped.
         duplicates: Rows dropped because their stamp repeated the one before.
+        derived: Signals that were made of others here and stand in no log.
         remarks: Facts on what was dropped, turned or derived; cautions and warnings on what looks
             suspicious but was left as it is.
         part: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
@@ -89,6 +90,7 @@ class Source:
     t0_ns: int | None = None
     rows: int = 0
     duplicates: int = 0
+    derived: tuple[str, ...] = ()
     remarks: tuple[Remark, ...] = ()
     part: str = ""
 
@@ -210,9 +212,11 @@ class Recording:
         """
         value: Array | None = getattr(self, name)
         if value is None:
+            derive = ", or derive them from the positions: --derive dq" if name == "dq" else ""
             raise MissingSignalError(
                 f"{self.name}: the log has no {MEANINGS[name]} ({name}); it has "
-                f"{', '.join(self.signals)}. Record them, or name their columns with --columns."
+                f"{', '.join(self.signals)}. Record them, or name their columns with --columns"
+                f"{derive}."
             )
         return value
 
@@ -244,6 +248,51 @@ class Recording:
         # 0 + x: no zero of the other sign.
         changed: dict[str, Any] = {**dict.fromkeys(there), kind: 0.0 + factor * value}
         return replace(self, source=where, **changed)
+
+    def with_joints(self, places: Sequence[int]) -> "Recording":
+        """Return the recording with some of its joints, in an order; what goes is said.
+
+        Args:
+            places: The place of each joint among those of this recording, from 0.
+        """
+        order = list(places)
+        if order == list(range(self.joints)):
+            return self
+        names = self.joint_names
+        left = [names[k] for k in range(self.joints) if k not in order]
+        remarks = [fact("joints-by-name", joints=[names[k] for k in order])]
+        remarks += [fact("joints-left-out", joints=left)] if left else []
+        joints = [name for name in JOINT_SIGNALS if getattr(self, name) is not None]
+        changed: dict[str, Any] = {name: getattr(self, name)[:, order] for name in joints}
+        return replace(
+            self,
+            joint_names=tuple(names[k] for k in order),
+            source=replace(self.source, remarks=(*self.source.remarks, *remarks)),
+            **changed,
+        )
+
+    def behind_gear(self, gear: Array, efficiency: Array) -> "Recording":
+        """Return the recording of the links where it was logged at the motors.
+
+        q = q_m / N, τ = N η τ_m: positions and velocities are divided by the gear's ratio N,
+        torques multiplied with it and its efficiency η. Currents and the vendor's estimate stay.
+
+        Args:
+            gear: Ratio of each joint, negative where the motor turns the other way. (n,)
+            efficiency: Share of the motor's torque that arrives. (n,)
+        """
+        scales = dict.fromkeys(("q", "dq", "target_q", "target_dq"), 1 / gear)
+        scales |= dict.fromkeys(
+            ("torque", "torque_without_gravity", "target_torque"), gear * efficiency
+        )
+        changed: dict[str, Any] = {
+            name: getattr(self, name) * scale
+            for name, scale in scales.items()
+            if getattr(self, name) is not None
+        }
+        taken = fact("gear-applied", ratios=gear.tolist())
+        source = replace(self.source, remarks=(*self.source.remarks, taken))
+        return replace(self, source=source, **changed)
 
     def between(self, start: float, stop: float) -> "Recording":
         """Return the samples with start ≤ t ≤ stop; their times stay those of the whole log. [s]

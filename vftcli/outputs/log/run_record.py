@@ -157,6 +157,7 @@ def input_record(recording: Recording) -> dict[str, Any]:
         "t0_s": source.t0,
         "rows": source.rows,
         "duplicates": source.duplicates,
+        **({"derived": source.derived} if source.derived else {}),
         "samples": recording.samples,
         "joints": recording.joints,
         "start_s": float(recording.t[0]),

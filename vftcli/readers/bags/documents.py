@@ -9,19 +9,17 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.bags.container import Batch, Channel, Ingest
-from vftcli.readers.joints import UR_NAMES, in_order, kinematic_order, robot_of
+from vftcli.readers.bags.decode import Stream
+from vftcli.readers.bags.json_messages import message_streams
+from vftcli.readers.columns import parse_columns
+from vftcli.readers.joints import laid_along
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark, caution, fact
-from vftcli.signals.series import median_step, resample_columns
-from vftcli.signals.wrench import WrenchFrame
+from vftcli.signals.remarks import fact
 
 FOXGLOVE = "foxglove.JointStates"
-NEAR = 3.0
-"""A wrench further than this many of its own sample times from a pose is not taken for it."""
-
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 8
 MAX_VALUES = 4096
@@ -62,6 +60,19 @@ class Documents:
                 ) from None
             times.append(int(time))
         return True
+
+    def streams(self, request: ReadChoice) -> list[Stream]:
+        """The channels that hold ROS messages, unless --columns speaks of other fields."""
+        items = parse_columns(request.columns).items if request.columns is not None else ()
+        fields = {(item.pattern or "").rpartition(".")[2] for item in items}
+        if not fields <= {"", "position", "velocity", "effort"}:
+            return []
+        found = (
+            stream
+            for channel, rows in self.rows.items()
+            for stream in message_streams(channel, rows, self.times[channel])
+        )
+        return list(found)
 
 
 def _document(message: bytes, *, json_like: bool) -> Any:  # noqa: ANN401
@@ -187,8 +198,10 @@ def read_documents(file: LogFile, documents: Documents, request: ReadChoice) -> 
             raw = _read(file, channel, rows, documents.times[channel], request)
         except LogError as error:
             failures.append((len(rows), error))
-        else:
-            return _with_wrench(raw, documents, channel, request)
+            continue
+        left = sorted({other.topic for other in documents.rows} - {channel.topic})
+        told = [fact("topics-left-out", topics=tuple(left[:6]))] if left else []
+        return replace(raw, remarks=(*raw.remarks, *told))
     if not failures:
         raise LogError(f"{file.path}: no messages of a kind that is known.")
     # The fullest channel is the one that was meant; what it lacks is what the user can mend.
@@ -204,12 +217,11 @@ def _read(
 ) -> RawLog:
     """The documents of one channel as a table, read by aliases or by --columns."""
     names = _names(rows[0])
-    order = kinematic_order(names)
     columns: dict[str, Column] = {}
     for key, first in rows[0].items():
         column = _column(first, [row.get(key) for row in rows])
         if column is not None and not key.lower().startswith(("timestamp", "stamp", "header")):
-            columns[key] = in_order(column, order, len(names)) if names else column
+            columns[key] = column
     clock = "log time of the recorder"
     if (stamps := _stamps(rows)) is not None:
         clock = f"stamps in the messages of {channel.topic}"
@@ -218,74 +230,9 @@ def _read(
         columns["timestamp_ns"] = np.array(times, dtype=np.int64)
     table = ArrayTable(path=f"{file.path}: topic {channel.topic}", columns=columns)
     raw = from_table(table, request, clock_name=clock)
-    if request.columns is not None or not names:
+    if len(names) != raw.signals["q"].shape[1]:
         return raw
-    ordered = tuple(names[k] for k in order)
-    raw = replace(raw, joint_names=ordered, robot_hint=robot_of(ordered))
-    return _told_effort(raw) if "effort" in columns and "torque" in raw.signals else raw
-
-
-def _told_effort(raw: RawLog) -> RawLog:
-    """The log with the effort of UR joints as current, as the UR drivers publish it."""
-    names = raw.joint_names
-    if len(names) != len(UR_NAMES) or not all(name.endswith(UR_NAMES) for name in names):
-        return raw
-    signals = dict(raw.signals)
-    signals["current"] = signals.pop("torque")
-    return replace(raw, signals=signals, remarks=(*raw.remarks, fact("effort-is-current")))
-
-
-def _with_wrench(raw: RawLog, documents: Documents, lead: Channel, request: ReadChoice) -> RawLog:
-    """The log with a sensor's wrench of another channel at its times; other channels are named."""
-    remarks: list[Remark] = []
-    rows = {channel: found for channel, found in documents.rows.items() if channel != lead}
-    found = {channel: keys for channel in rows if (keys := _wrench_keys(rows[channel][0]))}
-    best = max(found, key=lambda channel: len(rows[channel]), default=None)
-    wanted = "wrench" not in raw.signals and request.wants("wrench")
-    if best is not None and wanted:
-        values = _column([0.0], [[row.get(key) for key in found[best]] for row in rows.pop(best)])
-        raw, remark = _interpolated(raw, documents, (lead, best), values)
-        remarks.append(remark)
-    if rows:
-        left = sorted(channel.topic for channel in rows)
-        remarks.append(fact("topics-left-out", topics=tuple(left[:6])))
-    return replace(raw, remarks=(*raw.remarks, *remarks))
-
-
-def _wrench_keys(row: dict[str, Any]) -> tuple[str, ...]:
-    """The six paths of a wrench in a document, () where one is missing or stands twice."""
-    ends = [f"{part}.{axis}" for part in ("force", "torque") for axis in "xyz"]
-    found = [[key for key in row if f".{key}".endswith(f".{end}")] for end in ends]
-    return tuple(keys[0] for keys in found) if all(len(keys) == 1 for keys in found) else ()
-
-
-def _interpolated(
-    raw: RawLog, documents: Documents, channels: tuple[Channel, Channel], values: Column | None
-) -> tuple[RawLog, Remark]:
-    """The log with a channel's wrench at its times, and what is said of it.
-
-    The two are laid together by the stamps in their messages, or by those of the recorder.
-    """
-    stamps = [_stamps(documents.rows[channel]) for channel in channels]
-    if any(s is None or s.dtype != np.int64 for s in stamps):
-        stamps = [np.array(documents.times[channel], dtype=np.int64) for channel in channels]
-    lead, own = (s for s in stamps if s is not None)
-    topic = channels[1].topic
-    start = int(own[0])  # whole nanoseconds are subtracted before they are scaled
-    x, xp = (lead - start) * 1e-9, (own - start) * 1e-9
-    usual = median_step(xp) if len(xp) > 1 else 0.0
-    outside = (x < xp[0] - NEAR * usual) | (x > xp[-1] + NEAR * usual)
-    if values is None or usual <= 0 or np.any(np.diff(xp) < 0) or np.mean(outside) > 0.05:
-        return raw, caution("topic-too-short", signal="wrench", topic=topic)
-    fresh = np.concatenate([[True], np.diff(xp) > 0])
-    signals = {**raw.signals, "wrench": resample_columns(x, xp[fresh], values[fresh])}
-    frame = documents.rows[channels[1]][0].get("header.frame_id")
-    told = WrenchFrame(frame, frame) if isinstance(frame, str) and frame else None
-    remark = fact(
-        "signal-interpolated", signal="wrench", topic=topic, rate_Hz=1 / usual,
-        lead=channels[0].topic,
-    )  # fmt: skip
-    return replace(raw, signals=signals, wrench_frame=told), remark
+    return laid_along(raw, names, request)
 
 
 def _names(row: dict[str, Any]) -> tuple[str, ...]:

@@ -41,12 +41,15 @@ def read_bag(file: LogFile, request: ReadChoice) -> RawLog:
     if messages == 0:
         said = "; ".join(["no messages in any whole chunk", *map(str, ingest.remarks)])
         raise LogError(f"{file.path}: {said}.")
-    streams = decoder.streams()
+    of_documents = documents.streams(request)
+    streams = [*decoder.streams(), *of_documents]
     # ROS messages go before documents: their types say what they hold.
     if documents.rows and not any("q" in stream.signals for stream in streams):
         raw = read_documents(file, documents, request)
     else:
-        others = decoder.others | {c.topic: c.type or c.encoding for c in documents.rows}
+        known = {stream.channel.topic for stream in of_documents}
+        rows = (channel for channel in documents.rows if channel.topic not in known)
+        others = decoder.others | {c.topic: c.type or c.encoding for c in rows}
         raw = aligned(streams, file.path, request, others)
     return replace(raw, remarks=(*ingest.remarks, *raw.remarks))
 

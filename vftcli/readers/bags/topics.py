@@ -11,7 +11,7 @@ from vftcli.readers.aliases import RESIDUAL_TURNED
 from vftcli.readers.bags.container import Integers
 from vftcli.readers.bags.decode import Stream
 from vftcli.readers.columns import SIGNALS, parse_columns
-from vftcli.readers.joints import UR_NAMES, robot_of
+from vftcli.readers.joints import effort_of, robot_of
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
@@ -22,6 +22,8 @@ from vftcli.signals.wrench import WrenchFrame
 
 TARGETS = re.compile(r"desired|command|target|goal|reference", re.IGNORECASE)
 VENDOR_WRENCH = re.compile(r"franka|F_ext$|external_wrench", re.IGNORECASE)
+FORCES = re.compile(r"wrench|force|\bft\b|F_ext", re.IGNORECASE)
+"""Topics and types that may hold a wrench: left out, they are named."""
 NEAR = 3.0
 """A wrench further than this many of its own sample times from a pose is not taken for it."""
 
@@ -48,7 +50,7 @@ def aligned(
     for stream in streams:
         gathering.take(stream)
     frame = gathering.take_wrench(streams)
-    gathering.tell_left(streams)
+    gathering.tell_left(streams, others)
     lead, signals = gathering.lead, gathering.signals
     names, hint = lead.names, robot_of(lead.names)
     if not names:  # another topic about the arm may have them
@@ -153,10 +155,9 @@ class Gathering:
             code = "field-taken-turned" if factor < 0 else "field-taken"
             self.remarks.append(fact(code, field=last, signal=signal))
         if "effort" in self.signals:
-            names = lead.names
-            is_ur = len(names) == len(UR_NAMES) and all(name.endswith(UR_NAMES) for name in names)
-            self.signals["current" if is_ur else "torque"] = self.signals.pop("effort")
-            if is_ur:
+            kind = effort_of(lead.names)
+            self.signals[kind] = self.signals.pop("effort")
+            if kind == "current":
                 self.remarks.append(fact("effort-is-current"))
 
     def take(self, stream: Stream) -> None:
@@ -243,8 +244,8 @@ class Gathering:
         )
         return resample_columns(x, xp, values)
 
-    def tell_left(self, streams: Sequence[Stream]) -> None:
-        """Remark which messages and topics were left out."""
+    def tell_left(self, streams: Sequence[Stream], others: dict[str, str]) -> None:
+        """Remark which messages and topics were left out, those with forces first."""
         lead = self.lead
         for stream in streams:
             if stream.channel == lead.channel and stream.names == lead.names and stream is not lead:
@@ -257,7 +258,9 @@ class Gathering:
                     )
                 )
         topics = {s.channel.topic for s in streams if not s.channel.topic.startswith(OWN)}
+        topics |= {t for t, kind in others.items() if FORCES.search(t) or FORCES.search(kind)}
         left = sorted(topics - {lead.channel.topic} - self.taken)
+        left.sort(key=lambda topic: FORCES.search(topic) is None)
         if left:
             self.remarks.append(fact("topics-left-out", topics=tuple(left[:6])))
 

@@ -1,0 +1,115 @@
+"""Columns found by their names: joints in them, two-column clocks, what --columns leaves out."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.readers import read
+from vftcli.readers.joints import UR_NAMES
+from vftcli.signals.errors import ClockError, LogError
+
+ROWS = 30
+
+
+def write(path: Path, columns: dict[str, object]) -> Path:
+    """A CSV of columns; one number fills a column."""
+    filled = [np.broadcast_to(np.asarray(value), ROWS).tolist() for value in columns.values()]
+    lines = [",".join(columns), *(",".join(map(str, row)) for row in zip(*filled, strict=True))]
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "pattern", ["{signal}_{joint}", "{joint}_{signal}", "{joint}.{signal}", "{signal}/{joint}"]
+)
+def test_a_joints_name_beside_the_signals_gives_its_place(tmp_path: Path, pattern: str) -> None:
+    columns: dict[str, object] = {"t": np.arange(ROWS) * 0.01}
+    for k, signal in enumerate(("pos", "vel", "effort")):
+        for joint in reversed(UR_NAMES):
+            columns[pattern.format(signal=signal, joint=joint)] = k + 0.1 * UR_NAMES.index(joint)
+    log = read(write(tmp_path / "log", columns))
+    assert log.joint_names == UR_NAMES
+    np.testing.assert_allclose(log.q[0], 0.1 * np.arange(6))
+    np.testing.assert_allclose(log.require("dq")[0], 1 + 0.1 * np.arange(6))
+    np.testing.assert_allclose(log.require("current")[0], 2 + 0.1 * np.arange(6))
+
+
+@pytest.mark.parametrize("pattern", ["{signal}_{k}", "{signal}_joint{k}", "joint{k}_{signal}"])
+def test_numbered_joints_are_ordered_by_number(tmp_path: Path, pattern: str) -> None:
+    columns: dict[str, object] = {"t": np.arange(ROWS) * 0.01}
+    for signal in ("pos", "vel", "eff"):
+        columns |= {pattern.format(signal=signal, k=k): 0.1 * k for k in (3, 1, 2)}
+    log = read(write(tmp_path / "log", columns))
+    np.testing.assert_allclose(log.q[0], [0.1, 0.2, 0.3])
+    assert log.signals == ("q", "dq", "torque")
+
+
+def test_a_pose_has_no_joints(tmp_path: Path) -> None:
+    columns: dict[str, object] = {"t": np.arange(ROWS) * 0.01}
+    columns |= {f"{signal}_{axis}": 0.5 for signal in ("pos", "vel") for axis in "xyz"}
+    with pytest.raises(LogError, match="no joint positions"):
+        read(write(tmp_path / "log", columns))
+
+
+@pytest.mark.parametrize(
+    ("sec", "nsec"),
+    [
+        ("sec", "nsec"),
+        ("secs", "nsecs"),
+        ("sec", "nanosec"),
+        ("header.stamp.sec", "header.stamp.nanosec"),
+        ("/joint_states/header/stamp/sec", "/joint_states/header/stamp/nanosec"),
+    ],
+)
+def test_seconds_and_nanoseconds_are_one_clock(tmp_path: Path, sec: str, nsec: str) -> None:
+    stamps = 1_750_000_000_999_999_999 + np.arange(ROWS) * 8_000_001
+    columns = {sec: stamps // 10**9, nsec: stamps % 10**9, "q1": 0.1, "q2": 0.2}
+    log = read(write(tmp_path / "log", columns))
+    assert log.source.t0_ns == stamps[0]
+    np.testing.assert_array_equal(log.t, (stamps - stamps[0]) * 1e-9)
+    stated = read(tmp_path / "log", columns=f"t={sec}|{nsec},q=q{{i}}")
+    np.testing.assert_array_equal(stated.t, log.t)
+
+
+def test_a_messages_stamp_goes_before_the_recorders_time(tmp_path: Path) -> None:
+    stamps = np.arange(ROWS) * 8_000_000
+    columns = {"Time": np.arange(ROWS) * 0.0081, "q1": np.linspace(0, 1, ROWS)}
+    columns |= {"header.stamp.secs": stamps // 10**9, "header.stamp.nsecs": stamps % 10**9}
+    np.testing.assert_array_equal(read(write(tmp_path / "log", columns)).t, stamps * 1e-9)
+
+
+def test_seconds_alone_that_repeat_are_refused(tmp_path: Path) -> None:
+    columns = {"sec": np.arange(ROWS) // 10, "q1": np.linspace(0, 1, ROWS)}
+    with pytest.raises(ClockError, match="coarser than the samples"):
+        read(write(tmp_path / "log", columns))
+
+
+@pytest.mark.parametrize("nanoseconds", [0.5, 2e9, -1.0])
+def test_a_pair_that_is_none_is_refused(tmp_path: Path, nanoseconds: float) -> None:
+    columns = {"sec": np.arange(ROWS), "nsec": nanoseconds, "q1": np.linspace(0, 1, ROWS)}
+    with pytest.raises(LogError, match="no whole seconds and the nanoseconds"):
+        read(write(tmp_path / "log", columns))
+
+
+def test_a_rate_alone_leaves_the_signals_to_their_names(tmp_path: Path) -> None:
+    columns = {"q1": np.linspace(0, 1, ROWS), "dq1": 0.5, "current1": 2.0}
+    log = read(write(tmp_path / "log", columns), columns="t@125Hz,current[mA]")
+    assert log.signals == ("q", "dq", "current")
+    assert log.median_step == pytest.approx(0.008)
+    assert log.require("current")[0, 0] == pytest.approx(2e-3)
+
+
+def test_what_a_text_with_positions_leaves_out_is_found_where_one_group_fits(
+    tmp_path: Path,
+) -> None:
+    clock = np.arange(ROWS) * 0.01
+    columns = {"time": clock, "arm_1": 0.1, "dq_1": 0.2, "tau_1": 0.3, "tau_ext_1": 0.4}
+    log = read(write(tmp_path / "log", columns), columns="q=arm_{i}")
+    # A vendor's estimate may have either sign: it is not taken unasked.
+    assert log.signals == ("q", "dq", "torque")
+    assert [r.code for r in log.source.remarks].count("signal-by-name") == 2
+    # Of two efforts neither is.
+    write(tmp_path / "log", {**columns, "current_1": 0.5})
+    assert read(tmp_path / "log", columns="q=arm_{i}").signals == ("q", "dq")
+    assert read(tmp_path / "log", columns="q=arm_{i},tau=tau_{i}").signals == ("q", "dq", "torque")

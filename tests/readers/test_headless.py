@@ -1,0 +1,131 @@
+"""Tables without a header: what their values settle, and what they leave open."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.readers import read
+from vftcli.readers.headless import Guess, guessed
+from vftcli.signals.errors import LogError
+
+T31 = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+K = np.array([12.0, 12.0, 9.8, 10.8, 10.8, 10.8])
+"""Drive constants of the planted controller. [N·m/A]"""
+
+
+def table(joints: int = 6, seed: int = 3) -> dict[str, np.ndarray]:
+    """Signals of an arm on sines: a controller's currents carry friction, the measured ones noise.
+
+    The positions are integrated, so that dq is their derivative but for rounding. 100 Hz, 20 s
+    """
+    rng = np.random.default_rng(seed)
+    t = 100 + 0.01 * np.arange(2000) + 0.001 * rng.random(2000)
+    w = 0.6 + 0.2 * np.arange(joints)
+    q, dq = np.sin(np.outer(t, w)), w * np.cos(np.outer(t, w))
+    torque = 30 * np.cos(q) + 5 * np.gradient(dq, t, axis=0)
+    current = (torque + 8 * np.tanh(dq / 0.002) + 4 * dq) / K[:joints]
+    measured = current + 0.4 * rng.standard_normal(current.shape)
+    found = {"t": t[:, None], "q": q, "dq": dq, "current": measured}
+    return found | {"target_current": current, "target_torque": torque}
+
+
+def guess(*names: str, extra: int = 0, joints: int = 6) -> Guess | None:
+    signals = table(joints)
+    return guessed(list(np.hstack([*(signals[n] for n in names), np.ones((2000, extra))]).T))
+
+
+@pytest.mark.parametrize("order", [(3, 4, 5), (5, 4, 3), (4, 3, 5)])
+def test_a_controllers_targets_settle_three_efforts_in_any_order(order: tuple[int, ...]) -> None:
+    names = list(table())
+    names = [*names[:3], *(names[k] for k in order)]
+    found = guess(*names)
+    assert found is not None
+    assert found.columns == ",".join(n if n == "t" else f"{n}:6" for n in names)
+    assert found.others == ()
+
+
+def test_positions_with_velocities_alone_are_settled() -> None:
+    assert guess("t", "q", "dq", joints=5) == Guess(
+        "t,q:5,dq:5", "the first steps evenly, dq is the derivative of q"
+    )
+
+
+def test_one_effort_may_be_torque_or_current() -> None:
+    found = guess("t", "q", "dq", "current")
+    assert found is not None
+    texts = (found.columns, *found.others)
+    assert texts == ("t,q:6,dq:6,tau:6", "t,q:6,dq:6,current:6", "t,q:6,dq:6,tau+g:6")
+
+
+def test_columns_beyond_a_block_are_proposed_to_be_skipped() -> None:
+    found = guess("t", "q", "dq", "current", extra=2)
+    assert found is not None
+    assert found.columns == "t,q:6,dq:6,tau:6,_:2"
+    assert found.others
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("q", "dq", "current"),  # no clock
+        ("t", "q", "current"),  # no velocities
+        ("t", "current", "q"),
+        ("t", "dq", "q"),  # the velocities first
+    ],
+)
+def test_what_has_no_clock_or_no_velocities_behind_positions_is_not_guessed(names) -> None:
+    assert guess(*names) is None
+
+
+def test_a_joint_that_stands_is_counted_and_one_that_moves_without_velocity_is_not() -> None:
+    signals = table()
+    columns = np.hstack([signals["t"], signals["q"], signals["dq"]])
+    columns[:, [1, 6]], columns[:, [7, 12]] = 0.3, 0.0
+    found = guessed(list(columns.T))
+    assert found is not None
+    assert found.columns == "t,q:6,dq:6"
+    columns[:, 1] = signals["q"][:, 0]
+    assert guessed(list(columns.T)) is None
+
+
+@pytest.mark.parametrize("kind", ["csv", "npy"])
+def test_a_settled_table_is_read_as_if_it_were_described_and_that_is_said(
+    tmp_path: Path, kind: str
+) -> None:
+    signals = np.hstack(list(table().values()))
+    path = tmp_path / f"log.{kind}"
+    np.save(path, signals) if kind == "npy" else np.savetxt(path, signals, delimiter=",")
+    log, described = read(path), read(path, columns=T31)
+    for signal in ("t", *described.signals):
+        np.testing.assert_array_equal(getattr(log, signal), getattr(described, signal))
+    (told,) = [r for r in log.source.remarks if r.code == "columns-by-value"]
+    assert told.values["columns"] == T31
+    assert str(told).startswith(f"31 columns read as {T31}: the first steps evenly")
+
+
+def test_an_open_table_is_refused_with_the_lines_that_fit(tmp_path: Path) -> None:
+    signals = table()
+    path = tmp_path / "log.csv"
+    np.savetxt(path, np.hstack([signals[n] for n in ("t", "q", "dq", "current")]), delimiter=",")
+    with pytest.raises(LogError, match=r"19 columns .* t,q:6,dq:6,tau:6 or t,q:6,dq:6,current:6"):
+        read(path)
+
+
+def test_real_tables_are_read_as_their_description_says(logs: Path) -> None:
+    files = sorted((logs / "ur10e").iterdir())
+    assert len(files) == 11
+    for file in files:
+        log, described = read(file), read(file, columns=T31)
+        assert log.signals == described.signals, file.name
+        for signal in ("t", *described.signals):
+            np.testing.assert_array_equal(getattr(log, signal), getattr(described, signal))
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [("fr3/run_a.npy", "t,q:7,dq:7,tau:7,_:20"), ("ur10_link4/link4.csv.gz", "t,q:6,dq:6,tau:6")],
+)
+def test_other_real_tables_are_told_what_fits(logs: Path, name: str, line: str) -> None:
+    with pytest.raises(LogError, match=line):
+        read(logs / name)

@@ -1,0 +1,47 @@
+"""A path that no reader knows is told what it is, and the nearest thing to do."""
+
+from pathlib import Path
+
+import pytest
+
+from vftcli.readers import read
+from vftcli.signals.errors import UnknownFormatError
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"\x89PNG\r\n\x1a\n" + bytes(50), "a picture"),
+        (b"\0\0\0\x18ftypmp42" + bytes(50), "a video"),
+        (b"%PDF-1.7\n%\xe2\xe3", "a PDF"),
+        (b'<?xml version="1.0"?>\n<!-- a -->\n<robot name="arm">\n</robot>\n', "--robot"),
+        (b"<!DOCTYPE html>\n<html>\n", "XML"),
+        (b"PK\x03\x04" + bytes(50), "a zip archive; unpack it"),
+        (b'schema = 1\nname = "arm"\n', "a TOML file; a robot file goes to --robot"),
+        ("t,q1\n0,1\n".encode("utf-16"), "UTF-16"),
+        (
+            b"# A title\nSome words.\n\nAnd more of them.\n",
+            "a text that is no table of numbers .*'# A title'",
+        ),
+        (bytes(range(200)), "a binary file of no kind that is known .*00 01 02 03"),
+    ],
+)
+def test_a_file_is_told_what_it_is(tmp_path: Path, content: bytes, words: str) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(content)
+    with pytest.raises(UnknownFormatError, match=f"not recognised as a log: .*{words}"):
+        read(path)
+
+
+def test_a_folder_of_logs_says_how_to_run_all(tmp_path: Path) -> None:
+    with pytest.raises(UnknownFormatError, match="an empty folder"):
+        read(tmp_path)
+    for name in ("a.csv", "b.csv", "c.npy", "readme.md"):
+        (tmp_path / name).write_text("t,q1\n", "utf-8")
+    with pytest.raises(UnknownFormatError, match=r"3 files that may be logs .*FOLDER/\*\.csv") as e:
+        read(tmp_path)
+    assert "\n" not in str(e.value)
+    for path in tmp_path.iterdir():
+        path.rename(path.with_suffix(".md"))
+    with pytest.raises(UnknownFormatError, match="a folder without a log"):
+        read(tmp_path)

@@ -1,0 +1,115 @@
+"""What a path is that no reader knows, and the nearest thing to do: the words of a refusal."""
+
+import re
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from vftcli.readers.opening import HEAD_BYTES
+from vftcli.readers.reader import LogFile
+from vftcli.signals.letters import printable
+
+LOGS = (".csv", ".tsv", ".txt", ".gz", ".zst", ".npy", ".npz", ".parquet", ".bag", ".mcap", ".db3",
+        ".pkl", ".log", ".bin", ".json", ".jsonl", ".mat", ".hdf5", ".h5", ".feather",
+        ".arrow")  # fmt: skip
+"""How names of files end that may be logs; only to say so."""
+
+SHOWN = 4
+
+
+class FileKind(NamedTuple):
+    """A kind of file that is no log.
+
+    Attributes:
+        begins: How its content begins.
+        told: What it is, and what to do.
+    """
+
+    begins: re.Pattern[bytes]
+    told: str
+
+
+KINDS = tuple(
+    FileKind(re.compile(begins, re.DOTALL), told)
+    for begins, told in (
+        (rb"\x89PNG|\xff\xd8\xff|GIF8|BM....\0\0\0\0", "a picture; give the log it was drawn from"),
+        (rb"....ftyp|\x1aE\xdf\xa3|RIFF....AVI", "a video; give the log that was recorded with it"),
+        (rb"%PDF", "a PDF; give the log it tells of"),
+        (rb"RRF2|RRIO", "a Rerun recording, which vftcli writes and does not read; give the log"),
+        (rb"\x7fELF|MZ", "a program; give the log that it wrote"),
+        (
+            rb"\s*(<\?xml[^>]*>\s*)?(<!--.*?-->\s*)*<(robot|mujoco|sdf)\b",
+            "a robot's description, no log; give it with --robot, beside a log",
+        ),
+        (rb"\s*<(!DOCTYPE|html|\?xml)", "a page or document in XML; give the log it tells of"),
+        (rb"ULog\x01\x12\x35", "a PX4 ULog of a drone, which has no arm to estimate torques of"),
+        (rb"PK\x03\x04", "a zip archive; unpack it and give the log inside"),
+        (rb"(7z\xbc\xaf|Rar!|BZh|\xfd7zXZ)", "an archive; unpack it and give the log inside"),
+        (rb".{257}ustar", "a tar archive; unpack it and give the log inside"),
+        (rb"\xff\xfe|\xfe\xff", "a text in UTF-16; save it as UTF-8 (plain CSV)"),
+        (rb"schema\s*=|\[\[?[a-z_.]+\]\]?\s*\n", "a TOML file; a robot file goes to --robot"),
+    )
+)
+"""Kinds of files that users give by mistake, by their first bytes."""
+
+
+WORKBOOK = "an Excel workbook; save the sheet as CSV and give that"
+
+
+def description(file: LogFile) -> str:
+    """What a path is and what to do, behind its name."""
+    if file.is_folder:
+        return of_folder(file.entries)
+    # The end of a zip archive names what it holds.
+    if file.head.startswith(b"PK\x03\x04") and b"xl/workbook" in bytes(file.content[-HEAD_BYTES:]):
+        return WORKBOOK
+    told = next((kind.told for kind in KINDS if kind.begins.match(file.head)), None)
+    if told is None:
+        told = of_text(file) if file.lines else of_bytes(file.head)
+    return told
+
+
+def of_folder(entries: Sequence[str]) -> str:
+    """A folder that is no bag and no data set."""
+    if not entries:
+        return "an empty folder; give a log, or the folder of a bag"
+    logs = [name for name in entries if name.lower().endswith(LOGS)]
+    if not logs:
+        shown = listed(entries)
+        return f"a folder without a log ({shown}); give a log, or the folder of a bag"
+    ending = most_common([name[name.rindex(".") :] for name in logs])
+    count = f"{len(logs)} files that may be logs" if len(logs) > 1 else "a file that may be a log"
+    return (
+        f"a folder of {count} ({listed(logs)}), no bag and no data set; give them by name, all at "
+        f"once where the command takes several (FOLDER/*{ending}), or one by one: "
+        f"for f in FOLDER/*{ending}; do vftcli inspect $f; done"
+    )
+
+
+def of_text(file: LogFile) -> str:
+    """A text that is no table."""
+    first = file.first_line.decode("utf-8", "replace")[:60].strip()
+    return (
+        f"a text that is no table of numbers (it begins {printable(first)!r}); save the log as "
+        "CSV: a line of names, then one row a sample"
+    )
+
+
+def of_bytes(head: bytes) -> str:
+    """A file of bytes that nothing is known of."""
+    shown = head[:8].hex(" ")
+    return (
+        f"a binary file of no kind that is known (it begins {shown}); export the log as CSV, "
+        "Parquet or MCAP, or name its format with --format (vftcli formats lists them)"
+    )
+
+
+def listed(names: Sequence[str]) -> str:
+    """A few names for a message."""
+    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    return ", ".join(printable(name[:40]) for name in names[:SHOWN]) + more
+
+
+def most_common(words: Sequence[str]) -> str:
+    """The word that stands most often, the first of several."""
+    by_count: Callable[[str], int] = words.count
+    return max(dict.fromkeys(words), key=by_count)

@@ -1,0 +1,135 @@
+"""Pairing a log with its robot: the joints by their names, the motor's side of a gear taken off."""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from vftcli.readers.joints import UR_NAMES, UR_WORDS, kinematic_order
+from vftcli.robots.robot import Robot
+from vftcli.signals.errors import RobotError
+from vftcli.signals.letters import printable
+from vftcli.signals.recording import Recording
+
+NUMBER = re.compile(r"(.*?)(\d{1,4})(\D*)")
+
+
+def paired(recording: Recording, robot: Robot) -> Recording:
+    """Lay a log on its robot: joints in the robot's order, positions and torques of the link.
+
+    Where both have joint names these alone decide, and joints that the robot has not are left out.
+
+    Raises:
+        RobotError: If the log's joints do not cover the robot's; with both lists.
+    """
+    named = recording.joint_names
+    if len(named) == recording.joints and not is_nameless(robot):
+        order = places(named, robot.chain.names)
+        if order is None:
+            raise RobotError(
+                f"{recording.name}: the joints of the log ({listed(named)}) do not tell those of "
+                f"robot {robot.name!r} ({listed(robot.chain.names)}). Choose the arm of this log "
+                "with --robot, or call the joints in the robot file as the log does (name in "
+                "[[joints]])"
+            )
+        recording = recording.with_joints(order)
+    done = {remark.code for remark in recording.source.remarks}
+    if robot.gear is not None and "gear-applied" not in done and recording.joints == robot.joints:
+        efficiency = np.ones(robot.joints) if robot.efficiency is None else robot.efficiency
+        recording = recording.behind_gear(robot.gear, efficiency)
+    return recording
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names for a message."""
+    return ", ".join(printable(name[:40]) for name in names[:24]) or "none"
+
+
+def is_nameless(robot: Robot) -> bool:
+    """Whether the joints' names are not the robot file's own: it gives none."""
+    tables = robot.document.get("joints", ())
+    return bool(tables) and all("name" not in table for table in tables)
+
+
+def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
+    """Where each of a robot's joints stands among a log's, None where their names do not tell.
+
+    Names are compared as they are; then without a prefix that all share and without a trailing
+    `_joint`; then by number, where those of one of the two are numbered and nothing else, or by the
+    order that is known of a maker's names.
+    """
+    if all(logged.count(name) == 1 for name in joints):
+        return tuple(logged.index(name) for name in joints)
+    if (found := prefixed(logged, joints)) is not None:
+        return found
+    return numbered(logged, joints)
+
+
+def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
+    """The places of joints that a log calls by the same names behind a prefix.
+
+    None without one, and where several prefixes fit: two arms.
+    """
+    there, wanted = [plain(name) for name in logged], [plain(name) for name in joints]
+    # What all of the robot's names share up to a separator says nothing of a joint.
+    own = shared_prefix(wanted)
+    bare = [name.removeprefix(own) for name in wanted]
+    if all(name.isdigit() for name in bare):
+        return None
+    prefixes = {name.removesuffix(bare[0]) for name in there if name.endswith(bare[0])}
+    fits = [
+        prefix
+        for prefix in sorted(prefixes)
+        if prefix[-1:] in {"", "_"} and all(there.count(prefix + name) == 1 for name in bare)
+    ]
+    if len(fits) != 1:
+        return None
+    return tuple(there.index(fits[0] + name) for name in bare)
+
+
+def shared_prefix(names: Sequence[str]) -> str:
+    """What all names begin with, up to and with a `_`."""
+    parts = [name.split("_")[:-1] for name in names]
+    count = 0
+    while all(len(p) > count and p[: count + 1] == parts[0][: count + 1] for p in parts):
+        count += 1
+    return "".join(f"{part}_" for part in parts[0][:count])
+
+
+def numbered(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
+    """The places of joints by their numbers, or by an order known of a maker's names."""
+    count = len(joints)
+    if (found := by_number(logged, count)) is not None:
+        return found
+    known = kinematic_order(logged)
+    names = [plain(logged[k]) for k in known]
+    is_known = len(known) == count and (
+        names == [plain(word) for word in UR_WORDS]
+        or all(name.endswith(plain(ur)) for name, ur in zip(names, UR_NAMES, strict=False))
+    )
+    generic = by_number(joints, count) == tuple(range(count))
+    maker = [plain(name) for name in joints] == [plain(name) for name in UR_NAMES]
+    return known if is_known and (generic or maker) else None
+
+
+def by_number(names: Sequence[str], count: int) -> tuple[int, ...] | None:
+    """The places of names that differ in a number alone, in its order.
+
+    None where there are not as many of one stem as are wanted, of two stems, or with holes.
+    """
+    stems: dict[tuple[str, str], dict[int, int]] = {}
+    for place, name in enumerate(names):
+        if match := NUMBER.fullmatch(name):
+            stems.setdefault((match[1], match[3]), {})[int(match[2])] = place
+    fitting = [found for found in stems.values() if len(found) == count]
+    if len(fitting) != 1:
+        return None
+    numbers = sorted(fitting[0])
+    if numbers[0] > 1 or numbers[-1] - numbers[0] != count - 1:
+        return None
+    return tuple(fitting[0][number] for number in numbers)
+
+
+def plain(name: str) -> str:
+    """A joint's name in lower case, its parts joined by `_`, without a trailing `_joint`."""
+    return re.sub(r"[\s/.:\-]+", "_", name.strip().lower()).removesuffix("_joint")
