@@ -61,7 +61,7 @@ def test_a_sample_is_read_as_expected(name: str, samples: Path, expected: dict[s
 
 def test_a_workbook_is_refused_with_the_remedy(samples: Path, expected: dict[str, Any]) -> None:
     assert "save the sheet as CSV" in expected["ur5.xlsx"]["must"]
-    with pytest.raises(UnknownFormatError, match="Save the sheet as CSV"):
+    with pytest.raises(UnknownFormatError, match="save the sheet as CSV"):
         read(samples / "reach" / "ur5.xlsx")
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from vftcli.virtual_sensor.sensor_reading import SensorReading
 
 
-PARTS = frozenset({"episode-taken", "episode-taken-first", "arm-taken"})
+PARTS = frozenset({"episode-taken", "episode-taken-first", "arm-side-taken"})
 """Remarks that a part of a file was taken which nobody asked for."""
 
 
