@@ -275,10 +275,16 @@ def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
 
 def gate_of(analysis: "Analysis") -> "Gate | None":
     """The contacts, outside of which nothing touches; None where the whole log may be one."""
+    from vftcli.contacts.rows import loosened
+    from vftcli.virtual_sensor.smoother.observer_wrench import Gate
+    from vftcli.virtual_sensor.smoother.prior import WrenchPrior
+
     found = analysis.contacts
     if found is None or any(contact.is_load for contact in found.contacts):
         return None
-    return [(contact.start, contact.stop) for contact in found.contacts]
+    learned = found.model.prior
+    prior = None if learned is None else WrenchPrior(*loosened(learned))
+    return Gate([(contact.start, contact.stop) for contact in found.contacts], prior)
 
 
 def told_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "ToldContacts":
