@@ -268,19 +268,23 @@ def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
         asked or WrenchChoice(),
         analysis.terms_of,
         analysis.smoother_input,
-        gate_of(analysis),
+        gate_of(analysis, asked),
     )
     return replace(analysis, virtual_sensor=found)
 
 
-def gate_of(analysis: "Analysis") -> "Gate | None":
-    """The contacts, outside of which nothing touches; None where the whole log may be one."""
+def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None":
+    """The contacts, outside of which nothing touches; None where the whole log may be one.
+
+    That is so under a load, where no free motion tells what is no contact, and where the user asks
+    for the smoother by its name.
+    """
     from vftcli.contacts.rows import loosened
     from vftcli.virtual_sensor.smoother.observer_wrench import Gate
     from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
     found = analysis.contacts
-    if found is None or any(contact.is_load for contact in found.contacts):
+    if found is None or not found.tells_untouched or (asked is not None and asked.looks_back):
         return None
     learned = found.model.prior
     prior = None if learned is None else WrenchPrior(*loosened(learned))
