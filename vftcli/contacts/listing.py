@@ -8,9 +8,9 @@ import numpy as np
 from vftcli.contacts.contact_list import SURE_NATS, Contact, ContactList, ContactModel
 from vftcli.contacts.evidence import LEAST_EVIDENCE
 from vftcli.contacts.loads import is_load, load_row
-from vftcli.contacts.model_error import UNKNOWN, error_course
+from vftcli.contacts.model_error import UNKNOWN, UNSEEN_SHARE, error_course
 from vftcli.contacts.places import places
-from vftcli.contacts.rows import Measurer
+from vftcli.contacts.rows import NORMAL, Measurer
 from vftcli.contacts.search import Found, search
 from vftcli.contacts.stops import follows_stop
 from vftcli.contacts.threshold_list import axes_told, threshold_rows
@@ -25,7 +25,8 @@ from vftcli.contacts.windows import BlockLog, Run, gate_of
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.disturbance import disturbance_blocks
-from vftcli.signals.arrays import Mask
+from vftcli.robots.kinematics import flange_jacobian
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.virtual_sensor.smoother.noise import dry_torques
@@ -112,7 +113,7 @@ def by_smoother(free: Untouched, seconds: float) -> ContactList:
             error_time=free.noise.time,
             block=seconds,
         ),
-        remarks=tuple(limits(run, free, stops)),
+        remarks=tuple(limits(run, free, stops, measurer.test.smallest_force)),
     )
 
 
@@ -162,7 +163,9 @@ def fine_rows(free: Untouched, brief: Sequence[int], measurer: Measurer) -> dict
         places=places(fine.log.robot.loaded_chain, blocks.q),
         runs=[spans[k] for k in brief],
     )
-    return dict(zip(brief, Measurer.of(fine.log, some, fine, measurer).rows(), strict=True))
+    # Where it is takes no peak, and is told best from the longer blocks.
+    sites = [measurer.sites[k] for k in brief]
+    return dict(zip(brief, Measurer.of(fine.log, some, fine, measurer).rows(sites), strict=True))
 
 
 def in_free_part(run: ModelledRun, found: Found, span: tuple[int, int], free: Untouched) -> bool:
@@ -190,15 +193,31 @@ def false_rows(free: Untouched, seconds: float) -> int:
     return count
 
 
-def limits(run: ModelledRun, free: Untouched, stops: tuple[float, ...]) -> list[Remark]:
-    """What limits the list as a whole."""
+def limits(
+    run: ModelledRun, free: Untouched, stops: tuple[float, ...], smallest: float
+) -> list[Remark]:
+    """What limits the list as a whole; the smallest force as the free part shows it. [N]"""
     found = [caution("arm-stopped-abruptly", Where(span=(at, at)), at_s=at) for at in stops]
     unseen = [j + 1 for j in np.flatnonzero(free.noise.seen < 0.5).tolist()]
     if len(unseen) == run.robot.joints:
-        found.append(caution("free-part-rests"))
+        # At rest the free part shows no friction of motion: the share of F_c that is added does.
+        dry = UNSEEN_SHARE * free.noise.dry
+        found.append(caution("free-part-rests", least_N=max(smallest, felt_by(run, dry))))
     elif unseen:
         found.append(caution("free-part-misses-joints", Where(joints=tuple(unseen))))
     return found
+
+
+def felt_by(run: ModelledRun, torque: Array) -> float:
+    """Median over the log of the force along its best axis that turns no joint further. [N]
+
+    Args:
+        run: The log.
+        torque: What each joint may hide: 1.96 standard deviations of it. (n,) [N·m]
+    """
+    J = np.abs(flange_jacobian(run.robot.loaded_chain, run.recording.q)[:, :3])
+    each = np.min(NORMAL * torque / np.maximum(J, 1e-9), axis=2)
+    return float(np.median(each.min(axis=1)))
 
 
 def by_threshold(motion: FreeMotion) -> ContactList:

@@ -1,11 +1,13 @@
 """From what was found to the rows of the list: peak, band, place, torques, and what others say."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.contact_list import SURE_NATS, Contact
+from vftcli.contacts.contact_list import SURE_NATS, WIDE, Contact
 from vftcli.contacts.model_error import UNKNOWN, ErrorCourse, error_course
 from vftcli.contacts.places import (
     MORE_THAN_A_FORCE,
@@ -23,6 +25,7 @@ from vftcli.contacts.windows import BlockLog, ContactPrior, WindowWrench, gate_o
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.remarks import Remark, caution
 from vftcli.virtual_sensor.smoother.noise import resting
 from vftcli.virtual_sensor.smoother.smoothing import BENT, hidden_by_blocks
 
@@ -104,12 +107,26 @@ class Measurer:
             bent=bent,
         )
 
-    def rows(self) -> tuple[Contact, ...]:
-        """The contacts, in the order of time, numbered."""
+    @cached_property
+    def courses(self) -> list[WindowWrench]:
+        """The wrench of every contact at the flange."""
         runs, J = self.found.runs, self.found.places[0].jacobian
-        prior = loosened(self.prior)
-        courses = smooth_contacts(self.log, [J] * len(runs), runs, prior)
-        sites = [self.site(i, course) for i, course in enumerate(courses)]
+        return smooth_contacts(self.log, [J] * len(runs), runs, loosened(self.prior))
+
+    @cached_property
+    def sites(self) -> list["Site"]:
+        """Where every contact is."""
+        return [self.site(i, course) for i, course in enumerate(self.courses)]
+
+    def rows(self, sites: Sequence["Site"] | None = None) -> tuple[Contact, ...]:
+        """The contacts, in the order of time, numbered.
+
+        Args:
+            sites: Where each is, as longer blocks tell it; None to see.
+        """
+        runs, prior = self.found.runs, loosened(self.prior)
+        courses, J = list(self.courses), self.found.places[0].jacobian
+        sites = [site._replace(jacobian=J) for site in (self.sites if sites is None else sites)]
         moved = [i for i, site in enumerate(sites) if not site.on_wrist]
         point = prior._replace(moment=POINT_MOMENT)
         jacobians = [self.point_jacobian(sites[i].fits[0]) for i in moved]
@@ -155,9 +172,13 @@ class Measurer:
         # What the drives' constants and the blocks' length may hide, as in the wrench of `best`.
         covariance = covariance + hidden_by_blocks(course.values, self.bent)[peak - course.first]
         where, named, lead = self.part(number, site)
-        # Where another part may have been touched, another force touched it.
-        apart = 0.0 if named == "wrist" and lead >= SURE_NATS else site.spread(size)
-        band = NORMAL * float(np.hypot(np.sqrt(u @ covariance[:3, :3] @ u), apart))
+        band = NORMAL * float(np.sqrt(u @ covariance[:3, :3] @ u))
+        anywhere = site.sizes(size, band)
+        told = named == "wrist" and lead >= SURE_NATS
+        remarks: tuple[Remark, ...] = ()
+        if not told and NORMAL * site.spread(size) > WIDE * size:
+            # Where another part may have been touched, another force touched it.
+            remarks = (caution("size-goes-with-place", least_N=anywhere[0], most_N=anywhere[1]),)
         sd = np.sqrt(np.diag(covariance))
         J = site.jacobian[peak]
         torque_sd = np.sqrt(np.einsum("in,ij,jn->n", J, covariance, J))
@@ -176,7 +197,7 @@ class Measurer:
             wrench_sd=sd,
             mean_force=np.average(force, axis=0, weights=length),
             impulse=length @ force,
-            anywhere=site.sizes(size, band),
+            anywhere=anywhere,
             where=where,
             lead=lead,
             places=site.links(self.run.robot.joints),
@@ -188,6 +209,7 @@ class Measurer:
                 self.run, self.found.places[0].jacobian[peak], peak, blocks.t
             ),
             sensor_force=sensor_force(self.run, float(blocks.t[peak])),
+            remarks=remarks,
         )
 
     def part(self, number: int, site: "Site") -> tuple[ArmPart, ArmPart, float]:

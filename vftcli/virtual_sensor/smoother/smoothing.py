@@ -203,7 +203,7 @@ def smooth_wrench(
     mean, covariance = smooth_backward(single, filter_forward(single, measured))
     spread = covariance[:, :6, :6] * np.outer(WIDENED, WIDENED)
     if gate is not None:
-        spread = spread + hidden_by_blocks(mean[:, :6])
+        spread = spread + inside[:, None, None] * hidden_by_blocks(mean[:, :6])
     return SmoothedWrench(
         t=blocks.t,
         values=mean[:, :6],
@@ -227,7 +227,8 @@ def hidden_by_blocks(values: Array, bent: float = BENT) -> Array:
     """
     walled = np.vstack([values[:1], values, values[-1:]])
     bend = bent * (values - 0.5 * (walled[2:] + walled[:-2]))
-    return sum(x[:, :, None] * x[:, None, :] for x in (bend, DRIVES * values))
+    drives = DRIVES * values
+    return bend[:, :, None] * bend[:, None, :] + drives[:, :, None] * drives[:, None, :]
 
 
 def prior_of(
