@@ -37,7 +37,7 @@ LOOSER = 1.5
 """What the force's own standard deviation is multiplied by where its size is told: peaks are larger
 than the mean that it was learned from, and would be drawn to zero."""
 
-BENT_SHORT = 0.5
+BENT_SHORT = 0.4
 """Share of its bend that the peak of a contact may hide that is short for the prior of them all."""
 
 NORMAL = 1.96

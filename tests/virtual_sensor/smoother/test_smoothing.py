@@ -96,10 +96,9 @@ def test_the_gate_leaves_no_wrench_where_nothing_touches() -> None:
     np.testing.assert_allclose(gate.t[gate.inside][[0, -1]], [8.0, 11.0], atol=2 * gate.seconds)
     assert whole.inside.all()
     touched = (gate.t > 8.2) & (gate.t < 10.8)
-    # In a contact the band holds more than the model's own account: drives and blocks hide a share.
-    hidden = np.diagonal(hidden_by_blocks(gate.values), axis1=1, axis2=2)
-    own = np.sqrt(gate.sd**2 - gate.inside[:, None] * hidden)
-    assert np.all(own[touched].mean(axis=0) < whole.sd[touched].mean(axis=0))
+    # Stiction gives way under a listed contact: the same where nearly all of the log is one.
+    wide = smooth_wrench(terms, q, robot, [free], [(0.0, 19.5)], prior)
+    assert np.all(gate.sd[touched].mean(axis=0) < wide.sd[touched].mean(axis=0))
     assert np.mean(gate.values[touched, 2]) == pytest.approx(-25.0, abs=3.0)
 
 
