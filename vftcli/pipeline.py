@@ -294,10 +294,16 @@ def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None"
     That is so under a load, where no free motion tells what is no contact, and where the user asks
     for the smoother by its name.
     """
+    from vftcli.contacts.rows import loosened
+    from vftcli.virtual_sensor.smoother.observer_wrench import Gate
+    from vftcli.virtual_sensor.smoother.prior import WrenchPrior
+
     found = analysis.contacts
     if found is None or not found.tells_untouched or (asked is not None and asked.looks_back):
         return None
-    return [(contact.start, contact.stop) for contact in found.contacts]
+    learned = found.model.prior
+    prior = None if learned is None else WrenchPrior(*loosened(learned))
+    return Gate([(contact.start, contact.stop) for contact in found.contacts], prior)
 
 
 def told_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "ToldContacts":

@@ -25,7 +25,9 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.simulation import load_scenario, simulate
 
 TAPS = ("contacts.hand.style=taps",)
+KNOCKS = (*TAPS, "contacts.hand.length=[0.04,0.12]")
 FOREARM = ("contacts.hand.link=3", "contacts.hand.point=[-0.2,0,0]")
+UPPER = ("contacts.hand.link=2", "contacts.hand.point=[-0.2,0,0]")
 SCENARIOS = {
     "ur5-circle": ("ur5-circle", (), "0.3:4"),
     "ur5-table1": ("ur5-table1", (), "0.3:4"),
@@ -33,11 +35,12 @@ SCENARIOS = {
     "panda-bearing": ("panda-bearing", ("sensing.rate=100",), "0.3:3.9"),
     "ur5-sensor": ("ur5-sensor", (), "0.3:3"),
     "ur5-drag": ("ur5-drag", (), "0.3:6"),
+    "knocks": ("ur5-circle", KNOCKS, "0.3:4"),
+    "knocks-500": ("ur5-circle", (*KNOCKS, "sensing.rate=500"), "0.3:4"),
     "forearm": ("ur5-circle", FOREARM, "0.3:4"),
+    "upper arm": ("ur5-circle", UPPER, "0.3:4"),
 }
 """Name → scenario, settings, and the span that nobody touches. [s]"""
-
-BANDS = {"wrist": "wrist", "forearm": "forearm"}
 
 
 class LogScore(NamedTuple):
@@ -69,7 +72,9 @@ def main() -> None:
         logs = [scored(name, int(seed)) for seed in chosen.seeds.split(",")]
         if chosen.details:
             print(*(text for log in logs for text in details(log.list)), sep="\n")
-        print(name, line(logs, part="forearm" if name == "forearm" else "wrist"), flush=True)
+        print(
+            name, line(logs, part=name if name in {"forearm", "upper arm"} else "wrist"), flush=True
+        )
 
 
 def scored(name: str, seed: int) -> LogScore:
@@ -77,7 +82,9 @@ def scored(name: str, seed: int) -> LogScore:
     scenario, settings, free = SCENARIOS[name]
     made = simulate(load_scenario(scenario, list(settings)), seed)
     rows = np.unique(np.array(made.measured.rows))
-    truth, recording = made.truth.wrench[rows], made.recording
+    # A hand on a link has a wrench of its own, about its point.
+    hand = made.truth.contacts.get("hand", made.truth.wrench)
+    truth, recording = hand[rows], made.recording
     choice = AnalysisChoice(
         observers=ObserverChoice(names=("best",)), free=FreeChoice.parsed(free_part=free)
     )

@@ -6,8 +6,8 @@ from contact_logs import FIXTURES, motion
 from test_model_error import blocks, drawn, noise
 
 from vftcli.contacts.model_error import error_course
-from vftcli.contacts.places import PointFit
-from vftcli.contacts.rows import QuietError, from_flange, sensor_force, vendor_force
+from vftcli.contacts.places import PointFit, arm_parts
+from vftcli.contacts.rows import QuietError, Site, from_flange, sensor_force, vendor_force
 from vftcli.readers import read
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
@@ -77,3 +77,18 @@ def test_a_row_on_a_link_has_its_moment_about_the_flange() -> None:
         np.testing.assert_allclose(J.T @ row.wrench, row.joint_torque, atol=1e-9)
         assert row.start < row.peak < row.stop
         assert row.trust == "good"
+
+
+def test_a_size_is_as_sure_as_its_place() -> None:
+    def fit(link: int, size: float, score: float) -> PointFit:
+        force = np.array([size, 0.0, 0.0])
+        return PointFit(link=link, share=0.5, misfit=0.0, score=score, force=force, band=1.0)
+
+    parts = arm_parts(6)
+    alike = Site([fit(5, 40.0, 1.0), fit(4, 60.0, 1.0)], parts, np.zeros((1, 6, 6)))
+    assert alike.spread(40.0) == 0.0  # both on the wrist, whose wrench holds them
+    apart = Site([fit(5, 40.0, 1.0), fit(3, 60.0, 1.0)], parts, np.zeros((1, 6, 6)))
+    assert apart.spread(40.0) == pytest.approx(20.0 / np.sqrt(2.0))
+    # Four in the score are e⁻² in likelihood.
+    less = Site([fit(5, 40.0, 1.0), fit(3, 60.0, 5.0)], parts, np.zeros((1, 6, 6)))
+    assert less.spread(40.0) == pytest.approx(20.0 * np.sqrt(np.exp(-2) / (1 + np.exp(-2))))

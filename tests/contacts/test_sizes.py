@@ -1,10 +1,18 @@
 """How hard: splitting, and the prior that is learned from the contacts."""
 
 import numpy as np
+import pytest
 from test_model_error import B
 
 from vftcli.contacts.model_error import ErrorNoise, error_course
-from vftcli.contacts.sizes import START, learn_prior, quiet_pauses, smooth_contacts, split_run
+from vftcli.contacts.sizes import (
+    START,
+    learn_prior,
+    quiet_pauses,
+    smooth_contacts,
+    split_at_turns,
+    split_run,
+)
 from vftcli.contacts.windows import BlockLog, WindowWrench
 from vftcli.robots.disturbance import Blocks
 
@@ -82,3 +90,22 @@ def test_a_drawn_wrench_is_measured_and_its_prior_learned() -> None:
         inside = course.within(run)
         sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))
         assert np.mean(np.abs(inside.values - true[slice(*run)]) < 1.96 * sd) > 0.85
+
+
+def test_pushes_from_different_sides_are_two_contacts() -> None:
+    t = B * np.arange(200)
+    force = np.zeros((200, 3))
+    force[:100, 0] = 40.0 * np.sin(np.pi * np.arange(100) / 100)
+    force[100:, 1] = 40.0 * np.sin(np.pi * np.arange(100) / 100)
+    load = 0.5 * np.linalg.norm(force, axis=1)
+    (first, second) = split_at_turns(t, force, load, (0, 200))
+    assert first[1] == second[0] == pytest.approx(100, abs=1)
+    # From one side, or where the joints are loaded all the while, it is one.
+    same = np.roll(force[:, ::-1], 0, axis=1).copy()
+    same[:, 0] = np.linalg.norm(force, axis=1)
+    same[:, 1:] = 0.0
+    assert split_at_turns(t, same, load, (0, 200)) == [(0, 200)]
+    assert split_at_turns(t, force, np.full(200, 20.0), (0, 200)) == [(0, 200)]
+    # A hand that has just begun is none of its own.
+    brief = force[94:]
+    assert split_at_turns(t[94:], brief, load[94:], (0, 106)) == [(0, 106)]

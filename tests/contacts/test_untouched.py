@@ -1,5 +1,7 @@
 """What motion that nobody touched tells."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from contact_logs import FIXTURES, motion
@@ -12,12 +14,17 @@ from vftcli.contacts.untouched import (
     block_length,
     expected_torque,
     free_part,
+    is_touched,
     pseudo_contacts,
     self_test,
     torque_level,
     untouched_motion,
 )
 from vftcli.readers import read
+from vftcli.repetition.free_load import FreeLoad
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots import load_robot
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.smoother.noise import dry_torques
@@ -104,3 +111,44 @@ def test_contacts_that_are_none_read_little() -> None:
     # Simulations told 4 to 9 N.
     assert 1.0 < found.smallest_force < 15.0
     assert len(pseudo_contacts(free.pieces[0], 3)) == 3
+
+
+def test_a_load_in_the_free_part_is_no_noise() -> None:
+    """2.8 kg that the model lacks, in every sample: said, and off the noise and the log alike."""
+    plain = motion(LOG, "ur5", "0.3:4")
+    load = FreeLoad(mass=2.8, moment=np.zeros(3), sd=0.1, share=0.5)
+    run = plain.log.with_terms(
+        replace(plain.log.terms, mu=plain.log.terms.mu - load.torque(plain.log))
+    )
+    heavy = untouched_motion(replace(plain, log=run), BLOCK)
+    light = untouched_motion(plain, BLOCK)
+    assert heavy is not None
+    assert light is not None
+    assert [remark.code for remark in heavy.remarks] == ["free-span", "free-part-loaded"]
+    assert [remark.code for remark in light.remarks] == ["free-span"]
+    assert light.log is plain.log
+    # What the weighing leaves is a share of the model's own error, 0.5 N·m here.
+    assert np.all(heavy.noise.variance < 4.0 * light.noise.variance + 0.3)
+    left = heavy.log.terms.mu - plain.log.terms.mu
+    assert np.abs(left).mean() < 0.2 * np.abs(load.torque(plain.log)).mean()
+
+
+def test_free_cycles_with_a_contact_in_every_one_are_not_believed() -> None:
+    """A push in each of ten cycles: the quietest is no quieter, and beyond friction."""
+    robot, t = load_robot("ur5"), 0.008 * np.arange(5000)
+    phase = 2.0 * np.pi * t / 4.0
+    rest = np.array([0.0, -1.35, 1.9, -2.1, -1.57, 0.0])
+    q = rest + 0.2 * np.column_stack([np.sin(phase + k) for k in range(6)])
+    dq = 0.2 * (2.0 * np.pi / 4.0) * np.column_stack([np.cos(phase + k) for k in range(6)])
+    still = ModelledRun(recording=Recording(t=t, q=q, dq=dq, torque=np.zeros_like(q)), robot=robot)
+    rng = np.random.default_rng(5)
+    torque = 0.2 * rng.standard_normal(q.shape)
+    torque[(t % 4.0) > 2.0] += 20.0
+    # d = torque exactly, less friction: the log is told by its terms alone.
+    p = np.cumsum(0.008 * torque, axis=0)
+    log = still.with_terms(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)))
+    own = (t >= 4.5) & (t < 8.0)
+    assert is_touched(log, own)
+    quiet = torque * ~((t % 4.0 > 2.0) & own)[:, None]
+    p = np.cumsum(0.008 * quiet, axis=0)
+    assert not is_touched(still.with_terms(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))), own)

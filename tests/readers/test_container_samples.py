@@ -77,7 +77,7 @@ def test_aloha_has_two_arms(samples: Path, expected: dict[str, Any]) -> None:
         assert recording.current is not None
         efforts = [told[arm]["effort"]["first"], told[arm]["effort"]["last"]]
         np.testing.assert_allclose(1e3 * recording.current[[0, -1]], efforts, rtol=1e-9)
-    assert "arm-taken" in {remark.code for remark in read_first_recording(path).source.remarks}
+    assert "arm-side-taken" in {remark.code for remark in read_first_recording(path).source.remarks}
 
 
 def test_robomimic_has_episodes(samples: Path, expected: dict[str, Any]) -> None:

@@ -203,7 +203,7 @@ class TestHdf5:
 
     def test_an_examination_takes_the_left_arm_and_says_so(self, tmp_path: Path) -> None:
         seen = read_first_recording(seeds.aloha(tmp_path / "x"))
-        assert "arm-taken" in {remark.code for remark in seen.source.remarks}
+        assert "arm-side-taken" in {remark.code for remark in seen.source.remarks}
         np.testing.assert_array_equal(seen.q, motion()["q"])
 
     def test_a_text_of_columns_goes_before_the_layout(self, tmp_path: Path) -> None:

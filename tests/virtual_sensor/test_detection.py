@@ -144,7 +144,7 @@ def test_what_is_listed_is_judged_as_it_stands() -> None:
 
 
 def test_the_band_is_learned_where_the_arm_is_known_to_be_free() -> None:
-    """A bump of 5 N·m at 12 s is a false alarm, unless it lies in the free part or in a free run."""
+    """A bump of 5 N·m at 12 s is a false alarm, unless the free part or a free run shows it."""
     tau = reference(8.0).tau + np.column_stack([push(5.0, 12.0, 13.0), np.zeros(len(T))])
     estimate = [ExternalTorque(name="gmo", t=T, tau=tau)]
 

@@ -1,28 +1,39 @@
 """A log's contacts: the smoother's list where free motion is known, else a threshold's."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from vftcli.contacts.contact_list import Contact, ContactList, ContactModel
+from vftcli.contacts.contact_list import SURE_NATS, Contact, ContactList, ContactModel
 from vftcli.contacts.evidence import LEAST_EVIDENCE
 from vftcli.contacts.loads import is_load, load_row
-from vftcli.contacts.rows import Measurer
+from vftcli.contacts.model_error import UNKNOWN, UNSEEN_SHARE, error_course
+from vftcli.contacts.places import places
+from vftcli.contacts.rows import NORMAL, Measurer
 from vftcli.contacts.search import Found, search
 from vftcli.contacts.stops import follows_stop
-from vftcli.contacts.threshold_list import smallest_told, threshold_rows
+from vftcli.contacts.threshold_list import axes_told, threshold_rows
 from vftcli.contacts.untouched import (
+    BLOCK,
     MOVING_SHARE,
     Untouched,
     block_length,
     untouched_motion,
 )
+from vftcli.contacts.windows import BlockLog, Run, gate_of
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import ModelledRun
-from vftcli.signals.arrays import Mask
+from vftcli.robots.disturbance import disturbance_blocks
+from vftcli.robots.kinematics import flange_jacobian
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.virtual_sensor.smoother.noise import dry_torques
+
+SHORT, FINE = 0.25, 0.008
+"""A contact shorter than this [s] is measured in blocks of this length [s]: longer ones cut its
+peak."""
 
 FALSE_MARGIN = 1.5
 """A contact's evidence must be this much above that of any row in the log's own free part."""
@@ -79,17 +90,21 @@ def by_smoother(free: Untouched, seconds: float) -> ContactList:
     kept = [k for k in range(len(found.runs)) if found.best[k] > least]
     halted = [k for k in kept if is_stop(run, found, k, seconds)]
     stops = tuple(float(found.log.blocks.t[found.runs[k][0]]) for k in halted)
-    measurer = Measurer.of(run, found.kept([k for k in kept if k not in halted]), free)
+    found = found.kept([k for k in kept if k not in halted])
+    measurer = Measurer.of(run, found, free)
+    rows = dict(enumerate(measurer.rows()))
+    if brief := [k for k, span in enumerate(found.runs) if lasts(found, span) < SHORT]:
+        rows |= fine_rows(free, brief, measurer)
     return ContactList(
         recording=run.recording.name,
         duration=run.recording.duration,
-        contacts=measurer.rows(),
+        contacts=numbered([rows[k] for k in sorted(rows) if is_told(rows[k])]),
         method="smoother",
         free=free.remarks,
         free_seconds=free.noise.free_seconds,
         false_on_free=len(set(own) & set(strong)) + false_rows(free, seconds),
         threshold=least,
-        smallest_force=measurer.smallest_force,
+        smallest_force=measurer.test.smallest_force,
         stops=stops,
         model=ContactModel(
             prior=measurer.prior,
@@ -98,8 +113,59 @@ def by_smoother(free: Untouched, seconds: float) -> ContactList:
             error_time=free.noise.time,
             block=seconds,
         ),
-        remarks=tuple(limits(run, free, stops)),
+        remarks=tuple(limits(run, free, stops, measurer.test.smallest_force)),
     )
+
+
+def is_told(row: Contact) -> bool:
+    """Whether a row says more than that something may be there: a force, or sure evidence."""
+    if row.peak_force is None or row.peak_band is None:
+        return True
+    return row.peak_force > row.peak_band or (row.evidence or 0.0) >= SURE_NATS
+
+
+def numbered(rows: Sequence[Contact]) -> tuple[Contact, ...]:
+    """The rows with their numbers, from 1."""
+    return tuple(row.numbered(k) for k, row in enumerate(rows, start=1))
+
+
+def lasts(found: Found, span: Run) -> float:
+    """How long a contact lasts. [s]"""
+    return float(found.log.blocks.length[slice(*span)].sum())
+
+
+def fine_rows(free: Untouched, brief: Sequence[int], measurer: Measurer) -> dict[int, Contact]:
+    """Rows of short contacts, from blocks that cut their peaks less.
+
+    Args:
+        free: Motion that nobody touched.
+        brief: Numbers of the contacts that are short.
+        measurer: What measured all of them.
+
+    Returns:
+        Number → row; nothing where the log has no shorter blocks.
+    """
+    recording, found = free.log.recording, measurer.found
+    seconds, usual = max(FINE, float(recording.median_step)), block_length(recording.t)
+    # On a clock that jitters blocks are as short as they may be.
+    fine = free.in_blocks(seconds) if seconds < 0.7 * usual <= 0.7 * BLOCK else None
+    if fine is None:
+        return {}
+    blocks = disturbance_blocks(fine.log.terms, recording.q, seconds)
+    edges = found.log.blocks.t - 0.5 * found.log.blocks.length
+    edges = np.append(edges, edges[-1] + found.log.blocks.length[-1])
+    spans = [(int(a), int(b)) for a, b in np.searchsorted(blocks.t, edges[np.array(found.runs)])]
+    course = error_course(fine.noise, blocks)
+    others = gate_of(len(blocks.t), [spans[k] for k in range(len(spans)) if k not in set(brief)])
+    white = np.where(others[:, None], UNKNOWN, course.white)
+    some = found.kept(brief)._replace(
+        log=BlockLog.of(blocks, course._replace(white=white)),
+        places=places(fine.log.robot.loaded_chain, blocks.q),
+        runs=[spans[k] for k in brief],
+    )
+    # Where it is takes no peak, and is told best from the longer blocks.
+    sites = [measurer.sites[k] for k in brief]
+    return dict(zip(brief, Measurer.of(fine.log, some, fine, measurer).rows(sites), strict=True))
 
 
 def in_free_part(run: ModelledRun, found: Found, span: tuple[int, int], free: Untouched) -> bool:
@@ -127,15 +193,31 @@ def false_rows(free: Untouched, seconds: float) -> int:
     return count
 
 
-def limits(run: ModelledRun, free: Untouched, stops: tuple[float, ...]) -> list[Remark]:
-    """What limits the list as a whole."""
+def limits(
+    run: ModelledRun, free: Untouched, stops: tuple[float, ...], smallest: float
+) -> list[Remark]:
+    """What limits the list as a whole; the smallest force as the free part shows it. [N]"""
     found = [caution("arm-stopped-abruptly", Where(span=(at, at)), at_s=at) for at in stops]
     unseen = [j + 1 for j in np.flatnonzero(free.noise.seen < 0.5).tolist()]
     if len(unseen) == run.robot.joints:
-        found.append(caution("free-part-rests"))
+        # At rest the free part shows no friction of motion: the share of F_c that is added does.
+        dry = UNSEEN_SHARE * free.noise.dry
+        found.append(caution("free-part-rests", least_N=max(smallest, felt_by(run, dry))))
     elif unseen:
         found.append(caution("free-part-misses-joints", Where(joints=tuple(unseen))))
     return found
+
+
+def felt_by(run: ModelledRun, torque: Array) -> float:
+    """Median over the log of the force along its best axis that turns no joint further. [N]
+
+    Args:
+        run: The log.
+        torque: What each joint may hide: 1.96 standard deviations of it. (n,) [N·m]
+    """
+    J = np.abs(flange_jacobian(run.robot.loaded_chain, run.recording.q)[:, :3])
+    each = np.min(NORMAL * torque / np.maximum(J, 1e-9), axis=2)
+    return float(np.median(each.min(axis=1)))
 
 
 def by_threshold(motion: FreeMotion) -> ContactList:
@@ -151,7 +233,7 @@ def by_threshold(motion: FreeMotion) -> ContactList:
         free_seconds=0.0,
         false_on_free=None,
         threshold=None,
-        smallest_force=smallest_told(run) if has_wrench(run) else None,
+        smallest_force=float(axes_told(run)[2]) if has_wrench(run) else None,
         stops=(),
         model=ContactModel(
             prior=None,

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.contacts.contact_list import Contact
-from vftcli.contacts.rows import DRIVES, NORMAL
+from vftcli.contacts.rows import NORMAL
 from vftcli.contacts.untouched import free_part
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
-from vftcli.virtual_sensor.smoother.smoothing import SmoothedWrench, smooth_wrench
+from vftcli.virtual_sensor.smoother.smoothing import DRIVES, SmoothedWrench, smooth_wrench
 
 SHARE = 0.5
 """Share of the time since the first motion that contacts must fill together to be a load."""

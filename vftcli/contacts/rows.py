@@ -1,11 +1,13 @@
 """From what was found to the rows of the list: peak, band, place, torques, and what others say."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.contact_list import Contact
+from vftcli.contacts.contact_list import SURE_NATS, WIDE, Contact
 from vftcli.contacts.model_error import UNKNOWN, ErrorCourse, error_course
 from vftcli.contacts.places import (
     MORE_THAN_A_FORCE,
@@ -18,12 +20,14 @@ from vftcli.contacts.places import (
 )
 from vftcli.contacts.search import Found
 from vftcli.contacts.sizes import learn_prior, smooth_contacts
-from vftcli.contacts.untouched import Untouched, self_test
+from vftcli.contacts.untouched import SelfTest, Untouched, self_test
 from vftcli.contacts.windows import BlockLog, ContactPrior, WindowWrench, gate_of
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.remarks import Remark, caution
 from vftcli.virtual_sensor.smoother.noise import resting
+from vftcli.virtual_sensor.smoother.smoothing import BENT, hidden_by_blocks
 
 WIDENED = np.repeat([1.3, 2.0], 3)
 """What the model's own standard deviations of force and moment are multiplied by: the error of the
@@ -33,8 +37,8 @@ LOOSER = 1.5
 """What the force's own standard deviation is multiplied by where its size is told: peaks are larger
 than the mean that it was learned from, and would be drawn to zero."""
 
-DRIVES = 0.03
-"""Share of a reading that the drives' constants may be off by."""
+BENT_SHORT = 0.4
+"""Share of its bend that the peak of a contact may hide that is short for the prior of them all."""
 
 NORMAL = 1.96
 """Half width of a 95 % band in standard deviations."""
@@ -56,46 +60,73 @@ class Measurer:
         found: The contacts that were kept.
         log: The log in blocks; joints at rest may settle anew under a contact.
         prior: How the wrench of the contacts moves.
-        widening: Factor on each axis' standard deviation. (6,)
-        smallest_force: The smallest force that this log can tell. [N]
+        test: How well free motion lets a wrench be told.
         quiet: What the model errs by, bridged across the contacts.
+        bent: Share of a peak's bend that may be hidden.
     """
 
     run: ModelledRun
     found: Found
     log: BlockLog
     prior: ContactPrior
-    widening: Array
-    smallest_force: float
+    test: SelfTest
     quiet: "QuietError"
+    bent: float = BENT
 
     @classmethod
-    def of(cls, run: ModelledRun, found: Found, free: Untouched) -> "Measurer":
-        """Learn what the contacts' wrench is like, and how well free motion lets it be told."""
+    def of(
+        cls, run: ModelledRun, found: Found, free: Untouched, like: "Measurer | None" = None
+    ) -> "Measurer":
+        """Learn what the contacts' wrench is like, and how well free motion lets it be told.
+
+        Args:
+            run: The log with its robot's model.
+            found: The contacts.
+            free: Motion that nobody touched, in blocks as long as the log's.
+            like: A measurer of the same log in longer blocks, whose prior and test are taken.
+        """
         blocks, J = found.log.blocks, found.places[0].jacobian
         gate = gate_of(len(blocks.t), found.runs)
         course = error_course(free.noise, blocks, gate)._replace(white=found.log.course.white)
         log = BlockLog.of(blocks, course)
-        prior = found.prior
-        if found.runs:
-            prior = learn_prior(log, J, found.runs, prior, rounds=2)
-        test = self_test(free, run.robot, prior)
+        bent = BENT
+        if like is not None:
+            prior, test, bent = like.prior, like.test, BENT_SHORT
+        else:
+            prior = found.prior
+            if found.runs:
+                prior = learn_prior(log, J, found.runs, prior, rounds=2)
+            test = self_test(free, run.robot, prior)
         return cls(
             run=run,
             found=found,
             log=log,
             prior=prior,
-            widening=WIDENED * test.widening,
-            smallest_force=test.smallest_force,
+            test=test,
             quiet=QuietError.across(blocks.d, course, gate[:, None]),
+            bent=bent,
         )
 
-    def rows(self) -> tuple[Contact, ...]:
-        """The contacts, in the order of time, numbered."""
+    @cached_property
+    def courses(self) -> list[WindowWrench]:
+        """The wrench of every contact at the flange."""
         runs, J = self.found.runs, self.found.places[0].jacobian
-        prior = self.prior._replace(force=LOOSER * self.prior.force)
-        courses = smooth_contacts(self.log, [J] * len(runs), runs, prior)
-        sites = [self.site(i, course) for i, course in enumerate(courses)]
+        return smooth_contacts(self.log, [J] * len(runs), runs, loosened(self.prior))
+
+    @cached_property
+    def sites(self) -> list["Site"]:
+        """Where every contact is."""
+        return [self.site(i, course) for i, course in enumerate(self.courses)]
+
+    def rows(self, sites: Sequence["Site"] | None = None) -> tuple[Contact, ...]:
+        """The contacts, in the order of time, numbered.
+
+        Args:
+            sites: Where each is, as longer blocks tell it; None to see.
+        """
+        runs, prior = self.found.runs, loosened(self.prior)
+        courses, J = list(self.courses), self.found.places[0].jacobian
+        sites = [site._replace(jacobian=J) for site in (self.sites if sites is None else sites)]
         moved = [i for i, site in enumerate(sites) if not site.on_wrist]
         point = prior._replace(moment=POINT_MOMENT)
         jacobians = [self.point_jacobian(sites[i].fits[0]) for i in moved]
@@ -134,17 +165,26 @@ class Measurer:
         k = int(np.argmax(inside.size))
         peak = run[0] + k
         values, covariance = inside.values[k], inside.covariance[k]
-        covariance = covariance * np.outer(self.widening, self.widening)
+        factor = WIDENED * self.test.widening
+        covariance = covariance * np.outer(factor, factor)
         size, length = float(inside.size[k]), blocks.length[slice(*run)]
         u = values[:3] / max(size, 1e-12)
-        band = NORMAL * float(np.hypot(np.sqrt(u @ covariance[:3, :3] @ u), DRIVES * size))
-        sd = np.sqrt(np.diag(covariance) + (DRIVES * values) ** 2)
+        # What the drives' constants and the blocks' length may hide, as in the wrench of `best`.
+        covariance = covariance + hidden_by_blocks(course.values, self.bent)[peak - course.first]
+        where, named, lead = self.part(number, site)
+        band = NORMAL * float(np.sqrt(u @ covariance[:3, :3] @ u))
+        anywhere = site.sizes(size, band)
+        told = named == "wrist" and lead >= SURE_NATS
+        remarks: tuple[Remark, ...] = ()
+        if not told and NORMAL * site.spread(size) > WIDE * size:
+            # Where another part may have been touched, another force touched it.
+            remarks = (caution("size-goes-with-place", least_N=anywhere[0], most_N=anywhere[1]),)
+        sd = np.sqrt(np.diag(covariance))
         J = site.jacobian[peak]
         torque_sd = np.sqrt(np.einsum("in,ij,jn->n", J, covariance, J))
         wrench = values.copy()
         if site.jacobian is not self.found.places[0].jacobian:
             wrench[3:] += np.cross(from_flange(self.run, blocks.q[peak], site.fits[0]), values[:3])
-        where, lead = self.part(number, site)
         force = inside.values[:, :3]
         return Contact(
             number=number + 1,
@@ -157,7 +197,7 @@ class Measurer:
             wrench_sd=sd,
             mean_force=np.average(force, axis=0, weights=length),
             impulse=length @ force,
-            anywhere=site.sizes(size, band),
+            anywhere=anywhere,
             where=where,
             lead=lead,
             places=site.links(self.run.robot.joints),
@@ -169,10 +209,11 @@ class Measurer:
                 self.run, self.found.places[0].jacobian[peak], peak, blocks.t
             ),
             sensor_force=sensor_force(self.run, float(blocks.t[peak])),
+            remarks=remarks,
         )
 
-    def part(self, number: int, site: "Site") -> tuple[ArmPart, float]:
-        """The part of the arm that alone fits, and by how much its evidence leads."""
+    def part(self, number: int, site: "Site") -> tuple[ArmPart, ArmPart, float]:
+        """The part of the arm that alone fits, the one that leads, and by how much evidence."""
         parts = arm_parts(self.run.robot.joints)
         best: dict[ArmPart, float] = {}
         for place, nats in zip(self.found.places, self.found.evidence[number], strict=True):
@@ -181,7 +222,12 @@ class Measurer:
         fitting = site.parts
         where: ArmPart = fitting[0] if len(fitting) == 1 else "cannot tell"
         named = where if where in best else max(best, key=lambda part: best[part])
-        return where, best[named] - max(v for part, v in best.items() if part != named)
+        return where, named, best[named] - max(v for part, v in best.items() if part != named)
+
+
+def loosened(prior: ContactPrior) -> ContactPrior:
+    """The prior under which the size of a contact is told."""
+    return prior._replace(force=LOOSER * prior.force)
 
 
 class Site(NamedTuple):
@@ -211,6 +257,17 @@ class Site(NamedTuple):
         """Links that fit, 0 for the flange."""
         found = {0 if fit.link == joints and fit.share > 0.99 else fit.link for fit in self.fits}
         return tuple(sorted(found))
+
+    def spread(self, size: float) -> float:
+        """What the size may be off by for the place, where more than one part fits. [N]
+
+        The root mean square over the points that fit, each as likely as its score makes it.
+        """
+        if len(self.parts) == 1:
+            return 0.0
+        likely = np.exp(-0.5 * np.array([fit.score - self.fits[0].score for fit in self.fits]))
+        apart = np.array([fit.size for fit in self.fits]) - size
+        return float(np.sqrt(likely @ apart**2 / likely.sum()))
 
     def sizes(self, size: float, band: float) -> tuple[float, float]:
         """Smallest and largest |F| over the places that fit, bands included. [N]"""

@@ -39,6 +39,10 @@ RELEASED, RELEASE_TIME, RELEASE_SHARE = 1.5, 0.08, 0.25
 """A contact is split where the force is below so many standard deviations for so long [s], and
 below this share of the peaks on both sides."""
 
+HALF, TURNED, APART = 0.5, np.cos(np.radians(60.0)), 0.25
+"""A contact is split too where the force falls below this share of the peaks on both sides, if
+these point so far apart (cosine) and each side lasts so long [s]: one hand follows another."""
+
 
 def smooth_contacts(
     log: BlockLog, jacobians: Sequence[Array], runs: Sequence[Run], prior: ContactPrior
@@ -127,7 +131,36 @@ def split_run(t: Array, course: WindowWrench, run: Run, jacobian: Array) -> list
         if all(x[k:end].min() < valley(x[begin:k], x[end:]) for x in (size, torque)):
             pieces.append((run[0] + begin, run[0] + k))
             begin = end
-    return [*pieces, (run[0] + begin, run[1])]
+    pieces.append((run[0] + begin, run[1]))
+    force = inside.values[:, :3]
+    return [
+        (first + run[0], last + run[0])
+        for piece in pieces
+        for first, last in split_at_turns(at, force, torque, (piece[0] - run[0], piece[1] - run[0]))
+    ]
+
+
+def split_at_turns(t: Array, force: Array, torque: Array, piece: Run) -> list[Run]:
+    """A stretch of a contact, split at valleys of force and torque between different directions.
+
+    Args:
+        t: Time along the contact. (k,) [s]
+        force: Its force. (k, 3) [N]
+        torque: |Jᵀw|. (k,) [N·m]
+        piece: First and last block of the stretch.
+    """
+    span = slice(*piece)
+    at, there, load = t[span], force[span], torque[span]
+    size = np.linalg.norm(there, axis=1)
+    inner = np.flatnonzero((at - at[0] >= APART) & (at[-1] - at >= APART))
+    for k in inner[np.argsort(size[inner])].tolist():
+        if not all(x[k] < HALF * min(x[:k].max(), x[k:].max()) for x in (size, load)):
+            continue
+        i, j = int(np.argmax(size[:k])), k + int(np.argmax(size[k:]))
+        if there[i] @ there[j] < TURNED * size[i] * size[j]:
+            ends = (piece[0], piece[0] + k), (piece[0] + k, piece[1])
+            return [part for end in ends for part in split_at_turns(t, force, torque, end)]
+    return [piece]
 
 
 def valley(before: Array, after: Array) -> float:

@@ -10,7 +10,6 @@ from vftcli.contacts.candidates import LEVEL, threshold_contacts
 from vftcli.contacts.contact_list import Contact
 from vftcli.contacts.places import MORE_THAN_A_FORCE, arm_parts, point_fits, those_that_fit
 from vftcli.contacts.rows import (
-    DRIVES,
     NORMAL,
     Site,
     from_flange,
@@ -22,6 +21,7 @@ from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.signals.arrays import Array
 from vftcli.signals.series import median_step, runs_of
+from vftcli.virtual_sensor.smoother.smoothing import DRIVES
 
 HALF = 0.015
 """A peak's torque is the mean over so long before and after it. [s]"""
@@ -60,13 +60,16 @@ def threshold_rows(run: ModelledRun) -> tuple[Contact, ...]:
     J = flange_jacobian(run.robot.loaded_chain, run.recording.q)
     least = max(round(APART / median_step(t)), 1)
     rows: list[Contact] = []
-    told = smallest_told(run)
+    best, _, told = axes_told(run)
     for start, stop in runs_of(above):
         span = slice(start, stop)
         size = np.linalg.norm(flange_forces(J[span], torque[span], sd[span])[0][:, :3], axis=1)
         for first, last in split_at_valleys(size, least, told):
             peak = start + first + int(np.argmax(size[first:last]))
-            rows.append(peak_row(run, (start + first, start + last), peak, torque, sd))
+            row = peak_row(run, (start + first, start + last), peak, torque, sd)
+            # Less than is told along the best of axes is no contact, whatever joint shows it.
+            if row.peak_force is None or row.peak_force >= best:
+                rows.append(row)
     return tuple(rows[i].numbered(i + 1) for i in range(len(rows)))
 
 
@@ -155,11 +158,13 @@ def peak_row(
     )
 
 
-def smallest_told(run: ModelledRun) -> float:
-    """Median over the log of the force that the worst axis must have to be told. [N]
+def axes_told(run: ModelledRun) -> Array:
+    """Median over the log of the force that is told along the best, middle and worst axis. (3,) [N]
 
     Along an axis the joint that feels it best decides: min over joints of 4 sd/|J|.
     """
     sd, J = expected_torque(run, None), flange_jacobian(run.robot.loaded_chain, run.recording.q)
     felt = np.maximum(np.abs(J[:, :3]), 1e-9)
-    return float(np.median(np.min(LEVEL * sd[:, None, :] / felt, axis=2).max(axis=1)))
+    least = np.sort(np.min(LEVEL * sd[:, None, :] / felt, axis=2), axis=1)
+    found: Array = np.median(least, axis=0)
+    return found

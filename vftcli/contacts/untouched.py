@@ -1,7 +1,7 @@
 """What motion that nobody touched tells: noise, the level of a threshold, the smallest force."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -66,7 +66,8 @@ class Untouched:
         own: Samples of the log itself that are free. (T,)
         log: The log, less a load that the free part carries.
         runs: Free runs in other logs, less a load that they carry.
-        pieces: Every free piece in blocks, each with the log it is from.
+        free: Every free piece, less a load that it carries.
+        pieces: The same in blocks.
         remarks: What it is and how it was found, and a load that it carries.
     """
 
@@ -75,8 +76,14 @@ class Untouched:
     own: Mask
     log: ModelledRun
     runs: tuple[ModelledRun, ...]
+    free: tuple[FreePiece, ...]
     pieces: tuple[Blocks, ...]
     remarks: tuple[Remark, ...]
+
+    def in_blocks(self, seconds: float) -> "Untouched | None":
+        """The same in blocks of another length [s], None where no stretch holds enough of them."""
+        found = noise_of(self.free, seconds)
+        return None if found is None else replace(self, noise=found[0], pieces=found[1])
 
 
 def block_length(t: Array) -> float:
@@ -102,25 +109,34 @@ def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
     part = free_part(motion)
     if part is None:
         return None
-    robot, load = motion.log.robot, free_load(part.pieces)
+    load = free_load(part.pieces)
     # A load nobody told of is no noise: contacts are told beside it.
     pieces = tuple(p._replace(run=unloaded(p.run, load)) for p in part.pieces)
-    blocks = tuple(
-        disturbance_blocks(piece.run.terms, piece.run.recording.q, seconds, piece.inside)
-        for piece in pieces
-    )
-    noise = learn_noise(blocks, dry_torques(robot))
-    if noise is None:
+    found = noise_of(pieces, seconds)
+    if found is None:
         return None
     return Untouched(
-        noise=noise,
+        noise=found[0],
         level=torque_level(pieces),
         own=part.own,
         log=unloaded(motion.log, load),
         runs=tuple(p.run for p in pieces if p.run.recording is not motion.log.recording),
-        pieces=blocks,
+        free=pieces,
+        pieces=found[1],
         remarks=part.remarks if load is None else (*part.remarks, load.remark),
     )
+
+
+def noise_of(
+    pieces: Sequence[FreePiece], seconds: float
+) -> tuple[ErrorNoise, tuple[Blocks, ...]] | None:
+    """Noise of free pieces, and the pieces in blocks of a length [s]; None where they are short."""
+    blocks = tuple(
+        disturbance_blocks(piece.run.terms, piece.run.recording.q, seconds, piece.inside)
+        for piece in pieces
+    )
+    noise = learn_noise(blocks, dry_torques(pieces[0].run.robot))
+    return None if noise is None else (noise, blocks)
 
 
 def unloaded(run: ModelledRun, load: FreeLoad | None) -> ModelledRun:

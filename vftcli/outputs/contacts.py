@@ -145,6 +145,11 @@ def hardest_rows(contacts: Sequence[Contact]) -> list[Contact]:
 def answer(found: ContactList) -> str:
     """What touched the arm, in one sentence."""
     count = len(found.contacts)
+    if not count and found.false_on_free:
+        return (
+            "No contact stands out from the free part, which itself shows "
+            f"{found.false_on_free}: was nobody there?"
+        )
     if not count:
         return "Nothing touched the arm, as far as this log can tell."
     first = found.contacts[0]

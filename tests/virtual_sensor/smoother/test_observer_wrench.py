@@ -19,6 +19,7 @@ from vftcli.virtual_sensor.sensing import sense
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.observer_wrench import (
+    Gate,
     SmootherInput,
     corrected_input,
     known_free,
@@ -154,7 +155,7 @@ def test_a_list_of_contacts_is_its_gate(motion: FreeMotion) -> None:
         ]
     ]
     asked = WrenchChoice(solver="smoother", frame="base")
-    sensed = sense(motion, (), estimates, asked, gate=[(4.5, 5.0)])
+    sensed = sense(motion, (), estimates, asked, gate=Gate([(4.5, 5.0)]))
     (wrench,) = sensed.wrenches
     t = log.recording.t
     away = (t < 4.4) | (t > 5.1)

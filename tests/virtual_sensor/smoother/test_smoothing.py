@@ -17,7 +17,12 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior
-from vftcli.virtual_sensor.smoother.smoothing import MOST_BLOCKS, block_length, smooth_wrench
+from vftcli.virtual_sensor.smoother.smoothing import (
+    MOST_BLOCKS,
+    block_length,
+    hidden_by_blocks,
+    smooth_wrench,
+)
 from vftcli.virtual_sensor.solvers import LEAST_SIGMA, decompose
 
 FIXTURES = Path(__file__).parents[3] / "fixtures"
@@ -91,7 +96,9 @@ def test_the_gate_leaves_no_wrench_where_nothing_touches() -> None:
     np.testing.assert_allclose(gate.t[gate.inside][[0, -1]], [8.0, 11.0], atol=2 * gate.seconds)
     assert whole.inside.all()
     touched = (gate.t > 8.2) & (gate.t < 10.8)
-    assert np.all(gate.sd[touched].mean(axis=0) < whole.sd[touched].mean(axis=0))
+    # Stiction gives way under a listed contact: the same where nearly all of the log is one.
+    wide = smooth_wrench(terms, q, robot, [free], [(0.0, 19.5)], prior)
+    assert np.all(gate.sd[touched].mean(axis=0) < wide.sd[touched].mean(axis=0))
     assert np.mean(gate.values[touched, 2]) == pytest.approx(-25.0, abs=3.0)
 
 
@@ -209,3 +216,15 @@ def test_a_real_payload_is_read_in_every_pose(logs: Path) -> None:
     assert np.all(np.sqrt(np.mean(error**2, axis=0)) <= 4.0)
     assert np.all(np.abs(error.mean(axis=0)) <= 1.5)
     assert np.all(np.mean(np.abs(error) <= 1.96 * moved.sd[:, :3], axis=0) >= 0.88)
+
+
+def test_blocks_hide_a_share_of_a_bend_and_drives_one_of_the_reading() -> None:
+    """A tooth of 40 N: it stands 40 N above its neighbours' mean, they 20 N below theirs."""
+    values = np.zeros((5, 6))
+    values[2, 0] = 40.0
+    hidden = hidden_by_blocks(values)
+    assert hidden[2, 0, 0] == pytest.approx((0.25 * 40.0) ** 2 + (0.03 * 40.0) ** 2)
+    assert hidden[1, 0, 0] == pytest.approx((0.25 * 20.0) ** 2)
+    steady = hidden_by_blocks(np.tile([0.0, 3.0, 4.0, 0.0, 0.0, 0.0], (9, 1)))
+    along = np.array([0.0, 0.6, 0.8, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(steady @ along @ along, (0.03 * 5.0) ** 2)

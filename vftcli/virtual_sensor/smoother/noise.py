@@ -35,6 +35,10 @@ logs the residual at rest is .31 to .61 of it."""
 REST_TIME = 2.0
 """Stiction keeps its state at least this long. [s]"""
 
+PUSHED_SHARE, PUSHED_TIME = 0.6, 0.3
+"""A joint that rests under a contact: the push re-settles its stiction, by so much of F_c, within
+so long [s]."""
+
 UNSEEN_SHARE, UNSEEN_TIME, SEEN = 0.2, 1.0, 0.2
 """A joint that moves in less than the share `SEEN` of the free part's blocks: the model error of
 its motion, as a share of F_c, and its least correlation time. [s]"""
@@ -91,13 +95,24 @@ class TorqueNoise:
     near: float = 0.0
     free_seconds: float = 0.0
 
-    def variance(self, blocks: Blocks) -> Array:
-        """Stationary variance of the model error in every block. (K, n) [(N·m)²]"""
-        return np.where(self.rests(blocks), self.resting, self.moving)
+    def variance(self, blocks: Blocks, pushed: Mask | None = None) -> Array:
+        """Stationary variance of the model error in every block. (K, n) [(N·m)²]
 
-    def decay(self, blocks: Blocks) -> Array:
-        """Share of the model error that is kept from one block to the next. (K, n)"""
+        Args:
+            blocks: The log.
+            pushed: Blocks in which a contact may re-settle stiction; None for none. (K,)
+        """
+        found = np.where(self.rests(blocks), self.resting, self.moving)
+        if pushed is None:
+            return found
+        again = self.moving + (PUSHED_SHARE / REST_SHARE) ** 2 * self.resting
+        return np.where(resting(blocks) & pushed[:, None], again, found)
+
+    def decay(self, blocks: Blocks, pushed: Mask | None = None) -> Array:
+        """Share of the model error that is kept from one block to the next, likewise. (K, n)"""
         time = np.where(self.rests(blocks), self.resting_time, self.moving_time)
+        if pushed is not None:
+            time = np.where(resting(blocks) & pushed[:, None], PUSHED_TIME, time)
         return np.exp(-steps(blocks)[:, None] / time)
 
     def rests(self, blocks: Blocks) -> Mask:

@@ -16,11 +16,21 @@ from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import from_base
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 from vftcli.virtual_sensor.smoother.smoothing import SmoothedWrench, prior_of, smooth_wrench
 from vftcli.virtual_sensor.virtual_sensor import CHUNK, VirtualSensor
 
-Gate = Sequence[tuple[float, float]]
-"""From and to of every contact. [s]"""
+
+class Gate(NamedTuple):
+    """The contacts of a log, outside of which nothing touches the arm.
+
+    Attributes:
+        spans: From and to of every contact. [s]
+        prior: How their wrench moves, as the contacts themselves show it; None to choose it.
+    """
+
+    spans: Sequence[tuple[float, float]]
+    prior: WrenchPrior | None = None
 
 
 class SmootherInput(NamedTuple):
@@ -186,11 +196,14 @@ def smooth_input(
     if plain is not None and torque is not None:
         # A free run takes the model's error off by itself; the correction would do it again.
         given, plain = plain, None
+    if gate is not None:
+        free, terms = known_free(motion, given, unloaded), less_torque(given.terms, torque)
+        return smooth_wrench(terms, q, robot, free, gate.spans, gate.prior)
     if plain is not None:
         free = known_free(motion, plain, unloaded)
-        prior = prior_of(plain.terms, q, robot, free, gate)
+        prior = prior_of(plain.terms, q, robot, free)
         if prior.is_steady:
-            found = smooth_wrench(plain.terms, q, robot, free, gate, prior)
+            found = smooth_wrench(plain.terms, q, robot, free, prior=prior)
             return replace(found, uncorrected=True)
     free = known_free(motion, given, unloaded)
-    return smooth_wrench(less_torque(given.terms, torque), q, robot, free, gate)
+    return smooth_wrench(less_torque(given.terms, torque), q, robot, free)

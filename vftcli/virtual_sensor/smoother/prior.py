@@ -26,10 +26,12 @@ class WrenchPrior(NamedTuple):
     Attributes:
         time: Correlation time τ_w. [s]
         force: Standard deviation σ_f of each component of the force. [N]
+        moment: That of the moment; `LEVER` times the force where none is known. [N·m]
     """
 
     time: float
     force: float
+    moment: float | None = None
 
     @property
     def is_steady(self) -> bool:
@@ -41,7 +43,8 @@ class WrenchPrior(NamedTuple):
     @property
     def variance(self) -> Array:
         """Stationary variance of force and moment. (6,) [N², (N·m)²]"""
-        return np.repeat([self.force**2, (LEVER * self.force) ** 2], 3)
+        moment = LEVER * self.force if self.moment is None else self.moment
+        return np.repeat([self.force**2, moment**2], 3)
 
 
 STEADY = 30.0
@@ -95,10 +98,12 @@ def evolution(
         kept = np.where(goes_on, np.exp(-step / prior.time), 0.0)[:, None]
         decay[:, g, :6] = kept
         variance[:, g, :6] = np.where(inside[:, None], prior.variance * (1.0 - kept**2), 0.0)
-    kept = noise.decay(blocks)
+    # Where the whole log may be touched nothing tells a push from what it re-settles.
+    pushed = inside if not inside.all() else np.zeros(count, dtype=bool)
+    kept = noise.decay(blocks, pushed)
     kept[0] = 0.0
     decay[:, :, 6:] = kept[:, None, :]
-    variance[:, :, 6:] = (noise.variance(blocks) * (1.0 - kept**2))[:, None, :]
+    variance[:, :, 6:] = (noise.variance(blocks, pushed) * (1.0 - kept**2))[:, None, :]
     return Evolution(decay, variance)
 
 

@@ -42,6 +42,14 @@ WIDENED = np.repeat([1.5, 2.0], 3)
 friction is not Gaussian; chosen once on six simulated seeds, for all logs."""
 
 
+DRIVES = 0.03
+"""Share of a reading that the drives' constants may be off by."""
+
+BENT = 0.25
+"""Share of the bend, of a block less the mean of its neighbours, that the blocks may hide: what
+their mean loses of a peak and what lies between two of them."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class SmoothedWrench:
     """The wrench in base axes about the flange point, block by block, and what it rests on.
@@ -49,7 +57,8 @@ class SmoothedWrench:
     Attributes:
         t: Middle of each block. (K,) [s]
         values: Force and moment on the robot. (K, 6) [N, N·m]
-        covariance: Their covariance, widened by `WIDENED`. (K, 6, 6)
+        covariance: Their covariance, widened by `WIDENED`, and in contacts by what the drives and
+            the blocks may hide. (K, 6, 6)
         model_error: What the model errs by, as far as it can be told from the wrench. (K, n) [N·m]
         model_error_sd: Its standard deviation. (K, n) [N·m]
         inside: Blocks in which there may be a wrench; zero with certainty in the others. (K,)
@@ -192,10 +201,13 @@ def smooth_wrench(
     steps = evolution(blocks, noise, [prior], inside)
     single = Evolution(steps.decay[:, 0], steps.variance[:, 0])
     mean, covariance = smooth_backward(single, filter_forward(single, measured))
+    spread = covariance[:, :6, :6] * np.outer(WIDENED, WIDENED)
+    if gate is not None:
+        spread = spread + inside[:, None, None] * hidden_by_blocks(mean[:, :6])
     return SmoothedWrench(
         t=blocks.t,
         values=mean[:, :6],
-        covariance=covariance[:, :6, :6] * np.outer(WIDENED, WIDENED),
+        covariance=spread,
         model_error=mean[:, 6:],
         model_error_sd=deviations(covariance[:, 6:, 6:]),
         inside=inside,
@@ -204,6 +216,19 @@ def smooth_wrench(
         noise=noise,
         gate=gate is not None,
     )
+
+
+def hidden_by_blocks(values: Array, bent: float = BENT) -> Array:
+    """Covariance of what the drives' constants and the blocks' length may hide. (K, 6, 6)
+
+    Args:
+        values: A wrench block by block. (K, 6) [N, N·m]
+        bent: Share of the bend that is hidden.
+    """
+    walled = np.vstack([values[:1], values, values[-1:]])
+    bend = bent * (values - 0.5 * (walled[2:] + walled[:-2]))
+    drives = DRIVES * values
+    return bend[:, :, None] * bend[:, None, :] + drives[:, :, None] * drives[:, None, :]
 
 
 def prior_of(
