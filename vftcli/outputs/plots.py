@@ -49,6 +49,7 @@ class Lines(NamedTuple):
         lines: At least one, all of one length.
         family: Plots of one family have the same vertical axis; "" stands alone.
         points: Single points among the lines, or none.
+        legend: Whether a legend may cover a corner of it, where the title does not say it all.
     """
 
     path: str
@@ -56,6 +57,7 @@ class Lines(NamedTuple):
     lines: Sequence[PlotLine]
     family: str = ""
     points: PlotPoints | None = None
+    legend: bool = True
 
     @property
     def values(self) -> Array:

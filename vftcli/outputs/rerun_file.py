@@ -191,7 +191,7 @@ def arm_view(view: ArmView) -> Any:  # noqa: ANN401 - Rerun is untyped
     # The base stands at the origin and shall be seen too.
     low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
     centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
-    eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
+    eye = centre + 2.0 * radius * np.array([0.62, -0.66, 0.42])
     return rrb.Spatial3DView(
         origin="/robot",
         contents=["/robot/**", f"{CONTACTS}/**"],
@@ -209,7 +209,7 @@ def grid_of(tab: Tab) -> Any:  # noqa: ANN401 - Rerun is untyped
         rrb.TimeSeriesView(
             origin=lines.path,
             name=drawable(lines.title),
-            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=k == 0),
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=k == 0 and lines.legend),
             axis_x=rrb.archetypes.TimeAxis(link="LinkToGlobal"),
             axis_y=rrb.ScalarAxis(range=tab.ends(lines)),
         )
@@ -225,7 +225,7 @@ def log_view(log: Sequence[LogLine]) -> Any:  # noqa: ANN401 - Rerun is untyped
     """A text log: time and words."""
     import rerun.blueprint as rrb
 
-    columns = {}
+    columns: dict[str, Any] = {}
     # The path says nothing that the words do not; versions without the choice show it.
     if hasattr(rrb, "TextLogColumns"):
         shown = [rrb.components.TextLogColumn(kind) for kind in ("LogLevel", "Body")]

@@ -181,8 +181,9 @@ class Wrench:
             return None
         sd, size = self.known_sd[:, :3], self.size
         along = self.force / np.where(size > 0.0, size, 1.0)[:, None]
-        found = np.sqrt(np.sum((along * sd) ** 2, axis=1))
-        return np.where(size == 0.0, sd.max(axis=1), found)
+        found: Array = np.sqrt(np.sum((along * sd) ** 2, axis=1))
+        found[size == 0.0] = sd[size == 0.0].max(axis=1)
+        return found
 
     def between(self, start: float, stop: float) -> Array:
         """The known samples with start ≤ t ≤ stop. (k, 6) [N, N·m]"""

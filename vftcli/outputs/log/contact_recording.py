@@ -12,7 +12,7 @@ from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.observers.table import BEST
 from vftcli.outputs.arm import ArmPoses
-from vftcli.outputs.contacts import direction, place_words
+from vftcli.outputs.contacts import beginning
 from vftcli.outputs.palette import COLOURS, PLACES, REFERENCE, SPARE
 from vftcli.outputs.plots import Lines, LogLine, PlotLine, PlotPoints
 from vftcli.outputs.rerun_arm import PaintedSpan, send_force
@@ -61,14 +61,17 @@ def force_lines(analysis: Analysis) -> Lines | None:
         lines.append(PlotLine("95 % lower", lower, BAND, 0.8))
     if found is None:
         return Lines("/force", "|F| on the robot [N]", lines)
+    title = (
+        "|F| on the robot as at the flange, 95 % band [N]; bars: touched; diamonds: peaks by place"
+    )
     if found.smallest_force is not None and np.isfinite(found.smallest_force):
-        name = f"smallest that can be told: {found.smallest_force:.0f} N"
-        lines.append(PlotLine(name, np.full(len(size), found.smallest_force), SPARE[7], 1.0))
+        least = np.full(len(size), found.smallest_force)
+        lines.append(PlotLine("smallest that can be told", least, SPARE[7], 1.0))
+        title += f"; green: {found.smallest_force:.0f} N, the smallest told"
     points = peaks(found)
     tallest = np.nanmax(np.concatenate([size, [1.0], points.values if points else []]))
     lines += span_lines(analysis.t, found, -BELOW * float(tallest))
-    title = "|F| on the robot as at the flange [N]; diamonds: the contacts' peaks at their places"
-    return Lines("/force", title, lines, points=points)
+    return Lines("/force", title, lines, points=points, legend=False)
 
 
 def span_lines(t: Array, found: ContactList, level: float) -> Iterator[PlotLine]:
@@ -83,8 +86,8 @@ def span_lines(t: Array, found: ContactList, level: float) -> Iterator[PlotLine]
 
 
 def peaks(found: ContactList) -> PlotPoints | None:
-    """The peak of every contact whose force is known."""
-    felt = [contact for contact in found.contacts if contact.peak_force is not None]
+    """The peak of every contact whose force is known; a load has a mean and no peak."""
+    felt = [c for c in found.contacts if c.peak_force is not None and not c.is_load]
     if not felt:
         return None
     t = np.array([contact.peak for contact in felt])
@@ -107,24 +110,6 @@ def contact_log(found: ContactList) -> list[LogLine]:
     if not found.contacts:
         lines.append(LogLine("/remarks", 0.0, "nothing touched the arm, as far as told", REFERENCE))
     return lines
-
-
-def beginning(contact: Contact) -> str:
-    """What is said where a contact begins: when, for how long, how hard, in which direction, where.
-
-    As ``4.70 s: contact 1 begins, for 0.89 s: 86 ± 10 N, +x, wrist (good)``; the viewer's own column
-    of times is too narrow for them.
-    """
-    if contact.peak_force is None or contact.wrench is None:
-        torque = ", ".join(f"{value:.1f}" for value in contact.joint_torque)
-        size = f"joint torques {torque} N·m"
-    else:
-        size = f"{contact.peak_force:.0f} ± {contact.peak_band:.0f} N"
-        size += f", {direction(contact.wrench[:3])}"
-    what = "load" if contact.is_load else "contact"
-    where = f"{place_words(contact)} ({contact.trust})"
-    span = f"for {contact.stop - contact.start:.2f} s"
-    return f"{contact.start:.2f} s: {what} {contact.number} begins, {span}: {size}, {where}"
 
 
 def painted_links(found: ContactList, joints: int) -> dict[int, list[PaintedSpan]]:
