@@ -127,13 +127,41 @@ def write_csv(path: Path, analysis: Analysis) -> None:
         table.write_csv(file, float_precision=9)
 
 
-EXTRAS = {"csv": "estimates.csv", "mcap": "estimates.mcap", "rrd": "recording.rrd"}
-"""Flag → file name."""
+EXTRAS = {
+    "csv": ("estimates.csv",),
+    "mcap": ("estimates.mcap",),
+    "layouts": ("estimates.foxglove.json", "estimates.plotjuggler.xml"),
+    "rrd": ("recording.rrd",),
+}
+"""Flag → names of its files."""
+
+
+def extra_files(extras: Sequence[str]) -> tuple[str, ...]:
+    """Names of the files of these extras."""
+    return tuple(name for extra in extras for name in EXTRAS[extra])
 
 
 def estimate_files(extras: Sequence[str]) -> tuple[str, ...]:
     """Names of the files of a folder with these extras."""
-    return ("estimates.parquet", SEAL, *(EXTRAS[extra] for extra in extras))
+    return ("estimates.parquet", SEAL, *extra_files(extras))
+
+
+def write_extras(
+    folder: OutputFolder, place: str, analysis: Analysis, extras: Sequence[str]
+) -> None:
+    """Write what was asked for besides, below a place of a folder."""
+    from vftcli.outputs.log.layouts import foxglove_layout, plotjuggler_layout
+    from vftcli.outputs.log.mcap_output import write_mcap
+    from vftcli.outputs.log.rerun_recording import write_rrd
+
+    texts = dict(zip(EXTRAS["layouts"], (foxglove_layout, plotjuggler_layout), strict=True))
+    writers = {"csv": write_csv, "mcap": write_mcap, "rrd": write_rrd}
+    for extra in extras:
+        for name in EXTRAS[extra]:
+            if name in texts:
+                folder.write(f"{place}{name}", texts[name](analysis))
+            else:
+                writers[extra](folder / f"{place}{name}", analysis)
 
 
 def write_estimate_folder(
@@ -148,13 +176,8 @@ def write_estimate_folder(
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     record = run_record(analysis, command)
-    # After the record: it names the packages that are loaded, and these made no number.
-    from vftcli.outputs.log.mcap_output import write_mcap
-    from vftcli.outputs.log.rerun_recording import write_rrd
-
-    writers = {"csv": write_csv, "mcap": write_mcap, "rrd": write_rrd}
     with OutputFolder(path, force, estimate_files(extras)) as folder:
         write_estimates(folder / "estimates.parquet", analysis)
-        for extra in extras:
-            writers[extra](folder / EXTRAS[extra], analysis)
+        # After the record: it names the packages that are loaded, and these made no number.
+        write_extras(folder, "", analysis, extras)
         return seal(folder, SEAL, record)

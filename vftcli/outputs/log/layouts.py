@@ -5,7 +5,7 @@ formats are those that the programs themselves write; they read what is left out
 """
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -14,7 +14,7 @@ from vftcli.observers.table import BEST
 from vftcli.outputs.log.mcap_output import ros_name
 from vftcli.outputs.palette import COLOURS, REFERENCE, SPARE, colours_of
 
-Path = tuple[str, str, str]
+LinePath = tuple[str, str, str]
 """A line of a plot: its path in the program's own words, its name, its colour."""
 
 
@@ -86,7 +86,7 @@ def arm_panel() -> dict[str, Any]:
     }
 
 
-def plot_panel(title: str, lines: Iterable[Path]) -> dict[str, Any]:
+def plot_panel(title: str, lines: Iterable[LinePath]) -> dict[str, Any]:
     """One plot over time."""
     return {
         "foxglovePanelTitle": title,
@@ -132,7 +132,7 @@ def plotjuggler_layout(analysis: Analysis) -> str:
         for joint in names_of(analysis)
     ]
     root = ET.Element("root")
-    widget = ET.SubElement(root, "tabbed_widget", name="Main Window", parent="main_window")
+    widget = ET.SubElement(root, "tabbed_widget", {"name": "Main Window", "parent": "main_window"})
     for title, plots in tabs.items():
         tab = ET.SubElement(widget, "Tab", tab_name=title, containers="1")
         container = ET.SubElement(tab, "Container")
@@ -149,10 +149,3 @@ def plotjuggler_layout(analysis: Analysis) -> str:
     ET.SubElement(root, "use_relative_time_offset", enabled="1")
     ET.indent(root, " ")
     return f"<?xml version='1.0' encoding='UTF-8'?>\n{ET.tostring(root, encoding='unicode')}\n"
-
-
-LAYOUTS: dict[str, Callable[[Analysis], str]] = {
-    "estimates.foxglove.json": foxglove_layout,
-    "estimates.plotjuggler.xml": plotjuggler_layout,
-}
-"""File name → how its text is made."""
