@@ -13,7 +13,9 @@ from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.log.run_record import run_record, seal
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
+from vftcli.signals.columns import described_schema
 from vftcli.signals.wrench import AXES
+from vftcli.virtual_sensor.frames import FRAMES
 
 if TYPE_CHECKING:
     import polars as pl
@@ -114,10 +116,25 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
     # For who finds the table alone, without the record beside it.
     doubts = overridden_lines(analysis.examinations)
     metadata = {"vftcli": json.dumps({"overridden": doubts})} if doubts else None
+    schema = described_schema(table, frames_of(analysis))
     with table_file(path) as file:
         table.write_parquet(
-            file, compression="zstd", compression_level=1, statistics=False, metadata=metadata
+            file,
+            compression="zstd",
+            compression_level=1,
+            statistics=False,
+            metadata=metadata,
+            arrow_schema=schema,
         )
+
+
+def frames_of(analysis: Analysis) -> dict[str, str]:
+    """The columns of each wrench, without the axis → their frame in words."""
+    return {
+        f"{kind}/{wrench.name}": FRAMES[wrench.frame]
+        for wrench in analysis.wrenches
+        for kind in ("wrench", "wrench_sd", "wrench_masked")
+    }
 
 
 def write_csv(path: Path, analysis: Analysis) -> None:

@@ -5,8 +5,12 @@ from pathlib import Path
 import numpy as np
 
 from vftcli.signals.arrays import Array
+from vftcli.signals.columns import described_schema
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.truth import AXES, Truth
+
+TRUTH_FRAME = "base axes, moment about the flange point"
+"""Of the truth's wrenches; a contact elsewhere on the arm has its moment about its own point."""
 
 
 def write_parquet(path: Path, simulation: Simulation) -> None:
@@ -43,11 +47,14 @@ def signals(simulation: Simulation) -> dict[str, Array]:
 def write_truth(path: Path, truth: Truth, start: float) -> None:
     """Write the truth beside a log whose first stamp is `start` [s]: the same clock."""
     columns = truth.columns()
-    write_columns(path, columns | {"t": columns["t"] + start})
+    write_columns(path, columns | {"t": columns["t"] + start}, TRUTH_FRAME)
 
 
-def write_columns(path: Path, columns: dict[str, Array]) -> None:
-    """Write named columns (M,) of doubles as one Parquet table."""
+def write_columns(path: Path, columns: dict[str, Array], frame: str = "") -> None:
+    """Write named columns (M,) of doubles as one Parquet table, wrenches in this frame."""
     import polars as pl
 
-    pl.DataFrame(columns).write_parquet(path, compression="zstd")
+    table = pl.DataFrame(columns)
+    groups = {name.rpartition("/")[0] for name in columns}
+    schema = described_schema(table, dict.fromkeys(groups, frame) if frame else None)
+    table.write_parquet(path, compression="zstd", arrow_schema=schema)
