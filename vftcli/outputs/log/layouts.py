@@ -29,6 +29,15 @@ def names_of(analysis: Analysis) -> Sequence[str]:
     return analysis.recording.joint_names or analysis.robot.chain.names
 
 
+def torque_topics(analysis: Analysis) -> list[tuple[str, str, str]]:
+    """Name, topic and colour of every external torque, the reference last."""
+    colours = colours_of(analysis.estimates)
+    found = [(name, ros_name(name), colour) for name, colour in colours.items()]
+    if analysis.reference is not None:
+        found.append(("reference", "reference", REFERENCE))
+    return [(name, f"/vftcli/external/{topic}", colour) for name, topic, colour in found]
+
+
 def foxglove_layout(analysis: Analysis) -> str:
     """The arm, |F| and its axes, the joint torques, and the log of contacts, as JSON."""
     panels: dict[str, Any] = {"3D!arm": arm_panel()}
@@ -39,12 +48,9 @@ def foxglove_layout(analysis: Analysis) -> str:
         lines += [(f"{force}.{axis}", f"f{axis}", SPARE[k]) for k, axis in enumerate("xyz")]
         panels["Plot!force"] = plot_panel("Force on the robot [N]", lines)
         right.append("Plot!force")
-    torques = {e.name: f"/vftcli/external/{ros_name(e.name)}" for e in analysis.torques}
-    colours = colours_of(analysis.estimates)
     for j, joint in enumerate(names_of(analysis)):
         lines = [
-            (f"{topic}.effort[{j}]", own, colours.get(own, REFERENCE))
-            for own, topic in torques.items()
+            (f"{topic}.effort[{j}]", own, colour) for own, topic, colour in torque_topics(analysis)
         ]
         panels[f"Plot!J{j + 1}"] = plot_panel(f"J{j + 1} {joint}: external torque [N·m]", lines)
     joints = [f"Plot!J{j + 1}" for j in range(len(names_of(analysis)))]
@@ -123,12 +129,8 @@ def plotjuggler_layout(analysis: Analysis) -> str:
             [(f"{topic}/{part}/{axis}", SPARE[k]) for k, axis in enumerate("xyz")]
             for part in ("force", "torque")
         ]
-    colours = colours_of(analysis.estimates)
     tabs["joint torques"] = [
-        [
-            (f"/vftcli/external/{ros_name(e.name)}/{joint}/effort", colours.get(e.name, REFERENCE))
-            for e in analysis.torques
-        ]
+        [(f"{topic}/{joint}/effort", colour) for _, topic, colour in torque_topics(analysis)]
         for joint in names_of(analysis)
     ]
     root = ET.Element("root")

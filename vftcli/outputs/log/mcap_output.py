@@ -33,8 +33,10 @@ from vftcli.readers.bags.ros_messages import (
 )
 from vftcli.robots.drive import drive_torque
 from vftcli.signals.arrays import Array
+from vftcli.signals.pose import Pose
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import Wrench
+from vftcli.virtual_sensor.frames import frame_pose
 
 JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
 TEXT, LOG = "std_msgs/String", "foxglove_msgs/Log"
@@ -164,7 +166,7 @@ def events(analysis: Analysis, names: Sequence[str], start: int) -> list[Event]:
         start: The first sample's stamp. [ns]
     """
     found = analysis.contacts
-    urdf = urdf_text(analysis.robot, tuple(names))
+    urdf = urdf_text(analysis.robot, tuple(names), mounted_frames(analysis))
     made = [Event(start, "/robot_description", TEXT, {"data": urdf}, latched=True)]
     if found is None:
         return made
@@ -180,6 +182,15 @@ def events(analysis: Analysis, names: Sequence[str], start: int) -> list[Event]:
             values: dict[str, Value] = {"level": level, "message": words, "name": "vftcli"}
             made.append(Event(stamp, "/vftcli/contacts/log", LOG, values | logged_at(stamp)))
     return sorted(made, key=lambda event: event.stamp)
+
+
+def mounted_frames(analysis: Analysis) -> dict[str, Pose]:
+    """Poses in the flange frame of the tool and the sensor that wrenches are told in."""
+    sensed = analysis.virtual_sensor
+    names = {wrench.frame for wrench in analysis.wrenches} & {"tool", "sensor"}
+    if sensed is None:
+        return {}
+    return {name: frame_pose(name, sensed.sensor.mounting) for name in sorted(names)}
 
 
 def logged_at(stamp: int) -> dict[str, Value]:
