@@ -191,7 +191,7 @@ def arm_view(view: ArmView) -> Any:  # noqa: ANN401 - Rerun is untyped
     # The base stands at the origin and shall be seen too.
     low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
     centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
-    eye = centre + 2.0 * radius * np.array([0.62, -0.66, 0.42])
+    eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
     return rrb.Spatial3DView(
         origin="/robot",
         contents=["/robot/**", f"{CONTACTS}/**"],

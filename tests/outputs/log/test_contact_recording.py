@@ -103,6 +103,20 @@ def test_arrows_are_there_while_the_contact_lasts_and_no_longer(
     assert not rows_of(path, "/robot/flange_force", "Arrows3D:vectors")
 
 
+def test_the_arrow_goes_even_where_a_pose_is_drawn_as_the_contact_ends(
+    touched: Analysis, tmp_path: Path
+) -> None:
+    """Each second sample is drawn: 2.016 s is one of them."""
+    stop = float(touched.t[252])
+    found = contact_list(contact(start=1.0, stop=stop, peak=1.2))
+    write_rrd(tmp_path / "r.rrd", replace(touched, contacts=found))
+    arrows = rows_of(tmp_path / "r.rrd", "/contacts/1", "Arrows3D:vectors")
+    t = times_of(tmp_path / "r.rrd", "/contacts/1", "Arrows3D:vectors")
+    assert t[-2] == pytest.approx(stop, abs=1e-6)  # whole microseconds
+    assert arrows[-2]
+    assert not arrows[-1]
+
+
 def test_without_a_list_the_force_runs_on(touched: Analysis, tmp_path: Path) -> None:
     write_rrd(tmp_path / "r.rrd", replace(touched, contacts=None))
     assert rows_of(tmp_path / "r.rrd", "/robot/flange_force", "Arrows3D:vectors")

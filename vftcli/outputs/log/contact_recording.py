@@ -147,8 +147,9 @@ def send_contacts(
     for contact in found.contacts:
         if contact.wrench is None:
             continue
-        first, last = np.searchsorted(poses.t, (contact.start, contact.stop))
-        # One more: the last arrow goes when the contact has ended.
+        first = np.searchsorted(poses.t, contact.start)
+        # One more: the last arrow goes with the first pose after the contact.
+        last = np.searchsorted(poses.t, contact.stop, side="right")
         rows = slice(int(first), min(int(last) + 1, len(poses.t)))
         t, origin = poses.t[rows], touched_point(contact, poses.translation[rows])
         arrows = np.tile(contact.wrench[:3], (len(t), 1))
