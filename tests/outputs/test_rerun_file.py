@@ -7,7 +7,14 @@ import rerun.chunk
 from rerun_rows import rows_of
 
 from vftcli.outputs.plots import Lines, LogLine, PlotLine, PlotPoints, Tab
-from vftcli.outputs.rerun_file import drawable, finish, recording_id, rerun_file, time_panel
+from vftcli.outputs.rerun_file import (
+    drawable,
+    finish,
+    recording_id,
+    rerun_file,
+    time_panel,
+    title_of,
+)
 from vftcli.signals.errors import OutputError
 
 
@@ -61,6 +68,12 @@ def test_points_and_a_log_stand_beside_the_lines(tmp_path: Path) -> None:
     assert rows_of(tmp_path / "r.rrd", "/force/points", "Scalars:scalars") == [[7.0]]
     assert rows_of(tmp_path / "r.rrd", "/contacts/2", "TextLog:text") == [["second -> end"]]
     assert rows_of(tmp_path / "r.rrd", "/remarks", "TextLog:text") == [["first"], ["last"]]
+
+
+def test_small_plots_say_where_their_axes_end() -> None:
+    plots = [lines(f"/a{k}", np.array([[0.0], [10.0 * k]])) for k in range(4)]
+    assert title_of(Tab("many", np.arange(2.0), plots), plots[3]) == "what [N], -1.5 to 31.5"
+    assert title_of(Tab("few", np.arange(2.0), plots[:3]), plots[2]) == "what [N]"
 
 
 def test_the_time_panel_marks_a_span_in_nanoseconds() -> None:

@@ -175,12 +175,12 @@ def time_panel(marked: tuple[float, float] | None) -> Any:  # noqa: ANN401 - Rer
     """The time panel, paused on the log's own clock, with a span selected in it."""
     import rerun.blueprint as rrb
 
-    span = None
+    span: dict[str, Any] = {}
     # An unstable part of the viewer's: a version without it opens the recording all the same.
     if marked is not None and hasattr(rrb.components, "AbsoluteTimeRange"):
         first, last = (round(1e9 * end) for end in marked)
-        span = rrb.components.AbsoluteTimeRange(min=first, max=last)
-    return rrb.TimePanel(timeline="t", state="collapsed", play_state="paused", time_selection=span)
+        span = {"time_selection": rrb.components.AbsoluteTimeRange(min=first, max=last)}
+    return rrb.TimePanel(timeline="t", state="collapsed", play_state="paused", **span)
 
 
 def arm_view(view: ArmView) -> Any:  # noqa: ANN401 - Rerun is untyped
@@ -208,7 +208,7 @@ def grid_of(tab: Tab) -> Any:  # noqa: ANN401 - Rerun is untyped
     views = [
         rrb.TimeSeriesView(
             origin=lines.path,
-            name=drawable(lines.title),
+            name=drawable(title_of(tab, lines)),
             plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=k == 0 and lines.legend),
             axis_x=rrb.archetypes.TimeAxis(link="LinkToGlobal"),
             axis_y=rrb.ScalarAxis(range=tab.ends(lines)),
@@ -219,6 +219,14 @@ def grid_of(tab: Tab) -> Any:  # noqa: ANN401 - Rerun is untyped
     if not tab.log:
         return plots
     return rrb.Vertical(plots, log_view(tab.log), row_shares=[2, 1], name=tab.name)
+
+
+def title_of(tab: Tab, lines: Lines) -> str:
+    """A plot's title; in small plots the viewer labels few ticks, so the axis' ends stand in it."""
+    if len(tab.plots) <= 3:
+        return lines.title
+    low, high = tab.ends(lines)
+    return f"{lines.title}, {low:.3g} to {high:.3g}"
 
 
 def log_view(log: Sequence[LogLine]) -> Any:  # noqa: ANN401 - Rerun is untyped

@@ -35,6 +35,7 @@ from vftcli.robots.drive import drive_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.wrench import AXES, Wrench, unit_of
+from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
 
 WRIST = 3
@@ -168,10 +169,11 @@ def condition_lines(analysis: Analysis) -> list[Lines]:
     """What the pose can tell, and the torque that no wrench at the flange explains."""
     colours = colours_of(analysis.estimates)
     wrenches = [wrench for wrench in analysis.wrenches if wrench.name in colours]
-    found = []
+    found, sensed = [], analysis.virtual_sensor
     sigma = next((w.sigma_min for w in wrenches if w.sigma_min is not None), None)
-    if sigma is not None and analysis.virtual_sensor is not None:
-        least = np.full_like(sigma, analysis.virtual_sensor.sensor.least_sigma)
+    # The smoother asks no pose: its band grows where the pose tells little.
+    if sigma is not None and sensed is not None and sensed.solver != SMOOTHER:
+        least = np.full_like(sigma, sensed.sensor.least_sigma)
         lines = [
             PlotLine("σ_min", sigma, REFERENCE),
             PlotLine("masked below", least, SPARE[0], 1.0),
