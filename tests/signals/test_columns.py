@@ -6,9 +6,10 @@ import polars as pl
 import pyarrow.parquet as pq
 import pytest
 
-from vftcli.signals.columns import column_facts, described_schema
+from vftcli.signals.columns import StatedFrame, column_facts, described_schema
 
-FRAME = {"wrench/best": "flange axes, moment about the flange point"}
+FLANGE = "flange axes, moment about the flange point"
+FRAMES = {"wrench/best": StatedFrame(FLANGE), "wrench": StatedFrame("base axes", "by-robot")}
 
 
 @pytest.mark.parametrize(
@@ -18,17 +19,18 @@ FRAME = {"wrench/best": "flange axes, moment about the flange point"}
         ("t_src_ns", "ns", {}),
         ("q/3", "rad", {"joint": "3"}),
         ("tau_ext/kfo-fe/6", "N·m", {"joint": "6", "sign": "on the robot"}),
-        ("wrench/best/fx", "N", {"sign": "on the robot", "frame": FRAME["wrench/best"]}),
-        ("wrench/gmo/mz", "N·m", {"sign": "on the robot"}),
+        ("wrench/best/fx", "N", {"sign": "on the robot", "frame": FLANGE}),
+        ("wrench/mz", "N·m", {"sign": "by-robot", "frame": "base axes"}),
+        ("wrench/gmo/mz", "N·m", {}),
         ("wrench_sd/best/mx", "N·m", {}),
         ("sigma_min", "m", {}),
         ("contact", "1", {}),
-        ("contact/hand/fy", "N", {"sign": "on the robot"}),
-        ("contact/drift/2", "N·m", {"sign": "on the robot", "joint": "2"}),
+        ("contact/hand/fy", "N", {}),
+        ("contact/drift/2", "N·m", {"joint": "2"}),
     ],
 )
 def test_a_column_says_what_it_holds(name: str, unit: str, more: dict[str, str]) -> None:
-    facts = column_facts(name, FRAME)
+    facts = column_facts(name, FRAMES)
     assert facts.pop("meaning")
     assert facts == {"unit": unit} | more
 

@@ -5,7 +5,7 @@ beside each column: ``pyarrow.parquet.read_schema(path).field("tau_ext/gmo/1").m
 """
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vftcli.signals.recording import MEANINGS
 from vftcli.signals.wrench import AXES, unit_of
@@ -40,16 +40,28 @@ COLUMNS: dict[str, tuple[str, str]] = {
 }
 """First part of a column's name → its unit and what it is."""
 
-SIGNED = {"tau_ext", "wrench", "wrench_masked"}
-"""Whose values have the sign of a force ON the robot."""
+ON_ROBOT = "on the robot"
+"""Whose force it is: the environment's on the robot."""
 
 
-def column_facts(name: str, frames: Mapping[str, str]) -> dict[str, str]:
+class StatedFrame(NamedTuple):
+    """What is known of some columns that hold wrenches.
+
+    Attributes:
+        frame: Axes and reference point, in words.
+        sign: Whose force it is.
+    """
+
+    frame: str
+    sign: str = ON_ROBOT
+
+
+def column_facts(name: str, frames: Mapping[str, StatedFrame]) -> dict[str, str]:
     """Unit, meaning, and where they matter sign and frame of a column; {} of an unknown one.
 
     Args:
         name: As in the table: ``tau_ext/gmo/1``, ``wrench/best/fx``.
-        frames: Name without its last part → the frame of these columns, in words.
+        frames: Name without its last part → what is known of these wrenches.
     """
     kind, group, last = name.partition("/")[0], *name.rpartition("/")[::2]
     if kind not in COLUMNS:
@@ -57,22 +69,20 @@ def column_facts(name: str, frames: Mapping[str, str]) -> dict[str, str]:
     unit, meaning = COLUMNS[kind]
     # What touches an arm in a simulation is a wrench, or a torque, under the contact's own name.
     if kind == "contact" and group:
-        kind, meaning = "wrench", "force and moment, or joint torque, of one contact"
-        unit = TORQUE
+        unit, meaning = TORQUE, "force and moment, or joint torque, of one contact"
     if last in AXES:
         unit = unit_of(last)
     facts = {"unit": unit, "meaning": meaning}
-    if kind in SIGNED:
-        facts["sign"] = "on the robot"
-    if last in AXES:
-        if group in frames:
-            facts["frame"] = frames[group]
+    if last in AXES and group in frames:
+        facts |= frames[group]._asdict()
     elif last.isdigit():
         facts["joint"] = last
+        if kind == "tau_ext":
+            facts["sign"] = ON_ROBOT
     return facts
 
 
-def described_schema(table: "pl.DataFrame", frames: Mapping[str, str] | None = None) -> Any:  # noqa: ANN401
+def described_schema(table: "pl.DataFrame", frames: Mapping[str, StatedFrame] | None = None) -> Any:  # noqa: ANN401 - pyarrow is untyped
     """The table's pyarrow schema with what each column holds, for ``write_parquet``.
 
     Args:

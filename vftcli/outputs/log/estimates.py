@@ -13,7 +13,7 @@ from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.log.run_record import run_record, seal
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
-from vftcli.signals.columns import described_schema
+from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.frames import FRAMES
 
@@ -128,10 +128,10 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
         )
 
 
-def frames_of(analysis: Analysis) -> dict[str, str]:
-    """The columns of each wrench, without the axis → their frame in words."""
+def frames_of(analysis: Analysis) -> dict[str, StatedFrame]:
+    """The columns of each wrench, without the axis → their frame."""
     return {
-        f"{kind}/{wrench.name}": FRAMES[wrench.frame]
+        f"{kind}/{wrench.name}": StatedFrame(FRAMES[wrench.frame])
         for wrench in analysis.wrenches
         for kind in ("wrench", "wrench_sd", "wrench_masked")
     }
