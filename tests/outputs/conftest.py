@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation import evaluate
@@ -72,6 +73,14 @@ def analysis(without_reference: Analysis) -> Analysis:
     errors = evaluate(made.recording.name, made.estimates, reference)
     made = replace(made, reference=reference, errors=errors)
     return replace(made, run=run_record(made, shlex.join(["vftcli", "report", HOSTILE])))
+
+
+@pytest.fixture(scope="session")
+def touched(analysis: Analysis) -> Analysis:
+    """The same with two contacts: on the wrist from 1 to 1.5 s, on link 3 from 2.2 to 2.6 s."""
+    wrist = contact(number=1, start=1.0, stop=1.5, peak=1.2, where="wrist", places=(0, 5, 6))
+    forearm = contact(number=2, start=2.2, stop=2.6, peak=2.4, where="forearm", places=(3,))
+    return replace(analysis, contacts=contact_list(wrist, forearm))
 
 
 @pytest.fixture(scope="session")

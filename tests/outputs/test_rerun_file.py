@@ -4,15 +4,16 @@ from uuid import UUID
 import numpy as np
 import pytest
 import rerun.chunk
+from rerun_rows import rows_of
 
-from vftcli.outputs.plots import Lines, PlotLine, Tab
+from vftcli.outputs.plots import Lines, LogLine, PlotLine, PlotPoints, Tab
 from vftcli.outputs.rerun_file import (
     drawable,
     finish,
     recording_id,
     rerun_file,
-    send_force,
-    turn_from_z,
+    time_panel,
+    title_of,
 )
 from vftcli.signals.errors import OutputError
 
@@ -20,18 +21,6 @@ from vftcli.signals.errors import OutputError
 def lines(path: str, values: np.ndarray) -> Lines:
     shown = [PlotLine(f"line {k}", column, "#102030") for k, column in enumerate(values.T)]
     return Lines(path, "what [N]", shown)
-
-
-def rows_of(path: Path, entity: str, ending: str) -> list:
-    """All values of one component of an entity, in the order of the file."""
-    found = []
-    for chunk in rerun.chunk.RrdReader(str(path)).stream():
-        if chunk.entity_path == entity:
-            batch = chunk.to_record_batch()
-            for name in batch.schema.names:
-                if name.endswith(ending):
-                    found += batch.column(name).to_pylist()
-    return found
 
 
 def test_plots_and_words_of_two_clocks_read_back(tmp_path: Path) -> None:
@@ -49,25 +38,6 @@ def test_plots_and_words_of_two_clocks_read_back(tmp_path: Path) -> None:
     assert len(rerun.chunk.RrdReader(str(tmp_path / "r.rrd")).blueprints()) == 1
 
 
-def test_an_unknown_force_has_no_arrow(tmp_path: Path) -> None:
-    force = np.array([[2.0, 0.0, 0.0], [np.nan, 0.0, 0.0], [0.0, 0.0, -400.0]])
-    with rerun_file(tmp_path / "r.rrd", "r", [], {"Summary": ""}) as stream:
-        send_force(stream, "/force", np.arange(3.0), np.zeros((3, 3)), force, 0.01)
-    # 200 N are a metre
-    assert rows_of(tmp_path / "r.rrd", "/force", "Arrows3D:vectors") == [
-        [[pytest.approx(0.01), 0.0, 0.0]],
-        [],
-        [[0.0, 0.0, -2.0]],
-    ]
-
-
-@pytest.mark.parametrize("axis", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0.6, 0, 0.8), (0, -0.6, -0.8)])
-def test_capsules_point_where_they_should(axis: tuple[float, ...]) -> None:
-    x, y, z, w = turn_from_z(np.array(axis, dtype=float))
-    turned = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
-    np.testing.assert_allclose(turned, axis, atol=1e-12)  # rounding
-
-
 @pytest.mark.parametrize(
     ("text", "drawn"),
     [
@@ -81,6 +51,35 @@ def test_capsules_point_where_they_should(axis: tuple[float, ...]) -> None:
 def test_the_viewer_gets_letters_it_can_draw(text: str, drawn: str) -> None:
     """Viewer 0.41 stops at a letter its font lacks; Latin-1 and Greek were seen to be drawn."""
     assert drawable(text) == drawn
+
+
+def test_points_and_a_log_stand_beside_the_lines(tmp_path: Path) -> None:
+    """Points have a clock of their own; lines of a log are sorted, whatever order they come in."""
+    points = PlotPoints("peaks", np.array([0.5]), np.array([7.0]), "#102030")
+    plot = lines("/force", np.arange(4.0)[:, None])._replace(points=points)
+    log = [
+        LogLine("/contacts/2", 2.0, "second → end", "#102030"),
+        LogLine("/remarks", 3.0, "last", "#102030", "WARN"),
+        LogLine("/remarks", 1.0, "first", "#102030"),
+    ]
+    tab = Tab("one", np.arange(4.0), [plot], log)
+    with rerun_file(tmp_path / "r.rrd", "r", [tab], {"Summary": ""}, marked=(1.0, 2.0)):
+        pass
+    assert rows_of(tmp_path / "r.rrd", "/force/points", "Scalars:scalars") == [[7.0]]
+    assert rows_of(tmp_path / "r.rrd", "/contacts/2", "TextLog:text") == [["second -> end"]]
+    assert rows_of(tmp_path / "r.rrd", "/remarks", "TextLog:text") == [["first"], ["last"]]
+
+
+def test_small_plots_say_where_their_axes_end() -> None:
+    plots = [lines(f"/a{k}", np.array([[0.0], [10.0 * k]])) for k in range(4)]
+    assert title_of(Tab("many", np.arange(2.0), plots), plots[3]) == "what [N], -1.5 to 31.5"
+    assert title_of(Tab("few", np.arange(2.0), plots[:3]), plots[2]) == "what [N]"
+
+
+def test_the_time_panel_marks_a_span_in_nanoseconds() -> None:
+    span = time_panel((1.25, 2.0)).time_selection
+    assert (span.min.value, span.max.value) == (1_250_000_000, 2_000_000_000)
+    assert time_panel(None).time_selection is None
 
 
 def test_a_recording_without_its_footer_is_no_recording(tmp_path: Path) -> None:

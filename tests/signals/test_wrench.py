@@ -71,3 +71,22 @@ def test_without_a_mask_all_is_known() -> None:
 def test_a_mask_has_one_entry_a_sample() -> None:
     with pytest.raises(ShapeError, match="mask of x"):
         wrench(np.zeros(3, dtype=bool))
+
+
+def test_the_size_of_a_force_has_the_deviation_along_it() -> None:
+    """(3, 0, 4) N: sd = √((.6 · 1)² + (.8 · 2)²); no force: the largest; hidden: unknown."""
+    values = np.zeros((3, 6))
+    values[0, [0, 2]] = 3.0, 4.0
+    wrench = Wrench(
+        name="best",
+        t=np.arange(3.0),
+        values=values,
+        frame="flange",
+        sd=np.tile([1.0, 5.0, 2.0, 9.0, 9.0, 9.0], (3, 1)),
+        masked=np.array([False, False, True]),
+    )
+    np.testing.assert_allclose(wrench.size, [5.0, 0.0, np.nan])
+    assert wrench.size_sd is not None
+    # rounding
+    np.testing.assert_allclose(wrench.size_sd, [np.hypot(0.6, 1.6), 5.0, np.nan], rtol=1e-12)
+    assert Wrench(name="gmo", t=np.arange(3.0), values=values, frame="flange").size_sd is None

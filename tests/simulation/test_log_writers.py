@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
+import pyarrow.parquet as pq
 import pytest
 
 from vftcli.outputs.simulation import companions, save
@@ -12,6 +13,7 @@ from vftcli.readers.references import read_reference
 from vftcli.signals.errors import OutputError, ParameterError
 from vftcli.simulation import Simulation, load_scenario, simulate
 from vftcli.simulation.writers import WRITERS
+from vftcli.simulation.writers.parquet import TRUTH_FRAME
 
 LOSSY = ["duration=2.0", "sensing.repeated=0.02", "sensing.dropped=0.02"]
 
@@ -154,3 +156,11 @@ def test_a_robot_logs_only_in_its_own_formats(
 
 def test_every_writer_is_tried() -> None:
     assert {form for _, form, _, _ in CASES} == set(WRITERS)
+
+
+def test_the_truth_says_what_its_columns_hold(ur5: Simulation, tmp_path: Path) -> None:
+    save({tmp_path / "log.csv": ur5})
+    schema = pq.read_schema(tmp_path / "log.csv.truth.parquet")
+    assert all((field.metadata or {}).get(b"unit") for field in schema)
+    assert schema.field("wrench/mx").metadata[b"frame"] == TRUTH_FRAME.encode()
+    assert schema.field("tau_ext/1").metadata[b"sign"] == b"on the robot"

@@ -83,6 +83,10 @@ COMMANDS = {
         "bench:bench",
         "Time the observers and print the ratios to a bare RNEA loop and to per-sample scripts.",
     ),
+    "open": ListedCommand(
+        "opening:open_folder",
+        "Open the page of a folder that a command wrote, and say how to open its recording.",
+    ),
     "robots": ListedCommand(
         "listings:robots",
         "List the robot profiles, or show one with its numbers and their sources.",

@@ -102,6 +102,7 @@ def admit(
     output: Output = None,
     json: opt.Json = False,
     force: opt.Force = False,
+    show_made: opt.Open = False,
 ) -> None:
     """Replay a log's external force through traditional and variable-parameter admittance.
 
@@ -113,6 +114,7 @@ def admit(
     """
     from vftcli.admittance.choice import ControlChoice, split_settings
     from vftcli.cli.console import command_line, say
+    from vftcli.cli.opening import open_made
     from vftcli.outputs.admittance.files import FILES, write_admittance
     from vftcli.outputs.files import OutputFolder
 
@@ -124,6 +126,8 @@ def admit(
     analysis = analysis.changed(observers=observers)
     if output is not None:
         OutputFolder(output, force, FILES).check()
+    elif show_made:
+        raise typer.BadParameter("--open shows what -o DIR writes; give -o too")
     recording, run = None, None
     examinations: tuple[Examination, ...] = ()
     if loop.closed_loop is not None:
@@ -144,7 +148,9 @@ def admit(
             examinations=examinations,
         )
         if not json:
-            say(f"wrote {output}: open {output / 'index.html'}; rerun {output / 'recording.rrd'}")
+            say(f"wrote {output}: vftcli open {output}")
+        if show_made:
+            open_made(output)
 
 
 def chosen(analysis: opt.AnalysisOptions, log: Path | None = None) -> "AnalysisChoice":

@@ -14,11 +14,12 @@ def estimate(
     log: opt.Log,
     output: opt.Folder,
     analysis: opt.AnalysisOptions,
+    also: opt.ExtraOptions,
     csv: Annotated[bool, typer.Option("--csv", help="Also write estimates.csv.")] = False,
-    mcap: Annotated[bool, typer.Option("--mcap", help="Also write estimates.mcap.")] = False,
     rrd: Annotated[bool, typer.Option("--rrd", help="Also write recording.rrd.")] = False,
     json: opt.Json = False,
     force: opt.Force = False,
+    show: opt.Open = False,
 ) -> None:
     """Estimate the external joint torques along a log.
 
@@ -31,7 +32,7 @@ def estimate(
     from vftcli.doctor.examiner import EXAMINED
     from vftcli.readers.library import Library
 
-    extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
+    extras = also.names(csv=csv, rrd=rrd or show)
     # Of a large log only the columns that are looked at are read; outputs show the others too.
     causal = analysis.observers.causal or analysis.no_contacts
     signals = EXAMINED if causal and not (analysis.wrench.asks or extras) else None
@@ -39,6 +40,7 @@ def estimate(
     reading = Background(lambda: library.open(log, chosen))
 
     from vftcli.cli.console import command_line, say, say_analysis
+    from vftcli.cli.opening import open_made
     from vftcli.observers.table import BEST
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
@@ -52,6 +54,8 @@ def estimate(
     record = write_estimate_folder(output, made, command=command_line(), extras=extras, force=force)
     if json:
         typer.echo(record)
-        return
-    say_analysis(made)
-    say(f"wrote {output}")
+    else:
+        say_analysis(made)
+        say(f"wrote {output}")
+    if show:
+        open_made(output)

@@ -96,6 +96,7 @@ def identify_robot(
     anyway: opt.Anyway = False,
     json: opt.Json = False,
     force: opt.Force = False,
+    show: opt.Open = False,
 ) -> None:
     """Make a robot file from logs: friction, rotor inertia, link inertias, payload.
 
@@ -104,6 +105,7 @@ def identify_robot(
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
     from vftcli.cli.console import command_line, health_of, say, say_recording, say_robots
+    from vftcli.cli.opening import open_made
     from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.identification.files import beside, write_identification
@@ -138,3 +140,5 @@ def identify_robot(
         say(f"note: {remark}")
     say(f"wrote {', '.join(str(file) for file in beside(output).values())}")
     typer.echo(record.rstrip("\n") if json else tables_text(found))
+    if show:
+        open_made(output.with_suffix(".html"))

@@ -41,6 +41,12 @@ Json = Annotated[
         help="What the command makes as JSON on stdout: rows of a table, a run record, a summary.",
     ),
 ]
+Open = Annotated[
+    bool,
+    typer.Option(
+        "--open", help="Open what was made: the page in the browser, else the recording (--rrd)."
+    ),
+]
 ANYWAY = (
     "--anyway",
     "Go on where a finding about the log makes every result meaningless; the outputs say so.",
@@ -278,6 +284,20 @@ class ReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
     def choice(self) -> "ReferenceChoice | None":
         """The choice that the options state, None where no reference is named."""
         return super().choice() if self.reference is not None else None
+
+
+class ExtraOptions(Bundle):
+    """What else is written for other programs."""
+
+    mcap: bool = flag("--mcap", "Also write estimates.mcap, for ROS 2, Foxglove and PlotJuggler.")
+    layouts: bool = flag(
+        "--layouts", "Also write its layouts for Foxglove and PlotJuggler; implies --mcap."
+    )
+
+    def names(self, **others: bool) -> list[str]:
+        """The extras that are asked for, with those of the command's own options."""
+        asked = {**others, "mcap": self.mcap or self.layouts, "layouts": self.layouts}
+        return [name for name, wanted in asked.items() if wanted]
 
 
 class NamedReferenceOptions(Bundle):

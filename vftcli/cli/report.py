@@ -1,12 +1,15 @@
 """`vftcli report`: everything about a log in one folder."""
 
 from dataclasses import replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
+
+if TYPE_CHECKING:
+    from vftcli.analysis import Analysis
 
 
 @taken_apart
@@ -15,6 +18,7 @@ def report(
     output: opt.Folder,
     reference: opt.ReferenceOptions,
     analysis: opt.AnalysisOptions,
+    also: opt.ExtraOptions,
     published: Annotated[
         str | None,
         typer.Option(
@@ -23,25 +27,27 @@ def report(
     ] = None,
     json: opt.Json = False,
     force: opt.Force = False,
+    show: opt.Open = False,
 ) -> None:
     """Write a report page, a Rerun recording, tables and estimates of a log into one folder.
 
-    Writes index.html (opens offline), recording.rrd, estimates.parquet, errors.{csv,json,md,tex}
-    and run.json; several logs get a sub-folder each and an index.
+    Writes index.html (opens offline), recording.rrd, contacts.{json,csv}, estimates.parquet,
+    errors.{csv,json,md,tex} and run.json; several logs get a sub-folder each and an index.
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
     """
     from vftcli.cli.console import command_line, say, say_analysis
+    from vftcli.cli.opening import open_made
     from vftcli.evaluation.print_table import check_published, compare_with
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.report import report_files, write_report, write_reports
-    from vftcli.outputs.log.tables import print_text, to_terminal
-    from vftcli.outputs.log.wrench_tables import paper_bounds
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
 
     library = Library(logs)
-    OutputFolder(output, force, report_files([library.label(log) for log in logs])).check()
+    extras = also.names()
+    names = report_files([library.label(log) for log in logs], extras)
+    OutputFolder(output, force, names).check()
     choice = analysis.choice(library, reference)
     if published is not None:
         check_published(published, reference.reference)
@@ -56,15 +62,25 @@ def report(
             say_analysis(made)
     command = command_line()
     if len(analyses) == 1:
-        record = write_report(output, analyses[0], command=command, force=force)
+        record = write_report(output, analyses[0], command=command, force=force, extras=extras)
     else:
-        record = write_reports(output, analyses, command=command, force=force)
+        record = write_reports(output, analyses, command=command, force=force, extras=extras)
     if json:
         typer.echo(record)
-        return
-    for made in analyses:
-        if made.errors is not None:
-            typer.echo(to_terminal(made.errors, paper_bounds([made])))
-        if made.published is not None:
-            typer.echo(print_text(made.published))
-    say(f"wrote {output}: open {output / 'index.html'}; rerun {output / 'recording.rrd'}")
+    else:
+        for made in analyses:
+            say_errors(made)
+        say(f"wrote {output}: vftcli open {output}")
+    if show:
+        open_made(output)
+
+
+def say_errors(made: "Analysis") -> None:
+    """The errors of one log and the print beside them, where they are known."""
+    from vftcli.outputs.log.tables import print_text, to_terminal
+    from vftcli.outputs.log.wrench_tables import paper_bounds
+
+    if made.errors is not None:
+        typer.echo(to_terminal(made.errors, paper_bounds([made])))
+    if made.published is not None:
+        typer.echo(print_text(made.published))

@@ -264,3 +264,24 @@ def hardest_words(found: ContactList) -> str:
     if contact is None or contact.peak_force is None:
         return "–"
     return f"{contact.peak_force:.0f} ± {contact.peak_band:.0f} N at {contact.peak:.1f} s"
+
+
+def beginning(contact: Contact) -> str:
+    """What is said where a contact begins: when, for how long, how hard, in which direction, where.
+
+    As ``4.70 s: contact 1 begins, for 0.89 s: 86 ± 10 N, +x, wrist (good)``.
+    """
+    if contact.peak_force is None or contact.wrench is None:
+        torque = ", ".join(f"{value:.1f}" for value in contact.joint_torque)
+        size = f"joint torques {torque} N·m"
+    else:
+        size = f"{contact.peak_force:.0f} ± {contact.peak_band:.0f} N"
+        size += f", {direction(contact.wrench[:3])}"
+    where = f"{place_words(contact)} ({contact.trust})"
+    span = f"for {contact.stop - contact.start:.2f} s"
+    return f"{contact.start:.2f} s: {contact_name(contact)} begins, {span}: {size}, {where}"
+
+
+def contact_name(contact: Contact) -> str:
+    """What a row of the list is called."""
+    return f"{'load' if contact.is_load else 'contact'} {contact.number}"

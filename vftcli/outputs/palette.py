@@ -22,6 +22,14 @@ SPARE = ("#2f86d0", "#dd6415", "#0c9f76", "#c95fa4", "#b98900", "#7a6fd6", "#a05
 REFERENCE = "#8a929a"
 """The reference in a viewer whose background is not known; the page uses the colour of its ink."""
 
+PLACES = {
+    "wrist": "#dd6415",
+    "forearm": "#2f86d0",
+    "upper arm": "#c95fa4",
+    "cannot tell": "#c8a200",
+}
+"""The part of the arm that was touched, in words → its colour."""
+
 DASHED = ("kfo-zoh", "rts-auto")
 """Drawn dashed: where they lie on their neighbour, both are seen."""
 

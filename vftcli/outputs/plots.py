@@ -24,6 +24,22 @@ class PlotLine(NamedTuple):
     width: float = 1.5
 
 
+class PlotPoints(NamedTuple):
+    """Single points of a plot, at times of their own.
+
+    Attributes:
+        name: What the legend calls them.
+        t: Times. (K,) [s]
+        values: (K,)
+        colour: ``#rrggbb``.
+    """
+
+    name: str
+    t: Array
+    values: Array
+    colour: str
+
+
 class Lines(NamedTuple):
     """The lines of one plot.
 
@@ -31,11 +47,17 @@ class Lines(NamedTuple):
         path: The entity.
         title: What the plot shows, with its unit.
         lines: At least one, all of one length.
+        family: Plots of one family have the same vertical axis; "" stands alone.
+        points: Single points among the lines, or none.
+        legend: Whether a legend may cover a corner of it, where the title does not say it all.
     """
 
     path: str
     title: str
     lines: Sequence[PlotLine]
+    family: str = ""
+    points: PlotPoints | None = None
+    legend: bool = True
 
     @property
     def values(self) -> Array:
@@ -45,11 +67,31 @@ class Lines(NamedTuple):
     @property
     def ends(self) -> tuple[float, float]:
         """Lower and upper end of a vertical axis that shows all of them, with some room."""
-        known = self.values
+        known = self.values.ravel()
+        if self.points is not None:
+            known = np.concatenate([known, self.points.values])
         known = known[np.isfinite(known)]
         low, high = (known.min(), known.max()) if known.size else (-1.0, 1.0)
         room = max(0.05 * (high - low), 1e-3)
         return float(low - room), float(high + room)
+
+
+class LogLine(NamedTuple):
+    """One line of a text log.
+
+    Attributes:
+        path: The entity.
+        t: When. [s]
+        text: What happened.
+        colour: ``#rrggbb``.
+        level: How much it matters: INFO, WARN or ERROR.
+    """
+
+    path: str
+    t: float
+    text: str
+    colour: str
+    level: str = "INFO"
 
 
 class Tab(NamedTuple):
@@ -59,8 +101,16 @@ class Tab(NamedTuple):
         name: The tab's name.
         t: Time of their samples. (T,) [s]
         plots: What they show.
+        log: A text log below them, or none.
     """
 
     name: str
     t: Array
     plots: Sequence[Lines]
+    log: Sequence[LogLine] = ()
+
+    def ends(self, lines: Lines) -> tuple[float, float]:
+        """Lower and upper end of a plot's vertical axis: those of its whole family."""
+        alike = [p for p in self.plots if p.family and p.family == lines.family] or [lines]
+        low, high = zip(*(plot.ends for plot in alike), strict=True)
+        return min(low), max(high)

@@ -15,19 +15,15 @@ from uuid import UUID
 
 import numpy as np
 
-from vftcli.outputs.arm import ArmPoses, Capsule, capsules
+from vftcli.outputs.arm import ArmPoses
 from vftcli.outputs.files import one_line
 from vftcli.outputs.palette import rgb
-from vftcli.outputs.plots import Lines, Tab
-from vftcli.robots.chain import Chain
+from vftcli.outputs.plots import Lines, LogLine, Tab
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import OutputError
 
-NEWTON_PER_METRE = 200.0
-"""Length of the force arrow: 200 N are 1 m."""
-
-LINK, JOINT, FORCE = "#b0b8c0", "#4e5c6a", "#dd6415"
-"""Colours of links, joints and the force arrow."""
+CONTACTS = "/contacts"
+"""Below it stand the contacts: `/contacts/1` is that of number 1."""
 
 FOOTER, TRAILER = b"RRF2FOOT", 64
 """A whole recording has this mark in its last bytes."""
@@ -76,6 +72,7 @@ def rerun_file(
     tabs: Sequence[Tab],
     words: Mapping[str, str],
     view: ArmView | None = None,
+    marked: tuple[float, float] | None = None,
 ) -> Iterator[Stream]:
     """Write a recording with its plots and words; yield its stream, to draw arms into it.
 
@@ -85,6 +82,7 @@ def rerun_file(
         tabs: The plots.
         words: Name of a document → its Markdown.
         view: Where arms will be drawn, None if there are none.
+        marked: The span that the time panel marks, None if there is none. [s]
 
     Raises:
         OutputError: If the file is not whole in the end.
@@ -98,11 +96,12 @@ def rerun_file(
     stream = rr.RecordingStream(
         "vftcli", recording_id=identity, send_properties=False, batcher_config=untimed
     )
-    stream.save(str(path), default_blueprint=blueprint(tabs, list(words), view))
+    stream.save(str(path), default_blueprint=blueprint(tabs, list(words), view, marked))
     stream.send_recording_name(drawable(title))
     for tab in tabs:
         for lines in tab.plots:
             send_lines(stream, tab.t, lines)
+        send_log(stream, tab.log)
     for name, text in words.items():
         document = rr.TextDocument(drawable(text), media_type="text/markdown")
         stream.log(f"/{name.lower()}", document, static=True)
@@ -143,8 +142,17 @@ def finish(stream: Stream, path: Path) -> None:
             raise OutputError(f"{path.name} cannot be written whole: is the disk full?")
 
 
-def blueprint(tabs: Sequence[Tab], words: Sequence[str], view: ArmView | None) -> Any:  # noqa: ANN401
-    """How the recording opens: arms and words to the left, plots to the right."""
+def blueprint(
+    tabs: Sequence[Tab],
+    words: Sequence[str],
+    view: ArmView | None,
+    marked: tuple[float, float] | None = None,
+) -> Any:  # noqa: ANN401 - Rerun is untyped
+    """How the recording opens: arms and words to the left, plots to the right, paused.
+
+    Rerun lets no file say where its time cursor stands: it opens at the first sample. The marked
+    span stands out in the time panel, and a click on a time of the text log goes there.
+    """
     import rerun.blueprint as rrb
 
     documents = [rrb.TextDocumentView(origin=f"/{name.lower()}", name=name) for name in words]
@@ -155,12 +163,24 @@ def blueprint(tabs: Sequence[Tab], words: Sequence[str], view: ArmView | None) -
     shown = rrb.Horizontal(left, rrb.Tabs(*plots, active_tab=0), column_shares=[2, 5])
     return rrb.Blueprint(
         shown if plots else left,
-        rrb.TimePanel(timeline="t", state="collapsed", play_state="paused"),
+        time_panel(marked),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
         auto_views=False,
         auto_layout=False,
     )
+
+
+def time_panel(marked: tuple[float, float] | None) -> Any:  # noqa: ANN401 - Rerun is untyped
+    """The time panel, paused on the log's own clock, with a span selected in it."""
+    import rerun.blueprint as rrb
+
+    span: dict[str, Any] = {}
+    # An unstable part of the viewer's: a version without it opens the recording all the same.
+    if marked is not None and hasattr(rrb.components, "AbsoluteTimeRange"):
+        first, last = (round(1e9 * end) for end in marked)
+        span = {"time_selection": rrb.components.AbsoluteTimeRange(min=first, max=last)}
+    return rrb.TimePanel(timeline="t", state="collapsed", play_state="paused", **span)
 
 
 def arm_view(view: ArmView) -> Any:  # noqa: ANN401 - Rerun is untyped
@@ -174,7 +194,7 @@ def arm_view(view: ArmView) -> Any:  # noqa: ANN401 - Rerun is untyped
     eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
     return rrb.Spatial3DView(
         origin="/robot",
-        contents="/robot/**",
+        contents=["/robot/**", f"{CONTACTS}/**"],
         name=view.name,
         eye_controls=rrb.EyeControls3D(position=eye.tolist(), look_target=centre.tolist()),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.1),
@@ -188,14 +208,38 @@ def grid_of(tab: Tab) -> Any:  # noqa: ANN401 - Rerun is untyped
     views = [
         rrb.TimeSeriesView(
             origin=lines.path,
-            name=drawable(lines.title),
-            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=k == 0),
+            name=drawable(title_of(tab, lines)),
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=k == 0 and lines.legend),
             axis_x=rrb.archetypes.TimeAxis(link="LinkToGlobal"),
-            axis_y=rrb.ScalarAxis(range=lines.ends),
+            axis_y=rrb.ScalarAxis(range=tab.ends(lines)),
         )
         for k, lines in enumerate(tab.plots)
     ]
-    return rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=tab.name)
+    plots = rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=tab.name)
+    if not tab.log:
+        return plots
+    return rrb.Vertical(plots, log_view(tab.log), row_shares=[2, 1], name=tab.name)
+
+
+def title_of(tab: Tab, lines: Lines) -> str:
+    """A plot's title; in small plots the viewer labels few ticks, so the axis' ends stand in it."""
+    if len(tab.plots) <= 3:
+        return lines.title
+    low, high = tab.ends(lines)
+    return f"{lines.title}, {low:.3g} to {high:.3g}"
+
+
+def log_view(log: Sequence[LogLine]) -> Any:  # noqa: ANN401 - Rerun is untyped
+    """A text log: time and words."""
+    import rerun.blueprint as rrb
+
+    columns: dict[str, Any] = {}
+    # The path says nothing that the words do not; versions without the choice show it.
+    if hasattr(rrb, "TextLogColumns"):
+        shown = [rrb.components.TextLogColumn(kind) for kind in ("LogLevel", "Body")]
+        columns = {"columns": rrb.TextLogColumns(text_log_columns=shown)}
+    paths = list(dict.fromkeys(line.path for line in log))
+    return rrb.TextLogView(origin="/", contents=paths, name="Log", **columns)
 
 
 def send_lines(stream: Stream, t: Array, lines: Lines) -> None:
@@ -213,80 +257,31 @@ def send_lines(stream: Stream, t: Array, lines: Lines) -> None:
     counts = np.full(len(values), len(lines.lines))
     scalars = rr.Scalars.columns(scalars=values.ravel()).partition(counts)
     stream.send_columns(lines.path, [rr.TimeColumn("t", duration=t)], scalars)
+    if (points := lines.points) is not None:
+        path = f"{lines.path}/points"
+        marks = rr.SeriesPoints(
+            names=drawable(points.name),
+            colors=rgb(points.colour),
+            markers="diamond",
+            marker_sizes=6.0,
+        )
+        stream.log(path, marks, static=True)
+        single = rr.Scalars.columns(scalars=points.values)
+        stream.send_columns(path, [rr.TimeColumn("t", duration=points.t)], single)
 
 
-def send_arm(
-    stream: Stream, path: str, chain: Chain, poses: ArmPoses, ghost: tuple[int, ...] | None = None
-) -> None:
-    """Send an arm's shape once and its poses over time.
-
-    A `ghost` is a see-through arm of this red, green, blue and opacity.
-    """
+def send_log(stream: Stream, log: Sequence[LogLine]) -> None:
+    """Send the lines of a text log, each to its entity, in the order of time."""
     import rerun as rr
 
-    time = rr.TimeColumn("t", duration=poses.t)
-    for j, shapes in enumerate(capsules(chain)):
-        link = f"{path}/link_{j}" if j else f"{path}/base"
-        if shapes:
-            stream.log(link, capsule_batch(shapes, ghost), static=True)
-        if j:
-            columns = rr.Transform3D.columns(
-                translation=poses.translation[:, j - 1], quaternion=poses.quat_xyzw[:, j - 1]
-            )
-            stream.send_columns(link, [time], columns)
-
-
-def capsule_batch(shapes: Sequence[Capsule], ghost: tuple[int, ...] | None) -> Any:  # noqa: ANN401
-    """Capsules in the axes of the link they move with; Rerun's own lie along z from one end."""
-    import rerun as rr
-
-    directions = np.array([shape.direction for shape in shapes])
-    lengths = np.linalg.norm(directions, axis=1)
-    slimmer = 1.0 if ghost is None else 0.8  # ghosts that overlap are told apart
-    return rr.Capsules3D(
-        lengths=lengths,
-        radii=[slimmer * shape.radius for shape in shapes],
-        translations=np.array([shape.start for shape in shapes]),
-        quaternions=[turn_from_z(d / s) for d, s in zip(directions, lengths, strict=True)],
-        colors=[ghost or rgb(JOINT if shape.joint else LINK) for shape in shapes],
-        fill_mode="solid",
-    )
-
-
-def turn_from_z(unit: Array) -> Array:
-    """Quaternion (x, y, z, w) that turns z to a unit vector the short way. (4,)"""
-    # Straight down every turn by half is as short; the formula below would divide by zero.
-    if unit[2] < -1.0 + 1e-9:
-        return np.array([1.0, 0.0, 0.0, 0.0])
-    turn = np.array([-unit[1], unit[0], 0.0, 1.0 + unit[2]])
-    turned: Array = turn / np.linalg.norm(turn)
-    return turned
-
-
-def send_force(
-    stream: Stream, path: str, t: Array, origin: Array, force: Array, radius: float
-) -> None:
-    """Send an arrow over time; where the force is not known there is none.
-
-    Args:
-        stream: The recording.
-        path: Entity of the arrow.
-        t: Time. (S,) [s]
-        origin: Where it acts, in base axes. (S, 3) [m]
-        force: In base axes, NaN where not known. (S, 3) [N]
-        radius: Of the arrow's shaft. [m]
-    """
-    import rerun as rr
-
-    known = np.all(np.isfinite(force), axis=1)
-    count = int(known.sum())
-    columns = rr.Arrows3D.columns(
-        origins=origin[known],
-        vectors=force[known] / NEWTON_PER_METRE,
-        radii=np.full(count, radius),
-        colors=np.tile(np.array([*rgb(FORCE), 255], dtype=np.uint8), (count, 1)),
-    ).partition(known.astype(int))
-    stream.send_columns(path, [rr.TimeColumn("t", duration=t)], columns)
+    for path in dict.fromkeys(line.path for line in log):
+        own = sorted((line for line in log if line.path == path), key=lambda line: line.t)
+        rows = rr.TextLog.columns(
+            text=[drawable(line.text) for line in own],
+            level=[line.level for line in own],
+            color=[rgb(line.colour) for line in own],
+        )
+        stream.send_columns(path, [rr.TimeColumn("t", duration=[line.t for line in own])], rows)
 
 
 def drawable(text: str) -> str:

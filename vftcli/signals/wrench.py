@@ -165,6 +165,26 @@ class Wrench:
         """The moment about the frame's origin, NaN where unknown. (T, 3) [N·m]"""
         return self.known[:, 3:]
 
+    @property
+    def size(self) -> Array:
+        """|F|, NaN where the pose cannot tell it. (T,) [N]"""
+        size: Array = np.linalg.norm(self.force, axis=1)
+        return size
+
+    @property
+    def size_sd(self) -> Array | None:
+        """Standard deviation of |F|, from that of the axes along F taken as independent. (T,) [N]
+
+        Where there is no force it is the largest of the axes', since F may point anywhere.
+        """
+        if self.known_sd is None:
+            return None
+        sd, size = self.known_sd[:, :3], self.size
+        along = self.force / np.where(size > 0.0, size, 1.0)[:, None]
+        found: Array = np.sqrt(np.sum((along * sd) ** 2, axis=1))
+        found[size == 0.0] = sd[size == 0.0].max(axis=1)
+        return found
+
     def between(self, start: float, stop: float) -> Array:
         """The known samples with start ≤ t ≤ stop. (k, 6) [N, N·m]"""
         inside = (self.t >= start) & (self.t <= stop) & np.all(np.isfinite(self.known), axis=1)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from vftcli.outputs.log.conversion import WRITERS, convert
@@ -86,3 +87,13 @@ def test_what_exists_is_kept_and_unknown_endings_are_refused(tmp_path: Path) -> 
     with pytest.raises(OutputError, match=r"\.parquet, \.mcap, \.csv"):
         convert(full(), tmp_path / "x.xlsx")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["x.csv"]
+
+
+def test_columns_say_what_they_hold(tmp_path: Path) -> None:
+    """Also whose force the log's own wrench is, which is the robot's here."""
+    convert(full(), tmp_path / "x.parquet")
+    schema = pq.read_schema(tmp_path / "x.parquet")
+    assert all((field.metadata or {}).get(b"unit") for field in schema)
+    assert schema.field("current/1").metadata[b"unit"] == b"A"
+    assert schema.field("wrench/fx").metadata[b"sign"] == b"by-robot"
+    assert b"base axes" in schema.field("wrench/fx").metadata[b"frame"]

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
+import pyarrow.parquet as pq
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.log.estimates import estimates_table, write_csv, write_estimates
@@ -53,3 +54,14 @@ def test_every_sample_says_which_contact_it_lies_in(analysis: Analysis) -> None:
         assert number.filter(inside).to_list() == [contact.number] * inside.sum()
     within = [(t >= c.start) & (t <= c.stop) for c in analysis.contacts.contacts]
     assert number.is_null().sum() == len(t) - sum(part.sum() for part in within)
+
+
+def test_the_columns_say_unit_sign_and_frame(analysis: Analysis, tmp_path: Path) -> None:
+    write_estimates(tmp_path / "e.parquet", analysis)
+    schema = pq.read_schema(tmp_path / "e.parquet")
+    assert all((field.metadata or {}).get(b"unit") for field in schema)
+    force = {k.decode(): v.decode() for k, v in schema.field("wrench/best/fz").metadata.items()}
+    assert force["unit"] == "N"
+    assert force["sign"] == "on the robot"
+    assert force["frame"] == "flange axes, moment about the flange point"
+    assert schema.field("tau_ext/gmo/2").metadata[b"unit"] == "N·m".encode()

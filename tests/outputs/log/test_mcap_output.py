@@ -1,21 +1,35 @@
+import json
+from pathlib import Path
+
 import numpy as np
+import pinocchio as pin
 import pytest
+from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 from vftcli.analysis import Analysis
+from vftcli.outputs.contacts import contacts_record
 from vftcli.outputs.log import mcap_output
-from vftcli.outputs.log.mcap_output import ros_name, stamps_of, write_mcap
+from vftcli.outputs.log.mcap_output import frame_id, ros_name, stamps_of, write_mcap
+from vftcli.outputs.log.run_record import jsonable
 from vftcli.robots.drive import drive_torque
+from vftcli.robots.kinematics import link_poses
 from vftcli.signals.recording import Recording, Source
 
 
 @pytest.fixture(scope="module")
-def messages(analysis: Analysis, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list]:
-    """Topic → (stamp in the file, message), read by rosbags; three blocks of samples."""
+def path(touched: Analysis, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of three blocks of samples, with two contacts."""
     path = tmp_path_factory.mktemp("mcap") / "estimates.mcap"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(mcap_output, "BLOCK", 256)
-        write_mcap(path, analysis)
+        write_mcap(path, touched)
+    return path
+
+
+@pytest.fixture(scope="module")
+def messages(path: Path) -> dict[str, list]:
+    """Topic → (stamp in the file, message), read by rosbags."""
     found: dict[str, list] = {}
     with AnyReader([path]) as reader:
         for connection, stamp, raw in reader.messages():
@@ -27,9 +41,85 @@ def messages(analysis: Analysis, tmp_path_factory: pytest.TempPathFactory) -> di
 def test_every_topic_has_every_sample(messages: dict[str, list]) -> None:
     observers = ("best", "fdo", "gmo", "kfo_fe", "kfo_zoh", "reference")
     topics = ["/joint_states", *(f"/vftcli/external/{name}" for name in observers)]
+    topics.append("/vftcli/wrench/best")
     assert {topic: len(messages[topic]) for topic in topics} == dict.fromkeys(topics, 600)
-    assert len(messages["/robot_description"]) == 1
-    assert set(messages) == {*topics, "/robot_description"}
+    few = {"/robot_description": 1, "/vftcli/contacts": 1, "/vftcli/contacts/log": 4}
+    assert {topic: len(messages[topic]) for topic in few} == few
+    assert set(messages) == {*topics, *few}
+
+
+def test_mcap_reads_what_rosbags_reads(path: Path, messages: dict[str, list]) -> None:
+    """Every message of the file by the format's own reader, in the order of time as written."""
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        assert reader.get_header().profile == "ros2"
+        found = list(reader.iter_messages(log_time_order=False))
+        late = {c.topic for c in reader.get_summary().channels.values() if c.metadata}
+    assert len(found) == sum(map(len, messages.values()))
+    stamps = [message.log_time for _, _, message in found]
+    assert stamps == sorted(stamps)
+    assert {schema.encoding for schema, _, _ in found} == {"ros2msg"}
+    assert late == {"/robot_description", "/vftcli/contacts"}
+
+
+def test_the_description_and_the_list_are_kept_for_who_comes_late(path: Path) -> None:
+    with AnyReader([path]) as reader:
+        for connection in reader.connections:
+            latched = connection.topic in {"/robot_description", "/vftcli/contacts"}
+            profiles = connection.ext.offered_qos_profiles
+            assert bool(profiles) == latched
+            if latched:
+                assert profiles[0].durability.name == "TRANSIENT_LOCAL"
+                assert profiles[0].depth == 1
+
+
+def test_the_wrench_of_best_stands_in_the_flange(
+    messages: dict[str, list], touched: Analysis
+) -> None:
+    found = [message for _, message in messages["/vftcli/wrench/best"]]
+    assert {message.header.frame_id for message in found} == {"flange"}
+    force = [[m.wrench.force.x, m.wrench.force.y, m.wrench.force.z] for m in found]
+    moment = [[m.wrench.torque.x, m.wrench.torque.y, m.wrench.torque.z] for m in found]
+    np.testing.assert_array_equal(np.hstack([force, moment]), touched.wrenches[0].known)
+
+
+def test_wrenches_in_base_axes_say_about_which_point(with_wrench: Analysis) -> None:
+    """The flange is where their moment refers to: the frame of base would be another."""
+    assert {frame_id(wrench) for wrench in with_wrench.wrenches} == {"base@flange"}
+
+
+def test_contacts_are_logged_and_listed(messages: dict[str, list], touched: Analysis) -> None:
+    logged = [(stamp, message) for stamp, message in messages["/vftcli/contacts/log"]]
+    start = messages["/joint_states"][0][0]
+    seconds = [(stamp - start) / 1e9 for stamp, _ in logged]
+    assert seconds == pytest.approx([1.0, 1.5, 2.2, 2.6])
+    texts = [message.message for _, message in logged]
+    assert texts[0].startswith("1.00 s: contact 1 begins, for 0.50 s: 65 ± 7 N")
+    assert texts[1] == "contact 1 ends"
+    first = logged[0][1].timestamp
+    assert first.sec * 10**9 + first.nanosec == logged[0][0]
+    ((_, listed),) = messages["/vftcli/contacts"]
+    assert touched.contacts is not None
+    assert json.loads(listed.data) == json.loads(
+        json.dumps(jsonable(contacts_record(touched.contacts)))
+    )
+
+
+def test_pinocchio_moves_the_description_as_the_arm(
+    messages: dict[str, list], touched: Analysis
+) -> None:
+    """Poses of the flange at 20 drawn configurations of seed 5; 12 printed digits."""
+    ((_, message),) = messages["/robot_description"]
+    model = pin.buildModelFromXML(message.data)
+    assert list(model.names[1:]) == list(touched.robot.chain.names)
+    data, flange = model.createData(), model.getFrameId("flange")
+    q = np.random.default_rng(5).uniform(-3.0, 3.0, (20, 6))
+    expected = link_poses(touched.robot.chain, q)
+    for k, pose in enumerate(q):
+        pin.framesForwardKinematics(model, data, pose)
+        placed = data.oMf[flange]
+        np.testing.assert_allclose(placed.translation, expected.translation[k, -1], atol=1e-9)
+        np.testing.assert_allclose(placed.rotation, expected.rotation[k, -1], atol=1e-9)
 
 
 def test_joint_states_are_the_log(messages: dict[str, list], analysis: Analysis) -> None:

@@ -8,8 +8,8 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.log import report
-from vftcli.outputs.log.estimates import write_estimate_folder
-from vftcli.outputs.log.report import FILES, write_report, write_reports
+from vftcli.outputs.log.estimates import extra_files, write_estimate_folder
+from vftcli.outputs.log.report import ERROR_TABLES, FILES, write_report, write_reports
 from vftcli.outputs.seals import digests
 from vftcli.signals.errors import OutputError
 
@@ -32,7 +32,28 @@ def test_without_a_reference_there_are_no_error_tables(
 ) -> None:
     write_report(tmp_path, without_reference, command="")
     found = {p.name for p in tmp_path.iterdir()}
-    assert found == {"index.html", "recording.rrd", "estimates.parquet", "run.json"}
+    assert found == set(FILES) - set(ERROR_TABLES)
+
+
+def test_the_list_of_contacts_is_written_as_it_is_printed(
+    touched: Analysis, tmp_path: Path
+) -> None:
+    write_report(tmp_path / "one", touched, command="")
+    record = json.loads((tmp_path / "one/contacts.json").read_text(encoding="utf-8"))
+    assert [row["number"] for row in record["contacts"]] == [1, 2]
+    rows = pl.read_csv(tmp_path / "one/contacts.csv")
+    assert rows["start_s"].to_list() == [1.0, 2.2]
+    write_report(tmp_path / "none", replace(touched, contacts=None), command="")
+    assert not (tmp_path / "none/contacts.json").exists()
+
+
+def test_a_report_writes_an_mcap_with_its_layouts_on_request(
+    touched: Analysis, tmp_path: Path
+) -> None:
+    extras = ["mcap", "layouts"]
+    write_report(tmp_path / "out", touched, command="", extras=extras)
+    found = {p.name for p in (tmp_path / "out").iterdir()}
+    assert found == {*FILES, *extra_files(extras)}
 
 
 def labelled(analysis: Analysis, label: str, as_if: Callable) -> Analysis:
@@ -59,6 +80,7 @@ def test_several_logs_get_a_folder_each_and_an_index(
     errors = pl.read_csv(tmp_path / "out/errors.csv")
     assert errors["recording"].unique(maintain_order=True).to_list() == labels
     assert len(errors) == 2 * len(pl.read_csv(tmp_path / "out" / folders[0] / "errors.csv"))
+    assert len(json.loads((tmp_path / "out/contacts.json").read_text(encoding="utf-8"))) == 2
     assert (tmp_path / "out/errors.md").read_text(encoding="utf-8").count("run.csv against") == 2
 
 

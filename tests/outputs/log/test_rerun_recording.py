@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rerun.chunk
+from rerun_rows import rows_of
 
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.arm import motion
 from vftcli.outputs.log.rerun_recording import force_arrow, line_groups, write_rrd
-from vftcli.outputs.rerun_file import NEWTON_PER_METRE
+from vftcli.outputs.rerun_arm import NEWTON_PER_METRE
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian, link_poses
@@ -95,11 +96,10 @@ def test_the_arm_moves(rows: dict[str, dict[str, list]]) -> None:
     assert any(column(rows, "/robot/link_2", "Capsules3D:lengths"))
 
 
-def test_the_arrow_is_the_force_to_scale(
-    rows: dict[str, dict[str, list]], analysis: Analysis
-) -> None:
+def test_the_arrow_is_the_force_to_scale(analysis: Analysis, tmp_path: Path) -> None:
     """About 50 arrows a second: every second sample of this log at 125 Hz, of the best."""
-    drawn = column(rows, "/robot/flange_force", "Arrows3D:vectors")
+    write_rrd(tmp_path / "r.rrd", replace(analysis, contacts=None, virtual_sensor=None))
+    drawn = rows_of(tmp_path / "r.rrd", "/robot/flange_force", "Arrows3D:vectors")
     q, tau = analysis.recording.q[::2], analysis.estimates[0].tau[::2]
     found = wrench_of(tau, flange_jacobian(analysis.robot.chain, q))
     expected = np.where(found.known[:, None], found.values[:, :3], np.nan)

@@ -10,14 +10,8 @@ from vftcli.outputs.admittance.tables import comparison_text, parameter_text
 from vftcli.outputs.arm import motion
 from vftcli.outputs.palette import REFERENCE, SPARE, rgb
 from vftcli.outputs.plots import Lines, PlotLine, Tab
-from vftcli.outputs.rerun_file import (
-    FORCE,
-    NEWTON_PER_METRE,
-    ArmView,
-    rerun_file,
-    send_arm,
-    send_force,
-)
+from vftcli.outputs.rerun_arm import FORCE, NEWTON_PER_METRE, send_arm, send_force
+from vftcli.outputs.rerun_file import ArmView, rerun_file
 from vftcli.signals.arrays import Array
 from vftcli.signals.wrench import unit_of
 

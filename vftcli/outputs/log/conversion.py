@@ -15,6 +15,7 @@ from vftcli.outputs.log.mcap_output import (
     write_topics,
 )
 from vftcli.readers.bags.ros_messages import Value, in_parts
+from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
 
@@ -75,8 +76,11 @@ def write_parquet(recording: Recording, path: Path) -> None:
         "robot": recording.robot_hint,
         "repairs": [str(repair) for repair in recording.source.repairs],
     }
+    stated = {"wrench": StatedFrame(str(frame), frame.sign)} if frame is not None else None
+    schema = described_schema(table, stated)
+    about = {"vftcli": json.dumps(metadata)}
     with table_file(path) as file:
-        table.write_parquet(file, compression="zstd", metadata={"vftcli": json.dumps(metadata)})
+        table.write_parquet(file, compression="zstd", metadata=about, arrow_schema=schema)
 
 
 def write_csv(recording: Recording, path: Path) -> None:

@@ -1,5 +1,6 @@
 """The arm as URDF text, so that viewers of ROS 2 recordings can draw it."""
 
+from collections.abc import Mapping
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -7,11 +8,19 @@ import numpy as np
 from vftcli.outputs.arm import Capsule, capsules
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
-from vftcli.signals.pose import rotation_onto, rpy_angles
+from vftcli.signals.pose import Pose, rotation_onto, rpy_angles
 
 
-def urdf_text(robot: Robot, names: tuple[str, ...]) -> str:
-    """URDF of the arm as it was used, the payload in its last link; joint names base to tip."""
+def urdf_text(
+    robot: Robot, names: tuple[str, ...], mounted: Mapping[str, Pose] | None = None
+) -> str:
+    """URDF of the arm as it was used, the payload in its last link.
+
+    Args:
+        robot: The arm.
+        names: Its joints, base to tip.
+        mounted: Name → pose in the flange frame of what is fixed to it, as its tool.
+    """
     chain = robot.loaded_chain
     shapes = capsules(chain)
     parts = [f"<robot name={quoteattr(robot.name)}>", link("base", shapes[0], "")]
@@ -26,11 +35,18 @@ def urdf_text(robot: Robot, names: tuple[str, ...]) -> str:
             f'<child link="link_{j + 1}"/>{placed}<axis xyz="0 0 1"/>{limits}</joint>'
         )
     placed = origin(chain.flange_translation, chain.flange_rotation)
-    parts.append(
-        '<link name="flange"/><joint name="flange_mount" type="fixed">'
-        f'<parent link="link_{chain.joints}"/><child link="flange"/>{placed}</joint></robot>'
+    parts.append(fixed("flange", f"link_{chain.joints}", placed))
+    for name, pose in (mounted or {}).items():
+        parts.append(fixed(name, "flange", origin(pose.translation, pose.rotation)))
+    return "\n".join([*parts, "</robot>"]) + "\n"
+
+
+def fixed(name: str, parent: str, placed: str) -> str:
+    """A frame that is fixed to a link, at an origin."""
+    return (
+        f'<link name="{name}"/><joint name="{name}_mount" type="fixed">'
+        f'<parent link="{parent}"/><child link="{name}"/>{placed}</joint>'
     )
-    return "\n".join(parts) + "\n"
 
 
 def link(name: str, shapes: list[Capsule], inertial: str) -> str:

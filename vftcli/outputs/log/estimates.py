@@ -13,7 +13,9 @@ from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.log.run_record import run_record, seal
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
+from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.wrench import AXES
+from vftcli.virtual_sensor.frames import FRAMES
 
 if TYPE_CHECKING:
     import polars as pl
@@ -114,10 +116,25 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
     # For who finds the table alone, without the record beside it.
     doubts = overridden_lines(analysis.examinations)
     metadata = {"vftcli": json.dumps({"overridden": doubts})} if doubts else None
+    schema = described_schema(table, frames_of(analysis))
     with table_file(path) as file:
         table.write_parquet(
-            file, compression="zstd", compression_level=1, statistics=False, metadata=metadata
+            file,
+            compression="zstd",
+            compression_level=1,
+            statistics=False,
+            metadata=metadata,
+            arrow_schema=schema,
         )
+
+
+def frames_of(analysis: Analysis) -> dict[str, StatedFrame]:
+    """The columns of each wrench, without the axis → their frame."""
+    return {
+        f"{kind}/{wrench.name}": StatedFrame(FRAMES[wrench.frame])
+        for wrench in analysis.wrenches
+        for kind in ("wrench", "wrench_sd", "wrench_masked")
+    }
 
 
 def write_csv(path: Path, analysis: Analysis) -> None:
@@ -127,13 +144,41 @@ def write_csv(path: Path, analysis: Analysis) -> None:
         table.write_csv(file, float_precision=9)
 
 
-EXTRAS = {"csv": "estimates.csv", "mcap": "estimates.mcap", "rrd": "recording.rrd"}
-"""Flag → file name."""
+EXTRAS = {
+    "csv": ("estimates.csv",),
+    "mcap": ("estimates.mcap",),
+    "layouts": ("estimates.foxglove.json", "estimates.plotjuggler.xml"),
+    "rrd": ("recording.rrd",),
+}
+"""Flag → names of its files."""
+
+
+def extra_files(extras: Sequence[str]) -> tuple[str, ...]:
+    """Names of the files of these extras."""
+    return tuple(name for extra in extras for name in EXTRAS[extra])
 
 
 def estimate_files(extras: Sequence[str]) -> tuple[str, ...]:
     """Names of the files of a folder with these extras."""
-    return ("estimates.parquet", SEAL, *(EXTRAS[extra] for extra in extras))
+    return ("estimates.parquet", SEAL, *extra_files(extras))
+
+
+def write_extras(
+    folder: OutputFolder, place: str, analysis: Analysis, extras: Sequence[str]
+) -> None:
+    """Write what was asked for besides, below a place of a folder."""
+    from vftcli.outputs.log.layouts import foxglove_layout, plotjuggler_layout
+    from vftcli.outputs.log.mcap_output import write_mcap
+    from vftcli.outputs.log.rerun_recording import write_rrd
+
+    texts = dict(zip(EXTRAS["layouts"], (foxglove_layout, plotjuggler_layout), strict=True))
+    writers = {"csv": write_csv, "mcap": write_mcap, "rrd": write_rrd}
+    for extra in extras:
+        for name in EXTRAS[extra]:
+            if name in texts:
+                folder.write(f"{place}{name}", texts[name](analysis))
+            else:
+                writers[extra](folder / f"{place}{name}", analysis)
 
 
 def write_estimate_folder(
@@ -148,13 +193,8 @@ def write_estimate_folder(
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     record = run_record(analysis, command)
-    # After the record: it names the packages that are loaded, and these made no number.
-    from vftcli.outputs.log.mcap_output import write_mcap
-    from vftcli.outputs.log.rerun_recording import write_rrd
-
-    writers = {"csv": write_csv, "mcap": write_mcap, "rrd": write_rrd}
     with OutputFolder(path, force, estimate_files(extras)) as folder:
         write_estimates(folder / "estimates.parquet", analysis)
-        for extra in extras:
-            writers[extra](folder / EXTRAS[extra], analysis)
+        # After the record: it names the packages that are loaded, and these made no number.
+        write_extras(folder, "", analysis, extras)
         return seal(folder, SEAL, record)

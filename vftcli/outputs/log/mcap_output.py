@@ -2,10 +2,16 @@
 
 Topics of `estimates.mcap`: `/joint_states` (positions, velocities, measured drive torque as
 effort), `/vftcli/external/<observer>` and `/vftcli/external/reference` (external torque as effort),
-all sensor_msgs/JointState; `/robot_description` (std_msgs/String, URDF) once. Hyphens, which ROS
-names may not hold, become underscores.
+all sensor_msgs/JointState; `/vftcli/wrench/<observer>` and `/vftcli/wrench/reference`
+(geometry_msgs/WrenchStamped, NaN where the pose cannot tell it); `/vftcli/contacts/log`
+(foxglove_msgs/Log) where each contact begins and ends; `/vftcli/contacts` (std_msgs/String, the
+JSON of contacts.json) and `/robot_description` (std_msgs/String, URDF) once, kept for who comes
+late. Hyphens, which ROS names may not hold, become underscores. All of it is CDR: a channel of JSON
+messages in a ros2 file ends rosbags' reader.
 """
 
+import json
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,13 +20,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
+from vftcli.outputs.contacts import beginning, contact_name, contacts_record
 from vftcli.outputs.log.description import urdf_text
-from vftcli.readers.bags.ros_messages import Value, long_name, schema_text, serialised, stamped
+from vftcli.outputs.log.run_record import jsonable
+from vftcli.readers.bags.ros_messages import (
+    Value,
+    in_parts,
+    long_name,
+    schema_text,
+    serialised,
+    stamped,
+)
 from vftcli.robots.drive import drive_torque
 from vftcli.signals.arrays import Array
+from vftcli.signals.pose import Pose
 from vftcli.signals.recording import Recording
+from vftcli.signals.wrench import Wrench
+from vftcli.virtual_sensor.frames import frame_pose
 
-JOINT_STATE = "sensor_msgs/JointState"
+JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
+TEXT, LOG = "std_msgs/String", "foxglove_msgs/Log"
+
+INFO, WARNING = 2, 3
+"""Levels of a log message."""
 
 LAST_STAMP = 2**31 - 1
 """ROS 2 counts seconds in 32 bits with a sign."""
@@ -51,6 +73,38 @@ class OutputTopic(NamedTuple):
         return serialised(self.kind, {**stamped(times), **part}, len(times))
 
 
+class Event(NamedTuple):
+    """One message of a topic that has few.
+
+    Attributes:
+        stamp: When. [ns]
+        topic: The topic's name.
+        kind: The type, as package/Name.
+        values: Dotted path of a field → its value.
+        latched: Whether who subscribes later gets it too, as ROS 2 keeps a robot's description.
+    """
+
+    stamp: int
+    topic: str
+    kind: str
+    values: Mapping[str, Value]
+    latched: bool = False
+
+
+LATCHED = """\
+- history: keep_last
+  depth: 1
+  reliability: reliable
+  durability: transient_local
+  deadline: {sec: 9223372036, nsec: 854775807}
+  lifespan: {sec: 9223372036, nsec: 854775807}
+  liveliness: automatic
+  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
+  avoid_ros_namespace_conventions: false
+"""
+"""What `ros2 bag` writes of a latched topic, for it to be latched when the bag is played."""
+
+
 def joint_topic(
     name: str,
     joints: Sequence[str],
@@ -68,8 +122,8 @@ def write_mcap(path: Path, analysis: Analysis) -> None:
     """Write the recording's torques and its estimates; an existing file is replaced."""
     # The log's own names, so that the URDF moves with its /joint_states.
     names = analysis.recording.joint_names or analysis.robot.chain.names
-    description = urdf_text(analysis.robot, names)
-    write_topics(path, stamps_of(analysis.recording), topics(analysis, names), description)
+    stamps = stamps_of(analysis.recording)
+    write_topics(path, stamps, topics(analysis, names), events(analysis, names, int(stamps[0])))
 
 
 def topics(analysis: Analysis, names: Sequence[str]) -> Iterator[OutputTopic]:
@@ -82,6 +136,66 @@ def topics(analysis: Analysis, names: Sequence[str]) -> Iterator[OutputTopic]:
         yield joint_topic(name, names, effort=estimate.tau)
     if analysis.reference is not None:
         yield joint_topic("/vftcli/external/reference", names, effort=analysis.reference.tau)
+    for wrench in analysis.wrenches:
+        yield wrench_topic(
+            f"/vftcli/wrench/{ros_name(wrench.name)}", frame_id(wrench), wrench.known
+        )
+
+
+def frame_id(wrench: Wrench) -> str:
+    """The frame of a wrench: a link of the description, ``base@flange`` for base axes there."""
+    return "base@flange" if wrench.frame == "base" else wrench.frame
+
+
+def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
+    """A topic of WrenchStamped messages. (T, 6)"""
+    parts: dict[str, Value] = {
+        "header.frame_id": frame,
+        **in_parts("wrench.force", "xyz", values[:, :3]),
+        **in_parts("wrench.torque", "xyz", values[:, 3:]),
+    }
+    return OutputTopic(name, WRENCH, parts)
+
+
+def events(analysis: Analysis, names: Sequence[str], start: int) -> list[Event]:
+    """The arm's description, the contacts, and when each of them begins and ends.
+
+    Args:
+        analysis: The log.
+        names: The joints' names.
+        start: The first sample's stamp. [ns]
+    """
+    found = analysis.contacts
+    urdf = urdf_text(analysis.robot, tuple(names), mounted_frames(analysis))
+    made = [Event(start, "/robot_description", TEXT, {"data": urdf}, latched=True)]
+    if found is None:
+        return made
+    record = json.dumps(jsonable(contacts_record(found)), ensure_ascii=False, allow_nan=False)
+    made.append(Event(start, "/vftcli/contacts", TEXT, {"data": record}, latched=True))
+    for contact in found.contacts:
+        for t, words in (
+            (contact.start, beginning(contact)),
+            (contact.stop, f"{contact_name(contact)} ends"),
+        ):
+            stamp = start + round(t * 1e9)
+            level = WARNING if contact.trust == "weak" else INFO
+            values: dict[str, Value] = {"level": level, "message": words, "name": "vftcli"}
+            made.append(Event(stamp, "/vftcli/contacts/log", LOG, values | logged_at(stamp)))
+    return sorted(made, key=lambda event: event.stamp)
+
+
+def mounted_frames(analysis: Analysis) -> dict[str, Pose]:
+    """Poses in the flange frame of the tool and the sensor that wrenches are told in."""
+    sensed = analysis.virtual_sensor
+    names = {wrench.frame for wrench in analysis.wrenches} & {"tool", "sensor"}
+    if sensed is None:
+        return {}
+    return {name: frame_pose(name, sensed.sensor.mounting) for name in sorted(names)}
+
+
+def logged_at(stamp: int) -> dict[str, Value]:
+    """The values of a log message's own stamp."""
+    return stamped(np.array([stamp]), "timestamp")
 
 
 def ros_name(name: str) -> str:
@@ -106,7 +220,7 @@ def stamps_of(recording: Recording) -> Nanoseconds:
 
 
 def write_topics(
-    path: Path, stamps: Nanoseconds, found: Iterable[OutputTopic], description: str | None = None
+    path: Path, stamps: Nanoseconds, found: Iterable[OutputTopic], events: Sequence[Event] = ()
 ) -> None:
     """Write a ros2-profile MCAP with zstd chunks, sample by sample, all topics side by side.
 
@@ -114,7 +228,7 @@ def write_topics(
         path: Where to; an existing file is replaced.
         stamps: Time of every sample. (T,) [ns]
         found: The topics.
-        description: The robot's URDF, which comes first, or None.
+        events: Further messages, in the order of time.
     """
     from mcap.writer import CompressionType, Writer
 
@@ -122,22 +236,31 @@ def write_topics(
     with path.open("wb") as file:
         writer = Writer(file, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="vftcli")
-        if description is not None:
-            number = channel(writer, "/robot_description", "std_msgs/String")
-            body = serialised("std_msgs/String", {"data": description}, 1)
-            writer.add_message(number, int(stamps[0]), body.tobytes(), int(stamps[0]))
+        waiting = deque(events)
+        of_events = {e.topic: channel(writer, e.topic, e.kind, e.latched) for e in events}
         channels = [channel(writer, topic.name, topic.kind) for topic in found]
         # In blocks: all messages of an hour at 1 kHz at once would not fit in memory.
         for start in range(0, len(stamps), BLOCK):
             span = slice(start, start + BLOCK)
             bodies = [topic.messages(stamps, span) for topic in found]
             for k, stamp in enumerate(stamps[span].tolist()):
+                while waiting and waiting[0].stamp <= stamp:
+                    add_event(writer, of_events, waiting.popleft())
                 for number, body in zip(channels, bodies, strict=True):
                     writer.add_message(number, stamp, body[k].tobytes(), stamp, start + k)
+        for event in waiting:
+            add_event(writer, of_events, event)
         writer.finish()
 
 
-def channel(writer: Any, topic: str, kind: str) -> int:  # noqa: ANN401 - mcap is untyped
+def add_event(writer: Any, channels: Mapping[str, int], event: Event) -> None:  # noqa: ANN401
+    """Write one message of a topic that has few."""
+    body = serialised(event.kind, event.values, 1).tobytes()
+    writer.add_message(channels[event.topic], event.stamp, body, event.stamp)
+
+
+def channel(writer: Any, topic: str, kind: str, latched: bool = False) -> int:  # noqa: ANN401
     """Register a topic with its type's definition; return its channel number."""
     schema = writer.register_schema(long_name(kind), "ros2msg", schema_text(kind).encode())
-    return int(writer.register_channel(topic, "cdr", schema))
+    how = {"offered_qos_profiles": LATCHED} if latched else {}
+    return int(writer.register_channel(topic, "cdr", schema, metadata=how))

@@ -1,16 +1,18 @@
 """What `vftcli report` writes: page, recording, estimates, errors and run.json in one folder."""
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vftcli.analysis import Analysis
+from vftcli.outputs.contacts import contacts_csv, contacts_record
 from vftcli.outputs.files import OutputFolder, numbered
 from vftcli.outputs.log import tables
-from vftcli.outputs.log.estimates import write_estimates
+from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.log.rerun_recording import write_rrd
-from vftcli.outputs.log.run_record import run_record, seal, versions
+from vftcli.outputs.log.run_record import jsonable, run_record, seal, versions
 from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds
 from vftcli.outputs.page.page import render, render_index
 from vftcli.outputs.seals import SEAL
@@ -26,7 +28,10 @@ ERROR_TABLES: dict[str, Callable[["pl.DataFrame", PaperBounds], str]] = {
 }
 """File name → how its text is made from the errors table."""
 
-FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *ERROR_TABLES)
+CONTACTS = ("contacts.json", "contacts.csv")
+"""The list of contacts, where it is made."""
+
+FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *CONTACTS, *ERROR_TABLES)
 """What a report of one log may hold; the error tables only where there is a reference."""
 
 
@@ -35,15 +40,23 @@ def places_of(labels: Sequence[str]) -> list[str]:
     return numbered(Path(label).stem or "log" for label in labels)
 
 
-def report_files(labels: Sequence[str]) -> list[str]:
-    """Names of all files that a report of logs with these labels may hold."""
+def report_files(labels: Sequence[str], extras: Sequence[str] = ()) -> list[str]:
+    """Names of all files that a report of logs with these labels may hold, with these extras."""
+    own = [*FILES, *extra_files(extras)]
     if len(labels) == 1:
-        return list(FILES)
-    below = [f"{place}/{name}" for place in places_of(labels) for name in FILES]
-    return ["index.html", SEAL, *ERROR_TABLES, *below]
+        return own
+    below = [f"{place}/{name}" for place in places_of(labels) for name in own]
+    return ["index.html", SEAL, *CONTACTS, *ERROR_TABLES, *below]
 
 
-def write_report(path: Path, analysis: Analysis, *, command: str, force: bool = False) -> str:
+def write_report(
+    path: Path,
+    analysis: Analysis,
+    *,
+    command: str,
+    force: bool = False,
+    extras: Sequence[str] = (),
+) -> str:
     """Write the report of one log, all files or none.
 
     Returns:
@@ -52,12 +65,18 @@ def write_report(path: Path, analysis: Analysis, *, command: str, force: bool = 
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
-    with OutputFolder(path, force, FILES) as folder:
-        return fill(folder, "", analysis, command)
+    names = report_files([analysis.recording.name], extras)
+    with OutputFolder(path, force, names) as folder:
+        return fill(folder, "", analysis, command, extras)
 
 
 def write_reports(
-    path: Path, analyses: Sequence[Analysis], *, command: str, force: bool = False
+    path: Path,
+    analyses: Sequence[Analysis],
+    *,
+    command: str,
+    force: bool = False,
+    extras: Sequence[str] = (),
 ) -> str:
     """Write one sub-folder a log, and above them an index, all errors in one, and run.json.
 
@@ -71,21 +90,24 @@ def write_reports(
 
     labels = [a.recording.name for a in analyses]
     places = places_of(labels)
-    with OutputFolder(path, force, report_files(labels)) as folder:
+    with OutputFolder(path, force, report_files(labels, extras)) as folder:
         records = [
-            fill(folder, f"{place}/", analysis, command)
+            fill(folder, f"{place}/", analysis, command, extras)
             for place, analysis in zip(places, analyses, strict=True)
         ]
         folder.write("index.html", render_index(list(zip(places, analyses, strict=True))))
         found = [a.errors for a in analyses if a.errors is not None]
         together = pl.concat(found, how="diagonal") if found else None
         put_errors(folder, "", together, analyses)
+        put_contacts(folder, "", analyses)
         logs = dict(zip(places, labels, strict=True))
         seal(folder, SEAL, {"command": command, "versions": versions(), "logs": logs})
         return "[\n" + ",\n".join(record.rstrip("\n") for record in records) + "\n]\n"
 
 
-def fill(folder: OutputFolder, place: str, analysis: Analysis, command: str) -> str:
+def fill(
+    folder: OutputFolder, place: str, analysis: Analysis, command: str, extras: Sequence[str] = ()
+) -> str:
     """Write one log's files; return the text of its `run.json`."""
     record = run_record(analysis, command)
     # The page shows the record that is written beside it, not one of its own.
@@ -94,7 +116,21 @@ def fill(folder: OutputFolder, place: str, analysis: Analysis, command: str) -> 
     write_rrd(folder / f"{place}recording.rrd", analysis)
     write_estimates(folder / f"{place}estimates.parquet", analysis)
     put_errors(folder, place, analysis.errors, [analysis])
+    put_contacts(folder, place, [analysis])
+    write_extras(folder, place, analysis, extras)
     return seal(folder, f"{place}{SEAL}", record)
+
+
+def put_contacts(folder: OutputFolder, place: str, analyses: Sequence[Analysis]) -> None:
+    """Write the lists of contacts, if there are any: as `vftcli contacts` prints them."""
+    lists = [analysis.contacts for analysis in analyses if analysis.contacts is not None]
+    if not lists:
+        return
+    records = [jsonable(contacts_record(found)) for found in lists]
+    shown = records[0] if len(analyses) == 1 else records
+    text = json.dumps(shown, indent=2, ensure_ascii=False, allow_nan=False)
+    folder.write(f"{place}contacts.json", f"{text}\n")
+    folder.write(f"{place}contacts.csv", contacts_csv(lists))
 
 
 def put_errors(

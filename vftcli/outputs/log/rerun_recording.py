@@ -1,8 +1,9 @@
-"""recording.rrd: torques, residuals, motion and the arm, arranged for the Rerun viewer.
+"""recording.rrd: contacts, torques, residuals, motion and the arm, arranged for the Rerun viewer.
 
-Entities: `/tau_ext/J1` … (every observer, then the reference), `/residual/J1` … (every estimate
-minus the reference), `/drive_torque`, `/q` and `/dq` (one line a joint), `/wrench/fx` … where
-wrenches were asked for, `/robot` with the arm and the force on it.
+Entities: those of `contact_recording`; `/tau_ext/J1` … (every observer, then the reference),
+`/residual/J1` … (every estimate minus the reference), `/drive_torque`, `/q` and `/dq` (one line a
+joint), `/wrench/fx` … where wrenches are known, `/robot` with the arm, and the force on it where no
+contacts are listed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,23 +16,33 @@ from vftcli.analysis import Analysis
 from vftcli.observers.table import BEST
 from vftcli.outputs.arm import ArmPoses, motion
 from vftcli.outputs.grid import escape_markdown
+from vftcli.outputs.log.contact_recording import (
+    SHAFT,
+    contact_log,
+    flange_force,
+    force_lines,
+    painted_links,
+    send_contacts,
+)
 from vftcli.outputs.log.run_record import CONVENTIONS, all_remarks
 from vftcli.outputs.log.tables import to_markdown
 from vftcli.outputs.log.wrench_tables import paper_bounds
-from vftcli.outputs.palette import REFERENCE, SPARE, colours_of
+from vftcli.outputs.palette import COLOURS, REFERENCE, SPARE, colours_of
 from vftcli.outputs.plots import Lines, PlotLine, Tab
-from vftcli.outputs.rerun_file import NEWTON_PER_METRE, ArmView, rerun_file, send_arm, send_force
+from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, arrow_scale, send_arm, send_force
+from vftcli.outputs.rerun_file import ArmView, rerun_file
 from vftcli.robots.drive import drive_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS, ExternalTorque
-from vftcli.signals.wrench import AXES, unit_of
+from vftcli.signals.wrench import AXES, Wrench, unit_of
+from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
+
+WRIST = 3
+"""The last joints, whose torques are smaller than the others': they share a vertical axis."""
 
 LEADING = 2.0
 """Width of the line of `best`; the others are thinner. [px]"""
-
-SHAFT = 0.012
-"""Radius of the force arrow. [m]"""
 
 
 def write_rrd(path: Path, analysis: Analysis) -> None:
@@ -40,26 +51,42 @@ def write_rrd(path: Path, analysis: Analysis) -> None:
     Raises:
         OutputError: If it cannot be written whole.
     """
-    chain, errors = analysis.robot.chain, analysis.errors
+    chain, errors, found = analysis.robot.chain, analysis.errors, analysis.contacts
     tabs = [Tab(name, analysis.t, lines) for name, lines in line_groups(analysis).items()]
+    if found is not None:
+        tabs[0] = tabs[0]._replace(log=contact_log(found))
     table = to_markdown(errors, paper_bounds([analysis])) if errors is not None else ""
-    words = {
-        "Summary": summary(analysis),
-        "Errors": table or "No reference was given, so no errors can be told.",
-    }
+    words = {"Summary": summary(analysis)} | ({"Errors": table} if table else {})
     poses = motion(chain, analysis.t, analysis.recording.q)
-    arrow = force_arrow(analysis, poses, np.searchsorted(analysis.t, poses.t))
-    name = analysis.recording.name
-    with rerun_file(path, name, tabs, words, ArmView("Arm", poses)) as stream:
-        send_arm(stream, "/robot", chain, poses)
-        if arrow is not None:
+    sampled = np.searchsorted(analysis.t, poses.t)
+    scale = newton_per_metre(analysis)
+    view = ArmView(f"Arm (arrow: 1 m is {scale:g} N)", poses)
+    first = found.contacts[0] if found is not None and found.contacts else None
+    marked = (first.start, first.stop) if first is not None else None
+    with rerun_file(path, analysis.recording.name, tabs, words, view, marked) as stream:
+        painted = painted_links(found, chain.joints) if found is not None else {}
+        send_arm(stream, "/robot", chain, poses, painted=painted)
+        if found is not None:
+            force = flange_force(analysis, poses.q, sampled, chain)
+            send_contacts(stream, found, poses, force, scale)
+        elif (arrow := force_arrow(analysis, poses, sampled)) is not None:
             send_force(stream, "/robot/flange_force", poses.t, arrow.origin, arrow.force, SHAFT)
 
 
+def newton_per_metre(analysis: Analysis) -> float:
+    """How long arrows are: by the hardest contact. [N/m]"""
+    found = analysis.contacts
+    if found is None or found.hardest is None:
+        return NEWTON_PER_METRE
+    return arrow_scale(found.hardest.peak_force or NEWTON_PER_METRE)
+
+
 def line_groups(analysis: Analysis) -> dict[str, list[Lines]]:
-    """All plots, tab by tab: external torques and residuals joint by joint, then the motion."""
+    """All plots, tab by tab: the force, torques and residuals joint by joint, then the motion."""
     reference, joints = analysis.reference, range(analysis.recording.joints)
-    groups = {"External torque": [joint_lines("tau_ext", analysis, j, reference) for j in joints]}
+    force = force_lines(analysis)
+    groups = {"Contacts": [force]} if force is not None else {}
+    groups |= {"Joint torques": [joint_lines("tau_ext", analysis, j, reference) for j in joints]}
     if reference is not None:
         groups["Residual"] = [
             joint_lines("residual", analysis, j, None, reference.tau[:, j]) for j in joints
@@ -94,7 +121,8 @@ def joint_lines(
         lines.insert(0, PlotLine(name, reference.tau[:, j], REFERENCE, 2.5))
     rests = analysis.reference is not None and analysis.reference.mostly_rests[j]
     doubt = " (the joint rests: do not trust the reference)" if rests else ""
-    return Lines(f"/{group}/J{j + 1}", f"J{j + 1} {TITLES[group]}{doubt}", lines)
+    family = "wrist" if j >= analysis.recording.joints - WRIST else "shoulder"
+    return Lines(f"/{group}/J{j + 1}", f"J{j + 1} {TITLES[group]}{doubt}", lines, family)
 
 
 def band_lines(analysis: Analysis, j: int) -> Iterator[PlotLine]:
@@ -125,17 +153,27 @@ def wrench_lines(analysis: Analysis, k: int) -> Lines:
         else PlotLine(w.name, w.known[:, k], REFERENCE, 2.5)
         for w in found
     ]
-    return Lines(f"/wrench/{AXES[k]}", title, lines)
+    lines += [line for w in found if w.name == BEST for line in wrench_band(w, k)]
+    return Lines(f"/wrench/{AXES[k]}", title, lines, unit_of(k))
+
+
+def wrench_band(wrench: Wrench, k: int) -> Iterator[PlotLine]:
+    """Both edges of the 95 % band of one axis of a wrench, where it has one."""
+    if wrench.known_sd is not None:
+        for sign, edge in ((1.0, "upper"), (-1.0, "lower")):
+            column = wrench.known[:, k] + sign * COVERS * wrench.known_sd[:, k]
+            yield PlotLine(f"{wrench.name} 95 % {edge}", column, COLOURS[BEST], 0.6)
 
 
 def condition_lines(analysis: Analysis) -> list[Lines]:
     """What the pose can tell, and the torque that no wrench at the flange explains."""
     colours = colours_of(analysis.estimates)
     wrenches = [wrench for wrench in analysis.wrenches if wrench.name in colours]
-    found = []
+    found, sensed = [], analysis.virtual_sensor
     sigma = next((w.sigma_min for w in wrenches if w.sigma_min is not None), None)
-    if sigma is not None and analysis.virtual_sensor is not None:
-        least = np.full_like(sigma, analysis.virtual_sensor.sensor.least_sigma)
+    # The smoother asks no pose: its band grows where the pose tells little.
+    if sigma is not None and sensed is not None and sensed.solver != SMOOTHER:
+        least = np.full_like(sigma, sensed.sensor.least_sigma)
         lines = [
             PlotLine("σ_min", sigma, REFERENCE),
             PlotLine("masked below", least, SPARE[0], 1.0),
@@ -174,7 +212,6 @@ def motion_lines(analysis: Analysis) -> list[Lines]:
 def summary(analysis: Analysis) -> str:
     """Which log, which robot, what the numbers and the arrow mean."""
     recording, robot = analysis.recording, analysis.robot
-    force = force_source(analysis.estimates)
     source = recording.source
     lines = [
         f"# {escape_markdown(recording.name)}",
@@ -184,16 +221,28 @@ def summary(analysis: Analysis) -> str:
         "",
         *(f"- **{name}**: {escape_markdown(text)}" for name, text in CONVENTIONS.items()),
     ]
-    if force is not None:
-        lines.append(
-            f"- **orange arrow**: force on the robot from {force.name}, as in the tables of the "
-            "wrench where one was asked for, else at the flange by the pseudo-inverse of Jᵀ; 1 m "
-            f"is {NEWTON_PER_METRE:g} N; none where the pose cannot tell"
-        )
+    lines.append(f"- **arrow**: {arrow_words(analysis)}")
     remarks = [*source.remarks, *all_remarks(analysis)]
     lines += ["", "## Notes", *(f"- {escape_markdown(str(note))}" for note in remarks)]
     lines += ["", f"Log sha256 {source.sha256 or 'unknown'}"]
     return "\n".join(lines) + "\n"
+
+
+def arrow_words(analysis: Analysis) -> str:
+    """What the arrow and the colours of the arm mean."""
+    scale = f"1 m is {newton_per_metre(analysis):g} N"
+    if analysis.contacts is not None:
+        return (
+            "the force on the robot while it is touched, at the flange or in the middle of the "
+            f"link that the list names, which has its colour then; {scale}. On the wrist it is the "
+            "force as it runs, elsewhere that of the contact's peak"
+        )
+    source = force_source(analysis.estimates)
+    name = source.name if source is not None else "no estimate"
+    return (
+        f"force on the robot from {name}, as in the tables of the wrench where one was asked for, "
+        f"else at the flange by the pseudo-inverse of Jᵀ; {scale}; none where the pose cannot tell"
+    )
 
 
 def force_source(estimates: Sequence[ExternalTorque]) -> ExternalTorque | None:

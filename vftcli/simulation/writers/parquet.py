@@ -1,12 +1,20 @@
 """Flat Parquet tables: the log under our own column names, and the truth file."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from vftcli.signals.arrays import Array
+from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.truth import AXES, Truth
+
+TRUTH_FRAME = "base axes, moment about the flange point"
+"""Of the truth's wrench."""
+
+AT_CONTACT = "base axes, moment about the point that is touched"
+"""Of the wrench of one contact elsewhere on the arm."""
 
 
 def write_parquet(path: Path, simulation: Simulation) -> None:
@@ -43,11 +51,17 @@ def signals(simulation: Simulation) -> dict[str, Array]:
 def write_truth(path: Path, truth: Truth, start: float) -> None:
     """Write the truth beside a log whose first stamp is `start` [s]: the same clock."""
     columns = truth.columns()
-    write_columns(path, columns | {"t": columns["t"] + start})
+    touched = {name.rpartition("/")[0] for name in columns if name.startswith("contact/")}
+    frames = {"wrench": StatedFrame(TRUTH_FRAME)} | dict.fromkeys(touched, StatedFrame(AT_CONTACT))
+    write_columns(path, columns | {"t": columns["t"] + start}, frames)
 
 
-def write_columns(path: Path, columns: dict[str, Array]) -> None:
-    """Write named columns (M,) of doubles as one Parquet table."""
+def write_columns(
+    path: Path, columns: dict[str, Array], frames: Mapping[str, StatedFrame] | None = None
+) -> None:
+    """Write named columns (M,) of doubles as one Parquet table; wrenches have these frames."""
     import polars as pl
 
-    pl.DataFrame(columns).write_parquet(path, compression="zstd")
+    table = pl.DataFrame(columns)
+    schema = described_schema(table, frames)
+    table.write_parquet(path, compression="zstd", arrow_schema=schema)

@@ -1,0 +1,190 @@
+"""Contacts in a Rerun recording: |F| over time, a log of what happened, the arrow at the place.
+
+Entities: `/force` with |F|, its band and the spans of the contacts, `/force/points` with the peaks,
+`/contacts/1` … with the arrow and the words of each contact, `/remarks` with what limits the list.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.observers.table import BEST
+from vftcli.outputs.arm import ArmPoses
+from vftcli.outputs.contacts import beginning
+from vftcli.outputs.palette import COLOURS, PLACES, REFERENCE, SPARE
+from vftcli.outputs.plots import Lines, LogLine, PlotLine, PlotPoints
+from vftcli.outputs.rerun_arm import PaintedSpan, send_force
+from vftcli.outputs.rerun_file import CONTACTS, Stream
+from vftcli.robots.chain import Chain
+from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import COVERS
+from vftcli.signals.remarks import Remark, sentence
+from vftcli.signals.wrench import Wrench
+
+SHAFT = 0.012
+"""Radius of a force arrow. [m]"""
+
+BELOW = 0.06
+"""The spans of the contacts lie below zero by this share of the largest force."""
+
+BAND = "#e98aa2"
+"""The band of |F|: the colour of `best`, paler."""
+
+SPAN_WIDTH = 6.0
+"""Width of the line that is the span of a contact. [px]"""
+
+
+def best_wrench(analysis: Analysis) -> Wrench | None:
+    """The wrench of `best`, None where there is none."""
+    return next((w for w in analysis.wrenches if w.name == BEST), None)
+
+
+def force_lines(analysis: Analysis) -> Lines | None:
+    """|F| with its 95 % band, the spans of the contacts below it, their peaks as points.
+
+    None where no wrench of `best` is known, as of an arm of less than six joints.
+    """
+    wrench, found = best_wrench(analysis), analysis.contacts
+    if wrench is None:
+        return None
+    size, sd = wrench.size, wrench.size_sd
+    lines = []
+    if analysis.virtual_sensor is not None and analysis.virtual_sensor.reference is not None:
+        reference = analysis.virtual_sensor.reference.size
+        lines.append(PlotLine("reference", reference, REFERENCE, 2.5))
+    lines.append(PlotLine("|F|", size, COLOURS[BEST], 2.0))
+    if sd is not None:
+        upper, lower = size + COVERS * sd, np.maximum(size - COVERS * sd, 0.0)
+        lines.append(PlotLine("95 % upper", upper, BAND, 0.8))
+        lines.append(PlotLine("95 % lower", lower, BAND, 0.8))
+    if found is None:
+        return Lines("/force", "|F| on the robot [N]", lines)
+    title = (
+        "|F| on the robot as at the flange, 95 % band [N]; bars: touched; diamonds: peaks by place"
+    )
+    if found.smallest_force is not None and np.isfinite(found.smallest_force):
+        least = np.full(len(size), found.smallest_force)
+        lines.append(PlotLine("smallest that can be told", least, SPARE[7], 1.0))
+        title += f"; green: {found.smallest_force:.0f} N, the smallest told"
+    points = peaks(found)
+    tallest = np.nanmax(np.concatenate([size, [1.0], points.values if points else []]))
+    lines += span_lines(analysis.t, found, -BELOW * float(tallest))
+    return Lines("/force", title, lines, points=points, legend=False)
+
+
+def span_lines(t: Array, found: ContactList, level: float) -> Iterator[PlotLine]:
+    """A bar a contact at one level, a line a part of the arm, so that the legend names them."""
+    for where, colour in PLACES.items():
+        bar = np.full(len(t), np.nan)
+        for contact in found.contacts:
+            if contact.where == where:
+                bar[(t >= contact.start) & (t <= contact.stop)] = level
+        if np.isfinite(bar).any():
+            yield PlotLine(f"touched: {where}", bar, colour, SPAN_WIDTH)
+
+
+def peaks(found: ContactList) -> PlotPoints | None:
+    """The peak of every contact whose force is known; a load has a mean and no peak."""
+    felt = [c for c in found.contacts if c.peak_force is not None and not c.is_load]
+    if not felt:
+        return None
+    t = np.array([contact.peak for contact in felt])
+    force = np.array([contact.peak_force for contact in felt], dtype=float)
+    return PlotPoints("peaks", t, force, COLOURS[BEST])
+
+
+def contact_log(found: ContactList) -> list[LogLine]:
+    """When each contact begins, with what is known of it, and what limits the list."""
+    lines = []
+    for contact in found.contacts:
+        path, colour = f"{CONTACTS}/{contact.number}", PLACES[contact.where]
+        lines.append(LogLine(path, contact.start, beginning(contact), colour))
+    lines += [
+        LogLine("/remarks", time_of(remark), sentence(remark), REFERENCE, "WARN")
+        for remark in found.remarks
+    ]
+    if not found.contacts:
+        lines.append(LogLine("/remarks", 0.0, "nothing touched the arm, as far as told", REFERENCE))
+    return lines
+
+
+def time_of(remark: Remark) -> float:
+    """When what a remark says began, 0 where it holds throughout. [s]"""
+    return remark.where.span[0] if remark.where.span is not None else 0.0
+
+
+def painted_links(found: ContactList, joints: int) -> dict[int, list[PaintedSpan]]:
+    """Number of a link → when it is one of those that were touched, in the colour of the part."""
+    spans: dict[int, list[PaintedSpan]] = {}
+    for contact in found.contacts:
+        span = PaintedSpan(contact.start, contact.stop, PLACES[contact.where])
+        for link in sorted({place or joints for place in contact.places}):
+            spans.setdefault(link, []).append(span)
+    return spans
+
+
+def send_contacts(
+    stream: Stream,
+    found: ContactList,
+    poses: ArmPoses,
+    force: Array | None,
+    scale: float,
+) -> None:
+    """Send the arrow of each contact, while it lasts, at its place.
+
+    On the wrist it is the force as it runs; elsewhere, where the flange's would be another, that of
+    the contact's peak.
+
+    Args:
+        stream: The recording.
+        found: The contacts.
+        poses: Where the arm has been.
+        force: Force of `best` at these poses in base axes, None where there is none. (S, 3) [N]
+        scale: Newtons that are 1 m.
+    """
+    for contact in found.contacts:
+        if contact.wrench is None:
+            continue
+        first = np.searchsorted(poses.t, contact.start)
+        # One more: the last arrow goes with the first pose after the contact.
+        last = np.searchsorted(poses.t, contact.stop, side="right")
+        rows = slice(int(first), min(int(last) + 1, len(poses.t)))
+        t, origin = poses.t[rows], touched_point(contact, poses.translation[rows])
+        arrows = np.tile(contact.wrench[:3], (len(t), 1))
+        if force is not None and contact.where == "wrist":
+            arrows = np.where(np.isfinite(force[rows]), force[rows], arrows)
+        arrows[t > contact.stop] = np.nan
+        path, colour = f"{CONTACTS}/{contact.number}", PLACES[contact.where]
+        send_force(stream, path, t, origin, arrows, SHAFT, scale=scale, colour=colour)
+
+
+def touched_point(contact: Contact, origins: Array) -> Array:
+    """The flange where it fits, else the middle of the last link that does. (S, 3) [m]
+
+    Args:
+        contact: The contact.
+        origins: Origins of the links and of the flange in the base frame. (S, n+1, 3) [m]
+    """
+    links: Sequence[int] = [place for place in contact.places if place]
+    if 0 in contact.places or not links:
+        flange: Array = origins[:, -1]
+        return flange
+    middle: Array = 0.5 * (origins[:, links[-1] - 1] + origins[:, links[-1]])
+    return middle
+
+
+def flange_force(analysis: Analysis, q: Array, sampled: np.ndarray, chain: Chain) -> Array | None:
+    """The force of `best` at some of the log's samples, in base axes, None without one. (S, 3) [N]
+
+    Args:
+        analysis: The log.
+        q: Joint positions of the samples. (S, n) [rad]
+        sampled: Their rows in the log. (S,)
+        chain: The arm.
+    """
+    wrench, sensed = best_wrench(analysis), analysis.virtual_sensor
+    if wrench is None or sensed is None:
+        return None
+    return sensed.sensor.arrow(wrench.force[sampled], q, chain).force

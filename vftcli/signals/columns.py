@@ -1,0 +1,96 @@
+"""What the columns of our tables hold, told in the field metadata of Parquet files.
+
+A reader of another language, or a person with no documentation, sees unit, meaning, sign and frame
+beside each column: ``pyarrow.parquet.read_schema(path).field("tau_ext/gmo/1").metadata``.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from vftcli.signals.recording import MEANINGS
+from vftcli.signals.wrench import AXES, unit_of
+
+if TYPE_CHECKING:
+    import polars as pl
+
+TORQUE, FORCE = "N·m", "N and N·m"
+
+COLUMNS: dict[str, tuple[str, str]] = {
+    "t": ("s", "time"),
+    "t_src_ns": ("ns", "time on the log's own clock"),
+    "q": ("rad", MEANINGS["q"]),
+    "dq": ("rad/s", MEANINGS["dq"]),
+    "current": ("A", MEANINGS["current"]),
+    "tau": (TORQUE, MEANINGS["torque"]),
+    "torque_without_gravity": (TORQUE, MEANINGS["torque_without_gravity"]),
+    "target_q": ("rad", MEANINGS["target_q"]),
+    "target_dq": ("rad/s", MEANINGS["target_dq"]),
+    "target_current": ("A", MEANINGS["target_current"]),
+    "target_torque": (TORQUE, MEANINGS["target_torque"]),
+    "temperature": ("°C", MEANINGS["temperature"]),
+    "tau_ext": (TORQUE, "external joint torque"),
+    "sd": (TORQUE, "standard deviation of the external torque by the estimator's own account"),
+    "band": (TORQUE, "standard deviation of the external torque, what the model errs by included"),
+    "wrench": (FORCE, "external force and moment"),
+    "wrench_sd": (FORCE, "standard deviation of the external force and moment"),
+    "wrench_masked": (FORCE, "force and moment where the pose cannot tell them, by a prior"),
+    "null_space": (TORQUE, "joint torque that no wrench at the flange explains"),
+    "sigma_min": ("m", "smallest singular value of J, angular rows × 0.3 m"),
+    "contact": ("1", "number of the contact in the list that the sample lies in, null outside"),
+}
+"""First part of a column's name → its unit and what it is."""
+
+ON_ROBOT = "on the robot"
+"""Whose force it is: the environment's on the robot."""
+
+
+class StatedFrame(NamedTuple):
+    """What is known of some columns that hold wrenches.
+
+    Attributes:
+        frame: Axes and reference point, in words.
+        sign: Whose force it is.
+    """
+
+    frame: str
+    sign: str = ON_ROBOT
+
+
+def column_facts(name: str, frames: Mapping[str, StatedFrame]) -> dict[str, str]:
+    """Unit, meaning, and where they matter sign and frame of a column; {} of an unknown one.
+
+    Args:
+        name: As in the table: ``tau_ext/gmo/1``, ``wrench/best/fx``.
+        frames: Name without its last part → what is known of these wrenches.
+    """
+    kind, group, last = name.partition("/")[0], *name.rpartition("/")[::2]
+    if kind not in COLUMNS:
+        return {}
+    unit, meaning = COLUMNS[kind]
+    # What touches an arm in a simulation is a wrench, or a torque, under the contact's own name.
+    if kind == "contact" and group:
+        unit, meaning = TORQUE, "force and moment, or joint torque, of one contact"
+    if last in AXES:
+        unit = unit_of(last)
+    facts = {"unit": unit, "meaning": meaning}
+    if last in AXES and group in frames:
+        facts |= frames[group]._asdict()
+    elif last.isdigit():
+        facts["joint"] = last
+        if kind == "tau_ext":
+            facts["sign"] = ON_ROBOT
+    return facts
+
+
+def described_schema(table: "pl.DataFrame", frames: Mapping[str, StatedFrame] | None = None) -> Any:  # noqa: ANN401 - pyarrow is untyped
+    """The table's pyarrow schema with what each column holds, for ``write_parquet``.
+
+    Args:
+        table: The table.
+        frames: As in `column_facts`.
+    """
+    import pyarrow as pa
+
+    schema = table.clear().to_arrow().schema
+    known = frames or {}
+    return pa.schema(field.with_metadata(column_facts(field.name, known)) for field in schema)
