@@ -17,10 +17,11 @@ def convert_log(
         typer.Option("-o", "--output", metavar="FILE", help="x.parquet, x.mcap or x.csv."),
     ],
     reading: opt.ReadOptions,
+    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
-    """Convert any readable log into a flat Parquet or CSV table, or a ros2-profile MCAP.
+    """Convert any readable log into Parquet, CSV or MCAP.
 
     Example: vftcli convert fixtures/ur5_circle.csv -o ur5_circle.mcap
     """

@@ -33,12 +33,12 @@ def estimate(
 
     extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
     # Of a large log only the columns that are looked at are read; outputs show the others too.
-    causal = analysis.observers.causal or analysis.no_contacts
+    causal = analysis.observers.causal or analysis.contacts.no_contacts
     signals = EXAMINED if causal and not (analysis.wrench.asks or extras) else None
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
     reading = Background(lambda: library.open(log, chosen))
 
-    from vftcli.cli.console import command_line, say, say_analysis
+    from vftcli.cli.console import canvas, command_line, say_analysis, show
     from vftcli.observers.table import BEST
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
@@ -53,5 +53,8 @@ def estimate(
     if json:
         typer.echo(record)
         return
+    from vftcli.outputs.screen import short_screen, written_lines
+
     say_analysis(made)
-    say(f"wrote {output}")
+    screen = canvas()
+    show(short_screen(made, written_lines(output, estimate_files(extras), screen), screen))

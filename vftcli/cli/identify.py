@@ -93,17 +93,18 @@ def identify_robot(
     asked: TaskOptions,
     validation: ValidationOptions,
     free: WithoutLoad,
-    anyway: opt.Anyway = False,
+    anyway: opt.AnywayOptions,
+    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
-    """Make a robot file from logs: friction, rotor inertia, link inertias, payload.
+    """Make a robot file from logs: friction, inertias, payload.
 
     Writes FILE.toml for --robot, and FILE.html, FILE.rrd and FILE.run.json beside it.
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
-    from vftcli.cli.console import command_line, health_of, say, say_recording
+    from vftcli.cli.console import command_line, detail, health_of, say, say_recording
     from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.identification.files import beside, write_identification
@@ -118,7 +119,7 @@ def identify_robot(
     library = Library([*logs, *validated, *without_load])
     # That the profile is not the arm's is what this command is there to change; but the friction
     # method keeps the profile's links.
-    examiner = health_of(library, anyway=anyway, fitting=task.method == "friction")
+    examiner = health_of(library, anyway=anyway.anyway, fitting=task.method == "friction")
     profile = examiner.robot(library.open(logs[0], choice), chosen)
 
     def opened(paths: list[Path] | tuple[Path, ...], how: "ReadChoice") -> list["Recording"]:
@@ -132,6 +133,6 @@ def identify_robot(
     found = identify(train, profile, task, held_out, unloaded[0] if unloaded else None)
     record = write_identification(output, found, examiner.examinations, command_line(), force)
     for remark in found.remarks:
-        say(f"note: {remark}")
+        detail(f"note: {remark}")
     say(f"wrote {', '.join(str(file) for file in beside(output).values())}")
     typer.echo(record.rstrip("\n") if json else tables_text(found))

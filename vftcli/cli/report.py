@@ -1,12 +1,19 @@
 """`vftcli report`: everything about a log in one folder."""
 
 from dataclasses import replace
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
+from vftcli.cli.help import COMPARE
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from vftcli.analysis import Analysis
 
 
 @taken_apart
@@ -18,53 +25,79 @@ def report(
     published: Annotated[
         str | None,
         typer.Option(
-            "--published", metavar="table1", help="Set the paper's table beside the errors."
+            "--published",
+            metavar="table1",
+            help="Set the paper's table beside the errors.",
+            rich_help_panel=COMPARE,
         ),
     ] = None,
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
-    """Write a report page, a Rerun recording, tables and estimates of a log into one folder.
+    """Write a page, a recording, tables and estimates into one folder.
 
     Writes index.html (opens offline), recording.rrd, estimates.parquet, errors.{csv,json,md,tex}
     and run.json; several logs get a sub-folder each and an index.
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
     """
-    from vftcli.cli.console import command_line, say, say_analysis
+    from vftcli.cli.console import LeftOut, command_line, say_analysis
     from vftcli.evaluation.print_table import check_published, compare_with
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.report import report_files, write_report, write_reports
-    from vftcli.outputs.log.tables import print_text, to_terminal
-    from vftcli.outputs.log.wrench_tables import paper_bounds
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
 
     library = Library(logs)
     OutputFolder(output, force, report_files([library.label(log) for log in logs])).check()
-    choice = analysis.choice(library, reference)
+    choice = analysis.choice(library, reference, on_screen=not json)
     if published is not None:
         check_published(published, reference.reference)
         choice = replace(choice, observers=choice.observers.beside_print())
-    analyses = []
-    for made in analyse_logs(logs, choice):
+    left_out, analyses = LeftOut(library, logs), []
+    for made in analyse_logs(logs, choice, left_out.told):
         beside = None
         if published is not None and made.errors is not None:
             beside = compare_with(published, made.errors, made.observers, made.tunings)
         analyses.append(replace(made, published=beside))
         if not json:
             say_analysis(made)
-    command = command_line()
-    if len(analyses) == 1:
+    if not analyses:
+        left_out.end(0)
+    choice.progress("writing")
+    command, failed = command_line(), left_out.reasons
+    if len(logs) == 1:
         record = write_report(output, analyses[0], command=command, force=force)
     else:
-        record = write_reports(output, analyses, command=command, force=force)
+        record = write_reports(output, analyses, command=command, force=force, failed=failed)
     if json:
         typer.echo(record)
-        return
-    for made in analyses:
+    else:
+        show_report(analyses, output, failed, details=analysis.talk.details)
+    left_out.end(len(analyses))
+
+
+def show_report(
+    analyses: "Sequence[Analysis]", output: Path, failed: "Mapping[str, str]", *, details: bool
+) -> None:
+    """Print the screen; with details every table behind it too."""
+    from vftcli.cli.commands import COMMANDS
+    from vftcli.cli.console import canvas, show
+    from vftcli.outputs.log.report import FILES, SUMMARY_FILES
+    from vftcli.outputs.log.tables import print_text, to_terminal
+    from vftcli.outputs.log.wrench_tables import paper_bounds
+    from vftcli.outputs.screen import log_screen, logs_screen, written_lines
+
+    several = len(analyses) + len(failed) > 1
+    open_with = "vftcli open" if "open" in COMMANDS else ""
+    screen, names = canvas(), SUMMARY_FILES if several else FILES
+    below = written_lines(output, names, screen, open_with, several=several)
+    if several:
+        show(logs_screen(analyses, screen, failed, below, every=details))
+    else:
+        show(log_screen(analyses[0], screen, below, every=details))
+    for made in analyses if details else ():
         if made.errors is not None:
-            typer.echo(to_terminal(made.errors, paper_bounds([made])))
+            show(to_terminal(made.errors, paper_bounds([made])))
         if made.published is not None:
-            typer.echo(print_text(made.published))
-    say(f"wrote {output}: open {output / 'index.html'}; rerun {output / 'recording.rrd'}")
+            show(print_text(made.published))

@@ -52,7 +52,7 @@ def simulate_log(
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
-    """Simulate an experiment: the log, PATH.truth.parquet and PATH.scenario.toml.
+    """Simulate an experiment: the log, and the truth beside it.
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """

@@ -24,6 +24,8 @@ def contact_thresholds(
     reading: opt.ReadOptions,
     robot: opt.RobotOptions,
     reference: opt.NamedReferenceOptions,
+    anyway: opt.AnywayOptions,
+    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     check: Annotated[
         Path | None,
         typer.Option(
@@ -34,7 +36,6 @@ def contact_thresholds(
             "sensor; else the alarms are listed.",
         ),
     ] = None,
-    anyway: opt.Anyway = False,
     rate: Annotated[
         float,
         typer.Option(
@@ -43,14 +44,14 @@ def contact_thresholds(
     ] = 1.0,
     json: opt.Json = False,
 ) -> None:
-    """Learn from free motion the thresholds that a robot is given, at a rate of false alarms.
+    """Learn from free motion the thresholds that a robot is given.
 
-    The logs are motion that nobody touches, the longer the better; of several days the worst
+    For a stated rate of false alarms. The logs are motion that nobody touches, the longer the better; of several days the worst
     counts. Printed as libfranka's call, franka_ros parameters, URScript and TOML.
 
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
-    from vftcli.cli.console import health_of, say, say_json, say_recording
+    from vftcli.cli.console import detail, health_of, say, say_json, say_recording
     from vftcli.contacts.caught import check_contacts
     from vftcli.contacts.compared_signals import check_alike, compared_signals
     from vftcli.contacts.thresholds import find_thresholds, left_out
@@ -69,7 +70,7 @@ def contact_thresholds(
         read=reading.choice(),
         robot=robot.choice(),
         library=library,
-        examiner=health_of(library, anyway=anyway),
+        examiner=health_of(library, anyway=anyway.anyway),
     )
     models = Models()
     free = [modelled(log, choice, models) for log in library.open_logs(logs, choice.read)]
@@ -91,7 +92,9 @@ def contact_thresholds(
     for run in free:
         say_recording(run.recording)
     for remark in (*remarks, *(checked.remarks if checked else ())):
-        say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
+        # What limits the numbers is said beside them.
+        tell = detail if remark.level == "fact" else say
+        tell(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
     typer.echo(thresholds_text(thresholds, counted, checked), nl=False)
 
 

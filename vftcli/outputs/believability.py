@@ -39,6 +39,9 @@ Standing = Literal["good", "caution", "bad", "unknown"]
 MARKS = {"good": "✓", "caution": "△", "bad": "✗", "unknown": "–"}
 """The sign of each standing; the page and the terminal use the same."""
 
+SEVERITY: tuple[Standing, ...] = ("bad", "caution", "unknown", "good")
+"""The standings, the worst first."""
+
 STILL = 0.01
 """A joint slower than this rests. [rad/s]"""
 
@@ -112,8 +115,7 @@ def grounds(analysis: Analysis) -> tuple[Ground, ...]:
 
 def health(found: Sequence[Ground]) -> Ground:
     """The worst of what was found in a log itself, the first of several equally bad."""
-    order = ("bad", "caution", "unknown", "good")
-    return min((g for g in found if g.of_log), key=lambda ground: order.index(ground.standing))
+    return min((g for g in found if g.of_log), key=lambda ground: SEVERITY.index(ground.standing))
 
 
 def grounds_record(found: Iterable[Ground]) -> list[dict[str, Any]]:

@@ -14,6 +14,19 @@ PROFILES: dict[str, Path] = {
 """Built-in profile name → its file."""
 
 
+def same_model(name: str) -> list[str]:
+    """The profiles that a misspelt name can mean: never another arm, as ur5e for ur5.
+
+    What tells arms of one maker apart are the digits and what follows them.
+    """
+
+    def model(text: str) -> str:
+        letters = "".join(letter for letter in text.lower() if letter.isalnum())
+        return letters.lstrip("abcdefghijklmnopqrstuvwxyz")
+
+    return [profile for profile in PROFILES if model(profile) == model(name)]
+
+
 def load_robot(robot: str | Path) -> Robot:
     """Load a robot by profile name, TOML file or URDF file.
 
@@ -34,7 +47,7 @@ def load_robot(robot: str | Path) -> Robot:
 
         return load_profile(path)
     raise RobotError(
-        f"no robot {str(robot)!r}.{did_you_mean(str(robot).lower(), PROFILES)} "
+        f"no robot {str(robot)!r}.{did_you_mean(str(robot), same_model(str(robot)))} "
         f"Built in: {', '.join(PROFILES)}; or give a FILE.toml or FILE.urdf."
     )
 

@@ -1,8 +1,9 @@
 """What `vftcli report` writes: page, recording, estimates, errors and run.json in one folder."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from vftcli.analysis import Analysis
@@ -29,6 +30,9 @@ ERROR_TABLES: dict[str, Callable[["pl.DataFrame", PaperBounds], str]] = {
 FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *ERROR_TABLES)
 """What a report of one log may hold; the error tables only where there is a reference."""
 
+SUMMARY_FILES = ("index.html", SEAL, *ERROR_TABLES)
+"""What stands above the sub-folders of several logs."""
+
 
 def places_of(labels: Sequence[str]) -> list[str]:
     """The sub-folder of each of several logs: called as its file without the ending."""
@@ -40,7 +44,7 @@ def report_files(labels: Sequence[str]) -> list[str]:
     if len(labels) == 1:
         return list(FILES)
     below = [f"{place}/{name}" for place in places_of(labels) for name in FILES]
-    return ["index.html", SEAL, *ERROR_TABLES, *below]
+    return [*SUMMARY_FILES, *below]
 
 
 def write_report(path: Path, analysis: Analysis, *, command: str, force: bool = False) -> str:
@@ -57,9 +61,21 @@ def write_report(path: Path, analysis: Analysis, *, command: str, force: bool = 
 
 
 def write_reports(
-    path: Path, analyses: Sequence[Analysis], *, command: str, force: bool = False
+    path: Path,
+    analyses: Sequence[Analysis],
+    *,
+    command: str,
+    force: bool = False,
+    failed: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Write one sub-folder a log, and above them an index, all errors in one, and run.json.
+
+    Args:
+        path: The folder.
+        analyses: The logs that could be analysed.
+        command: The command line as the user typed it.
+        force: Whether files that are there may be replaced.
+        failed: Why each of the other logs could not be, by its label.
 
     Returns:
         The texts of the logs' own `run.json`, as one JSON array.
@@ -81,7 +97,11 @@ def write_reports(
         together = pl.concat(found, how="diagonal") if found else None
         put_errors(folder, "", together, analyses)
         logs = dict(zip(places, labels, strict=True))
-        seal(folder, SEAL, {"command": command, "versions": versions(), "logs": logs})
+        seal(
+            folder,
+            SEAL,
+            {"command": command, "versions": versions(), "logs": logs, "left_out": dict(failed)},
+        )
         return "[\n" + ",\n".join(record.rstrip("\n") for record in records) + "\n]\n"
 
 
