@@ -111,7 +111,7 @@ def test_the_same_bad_value_is_refused_with_the_same_line(
 def test_every_shared_option_is_tried() -> None:
     """A new option of several commands needs its bad value here, or is one that takes all."""
     takes_all = {"--output", "--help", "--json", "--force", "--causal", "--wrench", "--as-printed",
-                 "--sensor-weight", "--contacts", "--reference-columns",
+                 "--sensor-weight", "--contacts", "--no-contacts", "--reference-columns",
                  "--anyway"}  # fmt: skip
     count: dict[str, int] = {}
     for command in READING:

@@ -42,3 +42,14 @@ def test_csv_has_the_same_columns(analysis: Analysis, tmp_path: Path) -> None:
     np.testing.assert_allclose(
         [float(r["q/2"]) for r in rows], analysis.recording.q[:, 1], atol=1e-9
     )
+
+
+def test_every_sample_says_which_contact_it_lies_in(analysis: Analysis) -> None:
+    assert analysis.contacts is not None
+    table = estimates_table(analysis)
+    t, number = table["t"].to_numpy(), table["contact"]
+    for contact in analysis.contacts.contacts:
+        inside = (t >= contact.start) & (t <= contact.stop)
+        assert number.filter(inside).to_list() == [contact.number] * inside.sum()
+    within = [(t >= c.start) & (t <= c.stop) for c in analysis.contacts.contacts]
+    assert number.is_null().sum() == len(t) - sum(part.sum() for part in within)

@@ -47,11 +47,10 @@ def contact_column(t: Array, found: "ContactList") -> "pl.Series":
     """The number of the contact that each sample lies in, null outside of all. (T,)"""
     import polars as pl
 
-    number = np.zeros(len(t), dtype=np.int32)
+    number = np.full(len(t), np.nan)
     for contact in found.contacts:
         number[(t >= contact.start) & (t <= contact.stop)] = contact.number
-    inside = number > 0
-    return pl.Series("contact", number).set(pl.Series(~inside), None)
+    return pl.Series("contact", number)
 
 
 def columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
