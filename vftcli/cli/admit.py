@@ -8,6 +8,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, option, taken_apart
+from vftcli.cli.help import WRITE
 
 if TYPE_CHECKING:
     from vftcli.admittance.choice import ControlChoice
@@ -28,7 +29,13 @@ LogOrNone = Annotated[
 ]
 Output = Annotated[
     Path | None,
-    typer.Option("-o", "--output", metavar="DIR", help="Folder to write into; none: table only."),
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="DIR",
+        help="Folder to write into; none: table only.",
+        rich_help_panel=WRITE,
+    ),
 ]
 
 
@@ -38,7 +45,7 @@ class ControllerOptions(Bundle):
     GROUP = "The controller"
 
     alpha: str | None = option(
-        "--alpha", "A,B,…", "One variable controller for each; default the profile's."
+        "--alpha", "A,B,…", "One variable controller each. Default the profile's."
     )
     controller: opt.Words = option(
         "--controller", "variable|traditional", "Repeatable; default both."
@@ -125,7 +132,8 @@ def admit(
 ) -> None:
     """Replay a log's external force through admittance controllers.
 
-    Traditional ones and variable-parameter ones. Writes DIR/index.html, recording.rrd, motion.parquet, comparison.{csv,json} and run.json. The
+    Traditional ones and variable-parameter ones. Writes DIR/index.html, recording.rrd,
+    motion.parquet, comparison.{csv,json} and run.json. The
     force is that of one observer, kfo-fe unless another is named. --set also takes the controllers'
     parameters: position.stiffness=12, rz.threshold=4, admittance.xi=1.
 

@@ -7,10 +7,13 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, taken_apart
+from vftcli.cli.help import COMPARE, OUTPUT
 
 
 class TableOptions(Bundle):
     """The form of the table; one at most."""
+
+    GROUP = OUTPUT
 
     json: opt.Json = False
     csv: bool = flag("--csv", "Print one row per observer and joint.")
@@ -38,7 +41,11 @@ def compare(
     table: TableOptions,
     significance: Annotated[
         bool,
-        typer.Option("--significance", help="Every pair of observers: difference, interval, p."),
+        typer.Option(
+            "--significance",
+            help="Every pair of observers: difference, interval, p.",
+            rich_help_panel=COMPARE,
+        ),
     ] = False,
 ) -> None:
     """Print every observer's error against a reference, and its floor.

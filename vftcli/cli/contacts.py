@@ -6,6 +6,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, taken_apart
+from vftcli.cli.help import OUTPUT
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
 
 class ListOptions(Bundle):
     """The form of the list."""
+
+    GROUP = OUTPUT
 
     json: opt.Json = False
     csv: bool = flag("--csv", "Print one row per contact.")

@@ -7,6 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
+from vftcli.cli.help import WRITE
 
 
 @taken_apart
@@ -14,7 +15,13 @@ def convert_log(
     log: opt.Log,
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="FILE", help="x.parquet, x.mcap or x.csv."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="x.parquet, x.mcap or x.csv.",
+            rich_help_panel=WRITE,
+        ),
     ],
     reading: opt.ReadOptions,
     talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs

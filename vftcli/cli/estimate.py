@@ -7,6 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
+from vftcli.cli.help import WRITE
 
 
 @taken_apart
@@ -14,9 +15,15 @@ def estimate(
     log: opt.Log,
     output: opt.Folder,
     analysis: opt.AnalysisOptions,
-    csv: Annotated[bool, typer.Option("--csv", help="Also write estimates.csv.")] = False,
-    mcap: Annotated[bool, typer.Option("--mcap", help="Also write estimates.mcap.")] = False,
-    rrd: Annotated[bool, typer.Option("--rrd", help="Also write recording.rrd.")] = False,
+    csv: Annotated[
+        bool, typer.Option("--csv", help="Also write estimates.csv.", rich_help_panel=WRITE)
+    ] = False,
+    mcap: Annotated[
+        bool, typer.Option("--mcap", help="Also write estimates.mcap.", rich_help_panel=WRITE)
+    ] = False,
+    rrd: Annotated[
+        bool, typer.Option("--rrd", help="Also write recording.rrd.", rich_help_panel=WRITE)
+    ] = False,
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:

@@ -27,8 +27,11 @@ LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
 OWN = "This command"
 """Heading of the options that only one command has."""
 
-NARROWEST, WIDEST, LEFT = 72, 100, 28
+NARROWEST, WIDEST, LEFT = 72, 100, 33
 """Columns of a help text, and of its left half at most."""
+
+SHORT = 3
+"""Lines of a paragraph that the short help shows."""
 
 TOPICS = Path(__file__).parent / "topics.toml"
 """Topic → its summary and its text."""
@@ -107,8 +110,11 @@ def command_help(ctx: Any, *, every: bool) -> str:  # noqa: ANN401
     usage = " ".join(["Usage:", ctx.command_path, *command.collect_usage_pieces(ctx)])
     paragraphs = [" ".join(p.split()) for p in (command.help or "").split("\n\n")]
     lines = [usage, ""]
-    for paragraph in paragraphs:
-        lines += textwrap.wrap(paragraph, width)
+    for k, paragraph in enumerate(paragraphs):
+        wrapped = textwrap.wrap(paragraph, width)
+        # What it is and an example always; what takes long to say only in full.
+        if every or k in {0, len(paragraphs) - 1} or len(wrapped) <= SHORT:
+            lines += wrapped
     for group, rows in grouped(command.get_params(ctx), ctx, every=every):
         lines += ["", group] if every else [group + ":"]
         lines += list(two_columns(rows, width))

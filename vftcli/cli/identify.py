@@ -7,6 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, option, taken_apart
+from vftcli.cli.help import WRITE
 
 if TYPE_CHECKING:
     from vftcli.identification import Task
@@ -86,7 +87,10 @@ class WithoutLoad(Bundle):
 def identify_robot(
     logs: opt.Logs,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE.toml", help="The new robot file.")
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="FILE.toml", help="The new robot file.", rich_help_panel=WRITE
+        ),
     ],
     reading: opt.ReadOptions,
     robot: opt.RobotOptions,

@@ -216,11 +216,11 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
     GROUP = headings.WRENCH
     HOME = "virtual_sensor.choice:WrenchChoice"
 
-    wrench: bool = flag("--wrench", "Also the Cartesian wrench, as force on the robot.")
+    wrench: bool = flag("--wrench", "Also the wrench, as force on the robot.")
     frame: str | None = option(
         "--frame",
         "flange|base|tool|sensor",
-        "Its frame, default flange (vftcli help frames). base: base axes, moment about the flange "
+        "Its frame; default flange. See vftcli help frames. base: base axes, moment about the flange "
         "point. Implies --wrench.",
     )
     solver: str | None = option(

@@ -9,6 +9,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, option, taken_apart
+from vftcli.cli.help import WRITE
 
 Scenario = Annotated[
     str,
@@ -17,7 +18,10 @@ Scenario = Annotated[
     ),
 ]
 LogPath = Annotated[
-    Path, typer.Option("-o", "--output", metavar="PATH", help="The log file or bag folder.")
+    Path,
+    typer.Option(
+        "-o", "--output", metavar="PATH", help="The log file or bag folder.", rich_help_panel=WRITE
+    ),
 ]
 
 

@@ -46,8 +46,9 @@ def contact_thresholds(
 ) -> None:
     """Learn from free motion the thresholds that a robot is given.
 
-    For a stated rate of false alarms. The logs are motion that nobody touches, the longer the better; of several days the worst
-    counts. Printed as libfranka's call, franka_ros parameters, URScript and TOML.
+    For a stated rate of false alarms. The logs are motion that nobody touches, the longer the
+    better; of several days the worst counts. Printed as libfranka's call, franka_ros parameters,
+    URScript and TOML.
 
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """

@@ -7,13 +7,17 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
+from vftcli.cli.help import WRITE
 
 
 @taken_apart
 def tune_gains(
     log: opt.Log,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE.toml", help="The gains file.")
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="FILE.toml", help="The gains file.", rich_help_panel=WRITE
+        ),
     ],
     reading: opt.ReadOptions,
     robot: opt.RobotOptions,
