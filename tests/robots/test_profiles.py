@@ -1,5 +1,7 @@
 """Built-in profiles against numbers Pinocchio computed from the manufacturers' URDFs."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -148,9 +150,15 @@ def test_the_hand_is_mounted_turned_as_the_maker_mounts_it() -> None:
     assert hand.loaded_chain.mass[-1] == bare.chain.mass[-1] + 0.73
 
 
-def test_an_unknown_name_suggests_the_nearest() -> None:
-    with pytest.raises(RobotError, match=r"no robot 'ur10'\. Did you mean ur10e\?"):
-        load_robot("ur10")
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("UR-10e", "ur10e"), ("pnada", "panda"), ("ru5e", "ur5e"), ("ur10", ""), ("ur9", ""),
+     ("ur3e", ""), ("fr4", "")],
+)  # fmt: skip
+def test_a_misspelt_name_suggests_the_arm_it_means_and_never_another(name: str, meant: str) -> None:
+    words = f"Did you mean {meant}?" if meant else "Built in: ur5"
+    with pytest.raises(RobotError, match=rf"no robot '{name}'\. {re.escape(words)}"):
+        load_robot(name)
 
 
 def test_an_unknown_payload_lists_what_there_is() -> None:

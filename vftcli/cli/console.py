@@ -164,7 +164,7 @@ def health_of(
         if codes := dict.fromkeys(f.code for f in examination.refusals(fitting=fitting)):
             say(f"MEANINGLESS unless this is wrong, and made with --anyway: {', '.join(codes)}")
         line = health_line(examination, named=len(library) > 1)
-        (detail if on_screen else say)(line)
+        (detail if on_screen and not codes else say)(line)
         for assumption in examination.assumptions:
             detail(f"note: {examination.recording.name}: {assumption}")
 

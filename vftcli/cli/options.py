@@ -220,8 +220,8 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
     frame: str | None = option(
         "--frame",
         "flange|base|tool|sensor",
-        "Its frame; default flange. See vftcli help frames. base: base axes, moment about the flange "
-        "point. Implies --wrench.",
+        "Its frame; default flange. See vftcli help frames. base: base axes, moment about the "
+        "flange point. Implies --wrench.",
     )
     solver: str | None = option(
         "--solver",

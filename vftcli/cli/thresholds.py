@@ -52,7 +52,7 @@ def contact_thresholds(
 
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
-    from vftcli.cli.console import detail, health_of, say, say_json, say_recording
+    from vftcli.cli.console import health_of, say, say_json, say_recording
     from vftcli.contacts.caught import check_contacts
     from vftcli.contacts.compared_signals import check_alike, compared_signals
     from vftcli.contacts.thresholds import find_thresholds, left_out
@@ -93,9 +93,7 @@ def contact_thresholds(
     for run in free:
         say_recording(run.recording)
     for remark in (*remarks, *(checked.remarks if checked else ())):
-        # What limits the numbers is said beside them.
-        tell = detail if remark.level == "fact" else say
-        tell(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
+        say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
     typer.echo(thresholds_text(thresholds, counted, checked), nl=False)
 
 
