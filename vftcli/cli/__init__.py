@@ -81,7 +81,7 @@ def main() -> None:
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     gc.set_threshold(200_000)  # a command is short: collecting while it imports is a tenth of it
     try:
-        make_app(asked_for())()
+        make_app(asked_for())(prog_name="vftcli")
     except VftError as error:
         fail(str(error))
     except MemoryError:

@@ -180,8 +180,8 @@ def against_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
     for grid in contact_grids(analysis.errors):
         lines += terminal(grid).splitlines()
     if analysis.published is not None:
-        told = sentence(analysis.published.remarks[0]) if analysis.published.remarks else ""
-        text = f"Beside {analysis.published.published.title}: {told} → --details"
+        told = next((f": {sentence(each)}" for each in analysis.published.remarks), "")
+        text = f"Beside {analysis.published.published.title}{told} → --details"
         lines += canvas.wrapped(text, 2)
     return lines
 
