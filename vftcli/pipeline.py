@@ -10,6 +10,7 @@ import numpy as np
 from vftcli.doctor.examiner import Examiner
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.table import BEST, NOT_SHOWN
+from vftcli.readers.estimates import refuse_estimates
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
@@ -130,6 +131,8 @@ def analyse_logs(
     for path in logs:
         choice.progress(f"reading {path.name}")
         try:
+            if choice.read.columns is None:
+                refuse_estimates(path)
             recordings.append((path, choice.library.open(path, choice.read)))
         except VftError as error:
             tell(path, error)

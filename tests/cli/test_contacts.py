@@ -55,6 +55,21 @@ def test_a_free_part_that_is_not_there_is_refused(run: Run) -> None:
     assert "free part" in err
 
 
+def test_estimates_are_listed_as_they_were_written(run: Run, tmp_path: Path) -> None:
+    words = ("--robot", "ur5", "--free", "0.3:4")
+    assert run("estimate", TAPS, *words, "-q", "-o", tmp_path)[0] == 0
+    stored = tmp_path / "estimates.parquet"
+    code, out, _ = run("contacts", stored, "--json")
+    assert code == 0
+    fresh = json.loads(run("contacts", TAPS, *words, "--json")[1])
+    assert json.loads(out)["contacts"] == fresh["contacts"]
+    assert "2 contacts. The hardest" in run("contacts", stored)[1]
+    assert run("contacts", stored, "--csv")[1].count("\n") == 3
+    code, _, err = run("compare", stored, "--reference", "zero")
+    assert code == 1
+    assert "holds estimates, not what the drives measured; give the log" in err
+
+
 def test_a_notebook_asks_the_same() -> None:
     found = vft.contacts(TAPS, robot="ur5", free_part="0.3:4")
     assert len(found.contacts) == 2

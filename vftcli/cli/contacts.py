@@ -1,5 +1,6 @@
 """`vftcli contacts`: what touched the arm, when, how hard, where."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
@@ -45,8 +46,12 @@ def list_contacts(
 
     from vftcli.cli.console import LeftOut, health_of, say_analysis, stages
     from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches
+    from vftcli.readers.estimates import stored_observers
     from vftcli.readers.library import Library
 
+    if len(logs) == 1 and reading.columns is None and stored_observers(logs[0]):
+        print_stored(logs[0], form)
+        return
     library = Library(logs)
     choice = AnalysisChoice(
         read=reading.choice(),
@@ -64,6 +69,22 @@ def list_contacts(
     if found:
         print_lists(found, form, left_out.reasons, every=form.all or talk.details)
     left_out.end(len(found))
+
+
+def print_stored(estimates: Path, form: ListOptions) -> None:
+    """Print the list that the folder of an ``estimates.parquet`` holds."""
+    from vftcli.cli.console import canvas, say_json
+    from vftcli.outputs.contacts import contacts_csv
+    from vftcli.outputs.screen import list_screen
+    from vftcli.outputs.stored_contacts import stored_list, stored_record
+
+    record = stored_record(estimates)
+    if form.json:
+        say_json(record)
+    elif form.csv:
+        typer.echo(contacts_csv([stored_list(record)]), nl=False)
+    else:
+        typer.echo(list_screen(stored_list(record), canvas(), every=form.all), nl=False)
 
 
 def print_lists(

@@ -36,6 +36,7 @@ def estimate(
     """
     from vftcli.cli.background import Background
     from vftcli.doctor.examiner import EXAMINED
+    from vftcli.readers.estimates import refuse_estimates
     from vftcli.readers.library import Library
 
     extras = [name for name, wanted in (("csv", csv), ("mcap", mcap), ("rrd", rrd)) if wanted]
@@ -43,6 +44,8 @@ def estimate(
     causal = analysis.observers.causal or analysis.contacts.no_contacts
     signals = EXAMINED if causal and not (analysis.wrench.asks or extras) else None
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
+    if chosen.columns is None:
+        refuse_estimates(log)
     reading = Background(lambda: library.open(log, chosen))
 
     from vftcli.cli.console import canvas, command_line, say_analysis, show

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import ContactList
 from vftcli.outputs.believability import (
     MARKS,
     SEVERITY,
@@ -22,7 +23,7 @@ from vftcli.outputs.believability import (
     percent_words,
 )
 from vftcli.outputs.canvas import Canvas
-from vftcli.outputs.contacts import contact_grid, hardest_rows, hardest_words
+from vftcli.outputs.contacts import MOST_ROWS, answer, contact_grid, hardest_rows, hardest_words
 from vftcli.outputs.force_bars import force_bars, force_course
 from vftcli.outputs.grid import Column, Grid, significant, terminal
 from vftcli.outputs.log.rmse_tables import Block, blocks
@@ -82,6 +83,15 @@ def short_screen(analysis: Analysis, below: Sequence[str], canvas: Canvas) -> st
     return canvas.shown("\n".join(lines)) + "\n"
 
 
+def list_screen(found: ContactList, canvas: Canvas, *, every: bool = False) -> str:
+    """A list that was made earlier: its log, the answer, the rows."""
+    head = f"{printable(found.recording)} · {found.duration:.1f} s · as listed when it was written"
+    lines = [canvas.painted(head, "bold"), "", f"  {answer(found)}", ""]
+    rows = list_lines(found, None if every else MOST_ROWS)
+    end = "Whether it can be believed, and |F| over time: vftcli contacts on the log itself"
+    return canvas.shown("\n".join([*lines, *rows, "", end])) + "\n"
+
+
 def answer_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
     """The answer in a sentence."""
     return [f"  {line}" for line in canvas.wrapped(printable(headline(analysis)), 2)]
@@ -113,9 +123,11 @@ def table_lines(analysis: Analysis, most: int | None) -> list[str]:
         analysis: What was found.
         most: Rows that are shown at most, None for all.
     """
-    found = analysis.contacts
-    if found is None:
-        return []
+    return [] if analysis.contacts is None else list_lines(analysis.contacts, most)
+
+
+def list_lines(found: ContactList, most: int | None) -> list[str]:
+    """The rows of a list, and what can be said of the rest of its log."""
     contacts, rest = found.contacts, otherwise(found)
     if not contacts:
         return [f"  {rest}"] if rest else []
