@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import vftcli as vft
-from vftcli.pipeline import AnalysisChoice, contact_lists
+from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 
@@ -16,7 +16,8 @@ def test_contacts_are_those_of_the_pipeline() -> None:
     choice = AnalysisChoice(
         robot=RobotChoice.parsed(robot="ur5"), free=FreeChoice.parsed(free_part="0.3:4")
     )
-    (expected,) = contact_lists([TAPS], choice)
+    (made,) = analyse_logs([TAPS], choice, work=list_touches)
+    assert (expected := made.contacts) is not None
     found = vft.contacts(TAPS, robot="ur5", free_part="0.3:4")
     rows = [(contact.start, contact.stop, contact.peak_force) for contact in found.contacts]
     assert rows == [(c.start, c.stop, c.peak_force) for c in expected.contacts]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vftcli.pipeline import AnalysisChoice, contact_lists
+from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.repetition.choice import FreeChoice
@@ -42,4 +42,6 @@ def contacts(
         free=FreeChoice.parsed(free=free, free_part=free_part),
         library=Library([log]),
     )
-    return next(contact_lists([Path(log)], choice))
+    found = next(analyse_logs([Path(log)], choice, work=list_touches)).contacts
+    assert found is not None, "a log that tells no contacts raises"
+    return found

@@ -1,6 +1,6 @@
 """The whole way from a log to its numbers, in the order the data flows."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +10,7 @@ import numpy as np
 from vftcli.doctor.examiner import Examiner
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.table import BEST, NOT_SHOWN
+from vftcli.readers.estimates import refuse_estimates
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
@@ -19,17 +20,21 @@ from vftcli.repetition.free_run import FreeRun, Models
 from vftcli.robots import Robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import MissingSignalError, ParameterError, VftError
+from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.recording import Recording
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
-    from vftcli.contacts.contact_list import ContactList
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.refinement.baseline import Baseline
     from vftcli.virtual_sensor.choice import WrenchChoice
     from vftcli.virtual_sensor.detection import ToldContacts
     from vftcli.virtual_sensor.smoother.observer_wrench import Gate
+
+
+def silent(_stage: str) -> None:
+    """Tell nobody what is being done."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +52,7 @@ class AnalysisChoice:
         contacts: Whether what touched the arm is listed, where the complete log may be used.
         library: Where the logs of the command are read, each once.
         examiner: Who examines them, each once, and says whether results mean anything.
+        progress: Who is told what is being done.
     """
 
     read: ReadChoice = field(default_factory=ReadChoice)
@@ -59,6 +65,7 @@ class AnalysisChoice:
     contacts: bool = True
     library: Library = field(default_factory=Library, repr=False, compare=False)
     examiner: Examiner = field(default_factory=Examiner, repr=False, compare=False)
+    progress: Callable[[str], None] = field(default=silent, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.zero_log is not None and self.refinement.removes_bias:
@@ -94,30 +101,79 @@ class AnalysisChoice:
         return self.contacts and not self.observers.causal
 
 
-def analyse_logs(logs: Iterable[Path], choice: AnalysisChoice) -> Iterator["Analysis"]:
+Analyser = Callable[[Recording, Robot, AnalysisChoice, Models], "Analysis"]
+"""What is done with each log of a command."""
+
+Failed = Callable[[Path, VftError], None]
+"""Who is told which log could not be analysed, and why."""
+
+
+def analyse_logs(
+    logs: Iterable[Path],
+    choice: AnalysisChoice,
+    failed: Failed | None = None,
+    work: Analyser | None = None,
+) -> Iterator["Analysis"]:
     """Analyse the logs of a command one after the other; what they share is made once.
+
+    Args:
+        logs: The logs.
+        choice: What is asked of each.
+        failed: Who is told of a log that cannot be analysed, which is then left out; None to raise.
+        work: What is done with each, `analyse` if not given.
 
     Raises:
         ParameterError: If two of them are the same run.
+        VftError: If one cannot be analysed and nobody is told.
     """
-    models = Models()
-    for recording in choice.library.open_logs(list(logs), choice.read):
-        yield analyse(*prepared(recording, choice), choice, models)
+    models, work, tell = Models(), work or analyse, failed or raise_error
+    recordings: list[tuple[Path, Recording]] = []
+    for path in logs:
+        choice.progress(f"reading {path.name}")
+        try:
+            if choice.read.columns is None:
+                refuse_estimates(path)
+            each = choice.library.open_each([path], choice.read)
+            recordings += [(path, recording) for recording in each]
+        except VftError as error:
+            tell(path, error)
+    refuse_repeated_logs([recording for _, recording in recordings])
+    for path, recording in recordings:
+        try:
+            made = work(*prepared(recording, choice), choice, models)
+        except VftError as error:
+            tell(path, error)
+        else:
+            yield made
 
 
-def contact_lists(logs: Iterable[Path], choice: AnalysisChoice) -> Iterator["ContactList"]:
-    """What touched the arm along each log, without any observer's estimate.
+def raise_error(_log: Path, error: VftError) -> None:
+    """Raise what is wrong with a log."""
+    raise error
+
+
+def list_touches(
+    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Models
+) -> "Analysis":
+    """What touched the arm along a log, without any observer's estimate.
 
     Raises:
-        VftError: If a log cannot be read, is meaningless with this robot, or named twice.
+        VftError: If the log is meaningless with this robot, or tells no contacts.
     """
+    from vftcli.analysis import Analysis
     from vftcli.contacts.listing import list_contacts
 
-    models = Models()
-    for recording in choice.library.open_logs(list(logs), choice.read):
-        motion = read(*prepared(recording, choice), choice, models)
-        examine(motion, choice)
-        yield list_contacts(motion)
+    motion = read(recording, robot, choice, models)
+    examinations = examine(motion, choice)
+    choice.progress("listing contacts")
+    return Analysis(
+        motion=motion,
+        observers=(),
+        estimates=(),
+        tunings={},
+        contacts=list_contacts(motion),
+        examinations=examinations,
+    )
 
 
 def prepared(recording: Recording, choice: AnalysisChoice) -> tuple[Recording, Robot]:
@@ -161,12 +217,16 @@ def analyse(
         choice: What is asked of it.
         models: What the command has modelled so far, for several logs that share a free run.
     """
+    tell = choice.progress
     motion = read(recording, robot, choice, models or Models())
     examinations = examine(motion, choice)
+    tell(f"{recording.name}: running observers")
     baseline = model(motion, choice)
     analysis = replace(observe(motion, baseline, choice), examinations=examinations)
     analysis = refine(analysis, baseline, choice)
+    tell(f"{recording.name}: listing contacts")
     analysis = find_contacts(analysis, choice)
+    tell(f"{recording.name}: wrenches and errors")
     analysis = sense(analysis, choice)
     return judge(analysis, choice)
 

@@ -75,7 +75,16 @@ def test_log_becomes_a_folder(admit: Run, tmp_path: Path) -> None:
 
 
 def test_estimates_and_truth_are_forces_too(admit: Run, tmp_path: Path, monkeypatch) -> None:
-    words = ["vftcli", "estimate", str(FIXTURE), "--robot", "panda", "-o", str(tmp_path / "e")]
+    words = [
+        "vftcli",
+        "estimate",
+        str(FIXTURE),
+        "--robot",
+        "panda",
+        "-q",
+        "-o",
+        str(tmp_path / "e"),
+    ]
     monkeypatch.setattr("sys.argv", words)
     with pytest.raises(SystemExit, match="0"):
         main()

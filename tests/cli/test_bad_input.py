@@ -104,7 +104,8 @@ def test_binary_noise_is_one_line(tmp_path: Path, run: Run) -> None:
 def test_a_cut_last_row_is_dropped_and_said(tmp_path: Path, run: Run) -> None:
     log = saved(tmp_path / "log.csv", [*table(), ["3.2", "0.1"]], end="")
     out = tmp_path / "out"
-    code, _, stderr = run("estimate", log, "--robot", "ur5", "--columns", COLUMNS, "-o", out)
+    words = ("--robot", "ur5", "--columns", COLUMNS, "-o", out, "--details")
+    code, _, stderr = run("estimate", log, *words)
     assert code == 0
     assert "last" in stderr
     assert "400 samples" in stderr
@@ -147,8 +148,10 @@ def test_an_output_that_is_a_file_is_one_line(tmp_path: Path, run: Run) -> None:
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (("--robot", "ur9"), "Did you mean"),
+        (("--robot", "pnada"), "Did you mean panda?"),
+        (("--robot", "ur9"), "no robot 'ur9'. Built in: ur5"),
         (("--robot", "ur5", "--observer", "kalman"), "there is best, fdo, gmo"),
+        (("--robot", "ur5", "--observer", "gmoo"), "Did you mean gmo?"),
         (("--robot", "ur5", "--set", "gmo.gain=-3"), "must be positive"),
         (("--robot", "ur5", "--set", "gmo.gain=1,2"), "one for each of 6"),
         (("--robot", "ur5", "--set", "kfo.noise_convention=white"), "there is density"),

@@ -23,7 +23,9 @@ def test_the_answer_is_on_stdout_and_nothing_is_written(
     code, out, err = run("contacts", TAPS, "--robot", "ur5", "--free", "0.3:4")
     assert code == 0
     assert "2 contacts. The hardest" in out
-    assert "log health" in err
+    assert err == ""
+    assert "Can it be believed?" in out
+    assert "log health: sound" in run("contacts", TAPS, "--robot", "ur5", "--json")[2]
     assert not list(tmp_path.iterdir())
 
 
@@ -51,6 +53,21 @@ def test_a_free_part_that_is_not_there_is_refused(run: Run) -> None:
     code, _, err = run("contacts", TAPS, "--robot", "ur5", "--free", "90:95")
     assert code == 1
     assert "free part" in err
+
+
+def test_estimates_are_listed_as_they_were_written(run: Run, tmp_path: Path) -> None:
+    words = ("--robot", "ur5", "--free", "0.3:4")
+    assert run("estimate", TAPS, *words, "-q", "-o", tmp_path)[0] == 0
+    stored = tmp_path / "estimates.parquet"
+    code, out, _ = run("contacts", stored, "--json")
+    assert code == 0
+    fresh = json.loads(run("contacts", TAPS, *words, "--json")[1])
+    assert json.loads(out)["contacts"] == fresh["contacts"]
+    assert "2 contacts. The hardest" in run("contacts", stored)[1]
+    assert run("contacts", stored, "--csv")[1].count("\n") == 3
+    code, _, err = run("compare", stored, "--reference", "zero")
+    assert code == 1
+    assert "holds estimates, not what the drives measured; give the log" in err
 
 
 def test_a_notebook_asks_the_same() -> None:

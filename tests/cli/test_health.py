@@ -42,7 +42,7 @@ def test_a_sound_log_is_said_to_be_sound(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     words = COMMANDS.get(command, ("-o", "other.csv"))
-    code, out, err = run(command, FIXTURE, *words, "--json")
+    code, out, err = run(command, FIXTURE, *words, "--json", "-v")
     assert code == 0, err
     assert "log health: sound" in err.splitlines()
     # the short recipe has none, and the UR5's friction follows them where a command models the log
@@ -64,7 +64,7 @@ def test_a_log_with_temperatures_is_modelled_by_them(
             else [pl.lit(warm).alias(f"joint_temperatures_{j}") for j in range(6)]
         )
         table.with_columns(columns).write_csv(f"{name}.csv", separator=" ")
-        code, _, err = run("estimate", f"{name}.csv", *COMMANDS["estimate"], "--force")
+        code, _, err = run("estimate", f"{name}.csv", *COMMANDS["estimate"], "--force", "-v")
         assert code == 0, err
         assert ("no joint temperatures" in err) is (warm is None)
         estimates[name] = pl.read_parquet("out/estimates.parquet")

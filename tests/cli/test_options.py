@@ -22,14 +22,15 @@ READING = {
     "inspect": (),
     "thresholds": (),
     "convert": ("-o", "log.parquet"),
+    "contacts": (),
 }
 """Command that reads a log → what else it has to be given."""
 
 OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
        ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
-       ("estimate", "--csv"), ("compare", "--csv")}  # fmt: skip
+       ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, what is written where, and --csv, which
-the contract makes a file of `estimate` and a table of `compare`."""
+the contract makes a file of `estimate` and a table of the others."""
 
 BAD = {
     "--interval": ("8:4", "is not A:B with A < B"),
@@ -117,7 +118,7 @@ def test_every_shared_option_is_tried() -> None:
     """A new option of several commands needs its bad value here, or is one that takes all."""
     takes_all = {"--output", "--help", "--json", "--force", "--causal", "--wrench", "--as-printed",
                  "--sensor-weight", "--contacts", "--no-contacts", "--reference-columns",
-                 "--anyway", "--mcap", "--layouts", "--open"}  # fmt: skip
+                 "--anyway", "--mcap", "--layouts", "--open", "--details", "--quiet"}  # fmt: skip
     count: dict[str, int] = {}
     for command in READING:
         for name in parameters(command):
@@ -142,7 +143,8 @@ def test_a_shared_option_reads_alike_in_every_command() -> None:
 
 @pytest.mark.parametrize("command", READING)
 def test_a_command_that_reads_a_log_reads_it_as_all_do(command: str) -> None:
-    assert set(parameters(command)) >= {"--format", "--columns", "--interval", "--json"}
+    common = {"--format", "--columns", "--interval", "--json", "--details", "--quiet"}
+    assert set(parameters(command)) >= common
 
 
 @pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
@@ -160,7 +162,7 @@ def test_summaries_are_those_of_the_commands() -> None:
 
 
 ROOT = Path(__file__).parent.parent.parent
-OF_OTHER_TOOLS = {"--quiet", "--binary", "--storage", "--help", "--all-extras"}
+OF_OTHER_TOOLS = {"--binary", "--storage", "--help", "--all-extras"}
 """Options in the documents that are those of pip, of ros2 bag, or of all programs."""
 
 
@@ -171,4 +173,5 @@ def test_documents_name_every_option_and_no_other() -> None:
     text = "\n".join(f.read_text("utf-8") for f in files if f.name not in others)
     named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)) - OF_OTHER_TOOLS
     there = {name for c in COMMANDS for name in parameters(c) if name.startswith("--")}
-    assert named - {"--version"} == there
+    of_help = {"--version", "--help-all", "--install-completion"}
+    assert named - of_help == there

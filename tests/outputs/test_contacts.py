@@ -2,19 +2,20 @@
 
 import csv
 import io
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from contact_rows import contact, contact_list
 
 from vftcli.outputs.contacts import (
+    answer,
+    contact_grid,
     contacts_csv,
     contacts_record,
-    contacts_text,
     direction,
-    overview,
+    hardest_rows,
     place_words,
+    toward,
 )
 from vftcli.outputs.log.run_record import jsonable
 
@@ -45,9 +46,8 @@ def test_an_arm_without_a_wrench_has_no_newtons() -> None:
                    impulse=None, anywhere=None)  # fmt: skip
     (row,) = jsonable(contacts_record(contact_list(bare)))["contacts"]
     assert row["force_N"] is None
-    text = contacts_text(contact_list(bare, smallest_force=None))
-    assert "joint torque" in text
-    assert "1 contact." in text
+    assert contact_grid([bare]).columns[2].head == "joint torque [N·m]"
+    assert answer(contact_list(bare, smallest_force=None)) == "1 contact."
 
 
 def test_csv_has_a_row_a_contact_and_vectors_taken_apart() -> None:
@@ -59,28 +59,20 @@ def test_csv_has_a_row_a_contact_and_vectors_taken_apart() -> None:
     assert contacts_csv([contact_list()]).startswith("recording,number")
 
 
-def test_the_answer_comes_first() -> None:
-    text = contacts_text(contact_list(contact()))
-    assert "1 contact. The hardest, at 4.7 s: 65 ± 7 N on the wrist." in text
-    assert "smallest force this log can tell: 6 N" in text
-    assert "no contact listed in its 4 s" in text
-    assert "; 2 contacts listed in its 4 s" in contacts_text(
-        replace(contact_list(), false_on_free=2)
-    )
-    assert "caution: the arm stopped abruptly at 17.90 s" in text
-    assert "Nothing touched the arm" in contacts_text(contact_list())
+def test_the_answer_is_a_sentence() -> None:
+    found = contact_list(contact())
+    assert answer(found) == "1 contact. The hardest, at 4.7 s: 65 ± 7 N on the wrist."
+    assert answer(contact_list()) == "Nothing touched the arm, as far as this log can tell."
     load = contact(is_load=True, mean_force=np.array([0.0, 0.0, -27.0]), peak_force=27.0)
-    assert "A load, or a wrong payload, or a wrong model: 27 ± 7 N on average, down" in (
-        contacts_text(contact_list(load))
+    assert answer(contact_list(load)) == (
+        "A load, or a wrong payload, or a wrong model: 27 ± 7 N on average, down."
     )
 
 
-def test_twenty_rows_unless_all_are_asked_for() -> None:
-    many = [contact(number=k, start=float(k), peak_force=100.0 - k) for k in range(1, 31)]
-    text = contacts_text(contact_list(*many))
-    assert "the 20 hardest of 30: --all for the rest" in text
-    assert len(text.splitlines()) < 40
-    assert "hardest of" not in contacts_text(contact_list(*many), every=True)
+def test_the_hardest_rows_are_in_the_order_of_time() -> None:
+    many = [contact(number=k, start=float(k), peak_force=100.0 - k) for k in range(30, 0, -1)]
+    assert [row.number for row in hardest_rows(many)] == list(range(1, 21))
+    assert [row.number for row in hardest_rows(many, 3)] == [1, 2, 3]
 
 
 @pytest.mark.parametrize(
@@ -109,9 +101,17 @@ def test_places_that_cannot_be_told_apart_are_named() -> None:
     assert place_words(contact()) == "wrist"
 
 
-def test_several_logs_are_a_line_each() -> None:
-    text = overview([contact_list(contact()), contact_list(recording="other.csv")])
-    assert text.splitlines()[1].split() == [
-        "log.csv", "20.0", "s", "1", "65", "±", "7", "N", "at", "4.7", "s", "6", "N",
-    ]  # fmt: skip
-    assert "other.csv" in text
+@pytest.mark.parametrize(
+    ("force", "words"),
+    [
+        ((0.4, 51.9, -38.8), "+y, down"),
+        ((3.0, -4.0, 3.0), "−y, +x, up"),
+        ((0.0, 0.0, 2.0), "up"),
+        ((0.0, 0.0, 0.0), "–"),
+    ],
+)
+def test_the_table_names_every_axis_that_holds_much(
+    force: tuple[float, float, float], words: str
+) -> None:
+    """More than .35 of the force: 0.35² is an eighth of its square."""
+    assert toward(np.array(force)) == words

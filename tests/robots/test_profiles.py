@@ -1,5 +1,7 @@
 """Built-in profiles against numbers Pinocchio computed from the manufacturers' URDFs."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -364,10 +366,15 @@ def test_the_hand_is_mounted_turned_as_the_maker_mounts_it() -> None:
     assert hand.loaded_chain.mass[-1] == bare.chain.mass[-1] + 0.73
 
 
-def test_an_unknown_name_lists_the_profiles_and_suggests_no_other_arm() -> None:
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("pnada", "panda"), ("ru5e", "ur5e"), ("ur6e", ""), ("ur9", ""), ("fr4", "")],
+)
+def test_a_misspelt_name_suggests_the_arm_it_means_and_never_another(name: str, meant: str) -> None:
     """A profile of another arm gives wrong newtons, however near its name is."""
-    with pytest.raises(RobotError, match=r"no robot 'ur6e'\. Built in: ur3, ur5, .* m1013; or"):
-        load_robot("ur6e")
+    words = f"Did you mean {meant}?" if meant else "Built in: ur3"
+    with pytest.raises(RobotError, match=rf"no robot '{name}'\. {re.escape(words)}"):
+        load_robot(name)
 
 
 @pytest.mark.parametrize("word", ["UR5e", "ur-5e", "ur_5e", "UR 5E"])

@@ -11,10 +11,12 @@ from collections.abc import Collection
 from contextlib import suppress
 from importlib import import_module
 from types import FrameType
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
 
+from vftcli.cli.commands import COMMANDS
+from vftcli.cli.help import GroupedCommand, JourneyGroup
 from vftcli.signals.errors import VftError
 from vftcli.signals.letters import printable
 
@@ -22,104 +24,29 @@ PACKAGES = {"pinocchio": "pin"}
 """Module of a dependency that some platforms lack → the package that holds it."""
 
 
-class ListedCommand(NamedTuple):
-    """One command: where it is, and its first sentence, so that --help need not load it.
-
-    Attributes:
-        target: Module of this package, and the function in it.
-        summary: First line of the function's docstring.
-    """
-
-    target: str
-    summary: str
-
-
-COMMANDS = {
-    "estimate": ListedCommand(
-        "estimate:estimate",
-        "Estimate the external joint torques along a log.",
-    ),
-    "compare": ListedCommand(
-        "compare:compare",
-        "Print the RMSE of every observer against a reference, with the reference's own floor.",
-    ),
-    "report": ListedCommand(
-        "report:report",
-        "Write a report page, a Rerun recording, tables and estimates of a log into one folder.",
-    ),
-    "inspect": ListedCommand(
-        "inspect:inspect_log",
-        "Examine a log: format, signals, clock, and what looks wrong, with its remedy.",
-    ),
-    "contacts": ListedCommand(
-        "contacts:list_contacts",
-        "List what touched the arm: when, how hard, in which direction, where, how sure.",
-    ),
-    "convert": ListedCommand(
-        "convert:convert_log",
-        "Convert any readable log into a flat Parquet or CSV table, or a ros2-profile MCAP.",
-    ),
-    "admit": ListedCommand(
-        "admit:admit",
-        "Replay a log's external force through traditional and variable-parameter admittance.",
-    ),
-    "identify": ListedCommand(
-        "identify:identify_robot",
-        "Make a robot file from logs: friction, rotor inertia, link inertias, payload.",
-    ),
-    "tune": ListedCommand(
-        "tune:tune_gains",
-        "Find gains on a log for a stated goal, and write them to a file for --gains.",
-    ),
-    "thresholds": ListedCommand(
-        "thresholds:contact_thresholds",
-        "Learn from free motion the thresholds that a robot is given, at a rate of false alarms.",
-    ),
-    "simulate": ListedCommand(
-        "simulate:simulate_log",
-        "Simulate an experiment: the log, PATH.truth.parquet and PATH.scenario.toml.",
-    ),
-    "bench": ListedCommand(
-        "bench:bench",
-        "Time the observers and print the ratios to a bare RNEA loop and to per-sample scripts.",
-    ),
-    "open": ListedCommand(
-        "opening:open_folder",
-        "Open the page of a folder that a command wrote, and say how to open its recording.",
-    ),
-    "robots": ListedCommand(
-        "listings:robots",
-        "List the robot profiles, or show one with its numbers and their sources.",
-    ),
-    "observers": ListedCommand(
-        "listings:observers",
-        "List the observers, their equations and their parameters.",
-    ),
-    "formats": ListedCommand(
-        "listings:list_formats",
-        "List the log formats: how to record them, what is taken from them, what to look out for.",
-    ),
-}
-"""Name → the command."""
-
-
 def make_app(load: Collection[str] = tuple(COMMANDS)) -> typer.Typer:
     """Make the command line; a command that is not to be loaded has its summary only."""
     app = typer.Typer(
+        cls=JourneyGroup,
         help=vftcli.__doc__,
         no_args_is_help=True,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
-        add_completion=False,
+        context_settings=HELP,
     )
     app.callback()(vftcli)
     for name, command in COMMANDS.items():
+        how: Any = {"cls": GroupedCommand, "context_settings": HELP}
         if name in load:
             module, function = command.target.split(":")
-            app.command(name)(getattr(import_module(f"vftcli.cli.{module}"), function))
+            app.command(name, **how)(getattr(import_module(f"vftcli.cli.{module}"), function))
         else:
-            app.command(name, help=command.summary)(not_loaded)
+            app.command(name, help=command.summary, **how)(not_loaded)
     return app
+
+
+HELP = {"help_option_names": ["-h", "--help"]}
+"""How help is asked for."""
 
 
 def not_loaded() -> None:
@@ -156,15 +83,17 @@ def main() -> None:
         # The matrices here are small: threads of a linear algebra library only wait for each other.
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     gc.set_threshold(200_000)  # a command is short: collecting while it imports is a tenth of it
-    asked = sys.argv[1] if len(sys.argv) > 1 else ""
     try:
-        make_app({asked})()
+        make_app(asked_for())(prog_name="vftcli")
     except VftError as error:
         fail(str(error))
     except ModuleNotFoundError as error:
         if (package := PACKAGES.get(error.name or "")) is None:
             raise
-        fail(f"vftcli {asked} needs {package}, which is not installed here: pip install {package}")
+        fail(
+            f"vftcli {' '.join(sorted(asked_for()))} needs {package}, which is not installed here: "
+            f"pip install {package}"
+        )
     except MemoryError:
         fail("out of memory; use --interval to take a part of the log")
     except OSError as error:
@@ -172,6 +101,13 @@ def main() -> None:
             raise SystemExit(1) from None
         where = f": {error.filename}" if error.filename else ""
         fail(f"{error.strerror or error}{where}")
+
+
+def asked_for() -> set[str]:
+    """The command of this call, the one it wants explained, or whose words a shell completes."""
+    typed = os.environ.get("_TYPER_COMPLETE_ARGS") or os.environ.get("COMP_WORDS")
+    words = typed.split() if typed and "_VFTCLI_COMPLETE" in os.environ else sys.argv
+    return set(words[1:3] if words[1:2] == ["help"] else words[1:2])
 
 
 def launch() -> None:

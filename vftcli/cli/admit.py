@@ -8,6 +8,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, option, taken_apart
+from vftcli.cli.help import WRITE
 
 if TYPE_CHECKING:
     from vftcli.admittance.choice import ControlChoice
@@ -28,66 +29,92 @@ LogOrNone = Annotated[
 ]
 Output = Annotated[
     Path | None,
-    typer.Option("-o", "--output", metavar="DIR", help="Folder to write into; none: table only."),
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="DIR",
+        help="Folder to write into; none: table only.",
+        rich_help_panel=WRITE,
+    ),
 ]
 
 
 class ControllerOptions(Bundle):
     """Which controllers are compared."""
 
+    GROUP = "The controller"
+
     alpha: str | None = option(
-        "--alpha", "A,B,…", "One variable controller for each; default the profile's."
+        "--alpha", "A,B,…", "One variable controller each. Default the profile's."
     )
     controller: opt.Words = option(
         "--controller", "variable|traditional", "Repeatable; default both."
     )
     xi: str | None = option(
-        "--xi", "NUMBER|from-B", "Damping ratio of the recovery; default from B_d, M_d, K_d."
+        "--xi",
+        "NUMBER|from-B",
+        "Damping ratio of the recovery; default from B_d, M_d, K_d.",
+        seldom=True,
     )
     threshold_mode: str | None = option(
-        "--threshold-mode", "hard|soft", "The whole force above it, or the excess."
+        "--threshold-mode", "hard|soft", "The whole force above it, or the excess.", seldom=True
     )
     parameters: Path | None = option(
-        "--parameters", "FILE.toml", "Take [admittance] from this file, not the profile."
+        "--parameters",
+        "FILE.toml",
+        "Take [admittance] from this file, not the profile.",
+        seldom=True,
     )
-    force_unstable: bool = flag("--force-unstable", "Run settings that are unstable, for study.")
+    force_unstable: bool = flag(
+        "--force-unstable", "Run settings that are unstable, for study.", seldom=True
+    )
 
 
 class ReleaseOptions(Bundle):
     """A release from rest, without a log."""
 
+    GROUP = "Without a log"
+
     release: opt.Words = option(
         "--release", "AXIS=VALUE", "Replay a release from rest: x=0.3 [m], rz=0.5 [rad]."
     )
     start: str | None = option(
-        "--start", "Q1,Q2,…", "Start pose of a release [rad]; default the profile's."
+        "--start", "Q1,Q2,…", "Start pose of a release [rad]; default the profile's.", seldom=True
     )
     duration: float | None = option(
-        "--duration", "S", "Length of a release; default until it is over."
+        "--duration", "S", "Length of a release; default until it is over.", seldom=True
     )
 
 
 class LoopOptions(Bundle):
     """A controller in the loop of a simulation, without a log."""
 
+    GROUP = "Without a log"
+
     closed_loop: str | None = option(
         "--closed-loop",
         "SCENARIO",
-        "No log: run a scenario's contacts against the controller in simulation, then replay the "
-        "force it acted on.",
+        "Run a scenario against the controller. Its contacts are simulated, then the force that it "
+        "acted on is replayed.",
     )
-    seed: int | None = option(*opt.SEED, min=0)
+    seed: int | None = option(*opt.SEED, seldom=True, min=0)
     torque: str = option(
-        "--torque", "average|instant", "What the closed loop's sensors report.", "average"
+        "--torque",
+        "average|instant",
+        "What the closed loop's sensors report.",
+        "average",
+        seldom=True,
     )
 
 
 class ForceOptions(Bundle):
     """Which force drives the replay, if not an observer's."""
 
+    GROUP = "The force"
+
     sensor: bool = flag("--sensor", "Take the log's own wrench.")
     truth: Path | None = option(
-        "--truth", "FILE", "Take the wrench of a truth file, flange, base axes."
+        "--truth", "FILE", "Take the wrench of a truth file, flange, base axes.", seldom=True
     )
 
 
@@ -104,9 +131,10 @@ def admit(
     force: opt.Force = False,
     show_made: opt.Open = False,
 ) -> None:
-    """Replay a log's external force through traditional and variable-parameter admittance.
+    """Replay a log's external force through admittance controllers.
 
-    Writes DIR/index.html, recording.rrd, motion.parquet, comparison.{csv,json} and run.json. The
+    Traditional ones and variable-parameter ones. Writes DIR/index.html, recording.rrd,
+    motion.parquet, comparison.{csv,json} and run.json. The
     force is that of one observer, kfo-fe unless another is named. --set also takes the controllers'
     parameters: position.stiffness=12, rz.threshold=4, admittance.xi=1.
 
@@ -316,7 +344,7 @@ def looped(
 
 def show(result: "Replay", run: "ClosedLoop | None", json: bool) -> None:
     """The comparison on stdout, remarks on stderr."""
-    from vftcli.cli.console import say
+    from vftcli.cli.console import detail, say
     from vftcli.outputs.admittance.tables import comparison_text, latency_text, parameter_text
     from vftcli.outputs.grid import json_rows
 
@@ -326,7 +354,7 @@ def show(result: "Replay", run: "ClosedLoop | None", json: bool) -> None:
     say(f"{result.robot.title or result.robot.name}: {result.source}")
     say(parameter_text(result))
     for note in result.remarks:
-        say(f"note: {note}")
+        detail(f"note: {note}")
     if run is not None:
         say(latency_text(run))
     typer.echo(comparison_text(result.rows))

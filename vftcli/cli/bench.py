@@ -23,7 +23,7 @@ class BenchOptions(Bundle):
 
 @taken_apart
 def bench(measured: BenchOptions, json: opt.Json = False) -> None:
-    """Time the observers and print the ratios to a bare RNEA loop and to per-sample scripts.
+    """Time the observers, and scripts that do the same.
 
     Example: vftcli bench --rounds 3
     """

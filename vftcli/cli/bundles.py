@@ -9,6 +9,7 @@ function with one parameter an option, and hands the command the bundles put tog
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, NamedTuple, Self, TypeVar
@@ -27,34 +28,51 @@ class DeclaredOption(NamedTuple):
     Attributes:
         default: Its value if it is not given, `REQUIRED` if it has to be.
         typer: How it is typed, and what `--help` says of it.
+        seldom: Whether only `--help-all` shows it.
     """
 
     default: object
     typer: Any
+    seldom: bool = False
 
 
-def option(name: str, metavar: str, help: str, default: object = None, **limits: float) -> Any:  # noqa: ANN401
+def option(
+    name: str,
+    metavar: str,
+    help: str,
+    default: object = None,
+    *,
+    seldom: bool = False,
+    **limits: float,
+) -> Any:  # noqa: ANN401
     """One option of a bundle that takes a value.
 
     Args:
         name: As it is typed, with its dashes.
         metavar: What its value looks like.
-        help: What `--help` says of it.
+        help: What `--help` says of it: its first sentence, and `--help-all` the whole.
         default: Its value if it is not given, `REQUIRED` if it has to be.
+        seldom: Whether only `--help-all` shows it.
         limits: ``min`` and ``max`` of a number, where no room checks it.
     """
     how: Any = limits
-    return DeclaredOption(default, typer.Option(name, metavar=metavar, help=help, **how))
+    return DeclaredOption(default, typer.Option(name, metavar=metavar, help=help, **how), seldom)
 
 
-def flag(name: str, help: str) -> Any:  # noqa: ANN401
-    """One option of a bundle that is given or not."""
-    return DeclaredOption(False, typer.Option(name, help=help))
+def flag(name: str, help: str, *, seldom: bool = False) -> Any:  # noqa: ANN401
+    """One option of a bundle that is given or not; ``-v/--details`` has two names."""
+    return DeclaredOption(False, typer.Option(*name.split("/"), help=help), seldom)
 
 
 # No dataclass: making one takes a millisecond, and --help would pay for all of them.
 class Bundle:
-    """Options that belong together, each an attribute."""
+    """Options that belong together, each an attribute.
+
+    Attributes:
+        GROUP: Heading of `--help` under which they stand.
+    """
+
+    GROUP: ClassVar[str] = ""
 
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 - options are of every kind
         vars(self).update(values)
@@ -73,8 +91,7 @@ class Bundle:
         found: dict[str, Any] = {}
         for base in reversed(cls.__mro__):
             found |= inspect.get_annotations(base)
-        found.pop("HOME", None)
-        return found
+        return {name: kind for name, kind in found.items() if name not in {"HOME", "GROUP"}}
 
 
 class ChoiceBundle(Bundle, Generic[Choice]):
@@ -109,7 +126,7 @@ def taken_apart(command: Callable[..., None]) -> Callable[..., None]:
     def called(**values: Any) -> None:  # noqa: ANN401
         from vftcli.outputs.files import protected
 
-        with protected(inputs_of(values)):
+        with protected(inputs_of(values)), loudness(values):
             command(**{p.name: put_together(p.name, p.annotation, values) for p in own})
 
     flat = [single for p in own for single in parameters(p.name, p.annotation, p.default)]
@@ -120,21 +137,46 @@ def taken_apart(command: Callable[..., None]) -> Callable[..., None]:
     return called
 
 
-def parameters(name: str, kind: Any, default: object) -> Iterator[inspect.Parameter]:  # noqa: ANN401
+def loudness(values: Mapping[str, Any]) -> AbstractContextManager[None]:
+    """How much a command says: what its ``-v`` and ``-q`` ask, as usual where it has none."""
+    from vftcli.cli.console import speaking
+
+    asked = {name.rpartition("_")[2]: value for name, value in values.items()}
+    return speaking(details=bool(asked.get("details")), quiet=bool(asked.get("quiet")))
+
+
+def parameters(
+    name: str,
+    kind: Any,  # noqa: ANN401
+    default: object,
+    group: str = "",
+) -> Iterator[inspect.Parameter]:
     """The parameters of one argument of a command: itself, or those of the bundle it is.
 
     Args:
         name: Its name.
         kind: Its annotation, or the bundle.
         default: Its default, or `REQUIRED`.
+        group: Heading of `--help` under which it stands, unless it has its own.
     """
     if is_bundle(kind):
         for own, what in kind.declared().items():
-            yield from parameters(f"{name}_{own}", what, getattr(kind, own, REQUIRED))
+            under = kind.GROUP or group
+            yield from parameters(f"{name}_{own}", what, getattr(kind, own, REQUIRED), under)
         return
     if isinstance(default, DeclaredOption):
+        default.typer.rich_help_panel = heading(group, seldom=default.seldom)
         kind, default = Annotated[kind, default.typer], default.default
     yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+
+
+SELDOM = " …"
+"""Ending of a heading whose options only `--help-all` shows."""
+
+
+def heading(group: str, *, seldom: bool) -> str:
+    """The heading of an option, which typer keeps for us, with how often it is wanted."""
+    return f"{group}{SELDOM}" if seldom else group
 
 
 def put_together(name: str, kind: Any, values: Mapping[str, Any]) -> Any:  # noqa: ANN401

@@ -7,10 +7,13 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, taken_apart
+from vftcli.cli.help import COMPARE, OUTPUT
 
 
 class TableOptions(Bundle):
     """The form of the table; one at most."""
+
+    GROUP = OUTPUT
 
     json: opt.Json = False
     csv: bool = flag("--csv", "Print one row per observer and joint.")
@@ -38,16 +41,20 @@ def compare(
     table: TableOptions,
     significance: Annotated[
         bool,
-        typer.Option("--significance", help="Every pair of observers: difference, interval, p."),
+        typer.Option(
+            "--significance",
+            help="Every pair of observers: difference, interval, p.",
+            rich_help_panel=COMPARE,
+        ),
     ] = False,
 ) -> None:
-    """Print the RMSE of every observer against a reference, with the reference's own floor.
+    """Print every observer's error against a reference, and its floor.
 
     Example: vftcli compare fixtures/ur5_circle.csv --robot ur5 --reference zero --interval 0:4
     """
     import polars as pl
 
-    from vftcli.cli.console import say_analysis
+    from vftcli.cli.console import LeftOut, say_analysis
     from vftcli.evaluation import paired_significance
     from vftcli.evaluation.pooling import PoolMember, evaluate_pooled
     from vftcli.outputs.log import tables
@@ -62,15 +69,18 @@ def compare(
         "markdown": tables.to_markdown,
         "latex": tables.to_latex,
     }[table.form]
-    choice = analysis.choice(Library(logs), reference)
+    library = Library(logs)
+    choice = analysis.choice(library, reference)
     # The list is for the wrench and for judging contacts; a table of torques needs none.
     listed = choice.contacts and (analysis.wrench.asks or reference.contacts)
     choice = replace(choice, contacts=listed)
-    analyses = []
-    for made in analyse_logs(logs, choice):
+    left_out, analyses = LeftOut(library, logs), []
+    for made in analyse_logs(logs, choice, left_out.told):
         if not table.json:
             say_analysis(made)
         analyses.append(made)
+    if not analyses:
+        left_out.end(0)
     if significance:
         pairs = [
             paired_significance(a.recording.name, a.estimates, a.reference)
@@ -78,6 +88,7 @@ def compare(
             if a.reference is not None
         ]
         typer.echo(tables.pairs_text(pl.concat(pairs), as_json=table.json))
+        left_out.end(len(analyses))
         return
     errors = [a.errors for a in analyses if a.errors is not None]
     members = [
@@ -87,3 +98,4 @@ def compare(
     ]
     together = pl.concat([*errors, evaluate_pooled(members)], how="diagonal")
     typer.echo(show(tables.marked(together, analyses), paper_bounds(analyses)))
+    left_out.end(len(analyses))

@@ -1,12 +1,20 @@
-"""From a command's options to an AnalysisChoice, and the words every command prints alike."""
+"""What every command prints alike: how much is said, to whom, and how wide."""
 
 import json
+import os
 import shlex
+import shutil
 import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
+from vftcli.cli.progress import STAGES
+from vftcli.signals.errors import VftError
 from vftcli.signals.letters import printable, printable_lines
 
 if TYPE_CHECKING:
@@ -14,10 +22,32 @@ if TYPE_CHECKING:
 
     from vftcli.analysis import Analysis
     from vftcli.doctor import Examination, Examiner
+    from vftcli.outputs.canvas import Canvas
     from vftcli.readers.library import Library
     from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
     from vftcli.virtual_sensor.sensor_reading import SensorReading
+
+QUIET, USUAL, DETAILS = range(3)
+"""How much a command says."""
+
+_level: ContextVar[int] = ContextVar("level", default=USUAL)
+
+
+@contextmanager
+def speaking(*, details: bool, quiet: bool) -> Iterator[None]:
+    """Say as much as is asked for a block.
+
+    Raises:
+        typer.BadParameter: If both are asked for.
+    """
+    if details and quiet:
+        raise typer.BadParameter("choose one of --details, --quiet")
+    token = _level.set(DETAILS if details else QUIET if quiet else USUAL)
+    try:
+        yield
+    finally:
+        _level.reset(token)
 
 
 PARTS = frozenset({"episode-taken", "episode-taken-first", "arm-side-taken"})
@@ -30,8 +60,41 @@ def command_line() -> str:
 
 
 def say(text: str) -> None:
-    """Print words to stderr; tables go to stdout."""
-    typer.echo(printable_lines(text), err=True)
+    """Print words to stderr, unless --quiet; results go to stdout."""
+    if _level.get() > QUIET:
+        STAGES.clear()
+        typer.echo(printable_lines(text), err=True)
+
+
+def detail(text: str) -> None:
+    """Print words to stderr where --details asks for everything that is known."""
+    if _level.get() == DETAILS:
+        say(text)
+
+
+def show(text: str) -> None:
+    """Print a result that stands in a file as well to stdout, unless --quiet.
+
+    Its colours are the canvas's affair: typer, which would take them off, sees none where there
+    shall be none.
+    """
+    if _level.get() > QUIET:
+        STAGES.clear()
+        typer.echo(text, nl=not text.endswith("\n"), color=True)
+
+
+def canvas() -> "Canvas":
+    """What stdout can show: its width, its letters, whether in colour."""
+    from vftcli.outputs.canvas import Canvas
+
+    stream = sys.stdout
+    letters = (getattr(stream, "encoding", None) or "utf-8").lower().replace("-", "")
+    seen = getattr(stream, "isatty", bool)() and os.environ.get("TERM") != "dumb"
+    return Canvas.of(
+        columns=shutil.get_terminal_size().columns,
+        unicode=letters.startswith("utf"),
+        colour=seen and not os.environ.get("NO_COLOR"),
+    )
 
 
 def say_json(value: object) -> None:
@@ -41,27 +104,67 @@ def say_json(value: object) -> None:
     typer.echo(json.dumps(jsonable(value), indent=2, ensure_ascii=False, allow_nan=False))
 
 
+class LeftOut:
+    """The logs of a command that could not be analysed: one line each, the others go on.
+
+    Args:
+        library: What the logs are called.
+        logs: The logs of the command; of a single one the error itself is the command's.
+    """
+
+    def __init__(self, library: "Library", logs: Sequence[Path]) -> None:
+        self._library, self._several = library, len(logs) > 1
+        self.reasons: dict[str, str] = {}
+
+    def told(self, log: Path, error: VftError) -> None:
+        """Say which log is left out, and why."""
+        if not self._several:
+            raise error
+        reason = " ".join(str(error).split())
+        self.reasons[self._library.label(log)] = reason
+        STAGES.clear()
+        typer.echo(printable(f"error: {self._library.label(log)} left out: {reason}"), err=True)
+
+    def end(self, done: int) -> None:
+        """Stop with exit code 1 if any was left out.
+
+        Args:
+            done: How many were analysed.
+
+        Raises:
+            typer.Exit: If one was left out.
+        """
+        if not self.reasons:
+            return
+        if not done:
+            typer.echo("error: none of the logs can be analysed", err=True)
+        raise typer.Exit(1)
+
+
 def say_recording(recording: "Recording") -> None:
-    """One line on what was read, then what was repaired or looks odd."""
+    """In details: one line on what was read, then what was repaired or looks odd."""
     source = recording.source
     rate = f", {1.0 / recording.median_step:.4g} Hz" if recording.samples > 1 else ""
-    say(
+    detail(
         f"{recording.name}: {source.format}, {recording.joints} joints, "
         f"{recording.samples} samples, {recording.duration:.1f} s{rate}"
     )
     # That a part was taken is said with the health of the log.
     others = [remark for remark in source.remarks if remark.code not in PARTS]
     for remark in sorted(others, key=lambda remark: remark.level != "fact"):
-        say(f"  note: {remark}")
+        detail(f"  note: {remark}")
 
 
-def health_of(library: "Library", *, anyway: bool, fitting: bool = True) -> "Examiner":
+def health_of(
+    library: "Library", *, anyway: bool, fitting: bool = True, on_screen: bool = False
+) -> "Examiner":
     """Who examines a command's logs, and says one line on the health of each as soon as it is told.
 
     Args:
         library: Where the logs are read; of several each is told by its name.
         anyway: Whether results are wanted even where a finding makes them meaningless.
         fitting: Whether the robot must be the log's.
+        on_screen: Whether the result on stdout says how healthy the logs are.
     """
     from vftcli.doctor.examiner import Examiner
     from vftcli.outputs.examination import health_line
@@ -73,10 +176,10 @@ def health_of(library: "Library", *, anyway: bool, fitting: bool = True) -> "Exa
                 say(f"note: {recording.name}: {remark}")
         if codes := dict.fromkeys(f.code for f in examination.refusals(fitting=fitting)):
             say(f"MEANINGLESS unless this is wrong, and made with --anyway: {', '.join(codes)}")
-        named = len(library) > 1 or bool(recording.source.part)
-        say(health_line(examination, named=named))
+        line = health_line(examination, named=len(library) > 1 or bool(recording.source.part))
+        (detail if on_screen and not codes else say)(line)
         for assumption in examination.assumptions:
-            say(f"note: {recording.name}: {assumption}")
+            detail(f"note: {recording.name}: {assumption}")
 
     return Examiner(anyway=anyway, fitting=fitting, tell=tell)
 
@@ -88,12 +191,12 @@ def say_robots(robots: "Iterable[Robot]") -> None:
 
 
 def say_analysis(analysis: "Analysis") -> None:
-    """What was read, and what the reader of the numbers should know."""
+    """In details: what was read, and what the reader of the numbers should know."""
     say_recording(analysis.recording)
     reference = analysis.reference.remarks if analysis.reference is not None else ()
     own = [f"{e.name}: {note}" for e in analysis.estimates for note in e.remarks]
     for note in (*analysis.robot.remarks, *analysis.remarks, *own, *reference):
-        say(f"note: {note}")
+        detail(f"note: {note}")
     if analysis.virtual_sensor is not None:
         say_wrenches(analysis.virtual_sensor)
 
@@ -104,8 +207,18 @@ def say_wrenches(sensed: "SensorReading") -> None:
     from vftcli.outputs.log.wrench_tables import drift_grid
     from vftcli.virtual_sensor.frames import FRAMES
 
-    say(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.solver}")
+    detail(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.solver}")
     if sensed.drifts:
-        say(terminal(drift_grid(sensed.drifts)).rstrip())
+        detail(terminal(drift_grid(sensed.drifts)).rstrip())
     for remark in sensed.remarks:
-        say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
+        if remark.level == "warning":
+            say(f"warning: {remark}")
+        else:
+            detail(f"note: {remark}")
+
+
+def stages() -> "Callable[[str], None]":
+    """Who shows on stderr what is being done, if somebody watches and it takes a while."""
+    from vftcli.pipeline import silent
+
+    return STAGES.begin if _level.get() > QUIET and sys.stderr.isatty() else silent

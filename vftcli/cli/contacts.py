@@ -1,18 +1,24 @@
 """`vftcli contacts`: what touched the arm, when, how hard, where."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, taken_apart
+from vftcli.cli.help import OUTPUT
 
 if TYPE_CHECKING:
-    from vftcli.contacts.contact_list import ContactList
+    from collections.abc import Mapping
+
+    from vftcli.analysis import Analysis
 
 
 class ListOptions(Bundle):
     """The form of the list."""
+
+    GROUP = OUTPUT
 
     json: opt.Json = False
     csv: bool = flag("--csv", "Print one row per contact.")
@@ -26,9 +32,10 @@ def list_contacts(
     robot: opt.RobotOptions,
     free: opt.FreeOptions,
     form: ListOptions,
-    anyway: opt.Anyway = False,
+    anyway: opt.AnywayOptions,
+    talk: opt.TalkOptions,
 ) -> None:
-    """List what touched the arm: when, how hard, in which direction, where, how sure.
+    """List what touched the arm: when, how hard, where, how sure.
 
     Needs no output folder and no reference; with --free LOG or --free A:B it tells more.
 
@@ -37,36 +44,70 @@ def list_contacts(
     if form.json and form.csv:
         raise typer.BadParameter("choose one of --json, --csv")
 
-    from vftcli.cli.console import health_of, say_robots
-    from vftcli.pipeline import AnalysisChoice, contact_lists
+    from vftcli.cli.console import LeftOut, health_of, say_analysis, stages
+    from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches
+    from vftcli.readers.estimates import stored_observers
     from vftcli.readers.library import Library
 
+    if len(logs) == 1 and reading.columns is None and stored_observers(logs[0]):
+        print_stored(logs[0], form)
+        return
     library = Library(logs)
     choice = AnalysisChoice(
         read=reading.choice(),
         robot=robot.choice(),
         free=free.choice(),
         library=library,
-        examiner=health_of(library, anyway=anyway),
+        progress=stages(),
+        examiner=health_of(library, anyway=anyway.anyway, on_screen=not (form.json or form.csv)),
     )
-    found = list(contact_lists(logs, choice))
-    say_robots(choice.examiner.robots)
-    show(found, form)
+    left_out = LeftOut(library, logs)
+    found = []
+    for made in analyse_logs(logs, choice, left_out.told, list_touches):
+        say_analysis(made)
+        found.append(made)
+    if found:
+        print_lists(found, form, left_out.reasons, every=form.all or talk.details)
+    left_out.end(len(found))
 
 
-def show(found: "list[ContactList]", form: ListOptions) -> None:
-    """Print the lists in the form that is asked for."""
-    from vftcli.cli.console import say_json
-    from vftcli.outputs import contacts as output
+def print_stored(estimates: Path, form: ListOptions) -> None:
+    """Print the list that the folder of an ``estimates.parquet`` holds."""
+    from vftcli.cli.console import canvas, say_json
+    from vftcli.outputs.contacts import contacts_csv
+    from vftcli.outputs.screen import list_screen
+    from vftcli.outputs.stored_contacts import stored_list, stored_record
 
+    record = stored_record(estimates)
     if form.json:
-        records = [output.contacts_record(each) for each in found]
-        say_json(records[0] if len(records) == 1 else records)
+        say_json(record)
     elif form.csv:
-        typer.echo(output.contacts_csv(found), nl=False)
-    elif len(found) == 1 or form.all:
-        typer.echo(
-            "\n".join(output.contacts_text(each, every=form.all) for each in found), nl=False
-        )
+        typer.echo(contacts_csv([stored_list(record)]), nl=False)
     else:
-        typer.echo(output.overview(found), nl=False)
+        typer.echo(list_screen(stored_list(record), canvas(), every=form.all), nl=False)
+
+
+def print_lists(
+    found: "list[Analysis]", form: ListOptions, failed: "Mapping[str, str]", *, every: bool
+) -> None:
+    """Print the lists in the form that is asked for."""
+    from vftcli.cli.console import canvas, say_json
+    from vftcli.outputs import contacts as output
+    from vftcli.outputs.screen import log_screen, logs_screen
+
+    lists = [made.contacts for made in found if made.contacts is not None]
+    if form.json:
+        records = [output.contacts_record(each) for each in lists]
+        say_json(records[0] if len(records) + len(failed) == 1 else records)
+    elif form.csv:
+        typer.echo(output.contacts_csv(lists), nl=False)
+    else:
+        screen = canvas()
+        texts = (
+            []
+            if len(found) + len(failed) == 1
+            else [logs_screen(found, screen, failed, every=every)]
+        )
+        if not texts or form.all:
+            texts += [log_screen(made, screen, every=every) for made in found]
+        typer.echo("\n".join(texts), nl=False, color=screen.colour)

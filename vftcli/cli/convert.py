@@ -8,6 +8,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
+from vftcli.cli.help import WRITE
 
 
 @taken_apart
@@ -15,13 +16,20 @@ def convert_log(
     log: opt.Log,
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="FILE", help="x.parquet, x.mcap or x.csv."),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="x.parquet, x.mcap or x.csv.",
+            rich_help_panel=WRITE,
+        ),
     ],
     reading: opt.ReadOptions,
+    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
-    """Convert any readable log into a flat Parquet or CSV table, or a ros2-profile MCAP.
+    """Convert any readable log into Parquet, CSV or MCAP.
 
     Example: vftcli convert fixtures/ur5_circle.csv -o ur5_circle.mcap
     """

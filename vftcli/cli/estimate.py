@@ -1,12 +1,19 @@
 """`vftcli estimate`: a log becomes external torques."""
 
 from dataclasses import replace
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
+from vftcli.cli.help import WRITE
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from vftcli.analysis import Analysis
 
 
 @taken_apart
@@ -15,8 +22,12 @@ def estimate(
     output: opt.Folder,
     analysis: opt.AnalysisOptions,
     also: opt.ExtraOptions,
-    csv: Annotated[bool, typer.Option("--csv", help="Also write estimates.csv.")] = False,
-    rrd: Annotated[bool, typer.Option("--rrd", help="Also write recording.rrd.")] = False,
+    csv: Annotated[
+        bool, typer.Option("--csv", help="Also write estimates.csv.", rich_help_panel=WRITE)
+    ] = False,
+    rrd: Annotated[
+        bool, typer.Option("--rrd", help="Also write recording.rrd.", rich_help_panel=WRITE)
+    ] = False,
     json: opt.Json = False,
     force: opt.Force = False,
     show: opt.Open = False,
@@ -30,16 +41,19 @@ def estimate(
     """
     from vftcli.cli.background import Background
     from vftcli.doctor.examiner import EXAMINED
+    from vftcli.readers.estimates import refuse_estimates
     from vftcli.readers.library import Library
 
     extras = also.names(csv=csv, rrd=rrd or show)
     # Of a large log only the columns that are looked at are read; outputs show the others too.
-    causal = analysis.observers.causal or analysis.no_contacts
+    causal = analysis.observers.causal or analysis.contacts.no_contacts
     signals = EXAMINED if causal and not (analysis.wrench.asks or extras) else None
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
+    if chosen.columns is None:
+        refuse_estimates(log)
     reading = Background(lambda: library.open(log, chosen))
 
-    from vftcli.cli.console import command_line, say, say_analysis
+    from vftcli.cli.console import command_line
     from vftcli.cli.opening import open_made
     from vftcli.observers.table import BEST
     from vftcli.outputs.files import OutputFolder
@@ -55,7 +69,16 @@ def estimate(
     if json:
         typer.echo(record)
     else:
-        say_analysis(made)
-        say(f"wrote {output}")
+        show_estimates(made, output, estimate_files(extras))
     if show:
         open_made(output)
+
+
+def show_estimates(made: "Analysis", output: Path, files: "Sequence[str]") -> None:
+    """Print what was found in short, and what was written."""
+    from vftcli.cli.console import canvas, say_analysis, show
+    from vftcli.outputs.screen import short_screen, written_lines
+
+    say_analysis(made)
+    screen = canvas()
+    show(short_screen(made, written_lines(output, files, screen), screen))

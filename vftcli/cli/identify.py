@@ -7,6 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, option, taken_apart
+from vftcli.cli.help import WRITE
 
 if TYPE_CHECKING:
     from vftcli.identification import Task
@@ -86,25 +87,29 @@ class WithoutLoad(Bundle):
 def identify_robot(
     logs: opt.Logs,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE.toml", help="The new robot file.")
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="FILE.toml", help="The new robot file.", rich_help_panel=WRITE
+        ),
     ],
     reading: opt.ReadOptions,
     robot: opt.RobotOptions,
     asked: TaskOptions,
     validation: ValidationOptions,
     free: WithoutLoad,
-    anyway: opt.Anyway = False,
+    anyway: opt.AnywayOptions,
+    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     json: opt.Json = False,
     force: opt.Force = False,
     show: opt.Open = False,
 ) -> None:
-    """Make a robot file from logs: friction, rotor inertia, link inertias, payload.
+    """Make a robot file from logs: friction, inertias, payload.
 
     Writes FILE.toml for --robot, and FILE.html, FILE.rrd and FILE.run.json beside it.
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
-    from vftcli.cli.console import command_line, health_of, say, say_recording, say_robots
+    from vftcli.cli.console import command_line, detail, health_of, say, say_recording, say_robots
     from vftcli.cli.opening import open_made
     from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
@@ -122,7 +127,7 @@ def identify_robot(
     library = Library([*logs, *validated, *without_load])
     # That the profile is not the arm's is what this command is there to change; but the friction
     # method keeps the profile's links.
-    examiner = health_of(library, anyway=anyway, fitting=task.method == "friction")
+    examiner = health_of(library, anyway=anyway.anyway, fitting=task.method == "friction")
     profile = examiner.robot(next(library.open_each(logs, choice)), chosen)
 
     def opened(paths: list[Path] | tuple[Path, ...], how: "ReadChoice") -> list["Recording"]:
@@ -137,7 +142,7 @@ def identify_robot(
     record = write_identification(output, found, examiner.examinations, command_line(), force)
     say_robots(examiner.robots)
     for remark in found.remarks:
-        say(f"note: {remark}")
+        detail(f"note: {remark}")
     say(f"wrote {', '.join(str(file) for file in beside(output).values())}")
     typer.echo(record.rstrip("\n") if json else tables_text(found))
     if show:

@@ -13,12 +13,13 @@ def inspect_log(
     log: opt.Log,
     reading: opt.ReadOptions,
     robot: opt.RobotOptions,
+    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit with 1 if there is any warning, for CI.")
     ] = False,
     json: opt.Json = False,
 ) -> None:
-    """Examine a log: format, signals, clock, and what looks wrong, with its remedy.
+    """Examine a log: format, signals, clock, and what looks wrong.
 
     Example: vftcli inspect fixtures/ur5_circle.csv
     """

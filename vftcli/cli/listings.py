@@ -23,7 +23,7 @@ def robots(
     ] = None,
     json: opt.Json = False,
 ) -> None:
-    """List the robot profiles, or show one with its numbers and their sources.
+    """List the robot profiles, or show one and its sources.
 
     Example: vftcli robots ur5
     """
@@ -79,16 +79,18 @@ def list_formats(
     name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Show one format.")] = None,
     json: opt.Json = False,
 ) -> None:
-    """List the log formats: how to record them, what is taken from them, what to look out for.
+    """List the log formats, or show how to record one.
 
     Example: vftcli formats
     """
     from vftcli.cli.console import say_json
     from vftcli.readers import READERS
     from vftcli.signals.errors import UnknownFormatError
+    from vftcli.signals.parsing import did_you_mean
 
     if name is not None and name not in READERS:
-        raise UnknownFormatError(f"no format {name!r}; there is {', '.join(READERS)}")
+        near = did_you_mean(name, READERS)
+        raise UnknownFormatError(f"no format {name!r}; there is {', '.join(READERS)}.{near}")
     shown = [READERS[name]] if name else list(READERS.values())
     if json:
         say_json([{"name": r.name, **r.words, "columns": r.columns} for r in shown])

@@ -20,9 +20,9 @@ Made = Annotated[
 
 
 def open_folder(folder: Made) -> None:
-    """Open the page of a folder that a command wrote, and say how to open its recording.
+    """Open the page of a folder that a command wrote.
 
-    Without a page its recording is opened in the Rerun viewer.
+    How to open its recording is said; without a page its recording is opened in the Rerun viewer.
 
     Example: vftcli open out
     """

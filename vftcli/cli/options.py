@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vftcli.cli import help as headings
 from vftcli.cli.bundles import REQUIRED, Bundle, ChoiceBundle, flag, option
 
 if TYPE_CHECKING:
@@ -31,14 +32,25 @@ Logs = Annotated[
     typer.Argument(metavar="LOG...", help="Log files or bag directories; recognised by content."),
 ]
 Folder = Annotated[
-    Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write into.")
+    Path,
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="DIR",
+        help="Folder to write into.",
+        rich_help_panel=headings.WRITE,
+    ),
 ]
-Force = Annotated[bool, typer.Option("--force", help="Overwrite what exists.")]
+Force = Annotated[
+    bool,
+    typer.Option("--force", help="Overwrite what exists.", rich_help_panel=headings.WRITE),
+]
 Json = Annotated[
     bool,
     typer.Option(
         "--json",
-        help="What the command makes as JSON on stdout: rows of a table, a run record, a summary.",
+        help="JSON on stdout. It is what the command makes: rows, a run record, a summary.",
+        rich_help_panel=headings.OUTPUT,
     ),
 ]
 Open = Annotated[
@@ -49,9 +61,8 @@ Open = Annotated[
 ]
 ANYWAY = (
     "--anyway",
-    "Go on where a finding about the log makes every result meaningless; the outputs say so.",
+    "Go on where a finding makes results meaningless. The outputs say so.",
 )
-Anyway = Annotated[bool, typer.Option(ANYWAY[0], help=ANYWAY[1])]
 Words = list[str] | None
 """The values of an option that may be repeated."""
 
@@ -70,8 +81,8 @@ ROBOT_ARG = (
 FREE = (
     "--free",
     "LOG|A:B",
-    "Motion that nobody touched: a free run of the same trajectory, or a span of the log itself. "
-    "Repeatable: two free runs measure the floor.",
+    "Motion that nobody touched: another log, or a span. Repeatable: two free runs of the same "
+    "trajectory measure the floor.",
 )
 SEED = ("--seed", "N", "Seed of everything drawn; the scenario's own if not given.")
 REFERENCE = ("--reference", "REF", "two-cycle, sensor, vendor, zero, or file:PATH.")
@@ -85,25 +96,27 @@ REFERENCE_COLUMNS = (
 class ReadOptions(ChoiceBundle["ReadChoice"]):
     """How a log is read, and which part of it."""
 
+    GROUP = headings.LOG
     HOME = "readers.reader:ReadChoice"
 
     format: str | None = option(
-        "--format", "NAME", "Skip recognition; `vftcli formats` lists the names."
+        "--format", "NAME", "Skip recognition; `vftcli formats` lists the names.", seldom=True
     )
     columns: str | None = option(
         "--columns",
         "SPEC",
-        "Columns of a table: 't,q:6,dq:6,current:6' in file order, or "
+        "Columns of a table (vftcli help columns). 't,q:6,dq:6,current:6' in file order, or "
         "'q=joint_pos_{i},tau=eff_{i}' by header.",
     )
     interval: str | None = option(
-        "--interval", "A:B", "Use only this time span, in seconds from the first sample."
+        "--interval", "A:B", "Only this span, in seconds from the first sample."
     )
     effort: str | None = option(
         "--effort",
         "auto|current|torque|torque-without-gravity",
         "What the log's effort is, whatever it is called; auto takes what the robot's model "
         "explains best, and says so.",
+        seldom=True,
     )
     episode: str | None = option(
         "--episode", "K|all", "Of a file that holds several: which, or each as a log of its own."
@@ -120,6 +133,7 @@ class ReadOptions(ChoiceBundle["ReadChoice"]):
 class RobotOptions(ChoiceBundle["RobotChoice"]):
     """Which arm, and how it is modelled."""
 
+    GROUP = headings.LOG
     HOME = "robots.choice:RobotChoice"
 
     robot: str | None = option(*ROBOT)
@@ -127,11 +141,13 @@ class RobotOptions(ChoiceBundle["RobotChoice"]):
         "--friction",
         "profile|none|model",
         "The robot file's friction (default), none, or what an MJCF gives for simulation.",
+        seldom=True,
     )
     payload: str | None = option(
         "--payload",
         "NAME",
         "Mount a [payload.NAME] of the robot file; log: the one that the log declares.",
+        seldom=True,
     )
     tip: str | None = option(*TIP)
     robot_arg: Words = option(*ROBOT_ARG)
@@ -140,37 +156,48 @@ class RobotOptions(ChoiceBundle["RobotChoice"]):
 class ObserverOptions(ChoiceBundle["ObserverChoice"]):
     """Which observers run, and with which gains."""
 
+    GROUP = headings.ESTIMATE
     HOME = "observers.choice:ObserverChoice"
 
     observer: Words = option(
-        "--observer", "NAME", "Repeatable. Default: best fdo gmo kfo-fe kfo-zoh; of admit: kfo-fe."
+        "--observer",
+        "NAME",
+        "Which observers (repeatable; default: five). Default: best fdo gmo kfo-fe kfo-zoh; of "
+        "admit: kfo-fe.",
     )
     causal: bool = flag(
-        "--causal", "Leave out what could not run while the log is written: best, and smoothers."
+        "--causal", "Only what could run online. It leaves out best, and smoothers."
     )
     assignments: Words = option(
         "--set",
         "OBSERVER.PARAMETER=VALUE",
         "Repeatable: gmo.gain=30, gmo.gain=5,3,4,10,10,10, kfo.noise_convention=discrete.",
+        seldom=True,
     )
     gains: str | None = option(
         "--gains",
         "auto|paper|FILE",
-        "Gains of the other observers: those the log's spectra call for, the robot file's "
-        "(default), or those that `vftcli tune` wrote; --set goes before them.",
+        "Gains of all but best (vftcli help gains). Those the log's spectra call for, the robot "
+        "file's (default), or those that `vftcli tune` wrote; --set goes before them.",
     )
-    gains_file: Path | None = option("--set-file", "FILE", "The old name of --gains FILE.")
+    gains_file: Path | None = option(
+        "--set-file", "FILE", "The old name of --gains FILE.", seldom=True
+    )
     match: str | None = option(
         "--match",
         "delay=S|bandwidth=HZ",
         "Gains that give every observer the same delay or −3 dB bandwidth on every joint.",
+        seldom=True,
     )
-    as_printed: bool = flag("--as-printed", "The paper's printed formulas, errata and all.")
+    as_printed: bool = flag(
+        "--as-printed", "The paper's printed formulas, errata and all.", seldom=True
+    )
 
 
 class FreeOptions(ChoiceBundle["FreeChoice"]):
     """What nobody touched, and how it is laid under the log."""
 
+    GROUP = headings.LOG
     HOME = "repetition.choice:FreeChoice"
 
     free: Words = option(*FREE)
@@ -178,12 +205,13 @@ class FreeOptions(ChoiceBundle["FreeChoice"]):
         "--free-part",
         "A:B",
         "The same as --free A:B; without either, the log's own free cycles are found.",
+        seldom=True,
     )
     period: float | None = option(
-        "--period", "S", "Commanded period of a repeated motion; found if not given."
+        "--period", "S", "Commanded period of a repeated motion; found if not given.", seldom=True
     )
     free_cycles: str | None = option(
-        "--free-cycles", "1|1,2|1-3", "Cycles free of contact; found if not given."
+        "--free-cycles", "1|1,2|1-3", "Cycles free of contact; found if not given.", seldom=True
     )
     alignment: str = option(
         "--alignment",
@@ -191,15 +219,17 @@ class FreeOptions(ChoiceBundle["FreeChoice"]):
         "How the two-cycle difference lays free and loaded motion over one another; auto takes "
         "what has the smallest error on this log.",
         "auto",
+        seldom=True,
     )
     low_pass: str = option(
-        "--low-pass", "auto|none|HZ", "Zero-phase low-pass of that difference.", "auto"
+        "--low-pass", "auto|none|HZ", "Zero-phase low-pass of that difference.", "auto", seldom=True
     )
 
 
 class BiasOptions(ChoiceBundle["RefinementChoice"]):
     """What is taken off the estimates once the whole log is known."""
 
+    GROUP = headings.ESTIMATE
     HOME = "refinement.choice:RefinementChoice"
 
     remove_bias: str | None = option(
@@ -208,20 +238,22 @@ class BiasOptions(ChoiceBundle["RefinementChoice"]):
         "What comes off: the bias fitted to the whole log, what the observers read in free motion "
         "at the same phase, or a model of it over position and velocity. auto: the whole log's for "
         "best, none for the others.",
+        seldom=True,
     )
 
 
 class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
     """The Cartesian wrench."""
 
+    GROUP = headings.WRENCH
     HOME = "virtual_sensor.choice:WrenchChoice"
 
-    wrench: bool = flag("--wrench", "Also the Cartesian wrench, as force on the robot.")
+    wrench: bool = flag("--wrench", "Also the wrench, as force on the robot.")
     frame: str | None = option(
         "--frame",
         "flange|base|tool|sensor",
-        "Frame of the wrench (default flange; base: base axes, moment about the flange point). "
-        "Implies --wrench.",
+        "Its frame; default flange. See vftcli help frames. base: base axes, moment about the "
+        "flange point. Implies --wrench.",
     )
     solver: str | None = option(
         "--solver",
@@ -230,32 +262,37 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
         "(default for best: zero outside of the listed contacts), least squares (default for the "
         "others), damped, or with a prior of "
         "50 N and 10 N·m. Implies --wrench.",
+        seldom=True,
     )
     tool: str | None = option(
         "--tool",
         "POSE|NAME",
         "The tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or [tool.NAME] of the robot "
         "file.",
+        seldom=True,
     )
     sensor_pose: str | None = option(
         "--sensor-pose",
         "POSE|NAME|fit",
         "The force/torque sensor on the flange, likewise; fit estimates it from the log.",
+        seldom=True,
     )
     zero: Words = option(
         "--zero",
         "A:B|start|LOG",
-        "Unloaded span whose mean wrench is removed, the unloaded start, or a free run. Repeat A:B "
-        "to see the drift between spans. Implies --wrench.",
+        "Unloaded span whose mean comes off. Also the unloaded start, or a free run. Repeat A:B to "
+        "see the drift between spans. Implies --wrench.",
     )
     sensor_weight: bool = flag(
         "--sensor-weight",
         "Weigh the sensor's own tool in the unloaded spans and remove it from its reading.",
+        seldom=True,
     )
     torque_sd: str | None = option(
         "--torque-sd",
         "own|NUMBER(S)",
         "Joint torque error behind the wrench's band [N·m]; own: the observer's covariance.",
+        seldom=True,
     )
 
     @property
@@ -272,13 +309,15 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
 class ReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
     """What the estimates are compared with."""
 
+    GROUP = headings.COMPARE
     HOME = "evaluation.reference_choice:ReferenceChoice"
 
     reference: str | None = option(*REFERENCE)
-    reference_columns: str | None = option(*REFERENCE_COLUMNS)
+    reference_columns: str | None = option(*REFERENCE_COLUMNS, seldom=True)
     contacts: bool = flag(
         "--contacts",
-        "Also detection delay, false alarms per hour and missed contacts against the reference.",
+        "Judge the listed contacts. Also detection delay, false alarms per hour and missed "
+        "contacts of the observers against the reference, with the free part of --free.",
     )
 
     def choice(self) -> "ReferenceChoice | None":
@@ -303,8 +342,9 @@ class ExtraOptions(Bundle):
 class NamedReferenceOptions(Bundle):
     """What is taken for true where nothing else is asked of it."""
 
+    GROUP = headings.COMPARE
     reference: str | None = option(*REFERENCE)
-    reference_columns: str | None = option(*REFERENCE_COLUMNS)
+    reference_columns: str | None = option(*REFERENCE_COLUMNS, seldom=True)
 
     def choice(self) -> "ReferenceChoice | None":
         """The choice that the options state, None where no reference is named."""
@@ -317,6 +357,31 @@ class RequiredReferenceOptions(ReferenceOptions):
     reference: str = option(*REFERENCE, REQUIRED)
 
 
+class ListingOptions(Bundle):
+    """Whether contacts are listed."""
+
+    GROUP = headings.WRITE
+
+    no_contacts: bool = flag("--no-contacts", "Leave the list of contacts out.")
+
+
+class AnywayOptions(Bundle):
+    """Whether results are wanted that mean little."""
+
+    GROUP = headings.LOG
+
+    anyway: bool = flag(*ANYWAY, seldom=True)
+
+
+class TalkOptions(Bundle):
+    """How much a command says."""
+
+    GROUP = headings.OUTPUT
+
+    details: bool = flag("-v/--details", "Everything that is known.")
+    quiet: bool = flag("-q/--quiet", "Errors only, and the table or JSON that is asked for.")
+
+
 class AnalysisOptions(Bundle):
     """All that can be asked of a log but what it is compared with."""
 
@@ -326,22 +391,28 @@ class AnalysisOptions(Bundle):
     free: FreeOptions
     refinement: BiasOptions
     wrench: WrenchOptions
-    no_contacts: bool = flag("--no-contacts", "Leave the list of contacts out.")
-    anyway: bool = flag(*ANYWAY)
+    contacts: ListingOptions
+    anyway: AnywayOptions
+    talk: TalkOptions
 
     def choice(
-        self, library: "Library", reference: ReferenceOptions | None = None
+        self,
+        library: "Library",
+        reference: ReferenceOptions | None = None,
+        *,
+        on_screen: bool = False,
     ) -> "AnalysisChoice":
         """The choice that the options state, and those of a reference where the command has them.
 
         Args:
             library: Where the command's logs are read.
             reference: What the estimates are compared with.
+            on_screen: Whether the result on stdout says how healthy the logs are.
 
         Raises:
             VftError: If a word is not what its room takes.
         """
-        from vftcli.cli.console import health_of
+        from vftcli.cli.console import health_of, stages
         from vftcli.pipeline import AnalysisChoice
 
         return AnalysisChoice(
@@ -352,7 +423,8 @@ class AnalysisOptions(Bundle):
             refinement=self.refinement.choice(),
             wrench=self.wrench.choice(),
             reference=reference.choice() if reference is not None else None,
-            contacts=not self.no_contacts,
+            contacts=not self.contacts.no_contacts,
             library=library,
-            examiner=health_of(library, anyway=self.anyway),
+            progress=stages(),
+            examiner=health_of(library, anyway=self.anyway.anyway, on_screen=on_screen),
         )

@@ -1,12 +1,19 @@
 """`vftcli report`: everything about a log in one folder."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
+from vftcli.cli.help import COMPARE
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from vftcli.analysis import Analysis
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
@@ -22,21 +29,24 @@ def report(
     published: Annotated[
         str | None,
         typer.Option(
-            "--published", metavar="table1", help="Set the paper's table beside the errors."
+            "--published",
+            metavar="table1",
+            help="Set the paper's table beside the errors.",
+            rich_help_panel=COMPARE,
         ),
     ] = None,
     json: opt.Json = False,
     force: opt.Force = False,
     show: opt.Open = False,
 ) -> None:
-    """Write a report page, a Rerun recording, tables and estimates of a log into one folder.
+    """Write a page, a recording, tables and estimates into one folder.
 
     Writes index.html (opens offline), recording.rrd, contacts.{json,csv}, estimates.parquet,
     errors.{csv,json,md,tex} and run.json; several logs get a sub-folder each and an index.
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
     """
-    from vftcli.cli.console import command_line, say, say_analysis
+    from vftcli.cli.console import LeftOut, command_line, say_analysis
     from vftcli.cli.opening import open_made
     from vftcli.evaluation.print_table import check_published, compare_with
     from vftcli.outputs.files import OutputFolder
@@ -48,39 +58,56 @@ def report(
     extras = also.names()
     names = report_files([library.label(log) for log in logs], extras)
     OutputFolder(output, force, names).check()
-    choice = analysis.choice(library, reference)
+    choice = analysis.choice(library, reference, on_screen=not json)
     if published is not None:
         check_published(published, reference.reference)
         choice = replace(choice, observers=choice.observers.beside_print())
-    analyses = []
-    for made in analyse_logs(logs, choice):
+    left_out, analyses = LeftOut(library, logs), []
+    for made in analyse_logs(logs, choice, left_out.told):
         beside = None
         if published is not None and made.errors is not None:
             beside = compare_with(published, made.errors, made.observers, made.tunings)
         analyses.append(replace(made, published=beside))
         if not json:
             say_analysis(made)
-    command = command_line()
-    if len(analyses) == 1:
+    if not analyses:
+        left_out.end(0)
+    choice.progress("writing")
+    command, failed = command_line(), left_out.reasons
+    if len(analyses) + len(failed) == 1:
         record = write_report(output, analyses[0], command=command, force=force, extras=extras)
     else:
-        record = write_reports(output, analyses, command=command, force=force, extras=extras)
+        record = write_reports(
+            output, analyses, command=command, force=force, extras=extras, failed=failed
+        )
     if json:
         typer.echo(record)
     else:
-        for made in analyses:
-            say_errors(made)
-        say(f"wrote {output}: vftcli open {output}")
+        show_report(analyses, output, failed, details=analysis.talk.details)
     if show:
         open_made(output)
+    left_out.end(len(analyses))
 
 
-def say_errors(made: "Analysis") -> None:
-    """The errors of one log and the print beside them, where they are known."""
+def show_report(
+    analyses: "Sequence[Analysis]", output: Path, failed: "Mapping[str, str]", *, details: bool
+) -> None:
+    """Print the screen; with details every table behind it too."""
+    from vftcli.cli.console import canvas, show
+    from vftcli.outputs.log.report import FILES, SUMMARY_FILES
     from vftcli.outputs.log.tables import print_text, to_terminal
     from vftcli.outputs.log.wrench_tables import paper_bounds
+    from vftcli.outputs.screen import log_screen, logs_screen, written_lines
 
-    if made.errors is not None:
-        typer.echo(to_terminal(made.errors, paper_bounds([made])))
-    if made.published is not None:
-        typer.echo(print_text(made.published))
+    several = len(analyses) + len(failed) > 1
+    screen, names = canvas(), SUMMARY_FILES if several else FILES
+    below = written_lines(output, names, screen, "vftcli open", several=several)
+    if several:
+        show(logs_screen(analyses, screen, failed, below, every=details))
+    else:
+        show(log_screen(analyses[0], screen, below, every=details))
+    for made in analyses if details else ():
+        if made.errors is not None:
+            show(to_terminal(made.errors, paper_bounds([made])))
+        if made.published is not None:
+            show(print_text(made.published))

@@ -9,6 +9,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, option, taken_apart
+from vftcli.cli.help import WRITE
 
 Scenario = Annotated[
     str,
@@ -17,7 +18,10 @@ Scenario = Annotated[
     ),
 ]
 LogPath = Annotated[
-    Path, typer.Option("-o", "--output", metavar="PATH", help="The log file or bag folder.")
+    Path,
+    typer.Option(
+        "-o", "--output", metavar="PATH", help="The log file or bag folder.", rich_help_panel=WRITE
+    ),
 ]
 
 
@@ -52,7 +56,7 @@ def simulate_log(
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
-    """Simulate an experiment: the log, PATH.truth.parquet and PATH.scenario.toml.
+    """Simulate an experiment: the log, and the truth beside it.
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """

@@ -24,6 +24,8 @@ def contact_thresholds(
     reading: opt.ReadOptions,
     robot: opt.RobotOptions,
     reference: opt.NamedReferenceOptions,
+    anyway: opt.AnywayOptions,
+    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     check: Annotated[
         Path | None,
         typer.Option(
@@ -34,7 +36,6 @@ def contact_thresholds(
             "sensor; else the alarms are listed.",
         ),
     ] = None,
-    anyway: opt.Anyway = False,
     rate: Annotated[
         float,
         typer.Option(
@@ -43,10 +44,11 @@ def contact_thresholds(
     ] = 1.0,
     json: opt.Json = False,
 ) -> None:
-    """Learn from free motion the thresholds that a robot is given, at a rate of false alarms.
+    """Learn from free motion the thresholds that a robot is given.
 
-    The logs are motion that nobody touches, the longer the better; of several days the worst
-    counts. Printed as libfranka's call, franka_ros parameters, URScript and TOML.
+    For a stated rate of false alarms. The logs are motion that nobody touches, the longer the
+    better; of several days the worst counts. Printed as libfranka's call, franka_ros parameters,
+    URScript and TOML.
 
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
@@ -69,7 +71,7 @@ def contact_thresholds(
         read=reading.choice(),
         robot=robot.choice(),
         library=library,
-        examiner=health_of(library, anyway=anyway),
+        examiner=health_of(library, anyway=anyway.anyway),
     )
     models = Models()
     free = [modelled(log, choice, models) for log in library.open_logs(logs, choice.read)]

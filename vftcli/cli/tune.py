@@ -7,19 +7,24 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
+from vftcli.cli.help import WRITE
 
 
 @taken_apart
 def tune_gains(
     log: opt.Log,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE.toml", help="The gains file.")
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="FILE.toml", help="The gains file.", rich_help_panel=WRITE
+        ),
     ],
     reading: opt.ReadOptions,
     robot: opt.RobotOptions,
     free: opt.FreeOptions,
     bias: opt.BiasOptions,
-    anyway: opt.Anyway = False,
+    anyway: opt.AnywayOptions,
+    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     goal: Annotated[
         str,
         typer.Option(
@@ -39,13 +44,13 @@ def tune_gains(
     json: opt.Json = False,
     force: opt.Force = False,
 ) -> None:
-    """Find gains on a log for a stated goal, and write them to a file for --gains.
+    """Find gains on a log for a stated goal, for --gains.
 
     The spectra of the log's free and loaded part tell how much error every gain makes.
 
     Example: vftcli tune fixtures/ur5_circle.csv --robot ur5 -o gains.toml
     """
-    from vftcli.cli.console import command_line, health_of, say, say_json, say_recording
+    from vftcli.cli.console import command_line, detail, health_of, say, say_json, say_recording
     from vftcli.observers.choice import LOG_GAINS, ObserverChoice
     from vftcli.outputs.examination import health_record, overridden_lines
     from vftcli.outputs.files import check_file, write_text
@@ -69,7 +74,7 @@ def tune_gains(
         observers=ObserverChoice(gains=LOG_GAINS, causal=True),
         refinement=bias.choice(),
         library=library,
-        examiner=health_of(library, anyway=anyway),
+        examiner=health_of(library, anyway=anyway.anyway),
     )
     recording, arm = prepared(choice.library.open(log, choice.read), choice)
     motion = read(recording, arm, choice, Models())
@@ -92,6 +97,6 @@ def tune_gains(
         return
     say_recording(recording)
     for note in (*arm.remarks, *notes):
-        say(f"note: {note}")
+        detail(f"note: {note}")
     typer.echo(terminal(tuned_grid(tuned, wanted.threshold is not None)).rstrip("\n"))
     say(f"wrote {output}: use it with --gains {output}")

@@ -1,4 +1,4 @@
-"""The list of contacts as JSON, CSV and on the terminal."""
+"""The list of contacts as JSON, CSV, a table and a sentence."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from vftcli.contacts.contact_list import Contact, ContactList
-from vftcli.outputs.grid import Column, Grid, csv_rows, terminal
+from vftcli.outputs.grid import Column, Grid, csv_rows
 from vftcli.signals.arrays import Array
-from vftcli.signals.letters import printable
 from vftcli.signals.remarks import sentence
 
 MOST_ROWS = 20
@@ -16,6 +15,9 @@ MOST_ROWS = 20
 
 ONE_AXIS = 0.8
 """A force is said to go along an axis that holds more than this share of it."""
+
+PART = 0.35
+"""An axis that holds more than this share of a force is named in its direction."""
 
 AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")
 """An axis' two directions, base axes."""
@@ -114,32 +116,10 @@ def flat(record: Mapping[str, Any]) -> dict[str, Any]:
     return row
 
 
-def contacts_text(found: ContactList, *, every: bool = False) -> str:
-    """The answer for people: a sentence, the table, what it rests on.
-
-    Args:
-        found: The list.
-        every: Whether all rows are shown, else the `MOST_ROWS` hardest.
-    """
-    lines = [f"{printable(found.recording)} · {found.duration:.1f} s", "", f"  {answer(found)}"]
-    if found.contacts:
-        shown = found.contacts if every else hardest_rows(found.contacts)
-        table = terminal(contact_grid(shown)).splitlines()
-        lines += ["", *(f"  {line}" for line in table)]
-        if len(shown) < len(found.contacts):
-            lines.append(f"  the {len(shown)} hardest of {len(found.contacts)}: --all for the rest")
-        if found.hardest is not None:
-            lines.append(
-                "  (± 95 %; force ON the robot, base axes; anywhere: over every place that fits)"
-            )
-    lines += ["", *(f"  {line}" for line in basis(found))]
-    return "\n".join(lines) + "\n"
-
-
-def hardest_rows(contacts: Sequence[Contact]) -> list[Contact]:
-    """The `MOST_ROWS` contacts with the largest force, else the most evidence, in time's order."""
+def hardest_rows(contacts: Sequence[Contact], most: int = MOST_ROWS) -> list[Contact]:
+    """So many contacts with the largest force, else the most evidence, in time's order."""
     order = sorted(contacts, key=lambda c: (c.peak_force or 0.0, c.evidence or 0.0), reverse=True)
-    return sorted(order[:MOST_ROWS], key=lambda contact: contact.start)
+    return sorted(order[:most], key=lambda contact: contact.start)
 
 
 def answer(found: ContactList) -> str:
@@ -186,7 +166,7 @@ def contact_row(contact: Contact, force: bool) -> list[str]:
     if force and contact.wrench is not None and contact.anywhere is not None:
         low, high = contact.anywhere
         row += [f"{contact.peak_force:.0f} ± {contact.peak_band:.0f}", f"{low:.0f}–{high:.0f}"]
-        row.append(direction(contact.wrench[:3]))
+        row.append(toward(contact.wrench[:3]))
     else:
         row.append(" ".join(f"{torque:.1f}" for torque in contact.joint_torque))
     return [*row, place_words(contact), contact.trust]
@@ -205,6 +185,16 @@ def direction(force: Array) -> str:
     return f"({', '.join(f'{x + 0.0:.1f}' for x in np.round(u, 1))})".replace("-", "−")
 
 
+def toward(force: Array) -> str:
+    """A force's direction in words: every axis that holds much of it, the most first."""
+    size = float(np.linalg.norm(force))
+    if size == 0.0:
+        return "–"
+    u = force / size
+    axes = [k for k in np.argsort(-np.abs(u), kind="stable").tolist() if abs(u[k]) > PART]
+    return ", ".join(AXIS_WORDS[k][int(u[k] > 0)] for k in axes)
+
+
 def place_words(contact: Contact) -> str:
     """The part of the arm, and the links where it cannot be told."""
     if contact.where != "cannot tell":
@@ -220,42 +210,6 @@ def place_words(contact: Contact) -> str:
 def free_words(found: ContactList) -> str:
     """What is known of free motion, in words; "" where nothing is."""
     return "; ".join(sentence(remark) for remark in found.free)
-
-
-def basis(found: ContactList) -> list[str]:
-    """What the list rests on: smallest force, free motion, cautions."""
-    lines = []
-    if found.smallest_force is not None and np.isfinite(found.smallest_force):
-        lines.append(f"smallest force this log can tell: {found.smallest_force:.0f} N")
-    if found.free:
-        false = found.false_on_free or "no"
-        ending = "s" if (found.false_on_free or 0) > 1 else ""
-        lines.append(
-            f"{free_words(found)}; {false} contact{ending} listed in its {found.free_seconds:.0f} s"
-        )
-    return [*lines, *(f"caution: {sentence(remark)}" for remark in found.remarks)]
-
-
-def overview(lists: Sequence[ContactList]) -> str:
-    """Several logs: one line a log."""
-    columns = (
-        Column("log", words=True),
-        Column("span"),
-        Column("contacts"),
-        Column("hardest", words=True),
-        Column("smallest"),
-    )
-    rows = [
-        (
-            found.recording,
-            f"{found.duration:.1f} s",
-            "load" if found.contacts and found.contacts[0].is_load else str(len(found.contacts)),
-            hardest_words(found),
-            None if found.smallest_force is None else f"{found.smallest_force:.0f} N",
-        )
-        for found in lists
-    ]
-    return terminal(Grid(columns=columns, rows=tuple(rows)))
 
 
 def hardest_words(found: ContactList) -> str:

@@ -29,6 +29,7 @@ from vftcli.readers.parts import refuse_arm
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
 from vftcli.readers.unrecognised import description
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
+from vftcli.signals.parsing import did_you_mean
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import warning
 
@@ -165,7 +166,9 @@ def recognise(path: str | Path) -> Reader:
 def _reader(file: LogFile, name: str | None, columns: str | None) -> Reader:
     """The reader that is named, or that the content calls for."""
     if name is not None and name not in READERS:
-        raise UnknownFormatError(f"no format {name!r}; known formats: {', '.join(READERS)}.")
+        raise UnknownFormatError(
+            f"no format {name!r}; known formats: {', '.join(READERS)}.{did_you_mean(name, READERS)}"
+        )
     reader = READERS[name] if name else _recognise(file)
     if columns is None:
         return reader

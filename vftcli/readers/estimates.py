@@ -20,17 +20,7 @@ def estimates_columns(path: Path, observer: str) -> str | None:
     Raises:
         LogError: If it is, and holds no such observer; the message lists those it holds.
     """
-    if not path.is_file():
-        return None
-    with path.open("rb") as file:
-        if file.read(4) != b"PAR1":
-            return None
-    import polars as pl
-
-    with path.open("rb") as file:  # polars cannot open a name that is not UTF-8
-        names = pl.read_parquet_schema(file)
-    held = sorted({n.split("/")[1] for n in names if n.startswith(PREFIX) and n.count("/") == 2})
-    if not held or "t" not in names or "q/1" not in names:
+    if not (held := stored_observers(path)):
         return None
     if observer not in held:
         raise LogError(
@@ -38,3 +28,35 @@ def estimates_columns(path: Path, observer: str) -> str | None:
             "with --observer."
         )
     return f"t=t,q=q/{{i}},tau_ext={PREFIX}{observer}/{{i}}"
+
+
+def stored_observers(path: Path) -> list[str]:
+    """The observers whose estimates a file holds, none if it is not one of ours."""
+    if not path.is_file():
+        return []
+    with path.open("rb") as file:
+        if file.read(4) != b"PAR1":
+            return []
+    import polars as pl
+    from polars.exceptions import PolarsError
+
+    try:
+        with path.open("rb") as file:  # polars cannot open a name that is not UTF-8
+            names = pl.read_parquet_schema(file)
+    except PolarsError:  # what is damaged is said by whoever reads it
+        return []
+    held = sorted({n.split("/")[1] for n in names if n.startswith(PREFIX) and n.count("/") == 2})
+    return held if "t" in names and "q/1" in names else []
+
+
+def refuse_estimates(path: Path) -> None:
+    """Raise where a log is needed and a file of our estimates is given.
+
+    Raises:
+        LogError: If it is one.
+    """
+    if stored_observers(path):
+        raise LogError(
+            f"{path} holds estimates, not what the drives measured; give the log. `vftcli "
+            "contacts` lists its contacts and `vftcli admit` replays its force as they are"
+        )

@@ -59,7 +59,8 @@ def arm_of(
         raise LogError(
             f"{path}: holds two arms{where}; say which with --arm {' or --arm '.join(arms)}."
         )
-    return arms[0], (caution("arm-side-taken", arm=arms[0], other=arms[1], places=told or "by name"),)
+    taken = caution("arm-side-taken", arm=arms[0], other=arms[1], places=told or "by name")
+    return arms[0], (taken,)
 
 
 def refuse_arm(path: Path | str, request: ReadChoice) -> None:

@@ -7,6 +7,7 @@ from vftcli.robots.chain import Chain, Payload
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import DESCRIPTIONS
 from vftcli.signals.errors import RobotError
+from vftcli.signals.parsing import did_you_mean
 
 MAKERS = {
     "Universal Robots": (
@@ -27,6 +28,23 @@ PROFILES: dict[str, Path] = {
     for name in names
 }
 """Built-in profile name → its file."""
+
+
+def plain_name(word: str) -> str:
+    """How a robot's name is written here: ``UR-5e``, ``ur_5e`` and ``UR 5e`` are ``ur5e``."""
+    return "".join(letter for letter in word.lower() if letter not in "-_ ")
+
+
+def same_model(name: str) -> list[str]:
+    """The profiles that a misspelt name can mean: never another arm, as ur5e for ur5.
+
+    What tells arms of one maker apart are the digits and what follows them.
+    """
+
+    def model(text: str) -> str:
+        return plain_name(text).lstrip("abcdefghijklmnopqrstuvwxyz")
+
+    return [profile for profile in PROFILES if model(profile) == model(name)]
 
 
 def load_robot(robot: str | Path, *, tip: str = "", arguments: Sequence[str] = ()) -> Robot:
@@ -54,14 +72,9 @@ def load_robot(robot: str | Path, *, tip: str = "", arguments: Sequence[str] = (
 
         return load_described(path, tip, arguments)
     raise RobotError(
-        f"no robot {str(robot)!r}. Built in: {', '.join(PROFILES)}; "
-        "or give a FILE.toml or FILE.urdf"
+        f"no robot {str(robot)!r}.{did_you_mean(str(robot), same_model(str(robot)))} "
+        f"Built in: {', '.join(PROFILES)}; or give a FILE.toml or FILE.urdf"
     )
-
-
-def plain_name(word: str) -> str:
-    """How a robot's name is written here: ``UR-5e``, ``ur_5e`` and ``UR 5e`` are ``ur5e``."""
-    return "".join(letter for letter in word.lower() if letter not in "-_ ")
 
 
 __all__ = [

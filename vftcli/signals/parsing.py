@@ -7,17 +7,28 @@ from typing import Any
 
 from vftcli.signals.errors import ParameterError
 
+LIKE = 0.74
+"""Share of two words' letters that must agree in order: one slip in four letters, two in eight."""
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """The known name nearest to a word, "" where none is near."""
+    names = {name.lower(): name for name in known}
+    close = get_close_matches(word.lower(), names, n=1, cutoff=LIKE)
+    return names[close[0]] if close else ""
+
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """The known name nearest to a word, as a question behind a blank; "" where none is near."""
-    close = get_close_matches(word, list(known), n=1)
-    return f" Did you mean {close[0]}?" if close else ""
+    close = nearest(word, known)
+    return f" Did you mean {close}?" if close else ""
 
 
 def check_known(word: str, known: Iterable[str], complaint: str) -> None:
     """Raise a ParameterError of the complaint and of what there is unless a word is known."""
     if word not in (there := list(known)):
-        raise ParameterError(f"{complaint}; there is {', '.join(there)}")
+        near = did_you_mean(word, there)
+        raise ParameterError(f"{complaint}; there is {', '.join(there)}{'.' * bool(near)}{near}")
 
 
 def interval(text: str) -> tuple[float, float]:

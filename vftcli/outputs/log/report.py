@@ -1,9 +1,10 @@
 """What `vftcli report` writes: page, recording, estimates, errors and run.json in one folder."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from vftcli.analysis import Analysis
@@ -34,6 +35,9 @@ CONTACTS = ("contacts.json", "contacts.csv")
 FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *CONTACTS, *ERROR_TABLES)
 """What a report of one log may hold; the error tables only where there is a reference."""
 
+SUMMARY_FILES = ("index.html", SEAL, *ERROR_TABLES)
+"""What stands above the sub-folders of several logs."""
+
 
 def places_of(labels: Sequence[str]) -> list[str]:
     """The sub-folder of each of several logs: called as its file without the ending."""
@@ -46,7 +50,7 @@ def report_files(labels: Sequence[str], extras: Sequence[str] = ()) -> list[str]
     if len(labels) == 1:
         return own
     below = [f"{place}/{name}" for place in places_of(labels) for name in own]
-    return ["index.html", SEAL, *CONTACTS, *ERROR_TABLES, *below]
+    return [*SUMMARY_FILES, *below]
 
 
 def write_report(
@@ -77,8 +81,17 @@ def write_reports(
     command: str,
     force: bool = False,
     extras: Sequence[str] = (),
+    failed: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Write one sub-folder a log, and above them an index, all errors in one, and run.json.
+
+    Args:
+        path: The folder.
+        analyses: The logs that could be analysed.
+        command: The command line as the user typed it.
+        force: Whether files that are there may be replaced.
+        extras: What else is written of each log, names of `estimates.extra_files`.
+        failed: Why each of the other logs could not be, by its label.
 
     Returns:
         The texts of the logs' own `run.json`, as one JSON array.
@@ -101,7 +114,11 @@ def write_reports(
         put_errors(folder, "", together, analyses)
         put_contacts(folder, "", analyses)
         logs = dict(zip(places, labels, strict=True))
-        seal(folder, SEAL, {"command": command, "versions": versions(), "logs": logs})
+        seal(
+            folder,
+            SEAL,
+            {"command": command, "versions": versions(), "logs": logs, "left_out": dict(failed)},
+        )
         return "[\n" + ",\n".join(record.rstrip("\n") for record in records) + "\n]\n"
 
 

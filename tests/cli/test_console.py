@@ -1,0 +1,163 @@
+"""How much is said and to whom: -v, -q, colours, stages; a bad log of several is left out."""
+
+import csv
+import io
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from vftcli.cli.console import LeftOut, canvas, detail, say, show, speaking
+from vftcli.cli.progress import Stages
+from vftcli.readers.library import Library
+from vftcli.signals.errors import ParameterError
+
+Run = Callable[..., tuple[int, str, str]]
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+TAPS = FIXTURES / "ur5_taps_ur_rtde.csv"
+TRUTH = f"file:{TAPS}.truth.parquet"
+OTHER = FIXTURES / "panda_bag"
+
+
+def test_what_is_said_depends_on_what_is_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    def said(**asked: bool) -> tuple[str, str]:
+        with speaking(**asked):
+            say("usual")
+            detail("more")
+            show("result")
+        out, err = capsys.readouterr()
+        return out, err
+
+    assert said(details=False, quiet=False) == ("result\n", "usual\n")
+    assert said(details=True, quiet=False) == ("result\n", "usual\nmore\n")
+    assert said(details=False, quiet=True) == ("", "")
+    with pytest.raises(Exception, match="choose one of --details, --quiet"):
+        said(details=True, quiet=True)
+
+
+class Terminal(io.StringIO):
+    """Standard output that is a terminal."""
+
+    encoding = "utf-8"
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(
+    ("variables", "colour"),
+    [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)],
+)
+def test_colours_are_for_terminals_that_want_them(
+    monkeypatch: pytest.MonkeyPatch, variables: dict[str, str], colour: bool
+) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr("sys.stdout", Terminal())
+    assert canvas().colour is colour
+    monkeypatch.setattr("sys.stdout", io.StringIO())
+    assert not canvas().colour
+
+
+def test_letters_are_those_of_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    ascii_only = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr("sys.stdout", ascii_only)
+    assert not canvas().unicode
+
+
+def test_a_stage_is_shown_only_once_it_takes_long(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr("vftcli.cli.progress.time.monotonic", lambda: now[0])
+    stages = Stages()
+    stages.begin("reading")
+    assert capsys.readouterr().err == ""
+    now[0] = 1.5
+    stages.begin("running observers")
+    assert "running observers" in capsys.readouterr().err
+    stages.end()
+    assert capsys.readouterr().err.strip() == ""
+
+
+def test_of_a_single_log_the_error_is_the_commands_own() -> None:
+    library = Library(["a.csv"])
+    with pytest.raises(ParameterError):
+        LeftOut(library, [Path("a.csv")]).told(Path("a.csv"), ParameterError("no"))
+
+
+@pytest.fixture
+def logs(tmp_path: Path) -> tuple[Path, Path]:
+    """Two logs, of which the second is none."""
+    good, bad = tmp_path / "good.csv", tmp_path / "bad.csv"
+    shutil.copy(TAPS, good)
+    bad.write_text("# no log\n")
+    return good, bad
+
+
+def test_a_report_writes_the_others_and_fails(
+    logs: tuple[Path, Path], tmp_path: Path, run: Run
+) -> None:
+    out = tmp_path / "out"
+    code, stdout, err = run("report", *logs, "--robot", "ur5", "-o", out)
+    assert code == 1
+    assert "error: bad.csv left out: " in err
+    assert err.count("error: ") == 1
+    assert (out / "good" / "index.html").exists()
+    assert not (out / "bad").exists()
+    assert "✗ left out" in stdout
+    record = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    assert list(record["left_out"]) == ["bad.csv"]
+    assert list(record["logs"]) == ["good"]
+
+
+def test_lists_and_tables_show_the_others_and_fail(logs: tuple[Path, Path], run: Run) -> None:
+    words = (*logs, "--robot", "ur5")
+    code, out, _ = run("contacts", *words, "--json")
+    assert code == 1
+    assert [record["recording"] for record in json.loads(out)] == ["good.csv"]
+    code, out, _ = run("compare", *words, "--observer", "gmo", "--reference", TRUTH, "--csv")
+    assert code == 1
+    rows = csv.DictReader(io.StringIO(out))
+    assert {row["recording"] for row in rows} == {"good.csv"}
+
+
+def test_if_all_are_bad_nothing_is_written(tmp_path: Path, run: Run) -> None:
+    bad = [tmp_path / name for name in ("one.csv", "two.csv")]
+    for path in bad:
+        path.write_text("# no log\n")
+    out = tmp_path / "out"
+    for words in (("report", "-o", out), ("contacts",), ("compare", "--reference", "zero")):
+        name, *options = words
+        code, stdout, err = run(name, *bad, *options)
+        assert (code, stdout) == (1, "")
+        assert "none of the logs can be analysed" in err
+    assert not out.exists()
+
+
+def test_each_log_has_the_robot_that_it_settles_itself(run: Run) -> None:
+    code, out, _ = run("contacts", TAPS, OTHER)
+    assert code == 0
+    assert out.startswith("2 logs · ur5 and panda")
+
+
+def test_quiet_prints_errors_only_and_tables_that_are_asked_for(tmp_path: Path, run: Run) -> None:
+    words = ("--robot", "ur5", "--observer", "gmo", "-q")
+    assert run("estimate", TAPS, *words, "-o", tmp_path / "out") == (0, "", "")
+    code, out, err = run("compare", TAPS, *words, "--reference", TRUTH)
+    assert (code, err) == (0, "")
+    assert "gmo" in out
+
+
+def test_details_say_everything_that_is_known(tmp_path: Path, run: Run) -> None:
+    words = ("estimate", TAPS, "--robot", "ur5", "--observer", "gmo")
+    _, short, usual = run(*words, "-o", tmp_path / "one")
+    _, same, details = run(*words, "-o", tmp_path / "two", "-v")
+    assert "note: " not in usual
+    assert "note: " in details
+    assert short.splitlines()[:2] == same.splitlines()[:2]

@@ -1,0 +1,177 @@
+"""One screen: facts, answer, bars, table, whether it can be believed, what was written."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from contact_rows import contact, contact_list
+
+from vftcli.analysis import Analysis
+from vftcli.outputs.canvas import Canvas
+from vftcli.outputs.log.rmse_tables import blocks
+from vftcli.outputs.screen import (
+    MOST_LINES,
+    against,
+    facts,
+    log_screen,
+    logs_screen,
+    mean_errors,
+    mean_of,
+    short_screen,
+    written_lines,
+)
+from vftcli.signals.remarks import caution, fact, warning
+
+CANVAS = Canvas(width=80)
+
+
+def many(count: int) -> tuple:  # type: ignore[type-arg]
+    """So many contacts within the fixture's log, the first the hardest."""
+    times = np.linspace(0.2, 4.5, count)
+    return tuple(
+        contact(number=k + 1, start=t, stop=t + 0.05, peak=t + 0.02, peak_force=90.0 - k)
+        for k, t in enumerate(times)
+    )
+
+
+def listed(analysis: Analysis, count: int) -> Analysis:
+    return replace(analysis, contacts=contact_list(*many(count), remarks=()))
+
+
+def test_the_answer_stands_first_and_everything_on_one_screen(analysis: Analysis) -> None:
+    text = log_screen(listed(analysis, 4), CANVAS, ["out/  index.html", "Open: out/index.html"])
+    lines = text.splitlines()
+    assert len(lines) <= MOST_LINES
+    assert "· ur5" in lines[0]
+    assert lines[2].strip().startswith("4 contacts. The hardest, at ")
+    order = ["┤", "from – to [s]", "else: ", "Can it be believed?", "Against vendor", "out/  "]
+    assert [text.index(word) for word in order] == sorted(text.index(word) for word in order)
+    assert "the others" in text or "the paper's gains" in text
+    assert "\x1b" not in text
+
+
+@pytest.mark.parametrize("count", [0, 1, 12, 20, 60])
+def test_never_more_than_forty_lines(analysis: Analysis, count: int) -> None:
+    odd = [warning("saturation", signal="current") for _ in range(6)]
+    (own, *_) = analysis.examinations
+    troubled = replace(own, findings=tuple(odd))
+    for made in (analysis, replace(analysis, examinations=(troubled,))):
+        text = log_screen(listed(made, count), CANVAS, ["out/  index.html", "Open: out"])
+        assert len(text.splitlines()) <= MOST_LINES
+    assert len(log_screen(listed(analysis, 60), CANVAS, every=True).splitlines()) > MOST_LINES
+
+
+def test_the_hardest_are_shown_in_the_order_of_time(analysis: Analysis) -> None:
+    text = log_screen(listed(analysis, 60), CANVAS)
+    rows = [line.split()[0] for line in text.splitlines() if line.rstrip().endswith("good")]
+    assert rows == [str(k + 1) for k in range(len(rows))]
+    assert f"the {len(rows)} hardest of 60; --details shows all" in text
+
+
+def test_a_name_that_a_terminal_would_obey_is_shown_as_it_is(analysis: Analysis, as_if) -> None:  # type: ignore[no-untyped-def]
+    source = replace(analysis.recording.source, label="\x1b[31mred.csv")
+    made = as_if(analysis, replace(analysis.recording, source=source))
+    assert "\x1b" not in facts(made)
+    assert "\x1b" not in log_screen(listed(made, 3), CANVAS)
+
+
+def test_ascii_terminals_get_ascii(analysis: Analysis) -> None:
+    text = log_screen(listed(analysis, 3), Canvas(unicode=False))
+    assert text.isascii()
+    assert "+/-" in text
+
+
+def test_colours_paint_and_change_no_letter(analysis: Analysis) -> None:
+    import re
+
+    painted = log_screen(listed(analysis, 3), Canvas(colour=True))
+    assert "\x1b[32m" in painted
+    assert re.sub(r"\x1b\[\d+m", "", painted) == log_screen(listed(analysis, 3), Canvas())
+
+
+def test_a_load_has_no_rest(analysis: Analysis) -> None:
+    load = contact(start=0.5, stop=4.0, is_load=True, peak_force=27.0)
+    found = contact_list(load, remarks=(caution("contact-is-load"),))
+    text = log_screen(replace(analysis, contacts=found), CANVAS)
+    assert "A load, or a wrong payload" in text
+    assert "else: " not in text
+    assert "--find-payload" in text
+
+
+def test_against_tells_the_lead_the_others_and_the_floor(analysis: Analysis) -> None:
+    (block,) = blocks(analysis.errors)
+    means = mean_errors(block)
+    text = against(block, analysis)
+    assert text.startswith("Against vendor (floor 0.50): ")
+    assert f"({next(iter(means))})" in text
+    # Means of the joints, by hand from the tidy table.
+    rows = analysis.errors.filter(analysis.errors["observer"] == "best")
+    assert means["best"] == pytest.approx(rows["rmse_Nm"].mean())
+    paper = replace(analysis, remarks=(fact("paper-gains-measured"),))
+    assert "the paper's gains" in against(block, paper)
+    assert np.isnan(mean_of(np.array([np.nan])))
+
+
+def test_results_made_anyway_say_so(analysis: Analysis) -> None:
+    (own, *_) = analysis.examinations
+    bad = warning("effort-sign", signal="current", misfit_percent=190.0, healed_percent=3.0,
+                  column="current", width=6)  # fmt: skip
+    made = replace(analysis, examinations=(replace(own, findings=(bad,)),))
+    assert "MEANINGLESS unless this is wrong (--anyway): effort-sign" in log_screen(made, CANVAS)
+    assert "MEANINGLESS" in short_screen(made, [], CANVAS)
+
+
+def test_the_short_screen_is_facts_answer_and_files(without_reference: Analysis) -> None:
+    text = short_screen(listed(without_reference, 2), ["out/  run.json"], CANVAS)
+    assert len(text.splitlines()) == 3
+    assert "2 contacts" in text
+    assert text.endswith("out/  run.json\n")
+
+
+def test_only_paths_that_exist_are_printed(tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text("{}")
+    lines = written_lines(tmp_path, ["index.html", "run.json"], Canvas(width=100))
+    assert "run.json" in "".join(lines)
+    assert "index.html" not in "".join(lines)
+    (tmp_path / "index.html").write_text("")
+    lines = written_lines(tmp_path, ["index.html"], Canvas(width=100), several=True)
+    assert "one folder a log" in " ".join(lines)
+    assert any(line.startswith("Open: ") for line in lines)
+
+
+def named(analysis: Analysis, label: str, as_if, count: int = 1) -> Analysis:  # type: ignore[no-untyped-def]
+    source = replace(analysis.recording.source, label=label, remarks=())
+    made: Analysis = as_if(analysis, replace(analysis.recording, source=source))
+    return listed(made, count)
+
+
+def test_several_logs_are_a_line_each_then_the_worst_three(
+    without_reference: Analysis, as_if
+) -> None:  # type: ignore[no-untyped-def]
+    logs = [named(without_reference, f"log{k}.csv", as_if, k) for k in range(4)]
+    load = warning("light-load", load_kg=1.2, sd_kg=0.1, robot="ur5")
+    (own, *_) = without_reference.examinations
+    logs[2] = replace(logs[2], examinations=(replace(own, findings=(load,)),))
+    text = logs_screen(logs, CANVAS, {"bad.csv": "not recognised"}, ["many/  index.html"])
+    lines = text.splitlines()
+    assert lines[0] == "5 logs · ur5 · 1 left out"
+    assert lines[2].split() == ["log", "span", "contacts", "hardest", "else", "health"]
+    assert lines[5].endswith("✗ load")
+    assert lines[7].split() == ["bad.csv", "✗", "left", "out"]
+    believed = text.partition("Can it be believed?")[2]
+    assert believed.strip().startswith("✗ log2.csv: load")
+    assert lines[-1] == "many/  index.html"
+
+
+def test_a_hundred_logs_are_one_screen(without_reference: Analysis, as_if) -> None:  # type: ignore[no-untyped-def]
+    logs = [named(without_reference, f"log{k}.csv", as_if) for k in range(100)]
+    text = logs_screen(logs, CANVAS, {}, ["many/  index.html", "Open: many/index.html"])
+    assert len(text.splitlines()) <= MOST_LINES
+    assert "of 100; --details shows all" in text
+
+
+def test_several_logs_tell_their_errors_where_there_is_a_reference(analysis: Analysis) -> None:
+    text = logs_screen([listed(analysis, 1), listed(analysis, 1)], CANVAS, {})
+    assert "error" in text
+    assert "N·m" in text

@@ -1,0 +1,231 @@
+"""What `--help` shows: options in groups, commands by what one sets out to do, and topics.
+
+Nothing here loads more than the command line itself, so that help comes at once.
+"""
+
+import shutil
+import textwrap
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup, TyperOption
+
+from vftcli.cli.bundles import SELDOM
+from vftcli.cli.commands import COMMANDS
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import did_you_mean, nearest
+
+LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
+    "The log", "How to estimate", "How to compare", "The wrench", "What to write", "Output"
+)  # fmt: skip
+"""Headings of the options that commands share, in their order."""
+
+OWN = "This command"
+"""Heading of the options that only one command has."""
+
+NARROWEST, WIDEST, LEFT = 72, 100, 33
+"""Columns of a help text, and of its left half at most."""
+
+SHORT = 3
+"""Lines of a paragraph that the short help shows."""
+
+TOPICS = Path(__file__).parent / "topics.toml"
+"""Topic → its summary and its text."""
+
+
+class GroupedCommand(TyperCommand):
+    """A command whose `--help` shows the options wanted most, in groups, and `--help-all` all."""
+
+    def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - typer carries its own click
+        """The command's parameters, and `--help-all`."""
+        return [*super().get_params(ctx), help_all()]
+
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
+        """Parse the words; of an option that there is not, name the nearest if it is near."""
+        try:
+            return super().parse_args(ctx, args)
+        except Exception as error:
+            if found := getattr(error, "possibilities", None):
+                near = nearest(getattr(error, "option_name", ""), found)
+                vars(error)["possibilities"] = [near] if near else None
+            raise
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
+        """Write the short help."""
+        formatter.write(command_help(ctx, every=False))
+
+
+class JourneyGroup(TyperGroup):
+    """The program: its `--help` lists the commands by what one sets out to do."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
+        """Write the list of commands."""
+        formatter.write(program_help(self, ctx))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
+        """The command that is asked for; of one that there is not, the nearest if it is near."""
+        if args and not args[0].startswith("-") and args[0] not in self.commands:
+            ctx.fail(f"No such command '{args[0]}'.{did_you_mean(args[0], self.commands)}")
+        return super().resolve_command(ctx, args)
+
+
+def help_all() -> TyperOption:
+    """The option that shows every other."""
+    return TyperOption(
+        param_decls=["--help-all"],
+        is_flag=True,
+        is_eager=True,
+        expose_value=False,
+        callback=show_all,
+        help="Show every option.",
+        type=bool,
+        default=False,
+    )
+
+
+def show_all(ctx: Any, _param: Any, asked: bool) -> None:  # noqa: ANN401
+    """Print the help of every option and stop."""
+    if asked and not ctx.resilient_parsing:
+        typer.echo(command_help(ctx, every=True), nl=False)
+        ctx.exit()
+
+
+def columns() -> int:
+    """Width of a help text."""
+    return min(max(shutil.get_terminal_size().columns, NARROWEST), WIDEST)
+
+
+def command_help(ctx: Any, *, every: bool) -> str:  # noqa: ANN401
+    """The help of a command: how it is called, what it does, its options by group.
+
+    Args:
+        ctx: typer's context of the call.
+        every: Whether all options are shown and in full, or those wanted most in a sentence each.
+    """
+    command, width = ctx.command, columns()
+    usage = " ".join(["Usage:", ctx.command_path, *command.collect_usage_pieces(ctx)])
+    paragraphs = [" ".join(p.split()) for p in (command.help or "").split("\n\n")]
+    lines = [usage, ""]
+    for k, paragraph in enumerate(paragraphs):
+        wrapped = textwrap.wrap(paragraph, width)
+        # What it is and an example always; what takes long to say only in full.
+        if every or k in {0, len(paragraphs) - 1} or len(wrapped) <= SHORT:
+            lines += wrapped
+    for group, rows in grouped(command.get_params(ctx), ctx, every=every):
+        lines += ["", group] if every else [group + ":"]
+        lines += list(two_columns(rows, width))
+    if not every and any(is_seldom(p) for p in command.get_params(ctx)):
+        lines.append("Further options: --help-all. Topics: vftcli help")
+    return "\n".join(lines) + "\n"
+
+
+def grouped(
+    params: Iterable[Any],
+    ctx: Any,  # noqa: ANN401
+    *,
+    every: bool,
+) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+    """The options of each heading that has any, as they are typed and what they mean."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for param in params:
+        if (record := row_of(param, ctx)) is None or (is_seldom(param) and not every):
+            continue
+        text = record[1] if every else first_sentence(record[1])
+        found.setdefault(group_of(param), []).append((record[0], text))
+    others = [group for group in found if group not in GROUPS]
+    for group in (LOG, *others, *GROUPS[1:]):
+        if group in found:
+            yield group, found[group]
+
+
+def row_of(param: Any, ctx: Any) -> tuple[str, str] | None:  # noqa: ANN401
+    """How a parameter is typed, and what it means; None for one that is hidden."""
+    if param.param_type_name == "argument":
+        return (param.metavar or param.name.upper(), param.help) if param.help else None
+    record: tuple[str, str] | None = param.get_help_record(ctx)
+    return record
+
+
+def is_seldom(param: Any) -> bool:  # noqa: ANN401
+    """Whether only `--help-all` shows an option."""
+    return str(getattr(param, "rich_help_panel", None) or "").endswith(SELDOM)
+
+
+def group_of(param: Any) -> str:  # noqa: ANN401
+    """The heading under which an option stands."""
+    if param.name in {"help", "help_all"}:
+        return OUTPUT
+    if param.param_type_name == "argument":
+        return LOG
+    return str(param.rich_help_panel or "").removesuffix(SELDOM) or OWN
+
+
+def first_sentence(text: str) -> str:
+    """The first sentence of a text, and what stands in brackets at its end."""
+    head, _, rest = text.partition(". ")
+    required = "  [required]" if rest.endswith("[required]") else ""
+    return head.rstrip(".") + required
+
+
+def two_columns(rows: Sequence[tuple[str, str]], width: int) -> Iterator[str]:
+    """What is typed to the left, what it means to the right, wrapped."""
+    left = min(max(len(typed) for typed, _ in rows), LEFT)
+    for typed, meaning in rows:
+        lines = textwrap.wrap(meaning, width - left - 4) or [""]
+        if len(typed) > left:
+            yield f"  {typed}"
+        else:
+            yield f"  {typed:<{left}}  {lines.pop(0)}".rstrip()
+        yield from (f"{'':{left + 4}}{line}" for line in lines)
+
+
+def program_help(group: Any, ctx: Any) -> str:  # noqa: ANN401
+    """The commands by what one sets out to do, one line each; then the program's options."""
+    width = columns()
+    lines = ["Usage: vftcli COMMAND LOG… [OPTIONS]", "", *textwrap.wrap(group.help or "", width)]
+    left = max(map(len, group.commands))
+    for journey in dict.fromkeys(command.journey for command in COMMANDS.values()):
+        lines += ["", journey]
+        for name, command in COMMANDS.items():
+            if command.journey == journey:
+                text = f"  {name:<{left}}  {command.summary}"
+                lines += textwrap.wrap(text, width, subsequent_indent=" " * (left + 4))
+    shown = (p for p in group.get_params(ctx) if p.name != "show_completion")
+    rows = [row for p in shown if (row := row_of(p, ctx)) is not None]
+    return "\n".join([*lines, "", *two_columns(rows, width)]) + "\n"
+
+
+@cache
+def topics() -> Mapping[str, Mapping[str, str]]:
+    """Every topic: its summary and its text."""
+    return tomllib.loads(TOPICS.read_text(encoding="utf-8"))
+
+
+def show_help(
+    ctx: typer.Context,
+    topic: Annotated[
+        str | None, typer.Argument(metavar="[TOPIC]", help="A topic or a command; none: the list.")
+    ] = None,
+) -> None:
+    """Explain a topic, as columns or frames, or a command.
+
+    Example: vftcli help columns
+    """
+    found = topics()
+    if topic is None:
+        lines = [f"  {name:<10} {entry['summary']}" for name, entry in found.items()]
+        typer.echo("\n".join(["vftcli help TOPIC, of", *lines, "or of a command's name."]))
+    elif topic in found:
+        typer.echo(found[topic]["text"].rstrip())
+    elif topic in COMMANDS:
+        root: Any = ctx.find_root()
+        command = root.command.commands[topic]
+        of_command = command.make_context(topic, [], parent=root, resilient_parsing=True)
+        typer.echo(command.get_help(of_command))
+    else:
+        near = did_you_mean(topic, [*found, *COMMANDS])
+        raise ParameterError(f"no topic {topic!r}; there is {', '.join(found)}.{near}")

@@ -1,0 +1,59 @@
+"""Canvas: what a terminal can show, and text that fits it."""
+
+import textwrap
+from typing import NamedTuple, Self
+
+NARROWEST, WIDEST = 72, 100
+"""Columns that a screen uses at least, and at most."""
+
+STYLES = {"good": "32", "caution": "33", "bad": "31", "unknown": "2", "bold": "1", "bar": "36"}
+"""Style → ANSI code."""
+
+PLAIN = {
+    "·": "-", "–": "-", "−": "-", "…": "...", "±": "+/-", "≤": "<=", "→": "->", "°": " deg",
+    "✓": "+", "△": "!", "✗": "x", "┤": "|", "ω": "w", "τ": "tau", "×": "x", "≥": ">=", "√": "sqrt",
+    "₃": "3", "²": "2", "≈": "~", "’": "'",
+}  # fmt: skip
+"""What stands for a letter where a terminal has ASCII only."""
+
+
+class Canvas(NamedTuple):
+    """What a terminal can show.
+
+    Attributes:
+        width: Columns that are used.
+        unicode: Whether it has more letters than ASCII.
+        colour: Whether it has colours.
+    """
+
+    width: int = 80
+    unicode: bool = True
+    colour: bool = False
+
+    @classmethod
+    def of(cls, *, columns: int, unicode: bool, colour: bool) -> Self:
+        """The canvas of a terminal with so many columns."""
+        return cls(min(max(columns, NARROWEST), WIDEST), unicode, colour)
+
+    def painted(self, text: str, style: str) -> str:
+        """A text in a style, as it is where there are no colours."""
+        return f"\x1b[{STYLES[style]}m{text}\x1b[0m" if self.colour and text else text
+
+    def shown(self, text: str) -> str:
+        """A text in letters that the terminal has."""
+        if self.unicode:
+            return text
+        plain = "".join(PLAIN.get(letter, letter) for letter in text)
+        return plain.encode("ascii", "replace").decode()
+
+    def wrapped(self, text: str, indent: int, lines: int | None = None) -> list[str]:
+        """A text in lines behind an indent, cut behind so many of them; the first has none."""
+        found = textwrap.wrap(
+            text,
+            self.width - indent,
+            max_lines=lines,
+            placeholder=" …",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        return [line if k == 0 else " " * indent + line for k, line in enumerate(found or [""])]

@@ -1,0 +1,382 @@
+"""What a command shows of its logs on the terminal: the answer on one screen.
+
+Facts, the answer in a sentence, |F| over time, the contacts, whether it can be believed, the errors
+against a reference, and what was written: forty lines at most, whatever the number of logs.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import ContactList
+from vftcli.outputs.believability import (
+    MARKS,
+    SEVERITY,
+    Ground,
+    grounds,
+    headline,
+    health,
+    otherwise,
+    own_match,
+    percent_words,
+)
+from vftcli.outputs.canvas import Canvas
+from vftcli.outputs.contacts import MOST_ROWS, answer, contact_grid, hardest_rows, hardest_words
+from vftcli.outputs.force_bars import force_bars, force_course
+from vftcli.outputs.grid import Column, Grid, significant, terminal
+from vftcli.outputs.log.rmse_tables import Block, blocks
+from vftcli.outputs.log.wrench_tables import contact_grids
+from vftcli.signals.letters import printable
+from vftcli.signals.remarks import sentence
+
+MOST_LINES = 40
+"""Lines of a screen."""
+
+FORMS = ((None, None), (2, 20), (1, 20), *((0, rows) for rows in range(20, 2, -1)))
+"""Lines of a ground and rows of the table, None for all; then less and less, till it fits.
+
+With none, the good grounds share a line and the others have one each.
+"""
+
+MOST_LOGS, WORST = 20, 3
+"""Logs that are shown at most, findings below them."""
+
+SUBJECT = 17
+"""Columns of what a ground is about."""
+
+MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
+"""Remarks that the other observers run on the paper's gains."""
+
+LEGEND = "± 95 %; force ON the robot, base axes; anywhere: over every place that fits"
+
+
+def log_screen(
+    analysis: Analysis, canvas: Canvas, below: Sequence[str] = (), *, every: bool = False
+) -> str:
+    """The screen of one log.
+
+    Args:
+        analysis: What was found.
+        canvas: What the terminal can show.
+        below: Lines on what was written.
+        every: Whether everything is shown, however long.
+    """
+    head = [canvas.painted(facts(analysis), "bold"), "", *answer_lines(analysis, canvas)]
+    bars, found = bar_lines(analysis, canvas), grounds(analysis)
+    tail = [*doubt_lines(analysis), *against_lines(analysis, canvas)]
+    text = ""
+    for each, rows in FORMS[:1] if every else FORMS[1:]:
+        believed, table = belief_lines(found, canvas, each), table_lines(analysis, rows)
+        parts = [part for part in (head, bars, table, [*believed, *tail], list(below)) if part]
+        text = "\n\n".join("\n".join(block) for block in parts) + "\n"
+        if text.count("\n") <= MOST_LINES:
+            break
+    return canvas.shown(text)
+
+
+def short_screen(analysis: Analysis, below: Sequence[str], canvas: Canvas) -> str:
+    """Facts, the answer and what was written."""
+    head = canvas.painted(facts(analysis), "bold")
+    lines = [head, *answer_lines(analysis, canvas), *doubt_lines(analysis), *below]
+    return canvas.shown("\n".join(lines)) + "\n"
+
+
+def list_screen(found: ContactList, canvas: Canvas, *, every: bool = False) -> str:
+    """A list that was made earlier: its log, the answer, the rows."""
+    head = f"{printable(found.recording)} · {found.duration:.1f} s · as listed when it was written"
+    lines = [canvas.painted(head, "bold"), "", f"  {answer(found)}", ""]
+    rows = list_lines(found, None if every else MOST_ROWS)
+    end = "Whether it can be believed, and |F| over time: vftcli contacts on the log itself"
+    return canvas.shown("\n".join([*lines, *rows, "", end])) + "\n"
+
+
+def answer_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
+    """The answer in a sentence."""
+    return [f"  {line}" for line in canvas.wrapped(printable(headline(analysis)), 2)]
+
+
+def facts(analysis: Analysis) -> str:
+    """Which log, which arm and how well it fits, how long, how fast."""
+    recording, match = analysis.recording, own_match(analysis)
+    fit = f" (fits {percent_words(match.misfit)})" if match is not None else ""
+    rate = f" at {1.0 / recording.median_step:.3g} Hz" if recording.samples > 1 else ""
+    span = f"{recording.duration:.1f} s{rate}"
+    return " · ".join((printable(recording.name), f"{printable(analysis.robot.name)}{fit}", span))
+
+
+def bar_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
+    """|F| over time, none where no force is listed."""
+    course = force_course(analysis)
+    if course is None or analysis.contacts is None:
+        return []
+    contacts = analysis.contacts.contacts
+    shown = [] if contacts[0].is_load else hardest_rows(contacts)
+    return force_bars(course, shown, canvas)
+
+
+def table_lines(analysis: Analysis, most: int | None) -> list[str]:
+    """The contacts, the hardest of them where they are many, and what can be said of the rest.
+
+    Args:
+        analysis: What was found.
+        most: Rows that are shown at most, None for all.
+    """
+    return [] if analysis.contacts is None else list_lines(analysis.contacts, most)
+
+
+def list_lines(found: ContactList, most: int | None) -> list[str]:
+    """The rows of a list, and what can be said of the rest of its log."""
+    contacts, rest = found.contacts, otherwise(found)
+    if not contacts:
+        return [f"  {rest}"] if rest else []
+    shown = hardest_rows(contacts, len(contacts) if most is None else most)
+    lines = [f"  {line}" for line in terminal(contact_grid(shown)).splitlines()]
+    if len(shown) < len(contacts):
+        lines.append(f"  the {len(shown)} hardest of {len(contacts)}; --details shows all")
+    if rest:
+        lines.append(f"  {rest}")
+    if found.hardest is not None:
+        lines.append(f"  ({LEGEND})")
+    return lines
+
+
+def belief_lines(found: Sequence[Ground], canvas: Canvas, most: int | None) -> list[str]:
+    """Whether it can be believed: some lines a ground, one if it is good; its remedy below."""
+    lines = ["Can it be believed?"]
+    good = [ground for ground in found if ground.standing == "good"]
+    if most == 0 and len(good) > 1:
+        mark = canvas.painted(canvas.shown(good[0].mark), "good")
+        lines.append(f"  {mark} {' · '.join(dict.fromkeys(g.subject for g in good))}")
+        found = [ground for ground in found if ground not in good]
+    for ground in found:
+        short = most is not None and (most == 0 or ground.standing == "good")
+        lines += ground_lines(ground, canvas, 1 if short else most)
+    return lines
+
+
+def ground_lines(
+    ground: Ground, canvas: Canvas, most: int | None, about: str = ""
+) -> Iterator[str]:
+    """One ground: its mark, what it is about, what is known of it; then its remedy.
+
+    Args:
+        ground: It.
+        canvas: What the terminal can show.
+        most: Lines that its sentence may take, None for all.
+        about: The log, where there are several.
+    """
+    subject = f"{about}: {ground.subject}" if about else ground.subject
+    indent = SUBJECT + 5
+    first, *more = canvas.wrapped(printable(ground.sentence), indent, most)
+    mark = canvas.painted(canvas.shown(ground.mark), ground.standing)
+    if len(subject) > SUBJECT:
+        yield f"  {mark} {printable(subject)}"
+        yield f"{'':{indent}}{first}"
+    else:
+        yield f"  {mark} {subject:<{SUBJECT}} {first}"
+    yield from more
+    if ground.remedy:
+        # A command is not broken into lines: it is there to be copied.
+        room = indent if indent + len(ground.remedy) <= canvas.width else 4
+        yield f"{'':{room}}{printable(ground.remedy)}"
+
+
+def against_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
+    """The errors against a reference on one line, and beside a printed table on another."""
+    if analysis.errors is None:
+        return []
+    first = [against(block, analysis) for block in blocks(analysis.errors)[:1]]
+    lines = [line for text in first for line in canvas.wrapped(text, 2)]
+    for grid in contact_grids(analysis.errors):
+        lines += terminal(grid).splitlines()
+    if analysis.published is not None:
+        told = next((f": {sentence(each)}" for each in analysis.published.remarks), "")
+        text = f"Beside {analysis.published.published.title}{told} → --details"
+        lines += canvas.wrapped(text, 2)
+    return lines
+
+
+def against(block: Block, analysis: Analysis) -> str:
+    """One line on the errors: the observer in the lead, and the range of the others."""
+    means = mean_errors(block)
+    if not means:
+        return f"Against {block.reference}: no sample in common with the estimates"
+    (name, least), *others = means.items()
+    floor = f" (floor {significant(mean_of(block.floor), 2)})" if block.has_floor else ""
+    text = f"Against {printable(block.reference)}{floor}: {significant(least, 2)} N·m ({name})"
+    if others:
+        low, high = min(value for _, value in others), max(value for _, value in others)
+        paper = any(remark.code in MEASURED for remark in analysis.remarks)
+        whose = "the paper's gains" if paper else "the others"
+        size = significant(low, 2)
+        size += f"–{significant(high, 2)}" if significant(high, 2) != size else ""
+        text += f"; {whose} {size}"
+    return f"{text} → --details"
+
+
+def mean_errors(block: Block) -> dict[str, float]:
+    """RMSE of each observer, mean of the joints whose reference is to be trusted. [N·m]"""
+    use = [j not in block.untrusted for j in block.joints]
+    rows = block.rmse[:, use] if any(use) else block.rmse
+    means = {name: mean_of(row) for name, row in zip(block.observers, rows, strict=True)}
+    return {name: value for name, value in means.items() if np.isfinite(value)}
+
+
+def mean_of(values: np.ndarray) -> float:
+    """Mean of the numbers that are known, NaN without any."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else float("nan")
+
+
+def doubt_lines(analysis: Analysis) -> list[str]:
+    """What is said where results mean nothing and are made anyway."""
+    codes = [f.code for one in analysis.examinations for f in one.refusals()]
+    if not codes:
+        return []
+    return [f"MEANINGLESS unless this is wrong (--anyway): {', '.join(dict.fromkeys(codes))}"]
+
+
+def written_lines(
+    folder: Path,
+    names: Iterable[str],
+    canvas: Canvas,
+    open_with: str = "",
+    *,
+    several: bool = False,
+) -> list[str]:
+    """What was written, as far as it is there, and how to open it.
+
+    Args:
+        folder: Where it is.
+        names: Files that may be there, the most wanted first.
+        canvas: What the terminal can show.
+        open_with: The command that opens it, "" for the page itself.
+        several: Whether there is a sub-folder a log.
+    """
+    there = [name for name in names if (folder / name).exists()]
+    there += ["one folder a log"] * several
+    lines = canvas.wrapped(printable(f"{folder}/  {'  '.join(there)}"), 2)
+    page = folder / "index.html"
+    if open_with or page.exists():
+        what = f"{open_with} {folder}" if open_with else str(page)
+        lines.append(f"Open: {printable(what)}        More here: --details")
+    return lines
+
+
+def logs_screen(
+    analyses: Sequence[Analysis],
+    canvas: Canvas,
+    failed: Mapping[str, str],
+    below: Sequence[str] = (),
+    *,
+    every: bool = False,
+) -> str:
+    """The screen of several logs: one line a log, then the worst findings.
+
+    Args:
+        analyses: What was found in those that could be analysed.
+        canvas: What the terminal can show.
+        failed: Why each of the others could not, by its label.
+        below: Lines on what was written.
+        every: Whether every log is shown, however many.
+    """
+    found = [(analysis, grounds(analysis)) for analysis in analyses]
+    lines = [canvas.painted(logs_facts(analyses, len(failed)), "bold"), ""]
+    shown = found if every or len(found) <= MOST_LOGS else worst_logs(found)
+    lines += [f"  {line}" for line in log_table(shown, failed, canvas)]
+    if len(shown) < len(found):
+        lines.append(f"  the {len(shown)} worst and hardest of {len(found)}; --details shows all")
+    findings = sorted(
+        (
+            (ground, analysis)
+            for analysis, all_grounds in found
+            for ground in all_grounds
+            if ground.of_log and ground.standing in {"bad", "caution"}
+        ),
+        key=lambda pair: pair[0].standing != "bad",
+    )
+    if findings:
+        lines += ["", "Can it be believed?"]
+        for ground, analysis in findings if every else findings[:WORST]:
+            name = analysis.recording.name
+            lines += ground_lines(ground, canvas, None if every else 2, name)
+        if len(findings) > WORST and not every:
+            lines.append(f"  and {len(findings) - WORST} more: --details")
+    if below:
+        lines += ["", *below]
+    return canvas.shown("\n".join(lines)) + "\n"
+
+
+def logs_facts(analyses: Sequence[Analysis], failed: int) -> str:
+    """How many logs, of which arms, and what free motion the sizes rest on."""
+    arms = list(dict.fromkeys(analysis.robot.name for analysis in analyses))
+    free = list(dict.fromkeys(r.recording.name for a in analyses for r in a.motion.runs))
+    count = len(analyses) + failed
+    parts = [f"{count} logs", " and ".join(arms)]
+    if failed:
+        parts.append(f"{failed} left out")
+    if free:
+        parts.append(f"free motion from {', '.join(free)}")
+    return printable(" · ".join(part for part in parts if part))
+
+
+def worst_logs(
+    found: Sequence[tuple[Analysis, tuple[Ground, ...]]],
+) -> list[tuple[Analysis, tuple[Ground, ...]]]:
+    """The `MOST_LOGS` logs with the worst health, then the hardest contacts, in their order."""
+
+    def rank(k: int) -> tuple[int, float]:
+        analysis, all_grounds = found[k]
+        hardest = analysis.contacts.hardest if analysis.contacts is not None else None
+        size = hardest.peak_force if hardest is not None else None
+        return SEVERITY.index(health(all_grounds).standing), -(size or 0.0)
+
+    return [found[k] for k in sorted(sorted(range(len(found)), key=rank)[:MOST_LOGS])]
+
+
+def log_table(
+    found: Sequence[tuple[Analysis, tuple[Ground, ...]]],
+    failed: Mapping[str, str],
+    canvas: Canvas,
+) -> list[str]:
+    """One line a log: what touched the arm, and whether the log is sound."""
+    judged = any(analysis.errors is not None for analysis, _ in found)
+    rows = [log_row(analysis, judged=judged) for analysis, _ in found]
+    rows += [[name, *[""] * (4 + judged)] for name in failed]
+    heads = ("span", "contacts", "hardest", "else")
+    columns = [Column("log", words=True)]
+    columns += [Column(head, words=head == "hardest") for head in heads]
+    columns += [Column("error")] * judged
+    head, *table = terminal(Grid(columns=tuple(columns), rows=tuple(rows))).splitlines()
+    room = max(len(line) for line in (head, *table)) + 2
+    worst = [health(each) for _, each in found]
+    states = [(g.standing, "sound" if g.standing == "good" else g.subject) for g in worst]
+    states += [("bad", "left out")] * len(failed)
+    lines = [f"{head:<{room}}health"]
+    for line, (standing, words) in zip(table, states, strict=True):
+        text = canvas.painted(canvas.shown(f"{MARKS[standing]} {words}"), standing)
+        lines.append(f"{line:<{room}}{text}")
+    return lines
+
+
+def log_row(analysis: Analysis, *, judged: bool) -> list[str]:
+    """What one line tells of a log, its health left out."""
+    found, recording = analysis.contacts, analysis.recording
+    count, hardest, rest = "–", "–", "–"
+    if found is not None:
+        load = any(contact.is_load for contact in found.contacts)
+        count = "load" if load else str(len(found.contacts))
+        hardest = hardest_words(found)
+        if found.smallest_force is not None and not load:
+            rest = f"{found.smallest_force:.0f} N"
+    row = [recording.name, f"{recording.duration:.1f} s", count, hardest, rest]
+    if judged:
+        means = (
+            [m for b in blocks(analysis.errors)[:1] for m in mean_errors(b).values()]
+            if (analysis.errors is not None)
+            else []
+        )
+        row.append(f"{significant(means[0], 2)} N·m" if means else "–")
+    return row
