@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.contact_list import Contact
+from vftcli.contacts.contact_list import Contact, ForceCourse
 from vftcli.contacts.model_error import UNKNOWN, ErrorCourse, error_course
 from vftcli.contacts.places import (
     MORE_THAN_A_FORCE,
@@ -169,6 +169,11 @@ class Measurer:
                 self.run, self.found.places[0].jacobian[peak], peak, blocks.t
             ),
             sensor_force=sensor_force(self.run, float(blocks.t[peak])),
+            course=force_course(
+                blocks.t[slice(*run)],
+                force,
+                inside.covariance[:, :3, :3] * np.outer(self.widening[:3], self.widening[:3]),
+            ),
         )
 
     def part(self, number: int, site: "Site") -> tuple[ArmPart, float]:
@@ -255,6 +260,20 @@ class QuietError(NamedTuple):
             b[k] += C * (b[k + 1] - f * b[k])
             P[k] += C * C * (P[k + 1] - ahead[k + 1])
         return cls(b, P)
+
+
+def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:
+    """|F| over a contact with its band: along the force itself, the drives' share added.
+
+    Args:
+        t: Time. (K,) [s]
+        force: (K, 3) [N]
+        covariance: (K, 3, 3) [N²]
+    """
+    size: Array = np.linalg.norm(force, axis=1)
+    u = force / np.maximum(size, 1e-12)[:, None]
+    variance = np.einsum("ki,kij,kj->k", u, covariance, u)
+    return ForceCourse(t, size, NORMAL * np.hypot(np.sqrt(variance), DRIVES * size))
 
 
 def from_flange(run: ModelledRun, q: Array, fit: PointFit) -> Array:
