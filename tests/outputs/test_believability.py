@@ -1,0 +1,220 @@
+"""What supports an answer and what limits it: from the analysis' data, each with its remedy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from contact_rows import contact, contact_list
+
+from vftcli.analysis import Analysis
+from vftcli.doctor.findings import in_words
+from vftcli.doctor.fit import RobotMatch
+from vftcli.outputs.believability import (
+    MARKS,
+    Ground,
+    grounds,
+    grounds_record,
+    headline,
+    health,
+    joint_words,
+    otherwise,
+    percent_words,
+    resting,
+)
+from vftcli.robots import load_robot
+from vftcli.robots.friction import dry_friction
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.remarks import Remark, Where, caution, fact, warning
+
+
+def of(analysis: Analysis, subject: str) -> list[Ground]:
+    return [ground for ground in grounds(analysis) if ground.subject == subject]
+
+
+def examined(analysis: Analysis, *findings: Remark, misfit: float = 0.001) -> Analysis:
+    """The analysis as if its log had these findings, and its arm this misfit."""
+    match = RobotMatch(
+        robot="ur5", misfit=misfit, fits=misfit < 0.02, evidence="the controller's own model",
+        load=0.0, by_maker=True,
+    )  # fmt: skip
+    (own, *_) = analysis.examinations
+    return replace(analysis, examinations=(replace(own, findings=findings, robots=(match,)),))
+
+
+def test_a_fitting_arm_is_good_and_says_by_what(without_reference: Analysis) -> None:
+    (ground,) = of(examined(without_reference), "robot, gravity")
+    assert ground.standing == "good"
+    assert ground.sentence == "the controller's own model agrees to 0.1 %"
+    assert ground.remedy is None
+
+
+def test_an_arm_that_does_not_fit_is_a_caution(without_reference: Analysis) -> None:
+    (ground,) = of(examined(without_reference, misfit=0.3), "robot, gravity")
+    assert ground.standing == "caution"
+    assert "30.0 %" in ground.sentence
+    assert ground.remedy is not None
+    assert ground.remedy.startswith("vftcli inspect")
+
+
+def test_without_a_match_the_arm_is_not_checked(without_reference: Analysis) -> None:
+    made = replace(without_reference, examinations=())
+    (ground,) = of(made, "robot, gravity")
+    assert ground.standing == "unknown"
+
+
+def test_a_load_nobody_told_stands_first_with_its_command(without_reference: Analysis) -> None:
+    load = warning("light-load", load_kg=1.2, sd_kg=0.1, robot="ur5")
+    first = grounds(examined(without_reference, load))[0]
+    assert (first.standing, first.subject) == ("bad", "load")
+    assert first.sentence == in_words(load).evidence
+    assert first.remedy is not None
+    assert "--find-payload" in first.remedy
+
+
+def test_one_remedy_is_given_once(without_reference: Analysis) -> None:
+    load = warning("light-load", load_kg=1.2, sd_kg=0.1, robot="ur5")
+    made = replace(
+        examined(without_reference, load),
+        contacts=contact_list(contact(is_load=True), remarks=(caution("contact-is-load"),)),
+    )
+    loads = of(made, "load")
+    assert [ground.standing for ground in loads] == ["bad", "bad"]
+    assert loads[1].remedy is None
+
+
+def test_a_finding_that_makes_results_meaningless_is_bad(without_reference: Analysis) -> None:
+    other = warning("other-robot", own="ur5 30 %", best="ur5e 1 %", robot="ur5e")
+    (ground,) = of(examined(without_reference, other), "robot")
+    assert ground.standing == "bad"
+    assert ground.remedy is not None
+    assert ground.remedy.endswith("--robot ur5e")
+
+
+def test_the_clock_tells_gaps_and_repairs(without_reference: Analysis) -> None:
+    """The fixture's log has one gap of .4 s at 3.2 s and one odd and one mended signal."""
+    (ground,) = of(without_reference, "clock")
+    assert ground.standing == "caution"
+    assert ground.sentence.startswith("1 gap, the longest 0.41 s at 3.2 s; left out look & feel")
+    assert ground.sentence.endswith("and 1 more")
+
+
+def test_a_sound_clock_says_how_sound(without_reference: Analysis, as_if) -> None:  # type: ignore[no-untyped-def]
+    recording = without_reference.recording
+    source = replace(recording.source, remarks=())
+    sound = replace(recording, t=0.008 * np.arange(600.0), source=source)
+    (ground,) = of(as_if(without_reference, sound), "clock")
+    assert (ground.standing, ground.sentence) == ("good", "no gap above 8 ms, nothing repaired")
+
+
+def test_a_joint_at_rest_hides_its_dry_friction(without_reference: Analysis, as_if) -> None:  # type: ignore[no-untyped-def]
+    recording = without_reference.recording
+    dq = np.array(recording.require("dq"))
+    dq[:, 4] = 0.0
+    made = as_if(without_reference, replace(recording, dq=dq))
+    assert resting(made.recording).tolist() == [False] * 4 + [True, False]
+    (ground,) = of(made, "joints at rest")
+    dry = dry_friction(load_robot("ur5").friction, 6)[4]
+    assert ground.sentence == f"friction hides up to {dry:.2g} N·m on J5"
+    still = as_if(without_reference, replace(recording, dq=np.zeros_like(dq)))
+    assert len(of(still, "the arm is still")) == 1
+
+
+def test_friction_of_a_profile_names_the_command_for_ones_own(without_reference: Analysis) -> None:
+    (ground,) = of(without_reference, "friction")
+    assert ground.standing == "caution"
+    assert ground.remedy == "vftcli identify free.csv --robot ur5 -o my_ur5.toml"
+
+
+def test_without_free_motion_the_list_says_so(without_reference: Analysis) -> None:
+    found = contact_list(contact(), method="threshold", free=(), false_on_free=None, remarks=())
+    made = replace(without_reference, contacts=found)
+    (ground,) = of(made, "free motion")
+    assert ground.standing == "caution"
+    assert ground.remedy is not None
+    assert ground.remedy.endswith("--free free.csv")
+
+
+@pytest.mark.parametrize(("false", "standing"), [(0, "good"), (1, "caution")])
+def test_free_motion_counts_its_false_rows(
+    without_reference: Analysis, false: int, standing: str
+) -> None:
+    found = contact_list(contact(), false_on_free=false, remarks=())
+    (ground,) = of(replace(without_reference, contacts=found), "free motion")
+    assert ground.standing == standing
+    assert f"{false} contact" in ground.sentence
+
+
+def test_what_limits_the_list_is_told_with_its_subject(without_reference: Analysis) -> None:
+    (stop,) = of(replace(without_reference, contacts=contact_list(contact())), "stop")
+    assert stop.standing == "caution"
+    reason = caution("contacts-not-told", reason="no samples")
+    untold = replace(without_reference, contacts=None, remarks=(reason,))
+    (ground,) = of(untold, "contacts")
+    assert ground.standing == "unknown"
+
+
+def test_what_measures_the_force(analysis: Analysis, without_reference: Analysis) -> None:
+    (reference,) = of(analysis, "reference")
+    assert reference.sentence == "vendor, its own error 0.5 N·m a joint"
+    without = replace(without_reference, contacts=contact_list(contact()))
+    (none,) = of(without, "no reference")
+    assert none.standing == "unknown"
+    vendor = contact_list(contact(vendor_force=61.2), contact(vendor_force=None))
+    (own,) = of(replace(without_reference, contacts=vendor), "no reference")
+    assert "61, – N at the peaks" in own.sentence
+    assert own.remedy is not None
+    assert "--reference vendor" in own.remedy
+
+
+def test_the_rest_of_the_log(without_reference: Analysis) -> None:
+    assert otherwise(contact_list(contact())).startswith("else: nothing above 6 N")
+    threshold = contact_list(contact(), method="threshold", smallest_force=29.7)
+    assert otherwise(threshold).startswith("else: nothing above 30 N, below which friction alone")
+    assert otherwise(contact_list(contact(is_load=True))) == ""
+    assert otherwise(contact_list(smallest_force=None)) == ""
+    listed = replace(without_reference, contacts=contact_list())
+    assert headline(listed) == "Nothing touched the arm, as far as this log can tell."
+    assert "no contacts are listed" in headline(replace(listed, contacts=None))
+
+
+def test_health_is_the_worst_of_the_log_itself(without_reference: Analysis) -> None:
+    sound = [
+        Ground(standing="good", subject="robot, gravity", sentence="fits"),
+        Ground(standing="caution", subject="friction", sentence="…", of_log=False),
+        Ground(standing="unknown", subject="no reference", sentence="…", of_log=False),
+    ]
+    assert health(sound).sentence == "fits"
+    odd = Ground(standing="caution", subject="clock", sentence="2 gaps")
+    assert health([*sound, odd]) is odd
+    gap = warning("stuck-effort", Where(joints=(2,)), signal="current", longest_s=1.0, at_s=2.0)
+    assert health(grounds(examined(without_reference, gap))).subject == "effort"
+
+
+def test_temperature_is_told_where_the_log_has_none(without_reference: Analysis) -> None:
+    found = fact(
+        "no-temperature", robot="ur5", reference_C=35.0, least_percent=20.0, most_percent=24.0
+    )
+    (ground,) = of(examined(without_reference, found), "temperature")
+    assert ground.standing == "caution"
+
+
+def test_a_reference_without_a_floor(without_reference: Analysis) -> None:
+    made = without_reference
+    reference = ExternalTorque(name="sensor", t=made.t, tau=np.zeros((len(made.t), 6)))
+    (ground,) = of(replace(made, reference=reference), "reference")
+    assert ground.sentence == "sensor"
+
+
+def test_words_of_joints_and_shares() -> None:
+    assert joint_words([0, 1, 2]) == "J1…J3"
+    assert joint_words([0, 2, 3]) == "J1, J3, J4"
+    assert percent_words(0.00099) == "0.1 %"
+    assert percent_words(0.0004) == "0.04 %"
+    assert percent_words(0.123) == "12.3 %"
+
+
+def test_machines_get_the_same(without_reference: Analysis) -> None:
+    found = grounds(without_reference)
+    rows = grounds_record(found)
+    assert [row["subject"] for row in rows] == [ground.subject for ground in found]
+    assert all(MARKS[row["standing"]] for row in rows)

@@ -1,0 +1,55 @@
+"""The command that mends a finding, as it is typed."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from vftcli.analysis import Analysis
+from vftcli.outputs.remedies import (
+    SUBJECTS,
+    command,
+    is_profile,
+    payload_command,
+    remedy_of,
+    robot_option,
+    subject_of,
+)
+from vftcli.signals.remarks import warning, words
+
+
+def test_every_subject_stands_for_remarks_that_exist_once() -> None:
+    codes = [code for group in SUBJECTS.values() for code in group]
+    assert len(codes) == len(set(codes))
+    for code in codes:
+        assert words(code)["short"]
+    assert subject_of("saturation") == "effort"
+
+
+@pytest.mark.parametrize(
+    ("code", "ending"),
+    [
+        ("light-load", "--find-payload --robot ur5 -o loaded.toml"),
+        ("payload-not-mounted", "--robot ur5 --payload log"),
+        ("no-robot-fits", "--robot ur5 --method base -o my_robot.toml"),
+        ("saturation", "--robot ur5"),
+    ],
+)
+def test_the_command_of_a_finding(without_reference: Analysis, code: str, ending: str) -> None:
+    made = without_reference
+    assert remedy_of(warning(code), made.recording, made).endswith(ending)
+
+
+def test_a_hostile_name_is_quoted_as_a_shell_wants_it(without_reference: Analysis) -> None:
+    made = without_reference
+    assert f"'{made.recording.source.path}'" in command("inspect", made.recording)
+    assert "identify" in payload_command(made)
+
+
+def test_a_robot_file_is_named_by_its_path(without_reference: Analysis) -> None:
+    made = without_reference
+    assert is_profile(made)
+    assert robot_option(made) == "ur5"
+    log = made.motion.log
+    own = replace(log, robot=replace(log.robot, path=Path("my.toml")))
+    assert robot_option(replace(made, motion=replace(made.motion, log=own))) == "my.toml"
