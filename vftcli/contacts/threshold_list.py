@@ -56,7 +56,8 @@ def flange_forces(J: Array, torque: Array, sd: Array) -> tuple[Array, Array]:
     """
     A = J.swapaxes(1, 2) / sd[:, :, None]
     covariance: Array = np.asarray(
-        np.linalg.inv(A.swapaxes(1, 2) @ A + np.diag(1.0 / PRIOR[: J.shape[1]] ** 2)), dtype=np.float64
+        np.linalg.inv(A.swapaxes(1, 2) @ A + np.diag(1.0 / PRIOR[: J.shape[1]] ** 2)),
+        dtype=np.float64,
     )
     values: Array = (covariance @ (A.swapaxes(1, 2) @ (torque / sd)[..., None]))[..., 0]
     return values, covariance

@@ -169,7 +169,9 @@ def rectangle(x: float, y: float, width: float, height: float, look: str) -> str
 
 def stripe(scales: Scales, start: float, stop: float, look: str) -> str:
     """A stretch of time from top to floor."""
-    left, right = (float(scales.across(max(min(v, scales.x.high), scales.x.low))) for v in (start, stop))
+    left, right = (
+        float(scales.across(max(min(v, scales.x.high), scales.x.low))) for v in (start, stop)
+    )
     return rectangle(left, scales.box.top, right - left, scales.floor - scales.box.top, look)
 
 

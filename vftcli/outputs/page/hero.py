@@ -29,7 +29,8 @@ def hero(analysis: Analysis, found: ContactList) -> str:
         figures.svg(box, "Force on the robot over time", content(analysis, found, box), kind=kind)
         for box, kind in ((WIDE, "wide"), (NARROW, "narrow"))
     )
-    return f'<figure class="hero" id="timeline">{drawn}<figcaption>{caption(analysis, found)}</figcaption></figure>'
+    words = caption(analysis, found)
+    return f'<figure class="hero" id="timeline">{drawn}<figcaption>{words}</figcaption></figure>'
 
 
 def caption(analysis: Analysis, found: ContactList) -> str:
@@ -110,7 +111,7 @@ def hatch_name(box: Box) -> str:
 
 def hatched(scales: Scales, span: tuple[float, float]) -> str:
     """A stretch of free motion."""
-    return figures.stripe(scales, *span, f'fill="url(&#35;{hatch_name(scales.box)})"')
+    return figures.stripe(scales, *span, f'fill="url(#{hatch_name(scales.box)})"')
 
 
 def stripe_of(scales: Scales, contact: Contact) -> str:
@@ -126,9 +127,7 @@ def limit(scales: Scales, least: float) -> str:
         scales.box.left, y, scales.side - scales.box.left, scales.floor - y, 'class="untold"'
     )
     words = f"below {least:.0f} N: not told"
-    return (
-        f'{zone}<text x="{scales.side - 4:.1f}" y="{y - 5:.1f}" text-anchor="end">{words}</text>'
-    )
+    return f'{zone}<text x="{scales.side - 4:.1f}" y="{y - 5:.1f}" text-anchor="end">{words}</text>'
 
 
 def course_of(scales: Scales, contact: Contact, stretches: int) -> str:
@@ -149,8 +148,7 @@ def stop_of(scales: Scales, at: float) -> str:
 
 
 def numbers(scales: Scales, contacts: Sequence[Contact]) -> list[str]:
-    """The contacts' numbers above the plot, each a link to its row; those that would overlap are
-    left out."""
+    """The contacts' numbers above the plot, each a link to its row; none where two would overlap."""
     parts, last = [], -np.inf
     for contact in contacts:
         x = float(scales.across(0.5 * (contact.start + contact.stop)))
