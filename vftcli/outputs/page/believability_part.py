@@ -15,6 +15,11 @@ def believability_section(grounds: Sequence[Ground]) -> str:
     )
 
 
+def capital(text: str) -> str:
+    """A text with its first letter large."""
+    return text[:1].upper() + text[1:]
+
+
 def ground_item(ground: Ground) -> str:
     """One ground: its sign, what it is about, what is known of it, and what would mend it."""
     remedy = ""
@@ -22,5 +27,5 @@ def ground_item(ground: Ground) -> str:
         remedy = f'<code class="remedy">{escape(ground.remedy)}</code>'
     return (
         f'<li><b class="sign {ground.standing}">{ground.mark}</b><span>'
-        f"{escape(ground.subject)}<small>{escape(ground.sentence)}{remedy}</small></span></li>"
+        f"{escape(capital(ground.subject))}<small>{escape(ground.sentence)}{remedy}</small></span></li>"
     )

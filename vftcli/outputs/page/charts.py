@@ -18,7 +18,7 @@ from vftcli.outputs.palette import colours_of
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 
-ROOM, LONG = 450_000, 4.0
+ROOM, LONG = 350_000, 4.0
 """Bytes that the large charts of a page may take; a long log's may take more, up to this factor."""
 
 FEWEST, MOST = 250, 2000
@@ -126,13 +126,19 @@ def legend(chart: Chart) -> str:
     parts = [f"{swatch(s.colour, s.dash, leads=s.leads)} {escape(s.name)}" for s in shown]
     if chart.band is not None:
         parts.append(f'<span class="patch floor"></span> {escape(chart.band_label)}')
-    if any(s.half is not None for s in shown):
-        parts.append('<span class="patch ribbon"></span> 95 % band')
+    ribbons = dict.fromkeys(s.colour for s in shown if s.half is not None)
+    parts += [f"{patch(colour)} 95 % band" for colour in ribbons]
     if chart.spans:
         parts.append('<span class="patch contact"></span> contact')
     if len(parts) < 2:
         return ""
     return f'<p class="legend">{"".join(f"<span>{part}</span>" for part in parts)}</p>'
+
+
+def patch(colour: str) -> str:
+    """A small piece of a ribbon."""
+    box = f'<rect width="26" height="8" fill="{colour}" class="rim"/>'
+    return f'<svg class="swatch" viewBox="0 0 26 8" aria-hidden="true">{box}</svg>'
 
 
 def swatch(colour: str, dash: str, *, leads: bool = False) -> str:
@@ -159,7 +165,9 @@ def ends_of_family(chart: Chart, panel: int) -> Span:
     values = []
     for series in chart.series:
         if series.shown:
-            values += [series.values[:, j] for j in members]
+            half = 0.0 if series.half is None else np.nan_to_num(series.half[:, members])
+            drawn = series.values[:, members]
+            values += [drawn - half, drawn + half]
     if chart.band is not None:
         bounds = np.array([chart.band[j] for j in members])
         values += [bounds, -bounds]
@@ -174,6 +182,7 @@ def picture(chart: Chart, panel: int, ends: Span) -> str:
     parts = [figures.stripe(scales, *span, 'class="contact"') for span in chart.spans]
     if chart.band is not None and np.isfinite(chart.band[panel]):
         top, foot = (float(scales.up(sign * chart.band[panel])) for sign in (1.0, -1.0))
+        foot = min(foot, scales.floor)
         parts.append(
             figures.rectangle(box.left, top, scales.side - box.left, foot - top, 'class="floor"')
         )
@@ -192,7 +201,8 @@ def drawn_line(scales: Scales, chart: Chart, series: ChartLine, panel: int) -> s
     x = chart.x if series.x is None else series.x
     values = series.values[:, panel]
     if chart.log:
-        return figures.line(scales, x, values, look_of(series.colour, series.dash))
+        t, y = figures.thinned_log(x, values)
+        return figures.line(scales, t, y, look_of(series.colour, series.dash))
     t, y = figures.thinned(x, values)
     under = ""
     if series.half is not None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from html import escape
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,9 @@ from vftcli.signals.series import runs_of
 
 STEPS = 1.0, 2.0, 5.0, 10.0
 """What a tick's distance may begin with."""
+
+ROOM = 1.4
+"""How much smaller than wanted a tick's distance may be."""
 
 STRETCHES = 250
 """Stretches of a line in a small chart: two samples a stretch, about one a pixel."""
@@ -66,12 +70,14 @@ class Scales(NamedTuple):
         else:
             low, high = self.x
         share = (np.asarray(x) - low) / ((high - low) or 1.0)
-        return self.box.left + share * (self.box.width - self.box.left - self.box.right)
+        places: Array = self.box.left + share * (self.box.width - self.box.left - self.box.right)
+        return places
 
     def up(self, y: Array | float) -> Array:
         """Vertical places, which count downwards."""
         share = (np.asarray(y) - self.y.low) / ((self.y.high - self.y.low) or 1.0)
-        return self.floor - share * (self.floor - self.box.top)
+        places: Array = self.floor - share * (self.floor - self.box.top)
+        return places
 
     @property
     def floor(self) -> float:
@@ -90,7 +96,8 @@ def ticks(span: Span, count: int) -> list[float]:
     if not np.isfinite(width) or width <= 0.0:
         return [span.low]
     power = 10.0 ** np.floor(np.log10(width))
-    step = next(s for s in STEPS if width <= s * power * (1 + 1e-9)) * power
+    # A few more numbers than wanted are better than too few.
+    step = next(s for s in STEPS if width <= ROOM * s * power) * power
     first, last = np.ceil(span.low / step - 1e-9), np.floor(span.high / step + 1e-9)
     return [float(k * step) for k in np.arange(first, last + 1)]
 
@@ -218,3 +225,18 @@ def thinned(t: Array, values: Array, stretches: int = STRETCHES) -> tuple[Array,
     """One series as it is drawn: of every stretch its lowest and its highest sample."""
     (drawn,) = decimated(t, values[:, None], stretches)
     return drawn.t, drawn.y
+
+
+def thinned_log(x: Array, values: Array, stretches: int = STRETCHES) -> tuple[Array, Array]:
+    """The same over a logarithmic axis: stretches of equal width there."""
+    if len(x) <= 2 * stretches:
+        return x, values
+    starts = np.unique(np.searchsorted(x, np.geomspace(x[0], x[-1], stretches)))
+    index = [0, len(x) - 1]
+    for start, stop in pairwise(starts):
+        index += [
+            start + int(np.argmin(values[start:stop])),
+            start + int(np.argmax(values[start:stop])),
+        ]
+    chosen = np.unique(index)
+    return x[chosen], values[chosen]

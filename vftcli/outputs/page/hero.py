@@ -40,8 +40,8 @@ def caption(analysis: Analysis, found: ContactList) -> str:
     else:
         words = ["Size of the force on the robot, at the place that each contact names."]
         words.append("Blue: 95 % band. Yellow: contact.")
-    if told(found) is not None:
-        words.append("Grey: what this log cannot tell from no contact.")
+    if (least := told(found)) is not None:
+        words.append(f"Grey: below {least:.0f} N, what this log cannot tell from none.")
     if free_spans(analysis):
         words.append("Hatched: motion known to be free.")
     if found.stops:
@@ -75,7 +75,7 @@ def content(analysis: Analysis, found: ContactList, box: Box) -> str:
     parts += [stripe_of(scales, contact) for contact in found.contacts]
     if (least := told(found)) is not None:
         parts.append(limit(scales, least))
-    parts.append(figures.axes(scales, "s", (9 if box is WIDE else 4, 4 if force else 0)))
+    parts.append(figures.axes(scales, "s", (10 if box is WIDE else 4, 4 if force else 0)))
     if force:
         parts.append(f'<text x="4" y="{box.top - 12:g}">|F| in N</text>')
     parts += [course_of(scales, contact, STRETCHES[box]) for contact in found.contacts]
@@ -89,9 +89,9 @@ def highest(found: ContactList) -> float:
     tops = [2.5 * (told(found) or 0.0)]
     for contact in found.contacts:
         if contact.peak_force is not None and contact.peak_band is not None:
-            tops.append(1.05 * (contact.peak_force + contact.peak_band))
-        if contact.course is not None:
-            tops.append(1.05 * float(contact.course.force.max()))
+            tops.append(1.12 * (contact.peak_force + contact.peak_band))
+        if (course := contact.course) is not None:
+            tops.append(1.05 * float((course.force + np.minimum(course.band, course.force)).max()))
     return max(*tops, 0.0) or 1.0
 
 
@@ -123,11 +123,8 @@ def stripe_of(scales: Scales, contact: Contact) -> str:
 def limit(scales: Scales, least: float) -> str:
     """What lies below the smallest force that can be told."""
     y = float(scales.up(least))
-    zone = figures.rectangle(
-        scales.box.left, y, scales.side - scales.box.left, scales.floor - y, 'class="untold"'
-    )
-    words = f"below {least:.0f} N: not told"
-    return f'{zone}<text x="{scales.side - 4:.1f}" y="{y - 5:.1f}" text-anchor="end">{words}</text>'
+    width = scales.side - scales.box.left
+    return figures.rectangle(scales.box.left, y, width, scales.floor - y, 'class="untold"')
 
 
 def course_of(scales: Scales, contact: Contact, stretches: int) -> str:
@@ -148,13 +145,14 @@ def stop_of(scales: Scales, at: float) -> str:
 
 
 def numbers(scales: Scales, contacts: Sequence[Contact]) -> list[str]:
-    """The contacts' numbers above the plot, each a link to its row; none where two would overlap."""
+    """The contacts' numbers above the plot, each a link to its row, as far as there is room."""
     parts, last = [], -np.inf
     for contact in contacts:
         x = float(scales.across(0.5 * (contact.start + contact.stop)))
-        if x - last < 2 * LETTER:
+        half = 0.5 * LETTER * len(str(contact.number)) + 3.0
+        if x - half < last:
             continue
-        last = x
+        last = x + half
         parts.append(
             f'<a href="#contact-{contact.number}"><text class="number" x="{x:.1f}" '
             f'y="{scales.box.top - 8:g}" text-anchor="middle">{contact.number}</text></a>'
@@ -168,14 +166,18 @@ def peaks(scales: Scales, contacts: Sequence[Contact]) -> list[str]:
     taken: list[tuple[float, float]] = []
     hardest = sorted(contacts, key=lambda c: c.peak_force or 0.0, reverse=True)
     for contact in hardest:
-        if contact.peak_force is None or contact.is_load:
+        if contact.peak_force is None or contact.peak_band is None or contact.is_load:
             continue
         x, y = float(scales.across(contact.peak)), float(scales.up(contact.peak_force))
         parts.append(f'<circle class="peak" cx="{x:.1f}" cy="{y:.1f}" r="3.5"/>')
         text = f"{contact.peak_force:.0f} ± {contact.peak_band:.0f}"
-        width = LETTER * len(text)
-        left = x + 8 if x + 8 + width < scales.side else x - 8 - width
-        if all(left + width < a or left > b for a, b in taken):
-            taken.append((left, left + width))
-            parts.append(f'<text class="value" x="{left:.1f}" y="{y + 4:.1f}">{text}</text>')
+        half = 0.5 * LETTER * len(text)
+        middle = min(max(x, scales.box.left + half), scales.side - half)
+        above = max(float(scales.up(contact.peak_force + contact.peak_band)), scales.box.top + 8)
+        if all(abs(middle - other) > half + reach for other, reach in taken):
+            taken.append((middle, half))
+            parts.append(
+                f'<text class="value" x="{middle:.1f}" y="{above - 6:.1f}" '
+                f'text-anchor="middle">{text}</text>'
+            )
     return parts

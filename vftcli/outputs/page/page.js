@@ -24,6 +24,9 @@
   const ink = (colour) => (colour === "ink" ? css("--ink") : colour === "reference" ? css("--reference") : colour);
   const number = (value, unit) => (value == null ? "" : ` ${value.toPrecision(4).replace("-", "−")} ${unit}`);
 
+  const font = "13px system-ui, sans-serif";
+  const texts = (marks, unit) => marks.map((value, k) => `${Number(value.toPrecision(10))}`.replace("-", "−") + (unit && k === marks.length - 1 ? ` ${unit}` : ""));
+
   class Large {
     constructor(place, spec) {
       this.place = place; this.spec = spec; this.panel = 0;
@@ -114,11 +117,11 @@
       const { data, drawn, bands } = this.table(), unit = this.spec.units[this.panel];
       const kept = this.chart && { ...this.chart.scales.x };
       if (this.chart) this.chart.destroy();
-      const axis = { stroke: css("--mute"), grid: { stroke: css("--line"), width: 1 }, ticks: { stroke: css("--line"), width: 1 } };
+      const axis = { font, stroke: css("--mute"), grid: { stroke: css("--line"), width: 1 }, ticks: { stroke: css("--line"), width: 1 } };
       this.chart = new uPlot({
         width, height: 320, series: drawn, bands, legend: { show: false },
         scales: { x: { time: false } },
-        axes: [{ ...axis, label: this.spec.unit, labelSize: 20 }, { ...axis, size: 62, label: unit, labelSize: 20 }],
+        axes: [{ ...axis, size: 34, values: (chart, marks) => texts(marks, this.spec.unit) }, { ...axis, size: 66, label: unit, labelSize: 20, labelFont: font, values: (chart, marks) => texts(marks) }],
         cursor: { y: false, drag: { x: true, y: false }, focus: { prox: 30 } },
         hooks: { drawClear: [(chart) => this.under(chart)], setCursor: [(chart) => this.read(chart)] },
       }, data, this.plot);

@@ -75,7 +75,15 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
         sigma = (ChartLine("σ_min of J", column(first.sigma_min)),)
         title = "What the pose can tell: σ_min"
         yield Chart(
-            "sigma_min", title, ("m",), (title,), t, sigma, band=least, band_label="masked below"
+            "sigma_min",
+            title,
+            ("m",),
+            (title,),
+            t,
+            sigma,
+            band=least,
+            band_label="masked below",
+            lowest=0.0,
         )
     if sensed.hides:
         blown = tuple(
