@@ -74,3 +74,11 @@ def test_the_escape_bound_of_the_ur5s_rotation() -> None:
     assert "18°" in deviations_from_paper()["Rotation has a speed limit."]
     bound = judge(variable(parameters("ur5"))).escape[3]
     assert np.degrees(bound) == pytest.approx(18.0, abs=0.5)
+
+
+def test_the_page_draws_its_charts(release: Replay, opened) -> None:
+    tab = opened(render_admittance(release, admittance_record(release, None, None, ""), "r"))
+    tab.unfold()
+    assert tab.blank_charts() == []
+    assert tab.errors == []
+    assert tab.overflow <= 0

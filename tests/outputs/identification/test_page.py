@@ -69,3 +69,13 @@ def test_dots_stay_inside_their_plot(found):
     assert dots[:, 0].max() <= 360.0
     assert dots[:, 1].min() >= 0.0
     assert dots[:, 1].max() <= 220.0
+
+
+def test_the_page_draws_its_charts(found, opened):
+    result, log = found
+    record = identification_record(result, [examine(log)], "")
+    tab = opened(render_identification(result, record))
+    tab.unfold()
+    assert tab.blank_charts() == []
+    assert tab.errors == []
+    assert tab.overflow <= 0
