@@ -1,13 +1,16 @@
 """From what was found to rows."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from contact_logs import FIXTURES, motion
 from test_model_error import blocks, drawn, noise
 
+from vftcli.contacts.contact_list import ContactList
 from vftcli.contacts.model_error import error_course
 from vftcli.contacts.places import PointFit
-from vftcli.contacts.rows import QuietError, from_flange, sensor_force, vendor_force
+from vftcli.contacts.rows import QuietError, force_course, from_flange, sensor_force, vendor_force
 from vftcli.readers import read
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
@@ -77,3 +80,24 @@ def test_a_row_on_a_link_has_its_moment_about_the_flange() -> None:
         np.testing.assert_allclose(J.T @ row.wrench, row.joint_torque, atol=1e-9)
         assert row.start < row.peak < row.stop
         assert row.trust == "good"
+
+
+def test_a_course_bears_the_band_along_its_force() -> None:
+    t = np.array([1.0, 2.0])
+    force = np.array([[3.0, 4.0, 0.0], [0.0, 0.0, 0.0]])
+    covariance = np.tile(np.diag([4.0, 9.0, 25.0]), (2, 1, 1))
+    course = force_course(t, force, covariance)
+    assert course.force.tolist() == [5.0, 0.0]
+    # u = (.6, .8, 0): √(.36·4 + .64·9) = 2.683; 3 % of 5 N; without a force there is no direction.
+    assert course.band.tolist() == pytest.approx([1.96 * np.hypot(2.6833, 0.15), 0.0], rel=1e-4)
+
+
+def test_every_row_has_its_course(listed: Callable[..., ContactList]) -> None:
+    for contact in listed("ur5_circle.csv", "ur5", "0.3:4").contacts:
+        course = contact.course
+        assert course is not None
+        assert contact.start <= course.t[0] < course.t[-1] <= contact.stop
+        k = int(np.argmax(course.force))
+        assert course.t[k] == pytest.approx(contact.peak)
+        assert course.force[k] == pytest.approx(contact.peak_force)
+        assert course.band[k] == pytest.approx(contact.peak_band)

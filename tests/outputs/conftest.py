@@ -12,8 +12,8 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation import evaluate
-from vftcli.outputs.log.run_record import run_record
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.outputs.log.run_record import run_record
 from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
@@ -144,9 +144,11 @@ class Tab:
             .getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value);
           const large = [...document.querySelectorAll(".large")].filter((place) =>
             !place.querySelector("canvas") || !drawn(place.querySelector("canvas")));
-          const shown = (x) => { const { width, height } = x.getBoundingClientRect(); return width > 20 && height > 20; };
-          const small = [...document.querySelectorAll("figure svg")].filter((svg) =>
-            getComputedStyle(svg).display !== "none" && !(shown(svg) && svg.querySelector("path, rect")));
+          const small = [...document.querySelectorAll("figure svg")].filter((svg) => {
+            const { width, height } = svg.getBoundingClientRect();
+            const filled = width > 20 && height > 20 && svg.querySelector("path, rect");
+            return getComputedStyle(svg).display !== "none" && !filled;
+          });
           return [...large.map((x) => x.dataset.chart), ...small.map((x) => x.textContent)];
         }""")
 

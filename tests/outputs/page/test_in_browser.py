@@ -1,4 +1,4 @@
-"""The pages in a real browser: drawn, printed, linked, reached by the keyboard, without a script."""
+"""The pages in a real browser: drawn, printed, linked, by the keyboard, without a script."""
 
 import re
 from collections.abc import Callable

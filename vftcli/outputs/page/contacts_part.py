@@ -64,7 +64,8 @@ def where_words(contacts: Sequence[Contact]) -> str:
         return ""
     first = contacts[0]
     if first.is_load and first.mean_force is not None:
-        x, y, z = (f"{value:.0f}".replace("-", "−") for value in first.mean_force + 0.0)
+        # Adding a nought takes the minus from one.
+        x, y, z = (f"{value + 0.0:.0f}".replace("-", "−") for value in np.round(first.mean_force))
         return (
             f"What is read lasts from {first.start:.1f} to {first.stop:.1f} s, with a mean of "
             f"<b>({x}, {y}, {z}) N</b> in base axes. A push would not last so long; what touched "
@@ -214,7 +215,7 @@ def trust(contact: Contact) -> str:
 def reason(contact: Contact) -> str:
     """What a contact's trust rests on, the worst first."""
     if contact.remarks:
-        return sentence(contact.remarks[0])
+        return sentence(next(iter(contact.remarks)))
     if contact.evidence is None or contact.evidence < SURE_NATS:
         return "little evidence: friction explains nearly as much"
     if contact.peak_force is None or contact.peak_band is None:

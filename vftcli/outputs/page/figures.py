@@ -99,7 +99,9 @@ def ticks(span: Span, count: int) -> list[float]:
     # A few more numbers than wanted are better than too few.
     step = next(s for s in STEPS if width <= ROOM * s * power) * power
     first, last = np.ceil(span.low / step - 1e-9), np.floor(span.high / step + 1e-9)
-    return [float(k * step) for k in np.arange(first, last + 1)]
+    found = [float(k * step) for k in np.arange(first, last + 1)]
+    # One number or two leave the scale unsaid.
+    return found if len(found) >= min(count, 3) else ticks(span, count + 2)
 
 
 def decades(span: Span) -> list[float]:

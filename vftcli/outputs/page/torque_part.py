@@ -55,15 +55,21 @@ def contact_spans(analysis: Analysis) -> tuple[tuple[float, float], ...]:
 
 
 def estimate_lines(analysis: Analysis) -> tuple[ChartLine, ...]:
-    """Every observer's torque; one is drawn at once, `best` where it ran, with its 95 % band."""
+    """Every observer's torque; one is drawn at once, `best` where it ran, with its 95 % band.
+
+    Beside `best` no other bears a band: five would hide one another.
+    """
     styles = observer_lines(analysis.estimates)
-    first = BEST if BEST in styles else next(iter(styles), "")
+    alone = BEST not in styles
+    first = next(iter(styles), "") if alone else BEST
     lines = [
         ChartLine(
             e.name,
             e.tau,
             *styles[e.name],
-            half=COVERS * e.error_sd if e.error_sd is not None and e.name == first else None,
+            half=COVERS * e.error_sd
+            if e.error_sd is not None and (alone or e.name == first)
+            else None,
             leads=e.name == first,
             shown=e.name == first,
         )
