@@ -73,7 +73,8 @@ def test_ends_hold_all_values() -> None:
     found = ends_of([np.array([1.0, np.nan]), np.array([-3.0])])
     assert found.low < -3.0
     assert found.high > 1.0
-    assert ends_of([np.array([np.nan])]) == Span(-1.0, 1.0)
+    assert ends_of([np.array([np.nan])]) == ends_of([np.zeros(3)]) == Span(-1.0, 1.0)
+    assert ends_of([np.full(3, 4.0)]) == Span(0.0, 8.0)
     assert ends_of([np.array([2.0, 3.0])], zero=True).low <= 0.0
 
 

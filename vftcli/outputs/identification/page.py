@@ -66,7 +66,7 @@ def headline(found: Identification) -> str:
     """What was identified, and how well it predicts, in one sentence."""
     count = len({trace.motion.recording.name for trace in found.traces})
     source = f" from {count} log{'s' * (count > 1)}" if count else ""
-    return f"The {found.robot.title or found.robot.name}, identified{source}."
+    return f"{found.robot.title or found.robot.name}{source}."
 
 
 def residual_section(found: Identification) -> str:

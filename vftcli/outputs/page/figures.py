@@ -124,7 +124,8 @@ def ends_of(values: Sequence[Array], *, zero: bool = False) -> Span:
     low, high = min(float(v.min()) for v in known), max(float(v.max()) for v in known)
     if zero:
         low, high = min(low, 0.0), max(high, 0.0)
-    room = max(0.05 * (high - low), 1e-6 * max(abs(low), abs(high)), 1e-9)
+    # A line that does not change has no scale of its own.
+    room = 0.05 * (high - low) if high > low else abs(high) or 1.0
     return Span(low - room, high + room)
 
 

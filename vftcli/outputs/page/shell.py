@@ -12,7 +12,7 @@ from typing import Any
 
 from vftcli.doctor import Examination, in_words
 from vftcli.outputs.examination import overridden_lines, warnings_of
-from vftcli.outputs.page.charts import Chart, LineStyle, packed_charts
+from vftcli.outputs.page.charts import INK, Chart, LineStyle, packed_charts
 from vftcli.signals.remarks import Remark, explanation
 
 HERE = Path(__file__).parent
@@ -59,9 +59,10 @@ def swatch_rules(styles: Mapping[str, LineStyle]) -> str:
     rules = []
     for name, (colour, dash) in styles.items():
         # A name from a file could end the rule: it goes without a colour.
-        if re.fullmatch(r"[\w.-]+", name):
+        if re.fullmatch(r"[\w.,=× -]+", name):
             kind = "solid" if not dash else "dashed" if float(dash.split()[0]) > 3 else "dotted"
-            rules.append(f'[data-swatch="{name}"]::before{{border-top:3px {kind} {colour}}}')
+            paint = "var(--ink)" if colour == INK else colour
+            rules.append(f'[data-swatch="{name}"]::before{{border-top:3px {kind} {paint}}}')
     return "".join(rules)
 
 
