@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from vftcli.doctor.examiner import Examiner
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.table import BEST, NOT_SHOWN
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.refinement.baseline import Baseline
     from vftcli.virtual_sensor.choice import WrenchChoice
+    from vftcli.virtual_sensor.detection import ToldContacts
     from vftcli.virtual_sensor.smoother.observer_wrench import Gate
 
 
@@ -230,10 +233,20 @@ def find_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
     from vftcli.signals.remarks import caution
 
     try:
-        return replace(analysis, contacts=list_contacts(analysis.motion))
+        return replace(analysis, contacts=list_contacts(unloaded_motion(analysis.motion, choice)))
     except VftError as error:
         reason = caution("contacts-not-told", reason=str(error))
         return replace(analysis, remarks=(*analysis.remarks, reason))
+
+
+def unloaded_motion(motion: FreeMotion, choice: AnalysisChoice) -> FreeMotion:
+    """The log with what is free of contact: where that is not said, what is said to be unloaded."""
+    if motion.choice.is_given or choice.wrench is None:
+        return motion
+    spans, zero = choice.wrench.zero.spans, motion.zero
+    if spans:
+        return replace(motion, choice=replace(motion.choice, spans=spans))
+    return motion if zero is None else replace(motion, runs=(zero,))
 
 
 def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
@@ -255,17 +268,39 @@ def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
         asked or WrenchChoice(),
         analysis.terms_of,
         analysis.smoother_input,
-        gate_of(analysis),
+        gate_of(analysis, asked),
     )
     return replace(analysis, virtual_sensor=found)
 
 
-def gate_of(analysis: "Analysis") -> "Gate | None":
-    """The contacts, outside of which nothing touches; None where the whole log may be one."""
+def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None":
+    """The contacts, outside of which nothing touches; None where the whole log may be one.
+
+    That is so under a load, where no free motion tells what is no contact, and where the user asks
+    for the smoother by its name.
+    """
     found = analysis.contacts
-    if found is None or any(contact.is_load for contact in found.contacts):
+    if found is None or not found.tells_untouched or (asked is not None and asked.looks_back):
         return None
     return [(contact.start, contact.stop) for contact in found.contacts]
+
+
+def told_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "ToldContacts":
+    """What is known of the log's contacts: its list, and where nothing touches the arm."""
+    from vftcli.contacts.untouched import free_part
+    from vftcli.virtual_sensor.detection import ToldContacts, read_in_free_runs
+
+    motion = unloaded_motion(analysis.motion, choice)
+    part, rows = free_part(motion), analysis.contacts
+    listed = {} if rows is None else {BEST: rows.contacts}
+    if part is None:
+        return ToldContacts(untouched=np.zeros(motion.log.recording.samples, bool), listed=listed)
+    sensed = analysis.virtual_sensor if choice.wrench is not None else None
+    others = [] if part.own.any() else [p for p in part.pieces if p.run is not motion.log]
+    own = [o for o in analysis.observers if o.name not in listed]
+    sensor = None if sensed is None else sensed.sensor
+    beside = read_in_free_runs(others, own, analysis.terms_of, sensor)
+    return ToldContacts(untouched=part.own, beside=beside, listed=listed)
 
 
 def judge(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
@@ -275,7 +310,8 @@ def judge(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
     from vftcli.evaluation import judgement
 
     sensed = analysis.virtual_sensor if choice.wrench is not None else None
-    found = judgement.judge(analysis.motion, analysis.estimates, sensed, choice.reference)
+    told = told_contacts(analysis, choice) if choice.reference.contacts else None
+    found = judgement.judge(analysis.motion, analysis.estimates, sensed, choice.reference, told)
     if sensed is None:
         found = found._replace(virtual_sensor=analysis.virtual_sensor)
     remarks = analysis.remarks

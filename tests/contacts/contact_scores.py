@@ -1,8 +1,7 @@
-"""One-to-one scoring of a list of contacts against a true wrench.
+"""Truth beside lists of contacts: which row is credited to which true contact, and by how much.
 
-A row may be credited to one true contact, so that rows that run into one another count as misses.
-A true contact is |F| > 1 N or |M| > .2 N·m, pauses shorter than .12 s closed; a row meets it if it
-overlaps it, within .1 s.
+A true contact is |F| > 1 N or |M| > .2 N·m, pauses shorter than .12 s closed. Rows are credited one
+to one, as `vftcli.virtual_sensor.contact` does it.
 """
 
 from collections.abc import Sequence
@@ -14,8 +13,9 @@ from vftcli.contacts.candidates import close_gaps
 from vftcli.contacts.contact_list import Contact
 from vftcli.signals.arrays import Array
 from vftcli.signals.series import runs_of
+from vftcli.virtual_sensor.contact import credits, overlaps
 
-LEAST_FORCE, LEAST_MOMENT, GAP, SLACK = 1.0, 0.2, 0.12, 0.1
+LEAST_FORCE, LEAST_MOMENT, GAP = 1.0, 0.2, 0.12
 
 
 class TrueContact(NamedTuple):
@@ -37,12 +37,17 @@ class Score(NamedTuple):
     rows: int
 
 
+def touched(wrench: Array) -> np.ndarray:
+    """Samples in which a true wrench (M, 6) is a contact's."""
+    force, moment = (np.linalg.norm(part, axis=1) for part in (wrench[:, :3], wrench[:, 3:]))
+    return (force > LEAST_FORCE) | (moment > LEAST_MOMENT)
+
+
 def true_contacts(t: Array, wrench: Array) -> list[TrueContact]:
     """The contacts of a true wrench (M, 6)."""
     force = np.linalg.norm(wrench[:, :3], axis=1)
-    touched = (force > LEAST_FORCE) | (np.linalg.norm(wrench[:, 3:], axis=1) > LEAST_MOMENT)
     found = []
-    for start, stop in runs_of(close_gaps(t, touched, GAP)):
+    for start, stop in runs_of(close_gaps(t, touched(wrench), GAP)):
         span = slice(start, stop)
         peak = start + int(np.argmax(force[span]))
         impulse = np.trapezoid(wrench[span, :3], t[span], axis=0)
@@ -54,22 +59,12 @@ def true_contacts(t: Array, wrench: Array) -> list[TrueContact]:
 
 
 def score(rows: Sequence[Contact], true: Sequence[TrueContact]) -> Score:
-    """Credit each row to the one true contact, of those left, that it overlaps most."""
-    left, pairs, false = list(true), [], []
-    for row in rows:
-        overlaps = [overlap(row, each) for each in true]
-        if max(overlaps, default=0.0) <= 0.0:
-            false.append(row)
-        met = max(left, key=lambda each: overlap(row, each), default=None)
-        if met is not None and overlap(row, met) > 0.0:
-            pairs.append((row, met))
-            left.remove(met)
-    return Score(pairs, left, false, len(rows))
-
-
-def overlap(row: Contact, true: TrueContact) -> float:
-    """How long a row and a true contact lie on one another, the slack included. [s]"""
-    return min(row.stop, true.stop + SLACK) - max(row.start, true.start - SLACK)
+    """Credit each row to one true contact; false is what overlaps none."""
+    given, shared = credits(rows, true), overlaps(rows, true)
+    pairs = [(rows[i], met) for i, met in zip(given, true, strict=True) if i is not None]
+    missed = [met for i, met in zip(given, true, strict=True) if i is None]
+    false = [row for row, lies in zip(rows, shared, strict=True) if not lies.any()]
+    return Score(pairs, missed, false, len(rows))
 
 
 def angle(a: Array, b: Array) -> float:

@@ -1,11 +1,19 @@
 """Spectra of the raw disturbance: known densities, gaps, and the error they predict."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from vftcli.observers.spectra import Part, Spectra, around_impacts, neighbour_mean, spectra_of
+from vftcli.observers.spectra import (
+    Part,
+    Spectra,
+    around_impacts,
+    looks_free,
+    neighbour_mean,
+    spectra_of,
+)
 from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
@@ -207,3 +215,26 @@ def test_a_part_of_impacts_alone_has_the_spectrum_of_the_impacts() -> None:
     power = float(np.sum(found.loaded - found.free) * found.width)
     assert power == pytest.approx(np.mean(tau[tap] ** 2), rel=0.25)
     assert np.array_equal(around_impacts(t, t > 10.0), t > 10.0)  # lasts, so stays as it is
+
+
+def spectra(contact: float) -> Spectra:
+    """White noise, and in the loaded part a contact a thousand times louder about one frequency."""
+    f = np.linspace(0.0, 62.5, 251)
+    quiet = np.ones((251, 3))
+    louder = 1000.0 * np.exp(-(((f - contact) / 0.5) ** 2))[:, None] * np.ones(3)
+    return Spectra(frequency=f, free=quiet, loaded=quiet + louder, step=0.008, segments=(4, 4))
+
+
+@pytest.mark.parametrize(("contact", "free"), [(2.0, True), (3.0, True), (7.0, False)])
+def test_contacts_are_told_below_five_hertz(contact: float, free: bool) -> None:
+    """Above, drives ripple louder in some cycles than in others: that says nothing of contact."""
+    assert looks_free(spectra(contact)) is free
+
+
+def test_most_joints_decide() -> None:
+    one = spectra(2.0)
+    quiet = one.loaded.copy()
+    quiet[:, 0] = one.free[:, 0]
+    assert looks_free(replace(one, loaded=quiet))
+    quiet[:, 1] = one.free[:, 1]
+    assert not looks_free(replace(one, loaded=quiet))

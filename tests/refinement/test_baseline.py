@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 from vftcli.observers import MomentumObserver
-from vftcli.observers.spectra import Spectra
 from vftcli.readers import read
 from vftcli.refinement.baseline import (
     Baseline,
     baseline_of,
     bias_at_phase,
     free_reading,
-    looks_free,
     without_free_motion,
 )
 from vftcli.refinement.refine import refine
@@ -101,26 +99,3 @@ def test_a_log_without_a_free_part_says_why(circle: Recording) -> None:
     assert found.missing.code == "no-free-part"
     assert "no repetition found" in found.missing.values["reason"]
     assert found.remarks == (found.missing,)
-
-
-def spectra(contact: float) -> Spectra:
-    """White noise, and in the loaded part a contact a thousand times louder about one frequency."""
-    f = np.linspace(0.0, 62.5, 251)
-    quiet = np.ones((251, 3))
-    louder = 1000.0 * np.exp(-(((f - contact) / 0.5) ** 2))[:, None] * np.ones(3)
-    return Spectra(frequency=f, free=quiet, loaded=quiet + louder, step=0.008, segments=(4, 4))
-
-
-@pytest.mark.parametrize(("contact", "free"), [(2.0, True), (3.0, True), (7.0, False)])
-def test_contacts_are_told_below_five_hertz(contact: float, free: bool) -> None:
-    """Above, drives ripple louder in some cycles than in others: that says nothing of contact."""
-    assert looks_free(spectra(contact)) is free
-
-
-def test_most_joints_decide() -> None:
-    one = spectra(2.0)
-    quiet = one.loaded.copy()
-    quiet[:, 0] = one.free[:, 0]
-    assert looks_free(replace(one, loaded=quiet))
-    quiet[:, 1] = one.free[:, 1]
-    assert not looks_free(replace(one, loaded=quiet))

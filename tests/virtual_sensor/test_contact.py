@@ -6,6 +6,8 @@ import pytest
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.virtual_sensor.contact import (
+    ContactInterval,
+    credits,
     find_contacts,
     free_band,
     match_contacts,
@@ -48,11 +50,34 @@ def test_hits_misses_false_alarms_and_delays_are_counted() -> None:
     assert told.longest_delay == pytest.approx(0.2)
 
 
+def test_a_found_contact_is_credited_to_one_true_one() -> None:
+    true = find_contacts(T, pulses((2, 4), (5, 6), (7, 8), (14, 15)))
+    # One interval over three contacts, the last of which it has most of; one in two pieces.
+    found = find_contacts(T, pulses((3.9, 8), (14, 14.3), (14.6, 15)))
+    told = match_contacts(found, true, 20.0)
+    assert (told.contacts, told.listed, told.found, told.missed) == (4, 3, 2, 2)
+    assert (told.merged, told.split, told.false_alarms) == (2, 1, 0)
+    assert credits(found, true)[3] == 2  # the longer piece
+
+
+def test_as_many_contacts_as_possible_are_credited() -> None:
+    """The first interval overlaps the second contact more, but the second has nothing else."""
+    true = [ContactInterval(1.0, 2.0, 1.0), ContactInterval(3.0, 6.0, 1.0)]
+    found = [ContactInterval(1.9, 4.0, 1.0), ContactInterval(4.5, 5.0, 1.0)]
+    assert credits(found, true) == [0, 1]
+    assert credits([], true) == [None, None]
+    # Within a tenth of a second of its end a contact is still met, later no more.
+    assert credits([ContactInterval(2.05, 2.5, 1.0)], true[:1]) == [0]
+    late = match_contacts([ContactInterval(2.15, 2.5, 1.0)], true[:1], 10.0)
+    assert (late.missed, late.split, late.false_alarms) == (1, 1, 0)
+
+
 def test_a_higher_threshold_finds_less_and_alarms_less() -> None:
     rng = np.random.default_rng(0)
     score = np.abs(pulses((5, 6), (12, 13)) + 0.5 * rng.standard_normal(len(T)))
     curve = operating_curve(T, score, find_contacts(T, pulses((5, 6), (12, 13))), [0.3, 2.2, 20.0])
-    assert curve[0].found == 1.0
+    # An alarm that never ends is credited to one of the two.
+    assert curve[0].found == 0.5
     assert curve[1].found == 1.0
     assert curve[2].found == 0.0
     # noise of 0.5: at 0.3 the alarm never ends, at 2.2 (4.4 deviations) there is none
@@ -83,5 +108,5 @@ def test_contacts_are_told_from_torques_before_the_first_true_one() -> None:
 
 
 def test_a_log_that_starts_in_contact_has_no_free_part() -> None:
-    with pytest.raises(ParameterError, match=r"no free part.*--zero A:B"):
+    with pytest.raises(ParameterError, match=r"no free part.*--free A:B"):
         learned_free(T, find_contacts(T, pulses((0.5, 2.0))))

@@ -1,20 +1,30 @@
 """Every observer's contacts against the true ones: limits, free part, settling."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from vftcli.observers import MomentumObserver
+from vftcli.readers import read
+from vftcli.repetition.free_motion import FreePiece
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.contact import find_contacts
+from vftcli.virtual_sensor.contact import ContactInterval, find_contacts
 from vftcli.virtual_sensor.detection import (
     LEAST_TORQUE,
     WRENCH_LIMITS,
+    ToldContacts,
     floor_in_motion,
     judge_contacts,
     learned_free,
+    read_in_free_runs,
     true_intervals,
 )
+from vftcli.virtual_sensor.free_run_torque import as_modelled
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 from vftcli.virtual_sensor.zero import zero_drift
@@ -109,7 +119,7 @@ def test_the_free_part_lasts_from_settling_to_the_first_contact() -> None:
     true = find_contacts(T, push(3.0))
     np.testing.assert_array_equal(learned_free(T, true), (T >= 1.0) & (true[0].start > T))
     assert learned_free(T, ())[-2]
-    with pytest.raises(ParameterError, match=r"begins at 1.05 s.*--zero A:B"):
+    with pytest.raises(ParameterError, match=r"begins at 1.05 s.*--free A:B"):
         learned_free(T, find_contacts(T, push(3.0, 1.05)))
 
 
@@ -119,3 +129,47 @@ def test_false_alarms_count_by_the_hour_of_the_whole_log() -> None:
     (score,) = judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, reference(2.0))
     assert score.detection.false_alarms == 1
     assert score.detection.false_alarms_per_h == pytest.approx(200.0)
+
+
+def test_what_is_listed_is_judged_as_it_stands() -> None:
+    """Two rows for one push: one is credited, the other a piece; no band, no curve."""
+    told = ToldContacts(
+        untouched=np.zeros(len(T), dtype=bool),
+        listed={"best": (ContactInterval(5.0, 5.8, 1.0), ContactInterval(6.0, 7.0, 1.0))},
+    )
+    best = ExternalTorque(name="best", t=T, tau=np.zeros((len(T), 2)))
+    (score,) = judge_contacts([best], None, reference(2.0), told)
+    assert (score.signal, score.curve) == ("list", ())
+    assert (score.detection.found, score.detection.listed, score.detection.split) == (1, 2, 1)
+
+
+def test_the_band_is_learned_where_the_arm_is_known_to_be_free() -> None:
+    """A bump of 5 N·m at 12 s is a false alarm, unless it lies in the free part or in a free run."""
+    tau = reference(8.0).tau + np.column_stack([push(5.0, 12.0, 13.0), np.zeros(len(T))])
+    estimate = [ExternalTorque(name="gmo", t=T, tau=tau)]
+
+    def alarms(told: ToldContacts | None) -> int:
+        (score,) = judge_contacts(estimate, None, reference(8.0), told)
+        assert score.detection.missed == 0
+        return score.detection.false_alarms
+
+    nothing = np.zeros(len(T), dtype=bool)
+    assert alarms(None) == 1
+    assert alarms(ToldContacts(untouched=nothing)) == 1
+    assert alarms(ToldContacts(untouched=(T > 11.0) & (T < 14.0))) == 0
+    beside = np.outer(np.linspace(-5.0, 5.0, 50), [1.0, 0.1])
+    assert alarms(ToldContacts(untouched=nothing, beside={"gmo": beside})) == 0
+
+
+def test_observers_are_run_along_free_runs() -> None:
+    log = read(Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv")
+    run = ModelledRun(recording=log, robot=load_robot("ur5"))
+    piece = FreePiece(run, (log.t > 0.3) & (log.t < 4.0), ())
+    gmo = MomentumObserver(gain=10.0)
+    torques = read_in_free_runs([piece], [gmo], as_modelled, None)["gmo"]
+    # From the settling, at 1 s, to 4 s.
+    settled = (log.t >= 1.0) & (log.t < 4.0)
+    np.testing.assert_array_equal(torques, gmo.estimate(run.terms).tau[settled])
+    wrenches = read_in_free_runs([piece], [gmo], as_modelled, VirtualSensor(frame="base"))["gmo"]
+    assert wrenches.shape == (len(torques), 6)
+    assert read_in_free_runs([], [gmo], as_modelled, None) == {}

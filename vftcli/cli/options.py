@@ -196,7 +196,8 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
         "--solver",
         "smoother|pinv|damped|map",
         "How torques become a wrench: smoothed over the whole log with a band in every pose "
-        "(default for best), least squares (default for the others), damped, or with a prior of "
+        "(default for best: zero outside of the listed contacts), least squares (default for the "
+        "others), damped, or with a prior of "
         "50 N and 10 N·m. Implies --wrench.",
     )
     tool: str | None = option(

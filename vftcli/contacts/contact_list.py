@@ -162,6 +162,11 @@ class ContactList:
     remarks: tuple[Remark, ...] = ()
 
     @property
+    def tells_untouched(self) -> bool:
+        """Whether nothing touches the arm outside of the rows: known from its free motion."""
+        return self.method == "smoother" and not any(c.is_load for c in self.contacts)
+
+    @property
     def hardest(self) -> Contact | None:
         """The contact with the largest force, None without any."""
         felt = [contact for contact in self.contacts if contact.peak_force is not None]

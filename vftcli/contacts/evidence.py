@@ -33,10 +33,14 @@ LEAST_FORCE = 10.0
 """Smallest standard deviation of a force that is tried. [N]"""
 
 LONGEST_TIME = 1.0
-"""Longest correlation time of a wrench that is tried. [s]"""
+"""Longest correlation time of a wrench that comes and goes. [s]"""
 
 SIZES = 1.0, 3.0
 """Multiples of the standard deviation that are tried."""
+
+LASTING, STEADY_TIME = 1.5, 100.0
+"""A candidate that lasts longer than the first may be a wrench that stays, as a load's, with the
+second as its correlation time: one that wanders would have to pay for every block. [s]"""
 
 
 def evidence(
@@ -52,19 +56,32 @@ def evidence(
     """
     count = len(log.blocks.t)
     every = gate_of(count, runs)
-    force, time = max(prior.force, LEAST_FORCE), min(prior.time, LONGEST_TIME)
-    nothing, touched = [], []
-    for run in runs:
+    nothing, touched, owner = [], [], []
+    for number, run in enumerate(runs):
         window, gate = window_of(log.blocks.t, run), gate_of(count, [run])
         hidden = every & ~gate
         nothing.append(Lane(window, gate, hidden, places[0].jacobian, None))
-        for place in places:
-            for size in SIZES:
-                tried = ContactPrior(time, size * force, place.lever * size * force)
+        for k, place in enumerate(places):
+            for time, force in courses(prior, log.blocks.t[run[1] - 1] - log.blocks.t[run[0]]):
+                tried = ContactPrior(time, force, place.lever * force)
                 touched.append(Lane(window, gate, hidden, place.jacobian, tried))
-    each = likelihoods(log, touched).reshape(len(runs), len(places), len(SIZES)).max(axis=2)
+                owner.append((number, k))
+    each = np.full((len(runs), len(places)), -np.inf)
+    np.maximum.at(each, tuple(np.transpose(owner)), likelihoods(log, touched))
     found: Array = each - untouched(log, nothing)[:, None]
     return found
+
+
+def courses(prior: ContactPrior, lasts: float) -> list[tuple[float, float]]:
+    """Correlation time [s] and standard deviation [N] of the forces that are tried.
+
+    Args:
+        prior: How the wrench of the log's contacts moves.
+        lasts: How long the candidate is. [s]
+    """
+    force, time = max(prior.force, LEAST_FORCE), min(prior.time, LONGEST_TIME)
+    steady = [(STEADY_TIME, force)] if lasts > LASTING else []
+    return [*((time, size * force) for size in SIZES), *steady]
 
 
 def untouched(log: BlockLog, lanes: Sequence[Lane]) -> Array:

@@ -41,7 +41,7 @@ def list_contacts(motion: FreeMotion) -> ContactList:
     check_finite(motion.log)
     seconds = block_length(motion.log.recording.t)
     free = untouched_motion(motion, seconds)
-    made = by_threshold(motion) if free is None else by_smoother(motion, free, seconds)
+    made = by_threshold(motion) if free is None else by_smoother(free, seconds)
     if made.contacts and is_load(motion.log.recording, made.contacts) and has_wrench(motion.log):
         row = load_row(motion, made.contacts)
         made = replace(made, contacts=(row,), remarks=(*made.remarks, caution("contact-is-load")))
@@ -67,9 +67,9 @@ def has_wrench(run: ModelledRun) -> bool:
     return run.robot.joints >= 6
 
 
-def by_smoother(motion: FreeMotion, free: Untouched, seconds: float) -> ContactList:
+def by_smoother(free: Untouched, seconds: float) -> ContactList:
     """The list by the two-state filter, evidence, and the gated smoother."""
-    run = motion.log
+    run = free.log
     found = search(run, free.noise, free.level, seconds)
     own = [k for k, span in enumerate(found.runs) if in_free_part(run, found, span, free)]
     least = LEAST_EVIDENCE

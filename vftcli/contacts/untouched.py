@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.contacts.candidates import threshold_contacts
 from vftcli.contacts.model_error import ErrorNoise, error_course, learn_noise
 from vftcli.contacts.places import places
 from vftcli.contacts.windows import (
@@ -17,12 +18,14 @@ from vftcli.contacts.windows import (
     window_of,
 )
 from vftcli.observers import MomentumObserver
+from vftcli.observers.spectra import Part, looks_free, spectra_of
+from vftcli.repetition.free_load import FreeLoad, free_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.series import median_step, runs_of
 from vftcli.virtual_sensor.smoother.noise import dry_torques
@@ -61,14 +64,16 @@ class Untouched:
         noise: Noise and model error.
         level: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
         own: Samples of the log itself that are free. (T,)
-        runs: Free runs in other logs.
+        log: The log, less a load that the free part carries.
+        runs: Free runs in other logs, less a load that they carry.
         pieces: Every free piece in blocks, each with the log it is from.
-        remarks: What it is and how it was found.
+        remarks: What it is and how it was found, and a load that it carries.
     """
 
     noise: ErrorNoise
     level: Array
     own: Mask
+    log: ModelledRun
     runs: tuple[ModelledRun, ...]
     pieces: tuple[Blocks, ...]
     remarks: tuple[Remark, ...]
@@ -97,22 +102,30 @@ def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
     part = free_part(motion)
     if part is None:
         return None
-    robot = motion.log.robot
+    robot, load = motion.log.robot, free_load(part.pieces)
+    # A load nobody told of is no noise: contacts are told beside it.
+    pieces = tuple(p._replace(run=unloaded(p.run, load)) for p in part.pieces)
     blocks = tuple(
         disturbance_blocks(piece.run.terms, piece.run.recording.q, seconds, piece.inside)
-        for piece in part.pieces
+        for piece in pieces
     )
     noise = learn_noise(blocks, dry_torques(robot))
     if noise is None:
         return None
     return Untouched(
         noise=noise,
-        level=torque_level(part.pieces),
+        level=torque_level(pieces),
         own=part.own,
-        runs=tuple(piece.run for piece in part.pieces if piece.run is not motion.log),
+        log=unloaded(motion.log, load),
+        runs=tuple(p.run for p in pieces if p.run.recording is not motion.log.recording),
         pieces=blocks,
-        remarks=part.remarks,
+        remarks=part.remarks if load is None else (*part.remarks, load.remark),
     )
+
+
+def unloaded(run: ModelledRun, load: FreeLoad | None) -> ModelledRun:
+    """A run with a load taken off its terms, the run itself where there is none."""
+    return run if load is None else run.with_terms(load.off(run.terms, run))
 
 
 def free_part(motion: FreeMotion) -> FreePart | None:
@@ -131,12 +144,25 @@ def free_part(motion: FreeMotion) -> FreePart | None:
             return None
         found = motion.free_cycles
         own = own | np.isin(motion.cycles.number(log.recording.t), found.numbers)
+        if not choice.cycles and is_touched(log, own):
+            return None
         remarks.append(found.remark(motion.cycles.whole))
     pieces = [FreePiece(log, own, ())] if own.any() else []
     for run in motion.runs:
         pieces.append(FreePiece(run.run, np.ones(run.recording.samples, dtype=bool), ()))
         remarks.append(fact("free-log", Where(about=run.recording.name)))
     return FreePart(tuple(pieces), own, tuple(remarks))
+
+
+def is_touched(log: ModelledRun, own: Mask) -> bool:
+    """Whether a free part that was found is none: no quieter than the rest, and beyond friction."""
+    above = threshold_contacts(log.recording.t, observed(log), expected_torque(log, None))
+    if not (above & own & (log.recording.t >= log.recording.t[0] + SETTLED)).any():
+        return False
+    try:
+        return not looks_free(spectra_of(Part(log.terms, ~own), [Part(log.terms, own)]))
+    except ParameterError:  # too short for a spectrum
+        return False
 
 
 def repeats(motion: FreeMotion) -> bool:

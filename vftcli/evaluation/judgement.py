@@ -15,7 +15,7 @@ from vftcli.refinement.paper_gap import EXPECTED, MEASURED, gap_remark
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark
-from vftcli.virtual_sensor.detection import ContactScore, judge_contacts
+from vftcli.virtual_sensor.detection import ContactScore, ToldContacts, judge_contacts
 from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference
 
 
@@ -61,6 +61,7 @@ def judge(
     estimates: Sequence[ExternalTorque],
     sensed: SensorReading | None,
     choice: ReferenceChoice,
+    told: ToldContacts | None = None,
 ) -> Judgement:
     """Make the reference and compare with it.
 
@@ -69,6 +70,7 @@ def judge(
         estimates: The observers' torques.
         sensed: Their wrenches, or None.
         choice: Which reference.
+        told: What is known of the log's contacts, None for nothing.
 
     Raises:
         ReferenceTorqueError: If the reference cannot be made.
@@ -87,7 +89,7 @@ def judge(
         errors = with_wrenches(errors, recording.name, sensed)
     scores: tuple[ContactScore, ...] = ()
     if choice.contacts:
-        scores = judge_contacts(estimates, sensed, reference)
+        scores = judge_contacts(estimates, sensed, reference, told)
         errors = with_contacts(errors, recording.name, reference.name, scores)
     return Judgement(
         reference=reference, errors=errors, virtual_sensor=sensed, contact_scores=scores

@@ -82,13 +82,21 @@ CONTACT_SCHEMA: dict[str, type[pl.DataType]] = {
     "reference": pl.String,
     "signal": pl.String,
     "contacts": pl.Int64,
+    "listed_contacts": pl.Int64,
+    "found_contacts": pl.Int64,
     "missed_contacts": pl.Int64,
+    "merged_contacts": pl.Int64,
+    "split_contacts": pl.Int64,
     "false_alarms": pl.Int64,
     "false_alarms_per_h": pl.Float64,
     "detection_delay_s": pl.Float64,
     "longest_delay_s": pl.Float64,
 }
-"""Columns where contacts are judged: one row an observer; `signal` is "torque" or "wrench"."""
+"""Columns where contacts are judged: one row an observer; `signal` is "torque", "wrench" or "list".
+
+One to one: of the true contacts some are found; of those missed some are merged, which run into
+others. Rows that are neither credited nor false alarms are splits.
+"""
 
 
 def with_contacts(
@@ -102,7 +110,11 @@ def with_contacts(
             "reference": reference,
             "signal": score.signal,
             "contacts": score.detection.contacts,
+            "listed_contacts": score.detection.listed,
+            "found_contacts": score.detection.found,
             "missed_contacts": score.detection.missed,
+            "merged_contacts": score.detection.merged,
+            "split_contacts": score.detection.split,
             "false_alarms": score.detection.false_alarms,
             "false_alarms_per_h": number(score.detection.false_alarms_per_h),
             "detection_delay_s": number(score.detection.mean_delay),

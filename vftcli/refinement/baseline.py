@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from vftcli.observers.observer import Observer
-from vftcli.observers.spectra import Part, Spectra, spectra_of
+from vftcli.observers.spectra import Part, Spectra, looks_free, spectra_of
 from vftcli.observers.table import BEST, LogSpectra
-from vftcli.refinement.free_load import FreeLoad, free_load
 from vftcli.refinement.tuning import gains_of
+from vftcli.repetition.free_load import FreeLoad, free_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.repetition.pairing import mean_of
@@ -25,14 +25,6 @@ from vftcli.signals.series import resample_columns
 
 if TYPE_CHECKING:
     from vftcli.refinement.whole_log import WholeLogBias
-
-QUIETER = 0.85
-"""A free part that was found is believed if on most joints the loaded part has this share of its
-slow power beyond the free one's. Reference runs show 0.96 and more, those that are in contact all
-the time 0.82 and less."""
-
-CONTACT_BAND = 5.0
-"""Where contacts are told from noise: below this frequency. [Hz]"""
 
 STANDS = 0.5
 """A joint that stands in more than this share of the samples is limited by stiction."""
@@ -230,13 +222,6 @@ def bias_at_phase(part: FreePart, series: Sequence[Array]) -> Array:
     laid = zip(part.pieces, series, strict=True)
     signals = [x for piece, x in laid for _ in piece.pairings]
     return mean_of(part.pairings, signals)
-
-
-def looks_free(spectra: Spectra) -> bool:
-    """Whether most joints have clearly less slow power in the free part than in the loaded one."""
-    slow = spectra.frequency < CONTACT_BAND
-    power = np.maximum(spectra.loaded[slow].sum(axis=0), np.finfo(float).tiny)
-    return bool(np.median(spectra.external[slow].sum(axis=0) / power) > QUIETER)
 
 
 class FreeReading(NamedTuple):

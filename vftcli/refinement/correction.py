@@ -13,8 +13,8 @@ import numpy as np
 from vftcli.observers.spectra import Part, spectra_of
 from vftcli.refinement.baseline import Baseline, baseline_of, without_free_motion
 from vftcli.refinement.choice import RefinementChoice
-from vftcli.refinement.free_load import free_load
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
+from vftcli.repetition.free_load import free_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, VftError

@@ -1,6 +1,6 @@
 """A free run has one owner: what was read, what the model says of it, where in it a log belongs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -43,6 +43,12 @@ class ModelledRun:
         from vftcli.repetition.drive_run import drive_run_of
 
         return drive_run_of(self.recording, self.robot, self.terms)
+
+    def with_terms(self, terms: DynamicsTerms) -> "ModelledRun":
+        """The same recording with other terms than the model's own."""
+        made = replace(self)
+        made.__dict__["terms"] = terms
+        return made
 
 
 class Models:

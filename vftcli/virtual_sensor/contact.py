@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -82,15 +82,18 @@ def free_band(values: Array, free: Mask, least: Array | float) -> FreeBand:
     return FreeBand(centre=centre, half=np.maximum(half, least))
 
 
-def find_contacts(t: Array, score: Array, enter: float = 1.0) -> tuple[ContactInterval, ...]:
+def find_contacts(
+    t: Array, score: Array, enter: float = 1.0, gap: float = GAP
+) -> tuple[ContactInterval, ...]:
     """Intervals in which a score rises above `enter` until it falls below `LEAVE` of it.
 
-    Those shorter than `HOLD` are dropped, those closer than `GAP` joined.
+    Those shorter than `HOLD` are dropped, those closer than `gap` joined.
 
     Args:
         t: Time. (T,) [s]
         score: Departure in half widths of the free band. (T,)
         enter: Threshold, in half widths.
+        gap: Two contacts closer than this are one. [s]
     """
     found: list[ContactInterval] = []
     for begin, end in runs_of(score > LEAVE * enter):
@@ -101,30 +104,53 @@ def find_contacts(t: Array, score: Array, enter: float = 1.0) -> tuple[ContactIn
         first = begin + int(np.argmax(above))
         start, stop, peak = float(t[first]), float(t[end - 1]), float(score[first:end].max())
         # A hand that slips for a moment has not let go.
-        if found and start - found[-1].stop < GAP:
+        if found and start - found[-1].stop < gap:
             found[-1] = ContactInterval(found[-1].start, stop, max(found[-1].peak, peak))
         else:
             found.append(ContactInterval(start, stop, peak))
     return tuple(c for c in found if c.stop - c.start >= HOLD)
 
 
+class Interval(Protocol):
+    """Anything with a beginning and an end: a found interval, a listed contact, a true one."""
+
+    @property
+    def start(self) -> float:
+        """When it begins. [s]"""
+
+    @property
+    def stop(self) -> float:
+        """When it ends. [s]"""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Detection:
-    """How well detected contacts tell the true ones.
+    """How well found contacts tell the true ones, one to one.
 
     Attributes:
         contacts: True contacts.
-        missed: True contacts that no detection overlaps.
-        false_alarms: Detections that begin where nothing touches the arm.
+        listed: Found contacts, right or wrong.
+        missed: True contacts to which no found one is credited.
+        merged: Those of them that run into another: what overlaps them is credited elsewhere.
+        split: Found contacts that are neither credited nor false: pieces of a true one, its echo.
+        false_alarms: Found contacts that begin where nothing touches the arm.
         false_alarms_per_h: Those per hour without contact. [1/h]
-        delay: Time from each found contact's start to its detection; NaN where missed. [s]
+        delay: Time from each true contact's start to the one found; NaN where missed. [s]
     """
 
     contacts: int
+    listed: int
     missed: int
+    merged: int
+    split: int
     false_alarms: int
     false_alarms_per_h: float
     delay: tuple[float, ...]
+
+    @property
+    def found(self) -> int:
+        """True contacts that were found."""
+        return self.contacts - self.missed
 
     @property
     def mean_delay(self) -> float:
@@ -139,26 +165,65 @@ class Detection:
         return max(found) if found else float("nan")
 
 
-def match_contacts(
-    found: Sequence[ContactInterval], true: Sequence[ContactInterval], duration: float
-) -> Detection:
-    """Match detected contacts with the true ones of a log that lasts `duration` [s].
+def overlaps(found: Sequence[Interval], true: Sequence[Interval]) -> Array:
+    """How long each found contact lies on each true one, within `EARLY` of it. (F, C) [s]"""
+    table = np.zeros((len(found), len(true)))
+    for i, one in enumerate(found):
+        for j, other in enumerate(true):
+            shared = min(one.stop, other.stop + EARLY) - max(one.start, other.start - EARLY)
+            table[i, j] = max(shared, 0.0)
+    return table
 
-    A detection belongs to a true contact that it overlaps, or whose end it follows by less than
-    `LATE`.
+
+def credits(found: Sequence[Interval], true: Sequence[Interval]) -> list[int | None]:
+    """Of each true contact the number of the found one that is credited to it, None if missed.
+
+    A found contact is credited to one true contact, so that as many as possible are found, and of
+    the ways to do so to that which overlaps most.
     """
-    delays = []
-    for contact in true:
-        hits = [f for f in found if f.stop >= contact.start and f.start <= contact.stop + LATE]
-        delays.append(max(hits[0].start - contact.start, 0.0) if hits else float("nan"))
-    false = [f for f in found if not any(c.start - EARLY <= f.start <= c.stop + LATE for c in true)]
+    from scipy.optimize import linear_sum_assignment
+
+    given: list[int | None] = [None] * len(true)
+    if not found or not true:
+        return given
+    shared = overlaps(found, true)
+    # One more pair is worth more than all that may overlap.
+    worth = np.where(shared > 0.0, 1.0 + float(shared.sum()), 0.0) + shared
+    for i, j in zip(*linear_sum_assignment(worth, maximize=True), strict=True):
+        if shared[i, j] > 0.0:
+            given[int(j)] = int(i)
+    return given
+
+
+def match_contacts(
+    found: Sequence[Interval], true: Sequence[Interval], duration: float
+) -> Detection:
+    """Match found contacts one to one with the true ones of a log that lasts `duration` [s].
+
+    What begins within `LATE` of a true contact's end is no false alarm, but credited only where it
+    overlaps one; what begins too early is one, credited or not.
+    """
+    given, shared = credits(found, true), overlaps(found, true) > 0.0
+    used = {i for i in given if i is not None}
+    missed = [j for j, i in enumerate(given) if i is None]
+    false = {
+        i
+        for i, f in enumerate(found)
+        if not any(c.start - EARLY <= f.start <= c.stop + LATE for c in true)
+    }
     free = duration - sum(c.stop - c.start for c in true)
     return Detection(
         contacts=len(true),
-        missed=sum(1 for d in delays if not np.isfinite(d)),
+        listed=len(found),
+        missed=len(missed),
+        merged=int(np.count_nonzero(shared[:, missed].any(axis=0))) if len(found) else 0,
+        split=len(found) - len(used | false),
         false_alarms=len(false),
         false_alarms_per_h=len(false) * 3600.0 / free if free > 0 else float("nan"),
-        delay=tuple(delays),
+        delay=tuple(
+            float("nan") if i is None else max(found[i].start - c.start, 0.0)
+            for i, c in zip(given, true, strict=True)
+        ),
     )
 
 

@@ -1,23 +1,30 @@
-"""Contacts of every observer against the true ones."""
+"""Contacts of every observer, or of a list, against the true ones, one to one."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.observers.observer import Observer
+from vftcli.repetition.free_motion import FreePiece
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.virtual_sensor.contact import (
+    GAP,
     ContactInterval,
     Detection,
+    Interval,
     OperatingPoint,
     find_contacts,
     free_band,
     match_contacts,
     operating_curve,
 )
+from vftcli.virtual_sensor.free_run_torque import TermsOf
 from vftcli.virtual_sensor.sensor_reading import SensorReading
+from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 from vftcli.virtual_sensor.zero import SETTLING
 
 TRUE_TORQUE = 0.5
@@ -29,6 +36,10 @@ WRENCH_LIMITS = np.repeat([1.0, 0.2], 3)
 LEAST_TORQUE = 0.5
 """Smallest half width of a free band of joint torques. [N·m]"""
 
+TRUE_GAP = 0.12
+"""Contacts of an exact reference closer than this are one; those of a measured one, which has a
+floor, as those of an observer. [s]"""
+
 THRESHOLDS = tuple(float(x) for x in np.geomspace(0.1, 10.0, 41))
 """Multiples of the free band of an operating curve."""
 
@@ -38,9 +49,9 @@ class ContactScore(NamedTuple):
 
     Attributes:
         name: The observer.
-        signal: What it tells them from, "torque" or "wrench".
-        detection: Counts and delays at the free band itself.
-        curve: Hits against false alarms over `THRESHOLDS`.
+        signal: What it tells them from: "torque", "wrench", or "list" of contacts.
+        detection: Counts and delays, of the free band itself or of the list.
+        curve: Hits against false alarms over `THRESHOLDS`; none of a list, which has no band.
         found: The contacts it found.
     """
 
@@ -48,12 +59,57 @@ class ContactScore(NamedTuple):
     signal: str
     detection: Detection
     curve: tuple[OperatingPoint, ...]
-    found: tuple[ContactInterval, ...]
+    found: tuple[Interval, ...]
 
 
-def true_intervals(t: Array, truth: Array, limits: Array | float) -> tuple[ContactInterval, ...]:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ToldContacts:
+    """What is known of a log's contacts before they are judged.
+
+    Attributes:
+        untouched: Samples of the log that are known to be free; none where nothing is. (T,)
+        beside: What each observer reads in free runs of other logs, by name. (S, k) each
+        listed: Contacts that stand in a list, by the observer whose wrench they are told of.
+    """
+
+    untouched: Mask
+    beside: Mapping[str, Array] = field(default_factory=dict)
+    listed: Mapping[str, Sequence[Interval]] = field(default_factory=dict)
+
+
+def read_in_free_runs(
+    pieces: Sequence[FreePiece],
+    observers: Sequence[Observer],
+    terms_of: TermsOf,
+    sensor: VirtualSensor | None,
+) -> dict[str, Array]:
+    """What each observer reads in free runs once it has settled: wrenches, or joint torques.
+
+    Args:
+        pieces: The free samples of each run.
+        observers: The observers.
+        terms_of: What each of them runs on.
+        sensor: What makes their wrenches, None for joint torques.
+
+    Returns:
+        Name → (S, 6) or (S, n); nothing without pieces.
+    """
+    read: dict[str, list[Array]] = {}
+    for piece in pieces:
+        t, q, chain = piece.run.recording.t, piece.run.recording.q, piece.run.robot.chain
+        settled = piece.inside & (t >= t[0] + SETTLING)
+        for observer in observers:
+            torque = observer.estimate(terms_of(observer.name, piece.run))
+            values = torque.tau if sensor is None else sensor.wrench(torque, q, chain).known
+            read.setdefault(observer.name, []).append(values[settled])
+    return {name: np.concatenate(each) for name, each in read.items()}
+
+
+def true_intervals(
+    t: Array, truth: Array, limits: Array | float, gap: float = GAP
+) -> tuple[ContactInterval, ...]:
     """Contacts of a true wrench or torque (T, k)."""
-    return find_contacts(t, np.nan_to_num(np.abs(truth) / limits).max(axis=1))
+    return find_contacts(t, np.nan_to_num(np.abs(truth) / limits).max(axis=1), gap=gap)
 
 
 def learned_free(t: Array, true: Sequence[ContactInterval]) -> Mask:
@@ -67,7 +123,7 @@ def learned_free(t: Array, true: Sequence[ContactInterval]) -> Mask:
     if np.count_nonzero(free) < 10:
         raise ParameterError(
             f"contacts: the first true one begins at {first:g} s, so there is no free part to "
-            f"learn the band from; name one with --zero A:B"
+            f"learn the band from; name one with --free A:B"
         )
     return free
 
@@ -86,45 +142,83 @@ def floor_in_motion(reference: ExternalTorque) -> Array:
 
 
 def judge_contacts(
-    estimates: Sequence[ExternalTorque], measured: SensorReading | None, reference: ExternalTorque
+    estimates: Sequence[ExternalTorque],
+    measured: SensorReading | None,
+    reference: ExternalTorque,
+    told: ToldContacts | None = None,
 ) -> tuple[ContactScore, ...]:
     """Every observer's contacts against those of a reference torque.
 
-    Told from the wrenches where they were asked for, else from the joint torques. The free band is
-    learned in the zero spans if they were given, else before the first true contact.
+    An observer whose contacts are listed is judged by its list. The others' are told from their
+    wrenches where they were asked for, else from their joint torques, by a free band: learned in
+    the zero spans, else in the log's own free part, else in free runs, else before the first true
+    contact.
 
     Args:
         estimates: The observers' torques.
         measured: Their wrenches, or None.
         reference: The true torque; beyond `TRUE_TORQUE`, or five times its floor in
             motion, it is a contact.
+        told: What is known to be free, and what is listed; None for nothing.
 
     Raises:
         ParameterError: If there is no free part to learn the band from.
     """
     limits = np.maximum(TRUE_TORQUE, 5.0 * np.nan_to_num(floor_in_motion(reference)))
-    true = true_intervals(reference.t, reference.tau, limits)
+    gap = TRUE_GAP if reference.floor is None else GAP
+    true = true_intervals(reference.t, reference.tau, limits, gap)
     kind, least = "torque", np.asarray(LEAST_TORQUE)
     signals = {estimate.name: estimate.tau for estimate in estimates}
     if measured is not None:
         kind, least = "wrench", WRENCH_LIMITS
         signals = {wrench.name: wrench.known for wrench in measured.wrenches}
-    given = measured is not None and measured.drifts
     t = reference.t
-    free = measured.free if measured is not None and given else learned_free(t, true)
+    duration = float(t[-1] - t[0])
+    told = told or ToldContacts(untouched=np.zeros(len(t), dtype=bool))
+    zero = measured.free if measured is not None and measured.drifts else None
     found = []
     for name, values in signals.items():
-        score = free_band(values, free, least).score(values)
+        if name in told.listed:
+            rows = tuple(told.listed[name])
+            counts = match_contacts(rows, true, duration)
+            found.append(ContactScore(name, "list", counts, (), rows))
+            continue
+        quiet = untouched_values(values, told.beside.get(name), told.untouched, zero, (t, true))
         # Observers rise from zero: what they read before they have settled touches nothing.
-        score = np.where(t < t[0] + SETTLING, 0.0, score)
+        band = free_band(quiet, np.ones(len(quiet), dtype=bool), least)
+        score = np.where(t < t[0] + SETTLING, 0.0, band.score(values))
         here = find_contacts(t, score)
-        found.append(
-            ContactScore(
-                name=name,
-                signal=kind,
-                detection=match_contacts(here, true, float(t[-1] - t[0])),
-                curve=operating_curve(t, score, true, THRESHOLDS),
-                found=here,
-            )
-        )
+        curve = operating_curve(t, score, true, THRESHOLDS)
+        found.append(ContactScore(name, kind, match_contacts(here, true, duration), curve, here))
     return tuple(found)
+
+
+def untouched_values(
+    values: Array,
+    beside: Array | None,
+    own: Mask,
+    zero: Mask | None,
+    true: tuple[Array, Sequence[ContactInterval]],
+) -> Array:
+    """What an observer reads where nothing touches the arm. (S, k)
+
+    Args:
+        values: What it reads of the log. (T, k)
+        beside: What it reads in free runs, None without any. (S, k)
+        own: The log's own free samples; none where nothing is known. (T,)
+        zero: Samples of the zero spans, None without any. (T,)
+        true: Time, and the true contacts.
+
+    Raises:
+        ParameterError: If nothing tells.
+    """
+    t, contacts = true
+    chosen = own & (t >= t[0] + SETTLING)
+    if zero is not None:
+        chosen = zero
+    elif not chosen.any():
+        if beside is not None and len(beside):
+            return beside
+        chosen = learned_free(t, contacts)
+    found: Array = values[chosen]
+    return found

@@ -75,14 +75,19 @@ def test_contacts_are_counted_in_whole_numbers() -> None:
         "observer": "gmo",
         "signal": "torque",
         "contacts": 3,
+        "listed_contacts": 4,
+        "found_contacts": 3,
         "missed_contacts": 0,
+        "merged_contacts": 0,
+        "split_contacts": 1,
+        "false_alarms": 0,
         "false_alarms_per_h": 0.0,
         "detection_delay_s": 0.04,
         "longest_delay_s": None,
     }
     (grid,) = contact_grids(pl.DataFrame([row, row | {"contacts": None}]))
     assert terminal(grid).splitlines()[2].split() == [
-        "run.csv", "gmo", "torque", "3", "0", "0", "0.0400", "–",
+        "run.csv", "gmo", "torque", "3", "4", "3", "0", "0", "1", "0", "0", "0.0400", "–",
     ]  # fmt: skip
     assert list(contact_grids(pl.DataFrame({"recording": ["a"]}))) == []
 

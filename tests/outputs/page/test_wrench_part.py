@@ -56,7 +56,10 @@ def score() -> ContactScore:
     """Thresholds in steps of √2 about the free band; hits fall as they rise."""
     detection = Detection(
         contacts=4,
+        listed=5,
         missed=1,
+        merged=1,
+        split=0,
         false_alarms=2,
         false_alarms_per_h=7.25,
         delay=(0.04, 0.06, float("nan")),
@@ -73,8 +76,8 @@ def score() -> ContactScore:
 
 def test_contacts_are_counted(score: ContactScore) -> None:
     (row,) = contact_grid((score,)).rows
-    assert row[:4] == ("gmo", 4, 1, 7.25)
-    assert row[4:] == (pytest.approx(0.05), pytest.approx(0.06))
+    assert row[:8] == ("gmo", 4, 5, 3, 1, 1, 0, 7.25)
+    assert row[8:] == (pytest.approx(0.05), pytest.approx(0.06))
 
 
 def test_the_trade_off_shows_the_nearest_threshold_that_was_tried(score: ContactScore) -> None:

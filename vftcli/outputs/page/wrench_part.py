@@ -159,14 +159,18 @@ def masked_words(sensed: SensorReading) -> str:
 
 def contact_grid(contacts: tuple[ContactScore, ...]) -> Grid:
     """Contacts found and missed, false alarms and delays of each observer."""
-    heads = ("contacts", "missed", "false alarms/h", "mean delay [s]", "longest [s]")
+    heads = (
+        *("contacts", "rows", "found", "missed", "of them merged", "split"),
+        *("false alarms/h", "mean delay [s]", "longest [s]"),
+    )
     rows: list[tuple[Entry, ...]] = []
     for score in contacts:
         found = score.detection
         times = (found.false_alarms_per_h, found.mean_delay, found.longest_delay)
-        rows.append((score.name, found.contacts, found.missed, *map(float, times)))
+        counts = (found.contacts, found.listed, found.found, found.missed, found.merged)
+        rows.append((score.name, *counts, found.split, *map(float, times)))
     return Grid(
-        title="Contacts against the reference, told at the free band",
+        title="Contacts against the reference, one to one: of best its list, else at the free band",
         columns=(Column("observer", words=True), *map(Column, heads)),
         rows=tuple(rows),
         swatches=True,
@@ -176,7 +180,7 @@ def contact_grid(contacts: tuple[ContactScore, ...]) -> Grid:
 def trade_off_grid(contacts: tuple[ContactScore, ...]) -> Grid:
     """The operating curve (ROC): contacts found against false alarms, by threshold."""
     rows = []
-    for score in contacts:
+    for score in (each for each in contacts if each.curve):
         marks = np.array([point.threshold for point in score.curve])
         # The nearest threshold that was tried, as a ratio: the curve's steps are geometric.
         points = [score.curve[int(np.argmin(np.abs(np.log(marks / at))))] for at in SHOWN]

@@ -9,8 +9,8 @@ import pytest
 from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
-from vftcli.refinement.free_load import free_load, weigh
 from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.free_load import free_load, weigh
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
