@@ -12,6 +12,7 @@ from vftcli.outputs.page.figures import (
     path_of,
     ribbon,
     stripe,
+    stripes,
     svg,
     thinned,
     thinned_log,
@@ -67,6 +68,12 @@ def test_what_is_far_outside_stays_near() -> None:
 
 def test_a_stripe_stays_in_the_plot() -> None:
     assert 'x="50.0" y="0.0" width="50.0"' in stripe(SCALES, 5.0, 99.0, "")
+
+
+def test_many_stripes_are_one_path() -> None:
+    found = stripes(SCALES, [(0.0, 1.0), (5.0, 5.0)], "")
+    assert found == '<path d="M0.0 0h10.0v100h-10.0zM50.0 0h0.5v100h-0.5z" />'
+    assert stripes(SCALES, [], "") == ""
 
 
 def test_ends_hold_all_values() -> None:

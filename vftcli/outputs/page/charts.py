@@ -179,7 +179,7 @@ def picture(chart: Chart, panel: int, ends: Span) -> str:
     """One panel as a figure with its head."""
     box = Box()
     scales = Scales(box, Span(float(chart.x[0]), float(chart.x[-1])), ends, chart.log)
-    parts = [figures.stripe(scales, *span, 'class="contact"') for span in chart.spans]
+    parts = [figures.stripes(scales, chart.spans, 'class="contact"')]
     if chart.band is not None and np.isfinite(chart.band[panel]):
         top, foot = (float(scales.up(sign * chart.band[panel])) for sign in (1.0, -1.0))
         foot = min(foot, scales.floor)

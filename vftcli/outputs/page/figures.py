@@ -185,6 +185,18 @@ def stripe(scales: Scales, start: float, stop: float, look: str) -> str:
     return rectangle(left, scales.box.top, right - left, scales.floor - scales.box.top, look)
 
 
+def stripes(scales: Scales, spans: Sequence[tuple[float, float]], look: str) -> str:
+    """Many stretches of time as one path."""
+    height = scales.floor - scales.box.top
+    places = [(float(scales.across(a)), float(scales.across(b))) for a, b in spans]
+    path = "".join(
+        f"M{left:.1f} {scales.box.top:g}h{max(right - left, 0.5):.1f}v{height:g}"
+        f"h{-max(right - left, 0.5):.1f}z"
+        for left, right in places
+    )
+    return f'<path d="{path}" {look}/>' if path else ""
+
+
 def axes(scales: Scales, unit: str, count: tuple[int, int] = (6, 3)) -> str:
     """Grid lines and numbers of both axes; the last number below bears the unit.
 

@@ -19,6 +19,9 @@ NARROW = Box(width=400, height=260, left=38, bottom=24, top=28, right=8)
 STRETCHES = {WIDE: 600, NARROW: 200}
 """Stretches of the line in each of them."""
 
+FEWEST = 6
+"""Fewest stretches of one contact's line."""
+
 LETTER = 7.5
 """Width of a letter, for labels that shall not run into one another."""
 
@@ -132,7 +135,9 @@ def course_of(scales: Scales, contact: Contact, stretches: int) -> str:
     course = contact.course
     if course is None:
         return ""
-    t, force = figures.thinned(course.t, course.force, stretches)
+    # A contact's share of the log's stretches: hundreds of them shall not make a large page.
+    share = float(course.t[-1] - course.t[0]) / (scales.x.high - scales.x.low)
+    t, force = figures.thinned(course.t, course.force, max(round(share * stretches), FEWEST))
     half = np.interp(t, course.t, course.band)
     band = figures.ribbon(scales, t, np.maximum(force - half, 0.0), force + half, 'class="band"')
     return band + figures.line(scales, t, force, 'class="force"')
