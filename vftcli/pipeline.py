@@ -104,6 +104,12 @@ class AnalysisChoice:
 Analyser = Callable[[Recording, Robot, AnalysisChoice, Models], "Analysis"]
 """What is done with each log of a command."""
 
+
+def raise_error(_log: Path, error: VftError) -> None:
+    """Raise what is wrong with a log."""
+    raise error
+
+
 Failed = Callable[[Path, VftError], None]
 """Who is told which log could not be analysed, and why."""
 
@@ -133,8 +139,7 @@ def analyse_logs(
         try:
             if choice.read.columns is None:
                 refuse_estimates(path)
-            each = choice.library.open_each([path], choice.read)
-            recordings += [(path, recording) for recording in each]
+            recordings += [(path, r) for r in choice.library.open_each([path], choice.read)]
         except VftError as error:
             tell(path, error)
     refuse_repeated_logs([recording for _, recording in recordings])
@@ -145,11 +150,6 @@ def analyse_logs(
             tell(path, error)
         else:
             yield made
-
-
-def raise_error(_log: Path, error: VftError) -> None:
-    """Raise what is wrong with a log."""
-    raise error
 
 
 def list_touches(
@@ -224,9 +224,8 @@ def analyse(
     baseline = model(motion, choice)
     analysis = replace(observe(motion, baseline, choice), examinations=examinations)
     analysis = refine(analysis, baseline, choice)
-    tell(f"{recording.name}: listing contacts")
+    tell(f"{recording.name}: listing contacts, errors")
     analysis = find_contacts(analysis, choice)
-    tell(f"{recording.name}: wrenches and errors")
     analysis = sense(analysis, choice)
     return judge(analysis, choice)
 

@@ -1,13 +1,24 @@
 """From what was found to rows."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from contact_logs import FIXTURES, motion
 from test_model_error import blocks, drawn, noise
 
+from vftcli.contacts.contact_list import ContactList
 from vftcli.contacts.model_error import error_course
 from vftcli.contacts.places import PointFit, arm_parts
-from vftcli.contacts.rows import QuietError, Site, from_flange, sensor_force, vendor_force
+from vftcli.contacts.rows import (
+    QuietError,
+    Site,
+    force_course,
+    from_flange,
+    sensor_force,
+    vendor_force,
+    with_drives,
+)
 from vftcli.readers import read
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
@@ -92,3 +103,27 @@ def test_a_size_is_as_sure_as_its_place() -> None:
     # Four in the score are e⁻² in likelihood.
     less = Site([fit(5, 40.0, 1.0), fit(3, 60.0, 5.0)], parts, np.zeros((1, 6, 6)))
     assert less.spread(40.0) == pytest.approx(20.0 * np.sqrt(np.exp(-2) / (1 + np.exp(-2))))
+
+
+def test_a_course_bears_the_band_along_its_force() -> None:
+    t = np.array([1.0, 2.0])
+    force = np.array([[3.0, 4.0, 0.0], [0.0, 0.0, 0.0]])
+    covariance = np.tile(np.diag([4.0, 9.0, 25.0]), (2, 1, 1))
+    course = force_course(t, force, covariance)
+    assert course.force.tolist() == [5.0, 0.0]
+    # u = (.6, .8, 0): √(.36·4 + .64·9) = 2.683; without a force there is no direction.
+    assert course.band.tolist() == pytest.approx([1.96 * 2.6833, 0.0], rel=1e-4)
+    # 3 % of 5 N, which the drives' constants may be off.
+    wider = force_course(t, force, with_drives(force, covariance)).band[0]
+    assert wider == pytest.approx(1.96 * np.hypot(2.6833, 0.15), rel=1e-4)
+
+
+def test_every_row_has_its_course(listed: Callable[..., ContactList]) -> None:
+    for contact in listed("ur5_circle.csv", "ur5", "0.3:4").contacts:
+        course = contact.course
+        assert course is not None
+        assert contact.start <= course.t[0] < course.t[-1] <= contact.stop
+        k = int(np.argmax(course.force))
+        assert course.t[k] == pytest.approx(contact.peak)
+        assert course.force[k] == pytest.approx(contact.peak_force)
+        assert course.band[k] == pytest.approx(contact.peak_band)

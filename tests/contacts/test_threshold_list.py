@@ -56,4 +56,13 @@ def test_most_pushes_are_told_by_the_drives_friction_alone() -> None:
     # An observer of 1/30 s lags behind taps of .2 s, and a row before one may be credited for it.
     assert np.median(np.abs(error)) < 10.0
     assert [row.number for row in rows] == list(range(1, len(rows) + 1))
+    off = []
+    for row in rows:
+        assert row.course is not None
+        assert row.peak_force is not None
+        assert (row.course.t[0], row.course.t[-1]) == (row.start, row.stop)
+        at_peak = float(np.interp(row.peak, row.course.t, row.course.force))
+        off.append(at_peak / row.peak_force - 1.0)
+    # The row's torque is the mean over .03 s about the peak, the course's that of the sample.
+    assert np.median(np.abs(off)) < 0.1
     assert 5.0 < float(axes_told(run)[2]) < 60.0

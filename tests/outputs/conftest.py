@@ -1,9 +1,11 @@
-"""A small analysis of a simulated arm: made in memory, with hostile names in it."""
+"""Analyses of simulated arms, one with hostile names in it, and a real browser for their pages."""
 
 import shlex
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +13,9 @@ from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation import evaluate
+from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.outputs.log.run_record import run_record
-from vftcli.pipeline import AnalysisChoice, analyse
+from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import momentum_terms
@@ -104,3 +107,93 @@ def as_if() -> Reworked:
         return replace(analysis, motion=replace(analysis.motion, log=run))
 
     return as_if
+
+
+@pytest.fixture(scope="session")
+def pushed() -> Analysis:
+    """The simulated UR5 on a circle, pushed twelve times, judged by the two-cycle difference."""
+    log = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
+    choice = AnalysisChoice(
+        robot=RobotChoice(name="ur5"), reference=ReferenceChoice(name="two-cycle")
+    )
+    return analyse_log(log, choice)
+
+
+BROWSERS = "chromium", "chromium-browser", "google-chrome"
+"""Programs that a page is opened in, the first that is installed."""
+
+
+class Tab:
+    """A page opened in a browser, and what its console says.
+
+    Attributes:
+        page: The page, as Playwright has it.
+        errors: Errors of its scripts, and everything it wrote to the console.
+    """
+
+    def __init__(self, page: Any, path: Path) -> None:
+        self.page = page
+        self.errors: list[str] = []
+        page.on("console", lambda message: self.errors.append(message.text))
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.goto(path.as_uri())
+
+    def unfold(self) -> None:
+        """Open every part of the details and wait until its charts are drawn."""
+        self.page.evaluate("document.querySelectorAll('details').forEach(x => { x.open = true })")
+        places = self.page.locator(".large").count()
+        self.page.wait_for_function(
+            "count => document.querySelectorAll('.large canvas').length === count", arg=places
+        )
+
+    def blank_charts(self) -> list[str]:
+        """Charts, large or small, that take no room or on which nothing is drawn."""
+        return self.page.evaluate("""() => {
+          const drawn = (canvas) => canvas.width && canvas.height && canvas.getContext("2d")
+            .getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value);
+          const large = [...document.querySelectorAll(".large")].filter((place) =>
+            !place.querySelector("canvas") || !drawn(place.querySelector("canvas")));
+          const small = [...document.querySelectorAll("figure svg")].filter((svg) => {
+            const { width, height } = svg.getBoundingClientRect();
+            const filled = width > 20 && height > 20 && svg.querySelector("path, rect");
+            return getComputedStyle(svg).display !== "none" && !filled;
+          });
+          return [...large.map((x) => x.dataset.chart), ...small.map((x) => x.textContent)];
+        }""")
+
+    @property
+    def overflow(self) -> int:
+        """By how many pixels the page is wider than its window."""
+        return self.page.evaluate("document.documentElement.scrollWidth - innerWidth")
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """A real browser without a window; skips where there is none."""
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="no page is opened: the package playwright is not installed"
+    )
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
+        pytest.skip(f"no page is opened: none of {', '.join(BROWSERS)} is installed")
+    with playwright.sync_playwright() as running:
+        # Within a container the browser's own sandbox cannot start.
+        opened = running.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def opened(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Tab]]:
+    """Opens a page's text in the browser, in a window of its own kind."""
+    contexts = []
+
+    def opened(html: str, width: int = 1280, **kind: Any) -> Tab:
+        path = tmp_path / f"{len(contexts)}.html"
+        path.write_text(html, encoding="utf-8")
+        contexts.append(browser.new_context(viewport={"width": width, "height": 900}, **kind))
+        return Tab(contexts[-1].new_page(), path)
+
+    yield opened
+    for context in contexts:
+        context.close()

@@ -14,7 +14,7 @@ from vftcli.outputs.examination import (
     overridden_lines,
 )
 from vftcli.outputs.log.run_record import to_json
-from vftcli.outputs.page.shell import health
+from vftcli.outputs.page.shell import alarms, health
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import Remark, fact, warning
 
@@ -74,15 +74,16 @@ def test_another_arm_does_not_head_what_identify_makes() -> None:
 
 
 @pytest.mark.parametrize("sound", [True, False])
-def test_the_page_shows_warnings_open_and_escapes_names(sound: bool) -> None:
+def test_the_page_shows_warnings_first_and_escapes_names(sound: bool) -> None:
     note = fact("short", duration_s=1.0)
     made = examination(*([] if sound else [WRONG]), note)
     made = replace(made, recording=replace(LOG, source=Source(label="<b>.csv")))
-    page = health([made, made])
+    page = alarms([made, made]) + health([made, made], opened=True)
     assert "<b>.csv" not in page
     assert "&lt;b&gt;.csv" in page
-    warnings_shown, notes = page.split("<details>", 1)
+    warnings_shown, notes = page.split("<strong>short</strong>", 1)
     assert ("milliamperes" in warnings_shown) == (not sound)
-    assert "<strong>short</strong>" in notes
-    assert ("MEANINGLESS" in page) == (not sound)
+    assert (" open>" in page) == (not sound)
+    assert notes.count("<strong>short</strong>") == 1  # the second log's
+    assert page.startswith('<p class="alarm">MEANINGLESS') == (not sound)
     assert health([]) == ""

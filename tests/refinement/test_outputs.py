@@ -1,6 +1,5 @@
 """Bands, curves and limits reach the Parquet, the page, the recording and `run.json`."""
 
-import base64
 import json
 import re
 from pathlib import Path
@@ -14,8 +13,10 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.log.estimates import estimates_table
 from vftcli.outputs.log.rerun_recording import line_groups
 from vftcli.outputs.log.run_record import run_record, to_json
+from vftcli.outputs.page.charts import observer_lines
 from vftcli.outputs.page.page import render
-from vftcli.outputs.page.payload import payload
+from vftcli.outputs.page.refinement_part import spectra_chart, tuning_chart
+from vftcli.outputs.page.torque_part import torque_chart
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 
@@ -31,19 +32,20 @@ def test_the_parquet_holds_the_band_beside_the_covariance(worked_up: Analysis) -
 
 
 def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -> None:
-    data = payload(worked_up)
-    tau, error = data["charts"][:2]
-    halves = {s["name"]: s["lines"][2]["half"] for s in tau["series"] if "half" in s["lines"][2]}
+    halves = {s.name: s.half for s in torque_chart(worked_up).series if s.half is not None}
     assert set(halves) == {e.name for e in worked_up.estimates}
     band = worked_up.estimates[-1].error_sd
     assert band is not None
-    drawn = np.frombuffer(base64.b64decode(halves["rts-auto"]), dtype="<f4")
-    np.testing.assert_allclose(drawn, 1.96 * band[:, 2], rtol=1e-6)  # seven digits of a float32
-    assert not any("half" in line for s in error["series"] for line in s["lines"])
-    charts = {chart["key"]: chart for chart in data["responses"]}
-    assert [s["name"] for s in charts["curve"]["series"]] == ["kfo-auto", "rts-auto"]
-    assert len(charts["spectra"]["series"]) == 2
+    np.testing.assert_array_equal(halves["rts-auto"], 1.96 * band)
+    found = worked_up.refinement
+    assert found is not None
+    curve = tuning_chart(found, observer_lines(worked_up.estimates))
+    assert [s.name for s in curve.series] == ["kfo-auto", "rts-auto"]
+    assert found.baseline.spectra is not None
+    assert len(spectra_chart(found.baseline.spectra).series) == 2
     page = render(worked_up)
+    assert page.count("<title>Spectrum of the disturbance") == 6
+    assert page.count("<title>Expected error against") == 6
     assert "What the complete log tells" in page
     assert "Error budget in N·m rms" in page
     assert re.search(r"mean NIS \(1\)", page)

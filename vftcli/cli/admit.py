@@ -9,6 +9,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, option, taken_apart
 from vftcli.cli.help import WRITE
+from vftcli.cli.log_options import Words
 
 if TYPE_CHECKING:
     from vftcli.admittance.choice import ControlChoice
@@ -47,9 +48,7 @@ class ControllerOptions(Bundle):
     alpha: str | None = option(
         "--alpha", "A,B,…", "One variable controller each. Default the profile's."
     )
-    controller: opt.Words = option(
-        "--controller", "variable|traditional", "Repeatable; default both."
-    )
+    controller: Words = option("--controller", "variable|traditional", "Repeatable; default both.")
     xi: str | None = option(
         "--xi",
         "NUMBER|from-B",
@@ -75,7 +74,7 @@ class ReleaseOptions(Bundle):
 
     GROUP = "Without a log"
 
-    release: opt.Words = option(
+    release: Words = option(
         "--release", "AXIS=VALUE", "Replay a release from rest: x=0.3 [m], rz=0.5 [rad]."
     )
     start: str | None = option(

@@ -7,12 +7,13 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, option, taken_apart
+from vftcli.cli.log_options import ROBOT
 
 
 class BenchOptions(Bundle):
     """What is measured, and how often."""
 
-    robot: str = option(*opt.ROBOT, "ur5")
+    robot: str = option(*ROBOT, "ur5")
     samples: int = option("--samples", "N", "Length of the log.", 30_060, min=100)
     rounds: int = option("--rounds", "N", "Interleaved repetitions.", 7, min=1)
     examination: bool = flag(

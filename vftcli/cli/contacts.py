@@ -8,6 +8,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, taken_apart
 from vftcli.cli.help import OUTPUT
+from vftcli.cli.log_options import ReadOptions, RobotOptions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,8 +29,8 @@ class ListOptions(Bundle):
 @taken_apart
 def list_contacts(
     logs: opt.Logs,
-    reading: opt.ReadOptions,
-    robot: opt.RobotOptions,
+    reading: ReadOptions,
+    robot: RobotOptions,
     free: opt.FreeOptions,
     form: ListOptions,
     anyway: opt.AnywayOptions,

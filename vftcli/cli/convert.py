@@ -9,6 +9,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
 from vftcli.cli.help import WRITE
+from vftcli.cli.log_options import ReadOptions
 
 
 @taken_apart
@@ -24,7 +25,7 @@ def convert_log(
             rich_help_panel=WRITE,
         ),
     ],
-    reading: opt.ReadOptions,
+    reading: ReadOptions,
     talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     json: opt.Json = False,
     force: opt.Force = False,

@@ -8,6 +8,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, option, taken_apart
 from vftcli.cli.help import WRITE
+from vftcli.cli.log_options import ReadOptions, RobotOptions, Words
 
 if TYPE_CHECKING:
     from vftcli.identification import Task
@@ -59,7 +60,7 @@ class ValidationOptions(Bundle):
 class WithoutLoad(Bundle):
     """The same motion without the load that is sought."""
 
-    free: opt.Words = option(*opt.FREE)
+    free: Words = option(*opt.FREE)
 
     def logs(self, find_payload: bool) -> tuple[Path, ...]:
         """The logs that are given, one at most.
@@ -92,8 +93,8 @@ def identify_robot(
             "-o", "--output", metavar="FILE.toml", help="The new robot file.", rich_help_panel=WRITE
         ),
     ],
-    reading: opt.ReadOptions,
-    robot: opt.RobotOptions,
+    reading: ReadOptions,
+    robot: RobotOptions,
     asked: TaskOptions,
     validation: ValidationOptions,
     free: WithoutLoad,

@@ -6,13 +6,14 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
+from vftcli.cli.log_options import ReadOptions, RobotOptions
 
 
 @taken_apart
 def inspect_log(
     log: opt.Log,
-    reading: opt.ReadOptions,
-    robot: opt.RobotOptions,
+    reading: ReadOptions,
+    robot: RobotOptions,
     talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     strict: Annotated[
         bool, typer.Option("--strict", help="Exit with 1 if there is any warning, for CI.")

@@ -6,13 +6,14 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, option, taken_apart
+from vftcli.cli.log_options import ROBOT_ARG, TIP, Words
 
 
 class DescriptionOptions(Bundle):
     """Which arm of a description is shown."""
 
-    tip: str | None = option(*opt.TIP)
-    robot_arg: opt.Words = option(*opt.ROBOT_ARG)
+    tip: str | None = option(*TIP)
+    robot_arg: Words = option(*ROBOT_ARG)
 
 
 @taken_apart

@@ -11,16 +11,15 @@ import typer
 
 from vftcli.cli import help as headings
 from vftcli.cli.bundles import REQUIRED, Bundle, ChoiceBundle, flag, option
+from vftcli.cli.log_options import ReadOptions, RobotOptions, Words
 
 if TYPE_CHECKING:
     from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.observers.choice import ObserverChoice
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
-    from vftcli.readers.reader import ReadChoice
     from vftcli.refinement.choice import RefinementChoice
     from vftcli.repetition.choice import FreeChoice
-    from vftcli.robots.choice import RobotChoice
     from vftcli.virtual_sensor.choice import WrenchChoice
 
 Log = Annotated[
@@ -56,27 +55,14 @@ Json = Annotated[
 Open = Annotated[
     bool,
     typer.Option(
-        "--open", help="Open what was made: the page in the browser, else the recording (--rrd)."
+        "--open",
+        help="Open what was made. The page in the browser, else the recording (--rrd).",
+        rich_help_panel=headings.OUTPUT,
     ),
 ]
 ANYWAY = (
     "--anyway",
     "Go on where a finding makes results meaningless. The outputs say so.",
-)
-Words = list[str] | None
-"""The values of an option that may be repeated."""
-
-ROBOT = ("--robot", "NAME|FILE", "Profile, FILE.toml, or a URDF, xacro or MJCF.")
-TIP = (
-    "--tip",
-    "FRAME",
-    "Link or joint at the arm's end, in a description with hands or several arms; the wrench "
-    "stands at a link that is fixed to the last one.",
-)
-ROBOT_ARG = (
-    "--robot-arg",
-    "NAME=VALUE",
-    "An argument of a xacro, which is a program. Repeatable.",
 )
 FREE = (
     "--free",
@@ -91,66 +77,6 @@ REFERENCE_COLUMNS = (
     "SPEC",
     "Columns of a reference file, as --columns: 't,tau_ext:6'.",
 )
-
-
-class ReadOptions(ChoiceBundle["ReadChoice"]):
-    """How a log is read, and which part of it."""
-
-    GROUP = headings.LOG
-    HOME = "readers.reader:ReadChoice"
-
-    format: str | None = option(
-        "--format", "NAME", "Skip recognition; `vftcli formats` lists the names.", seldom=True
-    )
-    columns: str | None = option(
-        "--columns",
-        "SPEC",
-        "Columns of a table (vftcli help columns). 't,q:6,dq:6,current:6' in file order, or "
-        "'q=joint_pos_{i},tau=eff_{i}' by header.",
-    )
-    interval: str | None = option(
-        "--interval", "A:B", "Only this span, in seconds from the first sample."
-    )
-    effort: str | None = option(
-        "--effort",
-        "auto|current|torque|torque-without-gravity",
-        "What the log's effort is, whatever it is called; auto takes what the robot's model "
-        "explains best, and says so.",
-        seldom=True,
-    )
-    episode: str | None = option(
-        "--episode", "K|all", "Of a file that holds several: which, or each as a log of its own."
-    )
-    arm: str | None = option("--arm", "left|right", "Of a log of two arms: which.")
-    derive: str | None = option(
-        "--derive",
-        "dq|none",
-        "Velocities of a log that has none, from its positions over the complete log; from 50 Hz "
-        "on they are derived unasked, and that is said.",
-    )
-
-
-class RobotOptions(ChoiceBundle["RobotChoice"]):
-    """Which arm, and how it is modelled."""
-
-    GROUP = headings.LOG
-    HOME = "robots.choice:RobotChoice"
-
-    robot: str | None = option(*ROBOT)
-    friction: str | None = option(
-        "--friction",
-        "profile|none|model",
-        "The robot file's friction (default), none, or what an MJCF gives for simulation.",
-        seldom=True,
-    )
-    payload: str | None = option(
-        "--payload",
-        "NAME",
-        "Mount a [payload.NAME] of the robot file; log: the one that the log declares.",
-        seldom=True,
-    )
-    tip: str | None = option(*TIP)
-    robot_arg: Words = option(*ROBOT_ARG)
 
 
 class ObserverOptions(ChoiceBundle["ObserverChoice"]):
@@ -328,9 +254,13 @@ class ReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
 class ExtraOptions(Bundle):
     """What else is written for other programs."""
 
-    mcap: bool = flag("--mcap", "Also write estimates.mcap, for ROS 2, Foxglove and PlotJuggler.")
+    GROUP = headings.WRITE
+
+    mcap: bool = flag("--mcap", "Also write estimates.mcap. For ROS 2, Foxglove and PlotJuggler.")
     layouts: bool = flag(
-        "--layouts", "Also write its layouts for Foxglove and PlotJuggler; implies --mcap."
+        "--layouts",
+        "Also write its layouts for Foxglove and PlotJuggler; implies --mcap.",
+        seldom=True,
     )
 
     def names(self, **others: bool) -> list[str]:

@@ -10,6 +10,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, option, taken_apart
 from vftcli.cli.help import WRITE
+from vftcli.cli.log_options import Words
 
 Scenario = Annotated[
     str,
@@ -35,7 +36,7 @@ class ExperimentOptions(Bundle):
         "rtde, ur-rtde, libfranka, rosbag2 or parquet; default: the vendor's own.",
         "",
     )
-    settings: opt.Words = option(
+    settings: Words = option(
         "--set",
         "KEY=VALUE",
         "Repeatable: servo.stiffness=soft, sensing.clock_drift=0.003, duration=8.",

@@ -7,6 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
+from vftcli.cli.log_options import ReadOptions, RobotOptions
 
 if TYPE_CHECKING:
     from vftcli.evaluation.reference_choice import ReferenceChoice
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 @taken_apart
 def contact_thresholds(
     logs: opt.Logs,
-    reading: opt.ReadOptions,
-    robot: opt.RobotOptions,
+    reading: ReadOptions,
+    robot: RobotOptions,
     reference: opt.NamedReferenceOptions,
     anyway: opt.AnywayOptions,
     talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs

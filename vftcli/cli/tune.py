@@ -8,6 +8,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import taken_apart
 from vftcli.cli.help import WRITE
+from vftcli.cli.log_options import ReadOptions, RobotOptions
 
 
 @taken_apart
@@ -19,8 +20,8 @@ def tune_gains(
             "-o", "--output", metavar="FILE.toml", help="The gains file.", rich_help_panel=WRITE
         ),
     ],
-    reading: opt.ReadOptions,
-    robot: opt.RobotOptions,
+    reading: ReadOptions,
+    robot: RobotOptions,
     free: opt.FreeOptions,
     bias: opt.BiasOptions,
     anyway: opt.AnywayOptions,

@@ -1,7 +1,7 @@
 """Contact and ContactList: the answer to what touched the arm."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from vftcli.contacts.places import ArmPart
 from vftcli.contacts.windows import ContactPrior
@@ -13,6 +13,20 @@ Trust = Literal["good", "fair", "weak"]
 
 SURE_NATS, TIGHT, WIDE = 50.0, 0.25, 0.4
 """Evidence and band of a row that is good; a wider band makes it weak."""
+
+
+class ForceCourse(NamedTuple):
+    """How hard a contact pushes from its start to its end, at the place whose force it states.
+
+    Attributes:
+        t: Time. (K,) [s]
+        force: |F|. (K,) [N]
+        band: Half width of its 95 % band. (K,) [N]
+    """
+
+    t: Array
+    force: Array
+    band: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +58,7 @@ class Contact:
         at_rest: Whether no joint moves at the peak.
         vendor_force: |F| of the log's own torque estimate at the peak, None without one. [N]
         sensor_force: |F| of the log's own wrench at the peak, None without one. [N]
+        course: |F| from start to end, None where no force is told.
         remarks: What limits this row.
     """
 
@@ -68,6 +83,7 @@ class Contact:
     at_rest: bool
     vendor_force: float | None = None
     sensor_force: float | None = None
+    course: ForceCourse | None = None
     remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:

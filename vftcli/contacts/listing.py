@@ -267,5 +267,6 @@ def bare(contact: Contact) -> Contact:
         mean_force=None,
         impulse=None,
         anywhere=None,
+        course=None,
         vendor_force=None,
     )

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.contacts.contact_list import Contact
-from vftcli.contacts.rows import NORMAL
+from vftcli.contacts.rows import NORMAL, force_course, with_drives
 from vftcli.contacts.untouched import free_part
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.arrays import Array
@@ -56,6 +56,8 @@ def load_row(motion: FreeMotion, contacts: tuple[Contact, ...]) -> Contact:
     mean, sd = mean_and_spread(wrench, start, stop)
     size = float(np.linalg.norm(mean[:3]))
     u = mean[:3] / max(size, 1e-12)
+    lasts = (wrench.t >= start) & (wrench.t <= stop)
+    forces, covariance = wrench.values[lasts, :3], wrench.covariance[lasts, :3, :3]
     band = NORMAL * float(np.sqrt(u**2 @ sd[:3] ** 2))
     hardest = max(contacts, key=lambda contact: contact.evidence or 0.0)
     return replace(
@@ -71,6 +73,7 @@ def load_row(motion: FreeMotion, contacts: tuple[Contact, ...]) -> Contact:
         mean_force=mean[:3],
         impulse=mean[:3] * (stop - start),
         anywhere=(max(size - band, 0.0), size + band),
+        course=force_course(wrench.t[lasts], forces, with_drives(forces, covariance)),
         where="wrist" if "wrist" in {contact.where for contact in contacts} else "cannot tell",
     )
 

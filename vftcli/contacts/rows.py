@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.contact_list import SURE_NATS, WIDE, Contact
+from vftcli.contacts.contact_list import SURE_NATS, WIDE, Contact, ForceCourse
 from vftcli.contacts.model_error import UNKNOWN, ErrorCourse, error_course
 from vftcli.contacts.places import (
     MORE_THAN_A_FORCE,
@@ -27,7 +27,7 @@ from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.remarks import Remark, caution
 from vftcli.virtual_sensor.smoother.noise import resting
-from vftcli.virtual_sensor.smoother.smoothing import BENT, hidden_by_blocks
+from vftcli.virtual_sensor.smoother.smoothing import BENT, DRIVES, hidden_by_blocks
 
 WIDENED = np.repeat([1.3, 2.0], 3)
 """What the model's own standard deviations of force and moment are multiplied by: the error of the
@@ -164,13 +164,14 @@ class Measurer:
         inside = course.within(run)
         k = int(np.argmax(inside.size))
         peak = run[0] + k
-        values, covariance = inside.values[k], inside.covariance[k]
-        factor = WIDENED * self.test.widening
-        covariance = covariance * np.outer(factor, factor)
+        values, factor = inside.values[k], WIDENED * self.test.widening
+        # What the drives' constants and the blocks' length may hide, as in the wrench of `best`.
+        hidden = hidden_by_blocks(course.values, self.bent)
+        hidden = hidden[run[0] - course.first : run[1] - course.first]
+        covariances = inside.covariance * np.outer(factor, factor) + hidden
+        covariance = covariances[k]
         size, length = float(inside.size[k]), blocks.length[slice(*run)]
         u = values[:3] / max(size, 1e-12)
-        # What the drives' constants and the blocks' length may hide, as in the wrench of `best`.
-        covariance = covariance + hidden_by_blocks(course.values, self.bent)[peak - course.first]
         where, named, lead = self.part(number, site)
         band = NORMAL * float(np.sqrt(u @ covariance[:3, :3] @ u))
         anywhere = site.sizes(size, band)
@@ -209,6 +210,7 @@ class Measurer:
                 self.run, self.found.places[0].jacobian[peak], peak, blocks.t
             ),
             sensor_force=sensor_force(self.run, float(blocks.t[peak])),
+            course=force_course(blocks.t[slice(*run)], force, covariances[:, :3, :3]),
             remarks=remarks,
         )
 
@@ -312,6 +314,27 @@ class QuietError(NamedTuple):
             b[k] += C * (b[k + 1] - f * b[k])
             P[k] += C * C * (P[k + 1] - ahead[k + 1])
         return cls(b, P)
+
+
+def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:
+    """|F| over a contact with its band, along the force itself.
+
+    Args:
+        t: Time. (K,) [s]
+        force: (K, 3) [N]
+        covariance: (K, 3, 3) [N²]
+    """
+    size: Array = np.linalg.norm(force, axis=1)
+    u = force / np.maximum(size, 1e-12)[:, None]
+    variance = np.einsum("ki,kij,kj->k", u, covariance, u)
+    return ForceCourse(t, size, NORMAL * np.sqrt(variance))
+
+
+def with_drives(force: Array, covariance: Array) -> Array:
+    """Covariances of forces with the share of them that the drives' constants hide. (K, 3, 3)"""
+    share: Array = DRIVES * force
+    found: Array = covariance + share[:, :, None] * share[:, None, :]
+    return found
 
 
 def from_flange(run: ModelledRun, q: Array, fit: PointFit) -> Array:

@@ -7,14 +7,23 @@ is the one at the point that fits best, or the flange's where no point does.
 import numpy as np
 
 from vftcli.contacts.candidates import LEVEL, threshold_contacts
-from vftcli.contacts.contact_list import Contact
-from vftcli.contacts.places import MORE_THAN_A_FORCE, arm_parts, point_fits, those_that_fit
+from vftcli.contacts.contact_list import Contact, ForceCourse
+from vftcli.contacts.places import (
+    MORE_THAN_A_FORCE,
+    PointFit,
+    arm_parts,
+    link_jacobian,
+    point_fits,
+    those_that_fit,
+)
 from vftcli.contacts.rows import (
     NORMAL,
     Site,
+    force_course,
     from_flange,
     sensor_force,
     vendor_force,
+    with_drives,
 )
 from vftcli.contacts.untouched import MOVING, SETTLED, expected_torque, observed
 from vftcli.repetition.free_run import ModelledRun
@@ -39,6 +48,8 @@ APART = 0.1
 def flange_forces(J: Array, torque: Array, sd: Array) -> tuple[Array, Array]:
     """Wrench at the flange with its prior, and its covariance. (T, 6), (T, 6, 6)
 
+    With the first three rows of a point's Jacobian alone: the force at that point.
+
     Args:
         J: Jacobian of the flange. (T, 6, n)
         torque: Joint torque. (T, n) [N·m]
@@ -46,7 +57,8 @@ def flange_forces(J: Array, torque: Array, sd: Array) -> tuple[Array, Array]:
     """
     A = J.swapaxes(1, 2) / sd[:, :, None]
     covariance: Array = np.asarray(
-        np.linalg.inv(A.swapaxes(1, 2) @ A + np.diag(1.0 / PRIOR**2)), dtype=np.float64
+        np.linalg.inv(A.swapaxes(1, 2) @ A + np.diag(1.0 / PRIOR[: J.shape[1]] ** 2)),
+        dtype=np.float64,
     )
     values: Array = (covariance @ (A.swapaxes(1, 2) @ (torque / sd)[..., None]))[..., 0]
     return values, covariance
@@ -155,7 +167,24 @@ def peak_row(
         at_rest=bool(np.all(np.abs(recording.require("dq")[peak]) < MOVING)),
         vendor_force=vendor_force(run, J[0], peak, t),
         sensor_force=sensor_force(run, float(t[peak])),
+        course=course_at(run, inside, best, torque, sd),
     )
+
+
+def course_at(
+    run: ModelledRun, inside: slice, best: PointFit, torque: Array, sd: Array
+) -> ForceCourse:
+    """|F| over a contact, at the point that fits best, or at the flange where no point does."""
+    t, q = run.recording.t[inside], run.recording.q[inside]
+    chain, excess = run.robot.loaded_chain, 1.0
+    if best.misfit > MORE_THAN_A_FORCE:
+        J = flange_jacobian(chain, q)
+        excess = best.misfit / max(run.robot.joints - 3, 1)
+    else:
+        J = link_jacobian(chain, q, best.link, best.share)[:, :3]
+    values, covariance = flange_forces(J, torque[inside], sd[inside])
+    force = values[:, :3]
+    return force_course(t, force, with_drives(force, excess * covariance[:, :3, :3]))
 
 
 def axes_told(run: ModelledRun) -> Array:

@@ -1,14 +1,11 @@
 """|F| over time as bars of text: where the listed contacts are, and how hard they were."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact
-from vftcli.contacts.untouched import observed
-from vftcli.observers.table import BEST
 from vftcli.outputs.canvas import Canvas
 from vftcli.signals.arrays import Array
 
@@ -22,61 +19,32 @@ LABELS = 9
 """Seconds that are written below the bars, about."""
 
 
-class ForceCourse(NamedTuple):
-    """|F| of the listed contacts over time.
-
-    Attributes:
-        t: Time. (T,) [s]
-        force: |F|, zero where no contact is listed. (T,) [N]
-    """
-
-    t: Array
-    force: Array
-
-
-def force_course(analysis: Analysis) -> ForceCourse | None:
-    """|F| along a log as its list has it, None where no force is listed.
-
-    The height of a contact is the list's, which rests on the place that fits; its course is that
-    of the joint torques, to which a force at one place is proportional. A load has the course of
-    the wrench of `best`, its mean where there is none.
-    """
+def forces_of_list(analysis: Analysis) -> Array | None:
+    """|F| of the listed contacts along a log, zero outside of them; None without any. (T,) [N]"""
     if analysis.contacts is None or analysis.contacts.hardest is None:
         return None
     t, force = analysis.t, np.zeros(len(analysis.t))
-    torque = np.linalg.norm(observed(analysis.motion.log), axis=1)
     for contact in analysis.contacts.contacts:
-        inside = (t >= contact.start) & (t <= contact.stop)
-        if contact.peak_force is None or not inside.any():
-            continue
-        if contact.is_load:
-            force[inside] = load_course(analysis, contact)[inside]
-        else:
-            force[inside] = contact.peak_force * torque[inside] / max(torque[inside].max(), 1e-9)
-    return ForceCourse(t, force)
+        if (course := contact.course) is not None:
+            inside = (t >= contact.start) & (t <= contact.stop)
+            force[inside] = np.interp(t[inside], course.t, course.force)
+    return force
 
 
-def load_course(analysis: Analysis, contact: Contact) -> Array:
-    """|F| of a load: of the wrench of `best`, else its mean throughout. (T,) [N]"""
-    own = next((wrench for wrench in analysis.wrenches if wrench.name == BEST), None)
-    if own is None:
-        return np.full(len(analysis.t), contact.peak_force or 0.0)
-    return np.asarray(np.linalg.norm(own.values[:, :3], axis=1))
-
-
-def force_bars(course: ForceCourse, contacts: Sequence[Contact], canvas: Canvas) -> list[str]:
+def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canvas) -> list[str]:
     """The bars, seconds and the contacts' numbers below them.
 
     Args:
-        course: |F| over time.
+        t: Time. (T,) [s]
+        force: |F|. (T,) [N]
         contacts: Those whose number is shown.
         canvas: What the terminal can show.
     """
-    top = float(course.force.max())
+    top = float(force.max())
     labels = [f"{top * row / (ROWS - 1):.0f}" for row in range(ROWS)]
     left = max(map(len, labels))
     columns = canvas.width - left - 8
-    levels = column_peaks(course, columns) / max(top, 1e-9)
+    levels = column_peaks(t, force, columns) / max(top, 1e-9)
     steps = STEPS if canvas.unicode else ASCII_STEPS
     full = len(steps) - 1
     # The lowest step is the line on which nothing touches.
@@ -87,15 +55,14 @@ def force_bars(course: ForceCourse, contacts: Sequence[Contact], canvas: Canvas)
         bar = canvas.painted(letters.rstrip(), "bar")
         lines.append(f"  {labels[row]:>{left}} {canvas.shown('┤')}{bar}")
     indent = " " * (left + 4)
-    lines.append(f"{indent}{seconds(course.t, columns)}")
-    if numbers := contact_numbers(course.t, contacts, columns):
+    lines.append(f"{indent}{seconds(t, columns)}")
+    if numbers := contact_numbers(t, contacts, columns):
         lines.append(f"  {'#':>{left}}{' ' * 2}{numbers}")
     return lines
 
 
-def column_peaks(course: ForceCourse, columns: int) -> Array:
+def column_peaks(t: Array, force: Array, columns: int) -> Array:
     """The largest |F| in each of so many equal spans of time. (columns,) [N]"""
-    t, force = course
     edges = np.linspace(t[0], t[-1], columns + 1)
     # Where a span holds no sample, the line between its neighbours stands for them.
     peaks = np.interp(0.5 * (edges[1:] + edges[:-1]), t, force)

@@ -24,7 +24,7 @@ from vftcli.outputs.believability import (
 )
 from vftcli.outputs.canvas import Canvas
 from vftcli.outputs.contacts import MOST_ROWS, answer, contact_grid, hardest_rows, hardest_words
-from vftcli.outputs.force_bars import force_bars, force_course
+from vftcli.outputs.force_bars import force_bars, forces_of_list
 from vftcli.outputs.grid import Column, Grid, significant, terminal
 from vftcli.outputs.log.rmse_tables import Block, blocks
 from vftcli.outputs.log.wrench_tables import contact_grids
@@ -108,12 +108,12 @@ def facts(analysis: Analysis) -> str:
 
 def bar_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
     """|F| over time, none where no force is listed."""
-    course = force_course(analysis)
-    if course is None or analysis.contacts is None:
+    force = forces_of_list(analysis)
+    if force is None or analysis.contacts is None:
         return []
     contacts = analysis.contacts.contacts
     shown = [] if contacts[0].is_load else hardest_rows(contacts)
-    return force_bars(course, shown, canvas)
+    return force_bars(analysis.t, force, shown, canvas)
 
 
 def table_lines(analysis: Analysis, most: int | None) -> list[str]:

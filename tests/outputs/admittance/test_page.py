@@ -11,8 +11,8 @@ from vftcli.admittance.stability import judge
 from vftcli.outputs.admittance.files import admittance_record
 from vftcli.outputs.admittance.page import (
     UNITS,
+    charts,
     deviations_from_paper,
-    payload,
     render_admittance,
 )
 from vftcli.robots import load_robot
@@ -21,13 +21,15 @@ from vftcli.robots import load_robot
 def test_the_page_shows_every_part(release: Replay) -> None:
     record = admittance_record(release, None, None, "vftcli admit --release x=0.1")
     page = render_admittance(release, record, "<release>")
-    for heading in ("Comparison", "Parameters", "Stability before motion", "Provenance"):
-        assert f"<h2>{heading}</h2>" in page
+    assert "<h2>Comparison</h2>" in page
+    for heading in ("Deviation", "Parameters", "Stability before motion"):
+        assert f"<summary>{heading}" in page
+    assert "Conventions and provenance" in page
     assert "<release>" not in page
     assert "vftcli admit --release x=0.1" in page
     data = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
     assert data is not None
-    assert json.loads(data.group(1))["labels"] == ["x", "y", "z", "rx", "ry", "rz"]
+    assert json.loads(data.group(1))[0]["panels"] == ["x", "y", "z", "rx", "ry", "rz"]
 
 
 def test_rows_bear_the_name_that_the_legend_has(release: Replay) -> None:
@@ -38,14 +40,17 @@ def test_rows_bear_the_name_that_the_legend_has(release: Replay) -> None:
 
 
 def test_charts_have_the_unit_of_their_axis(push: Replay) -> None:
-    charts = {chart["key"]: chart for chart in payload(push, None)["charts"]}
-    assert list(charts) == ["x", "force", "v", "energy-w", "energy-v"]
-    assert charts["force"]["units"] == ["N"] * 3 + ["N·m"] * 3
-    assert charts["energy-w"]["units"] == ["J"] * 6
-    assert charts["v"]["units"][3] == UNITS["v"][1]
-    assert charts["force"]["band"][:4] == [20.0, 20.0, 20.0, 6.0]
-    names = [line["name"] for line in charts["x"]["series"]]
-    assert names == [controller.name for controller in push.controllers]
+    found = {chart.key: chart for chart in charts(push)}
+    assert list(found) == ["x", "force", "v", "energy-w", "energy-v"]
+    assert found["force"].units == ("N",) * 3 + ("N·m",) * 3
+    assert found["energy-w"].units == ("J",) * 6
+    assert found["v"].units[3] == UNITS["v"][1]
+    band = found["force"].band
+    assert band is not None
+    assert band[:4].tolist() == [20.0, 20.0, 20.0, 6.0]
+    lines = found["x"].series
+    assert [line.name for line in lines] == [controller.name for controller in push.controllers]
+    assert len({line.dash for line in lines}) == len(lines)  # none is told by its colour alone
 
 
 def test_without_a_drag_the_page_says_so(release: Replay) -> None:
@@ -74,3 +79,11 @@ def test_the_escape_bound_of_the_ur5s_rotation() -> None:
     assert "18°" in deviations_from_paper()["Rotation has a speed limit."]
     bound = judge(variable(parameters("ur5"))).escape[3]
     assert np.degrees(bound) == pytest.approx(18.0, abs=0.5)
+
+
+def test_the_page_draws_its_charts(release: Replay, opened) -> None:
+    tab = opened(render_admittance(release, admittance_record(release, None, None, ""), "r"))
+    tab.unfold()
+    assert tab.blank_charts() == []
+    assert tab.errors == []
+    assert tab.overflow <= 0

@@ -1,21 +1,23 @@
 import json
 
+import numpy as np
 import pytest
 
+from vftcli.outputs.page.charts import Chart, ChartLine
 from vftcli.outputs.page.shell import (
+    all_remarks,
     bullets,
-    chart_places,
     document,
-    fact_list,
-    folded,
-    headline,
+    lead,
     pairs,
     provenance,
-    remarks,
     script_json,
+    section,
+    swatch_rules,
+    top,
 )
 from vftcli.signals import remarks as remarks_module
-from vftcli.signals.remarks import fact
+from vftcli.signals.remarks import fact, warning
 
 HOSTILE = "<b>&</script>\u2028"
 
@@ -23,14 +25,12 @@ HOSTILE = "<b>&</script>\u2028"
 @pytest.mark.parametrize(
     "html",
     [
-        headline(HOSTILE, HOSTILE),
-        fact_list({HOSTILE: HOSTILE}),
+        top((HOSTILE,), HOSTILE, lead(HOSTILE)),
         pairs({HOSTILE: HOSTILE}),
         bullets([HOSTILE]),
-        remarks([HOSTILE]),
-        folded(HOSTILE, "x"),
+        section(HOSTILE, "x", HOSTILE),
         document(HOSTILE, ""),
-        provenance({"command": HOSTILE, "notes": [HOSTILE], "versions": {HOSTILE: HOSTILE}}),
+        provenance({"command": HOSTILE, "versions": {HOSTILE: HOSTILE}}),
     ],
 )
 def test_no_word_from_outside_becomes_an_element(html: str) -> None:
@@ -48,24 +48,34 @@ def test_data_reads_back_and_cannot_end_its_element() -> None:
 
 def test_a_page_without_charts_has_no_script() -> None:
     assert "<script" not in document("t", "body")
-    assert document("t", "body", {"a": 1}).count("<script") == 2
+    chart = Chart("k", "K", ("N",), ("a",), np.arange(3.0), (ChartLine("l", np.ones((3, 1))),))
+    page = document("t", "body", [chart])
+    assert page.count("<script") == 3  # the data, the library with its licence, and the glue
+    assert "Permission is hereby granted" in page
 
 
 def test_nothing_to_say_is_nothing_shown() -> None:
-    assert remarks([]) == ""
-    assert folded("more", "") == ""
+    assert all_remarks([]) == ""
+    assert section("more", "") == ""
+    assert lead("") == ""
+
+
+def test_a_remark_is_said_once_and_the_worst_first() -> None:
+    turned, cut = fact("sign-turned", signal="q"), warning("topic-too-short", signal="a", topic="b")
+    html = all_remarks([turned, cut, turned])
+    assert html.count("<li>") == 2
+    assert html.index("/b" if "/b" in html else "b") < html.index("turned the sign")
+
+
+def test_a_name_that_could_end_a_rule_has_no_swatch() -> None:
+    rules = swatch_rules({"gmo": ("#112233", "2 2"), 'x"]{}</style>': ("#445566", "")})
+    assert rules == '[data-swatch="gmo"]::before{border-top:3px dotted #112233}'
 
 
 def test_a_remark_shows_its_long_words(monkeypatch: pytest.MonkeyPatch) -> None:
     words = '[test-code]\nshort = "in short {a_s:.1f} s"\nlong = "at length {a_s:.2f} s"\n'
     monkeypatch.setattr(remarks_module, "catalogue", lambda: (words,))
     assert "at length 0.25 s" in bullets([fact("test-code", a_s=0.25)])
-
-
-def test_buttons_choose_joints_or_axes() -> None:
-    assert 'aria-label="Axis"' in chart_places("Axis", "Controller")
-    assert "choose its axis" in chart_places("Axis", "Controller")
-    assert "choose its joint" in chart_places()
 
 
 def test_provenance_without_a_log_names_none() -> None:

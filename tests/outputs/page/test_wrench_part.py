@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from vftcli.outputs.page.wrench_part import (
     condition_charts,
     contact_grid,
     trade_off_grid,
+    wrench_chart,
     wrench_section,
 )
 from vftcli.virtual_sensor.contact import Detection, OperatingPoint
@@ -17,7 +20,7 @@ def test_the_pose_has_a_chart_with_its_threshold(with_wrench: Analysis) -> None:
     reading = with_wrench.virtual_sensor
     assert reading is not None
     first = next(condition_charts(with_wrench))
-    assert (first.key, first.unit) == ("sigma_min", "m")
+    assert (first.key, first.units) == ("sigma_min", ("m",))
     assert first.band is not None
     assert first.band.tolist() == [reading.sensor.least_sigma]
     sigma = reading.wrenches[0].sigma_min
@@ -26,8 +29,26 @@ def test_the_pose_has_a_chart_with_its_threshold(with_wrench: Analysis) -> None:
 
 
 def test_without_wrenches_there_is_no_section(without_reference: Analysis) -> None:
-    assert wrench_section(without_reference) == ""
-    assert list(condition_charts(without_reference)) == []
+    bare = replace(without_reference, virtual_sensor=None)
+    assert wrench_chart(bare) is None
+    assert wrench_section(bare, None) == ""
+    assert list(condition_charts(bare)) == []
+
+
+def test_wrenches_have_a_panel_an_axis(with_wrench: Analysis) -> None:
+    chart = wrench_chart(with_wrench)
+    assert chart is not None
+    assert chart.panels == ("fx", "fy", "fz", "mx", "my", "mz")
+    assert chart.units == ("N",) * 3 + ("N·m",) * 3
+    assert chart.families == (1, 1, 1, 2, 2, 2)
+    (leading,) = (line for line in chart.series if line.leads)
+    assert leading.name == "best"
+    known = next(w for w in with_wrench.wrenches if w.name == "best").known
+    np.testing.assert_array_equal(leading.values, known)
+    assert [line.shown for line in chart.series if not line.leads] == [False] * 4
+    html = wrench_section(with_wrench, chart)
+    assert html.count('data-panel="0"') >= 2  # fx, and what the pose can tell
+    assert "ON the robot in base axes" in html
 
 
 @pytest.fixture

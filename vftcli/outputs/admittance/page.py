@@ -1,7 +1,7 @@
 """The page of an admittance replay: Figs 6/9, 7/10, 12/13 and Tables III/IV for the user's log."""
 
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,21 +20,22 @@ from vftcli.outputs.admittance.tables import (
     stability_grid,
 )
 from vftcli.outputs.grid import html
-from vftcli.outputs.page.charts import Chart, ChartLine, packed
+from vftcli.outputs.page.charts import DASHES, Chart, ChartLine, large, multiples
 from vftcli.outputs.page.shell import (
+    alarms,
+    all_remarks,
     bullets,
-    chart_places,
     document,
-    fact_list,
-    headline,
     health,
-    pairs,
+    lead,
     provenance,
-    remarks,
+    section,
     soft,
+    top,
 )
 from vftcli.outputs.palette import SPARE
 from vftcli.signals.arrays import Array
+from vftcli.signals.remarks import Remark, sentence
 
 UNITS = {"x": ("m", "rad"), "v": ("m/s", "rad/s"), "force": ("N", "N·m"), "energy": ("J", "J")}
 """Chart → unit of a translational and of a rotational axis."""
@@ -54,47 +55,69 @@ def render_admittance(
     examinations: Sequence[Examination] = (),
 ) -> str:
     """The page: self-contained, nothing is loaded from anywhere."""
-    text = f"Admittance replay on {replay.robot.title or replay.robot.name}: {replay.source}"
     differences = bullets(f"{what} {why}" for what, why in deviations_from_paper().items())
+    drawn = charts(replay, run)
     parts = (
-        headline(title, text),
-        facts_section(replay),
-        health(examinations),
-        remarks(replay.remarks),
+        alarms(examinations),
+        top(eyebrow(replay, title), headline(replay), lead(*map(sentence, told(replay)))),
         closed_loop_section(run),
         comparison_section(replay),
         "<h2>Force and motion over time</h2>",
+        *map(chart_section, drawn),
         soft(
             "Deviation of the flange (Figs 6b, 9b, 7, 10, 13), force with the threshold band (Figs "
             "6a, 9a, 12), speed with its limit, and the Lyapunov function W of the recovery phases "
             "beside the printed V, which rises."
         ),
-        chart_places("Axis", "Controller"),
-        f"<h2>Parameters</h2>{html(parameter_grid(replay))}",
-        f"<h2>Stability before motion</h2>{html(stability_grid(replay))}",
-        soft(
-            "The escape bound is the largest deviation from which a release at rest would not run "
-            "away if there were no speed limit."
+        "<h2>Details</h2>",
+        section("Parameters", html(parameter_grid(replay))),
+        section(
+            "Stability before motion",
+            html(stability_grid(replay))
+            + soft(
+                "The escape bound is the largest deviation from which a release at rest would not "
+                "run away if there were no speed limit."
+            ),
         ),
-        f"<h2>What differs from the paper, and why</h2>{differences}",
-        f"<h2>Conventions</h2>{pairs(record['conventions'])}",
+        section("What differs from the paper, and why", differences),
+        health(examinations, opened=True),
+        all_remarks(replay.remarks),
         provenance(record),
     )
-    return document(f"{title}: admittance", "".join(parts), payload(replay, run))
+    styles = {controller.name: (colour, "") for controller, colour in painted(replay)}
+    return document(f"{title}: admittance", "".join(parts), drawn, styles)
 
 
-def facts_section(replay: Replay) -> str:
-    """The robot, the span, the control period."""
+def headline(replay: Replay) -> str:
+    """What was replayed, in one sentence."""
+    count = len(replay.controllers)
+    return f"The same force through {count} admittance controller{'s' * (count > 1)}."
+
+
+def told(replay: Replay) -> list[Remark]:
+    """Remarks that may change what a reader makes of the numbers."""
+    return [remark for remark in replay.remarks if remark.level == "warning"]
+
+
+def eyebrow(replay: Replay, title: str) -> tuple[str, ...]:
+    """The log, the robot, the span, the force, the control period."""
     p, t = replay.parameters, replay.motion.t
-    return fact_list(
-        {
-            "Robot": replay.robot.title or replay.robot.name,
-            "Span": f"{t[0]:.3f} – {t[-1]:.3f} s",
-            "Control period": f"{1e3 * p.period:g} ms",
-            "Threshold": p.threshold_mode,
-            "Controllers": f"{len(replay.controllers)}",
-            "Poses out of reach": f"{int(np.count_nonzero(~replay.path.reached))}",
-        }
+    lost = int(np.count_nonzero(~replay.path.reached))
+    return (
+        title,
+        replay.robot.title or replay.robot.name,
+        f"{t[0]:.3f} – {t[-1]:.3f} s",
+        str(replay.source),
+        f"control period {1e3 * p.period:g} ms",
+        f"threshold {p.threshold_mode}",
+        f"{lost} poses out of reach" if lost else "",
+    )
+
+
+def chart_section(chart: Chart) -> str:
+    """One quantity axis by axis; the deviation is open at once."""
+    return section(
+        chart.title, multiples(chart) + large(chart), name=chart.key, opened=chart.key == "x"
     )
 
 
@@ -135,58 +158,66 @@ def comparison_section(replay: Replay) -> str:
     return f"<h2>Comparison</h2>{html(grid)}{words}"
 
 
-def payload(replay: Replay, run: ClosedLoop | None) -> dict[str, Any]:
-    """The charts with their units, as the page's script takes them."""
-    t = replay.motion.t
-    return {
-        "joints": 6,
-        "labels": list(AXES),
-        "span": [float(t[0]), float(t[-1])],
-        "charts": [
-            packed(chart, t) | {"units": [UNITS[chart.key.split("-")[0]][k // 3] for k in range(6)]}
-            for chart in charts(replay, run)
-        ],
-        "responses": [],
-    }
+def painted(replay: Replay) -> list[tuple[Controller, str]]:
+    """Every controller with its colour."""
+    return list(zip(replay.controllers, colours(replay, "ink"), strict=True))
 
 
-def charts(replay: Replay, run: ClosedLoop | None = None) -> Iterator[Chart]:
-    """The charts, top to bottom; one column an axis."""
-    p, paint = replay.parameters, colours(replay, "ink")
-    pairs_of = list(zip(replay.controllers, paint, strict=True))
-    moved = () if run is None else (ChartLine("closed loop", padded(run.moved), "#8a929a", True),)
-    shown = (*lines(pairs_of, replay.motion.x), *moved)
-    yield Chart("x", "Deviation", "m", shown, height=1.6)
-    true = () if run is None else (ChartLine("true force", padded(run.truth)),)
-    yield Chart(
-        "force",
-        "Force on the robot",
-        "N",
-        (
-            *true,
-            ChartLine("force", padded(replay.wrench), "#8a929a"),
-            ChartLine("force that enters the law", padded(replay.phases.force), SPARE[1]),
-        ),
-        np.asarray(p.threshold),
-        "± threshold",
+def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
+    """The charts, top to bottom; one panel an axis, three axes on one scale."""
+    p, paint = replay.parameters, painted(replay)
+    moved = () if run is None else (ChartLine("closed loop", padded(run.moved), "#8a929a", "5 3"),)
+    true = () if run is None else (ChartLine("true force", padded(run.truth), dash="2 2"),)
+    force = (
+        *true,
+        ChartLine("force", padded(replay.wrench), "#8a929a"),
+        ChartLine("force that enters the law", padded(replay.phases.force), SPARE[1]),
     )
     limit = np.where(np.isfinite(p.speed_limit), p.speed_limit, np.nan)
-    speed = lines(pairs_of, replay.motion.v)
-    yield Chart("v", "Velocity", "m/s", speed, limit, "± speed limit")
-    yield Chart(
-        "energy-w",
-        "Lyapunov function W (recovery phases)",
-        "J",
-        lines(pairs_of, replay.lyapunov.corrected),
+    found = (
+        ("x", "Deviation", (*lines(paint, replay.motion.x), *moved), None, ""),
+        ("force", "Force on the robot", force, np.asarray(p.threshold), "± threshold"),
+        ("v", "Velocity", lines(paint, replay.motion.v), limit, "± speed limit"),
+        (
+            "energy-w",
+            "Lyapunov function W (recovery phases)",
+            lines(paint, replay.lyapunov.corrected),
+            None,
+            "",
+        ),
+        (
+            "energy-v",
+            "The printed V (52): it rises",
+            lines(paint, replay.lyapunov.printed),
+            None,
+            "",
+        ),
     )
-    yield Chart(
-        "energy-v", "The printed V (52): it rises", "J", lines(pairs_of, replay.lyapunov.printed)
-    )
+    return [
+        Chart(
+            key,
+            title,
+            tuple(UNITS[key.split("-")[0]][k // 3] for k in range(6)),
+            AXES,
+            replay.motion.t,
+            shown,
+            families=(1, 1, 1, 2, 2, 2),
+            band=known_band(band),
+            band_label=label,
+        )
+        for key, title, shown, band, label in found
+    ]
+
+
+def known_band(band: Array | None) -> Array | None:
+    """A band, None where none of it is known."""
+    return band if band is not None and np.isfinite(band).any() else None
 
 
 def lines(controllers: list[tuple[Controller, str]], values: Array) -> tuple[ChartLine, ...]:
-    """One line a controller. (T+1, N, 6)"""
+    """One line a controller, each with its own dashes. (T+1, N, 6)"""
+    dashes = ("", *DASHES)
     return tuple(
-        ChartLine(controller.name, values[:, n], colour)
+        ChartLine(controller.name, values[:, n], colour, dashes[n % len(dashes)])
         for n, (controller, colour) in enumerate(controllers)
     )

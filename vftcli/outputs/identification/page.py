@@ -15,66 +15,78 @@ from vftcli.outputs.identification.tables import (
     residual_grid,
     shape_choice_grid,
 )
-from vftcli.outputs.page.charts import Chart, ChartLine, packed
+from vftcli.outputs.page.charts import Chart, ChartLine, families_of, large, multiples
+from vftcli.outputs.page.figures import Box, Scales, Span, axes, svg
 from vftcli.outputs.page.shell import (
+    alarms,
+    all_remarks,
     bullets,
-    chart_places,
     document,
-    folded,
-    headline,
     health,
+    lead,
     pairs,
-    remarks,
+    section,
     soft,
+    top,
 )
+from vftcli.outputs.page.torque_part import joint_panels
 from vftcli.outputs.palette import SPARE
 
 DOTS = 600
 """Samples drawn in a residual-over-velocity plot."""
-
-WIDTH, HEIGHT, EDGE = 360, 220, 40
-"""Size of such a plot and room for its numbers. [px]"""
 
 
 def render_identification(
     found: Identification, record: Mapping[str, Any], examinations: Sequence[Examination] = ()
 ) -> str:
     """The page as text: self-contained, nothing is loaded from anywhere."""
-    logs = (
-        ", ".join(dict.fromkeys(t.motion.recording.name for t in found.traces)) or found.robot.name
-    )
-    text = f"{found.robot.title}: method {found.method}, from {logs}"
-    residuals = ""
-    if not found.residuals.is_empty():
-        words = "Measured less predicted torque, from the first to the last movement."
-        residuals = f"<h2>Residuals</h2>{html(residual_grid(found))}{soft(words)}"
+    names = dict.fromkeys(t.motion.recording.name for t in found.traces)
+    charts = torque_charts(found)
     parts = (
-        headline(found.robot.name, text),
-        health(examinations, fitting=False),
-        remarks(found.remarks),
-        residuals,
+        alarms(examinations, fitting=False),
+        top(
+            (found.robot.title or found.robot.name, f"method {found.method}", ", ".join(names)),
+            headline(found),
+            lead("Residual: measured less predicted torque, from the first to the last movement."),
+        ),
+        residual_section(found),
         velocity_section(found),
+        "<h2>Details</h2>",
         parameter_section(found),
-        series_section(found),
-        "<h2>Signal processing</h2>",
-        pairs(found.processing),
+        series_section(found, charts),
+        health(examinations, opened=True),
+        section("Signal processing", pairs(found.processing)),
+        all_remarks(found.remarks),
         provenance_section(record),
     )
-    data = payload(found) if found.traces else None
-    return document(f"{found.robot.name}: identification", "".join(parts), data)
+    return document(f"{found.robot.name}: identification", "".join(parts), charts)
+
+
+def headline(found: Identification) -> str:
+    """What was identified, and how well it predicts, in one sentence."""
+    count = len({trace.motion.recording.name for trace in found.traces})
+    source = f" from {count} log{'s' * (count > 1)}" if count else ""
+    return f"{found.robot.title or found.robot.name}{source}."
+
+
+def residual_section(found: Identification) -> str:
+    """The table of residuals, "" where no log was used."""
+    if found.residuals.is_empty():
+        return ""
+    return f"<h2>How much torque is left unexplained</h2>{html(residual_grid(found))}"
 
 
 def parameter_section(found: Identification) -> str:
-    """The identified numbers; folded away, how friction models competed, and base parameters."""
+    """The identified numbers, how friction models competed, and base parameters."""
     parts = []
     if not found.parameters.is_empty():
-        parts.append(f"<h2>Identified numbers</h2>{html(parameter_grid(found))}")
+        parts.append(section("Identified numbers", html(parameter_grid(found)), opened=True))
     if not found.shape_choices.is_empty():
         parts.append(
-            folded("Friction models compared", html(shape_choice_grid(found.shape_choices)))
+            section("Friction models compared", html(shape_choice_grid(found.shape_choices)))
         )
     if found.base is not None:
-        parts.append(folded(f"Base parameters ({len(found.base)})", html(base_grid(found.base))))
+        parts.append(section(f"Base parameters ({len(found.base)})", html(base_grid(found.base))))
     return "".join(parts)
 
 
@@ -87,8 +99,10 @@ def velocity_section(found: Identification) -> str:
         f'<span style="color:{colour}">● {escape(t.motion.recording.name)} ({t.role})</span> '
         for t, colour in coloured(found.traces)
     )
+    words = "Friction that the model misses shows here as a curve."
     return (
-        f'<h2>Residual over velocity</h2><p class="soft">{key}</p><div class="plots">{plots}</div>'
+        f'<h2>Residual over velocity</h2><p class="legend">{key}</p>'
+        f'<div class="multiples">{plots}</div>{soft(words)}'
     )
 
 
@@ -98,34 +112,25 @@ def coloured(traces: Sequence[Trace]) -> list[tuple[Trace, str]]:
 
 
 def velocity_plot(traces: Sequence[Trace], j: int) -> str:
-    """SVG of one joint: residual over velocity, each log in its colour."""
+    """One joint: residual over velocity, each log in its colour."""
     # One scale for all logs of a joint, or their dots could not be compared.
     speed = max(float(np.max(np.abs(t.motion.dq[:, j]))) for t in traces) or 1.0
     sizes = np.concatenate([np.abs(t.residual[:, j]) for t in traces])
     # A few samples at reversals are far off; they are drawn at the edge.
     high = float(np.quantile(sizes, 0.995)) or 1.0
-    dots = "".join(scatter(t, j, speed, high, colour) for t, colour in coloured(traces))
-    middle, centre = HEIGHT / 2, (WIDTH + EDGE) / 2
-    axes = (
-        f'<path d="M{EDGE} {middle}H{WIDTH}M{centre} 0V{HEIGHT}" stroke="currentColor" '
-        'stroke-opacity=".35" fill="none"/>'
+    scales = Scales(Box(height=180), Span(-speed, speed), Span(-high, high))
+    dots = "".join(scatter(t, j, scales, colour) for t, colour in coloured(traces))
+    drawn = svg(
+        scales.box, f"Residual over velocity, J{j + 1}", axes(scales, "rad/s", (4, 4)) + dots
     )
-    words = (
-        f'<text x="{EDGE + 4}" y="12">J{j + 1} ±{high:.3g} N·m</text>'
-        f'<text x="{WIDTH - 4}" y="{middle - 4}" text-anchor="end">{speed:.2g} rad/s</text>'
-    )
-    return (
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img" '
-        f'aria-label="Residual over velocity of joint {j + 1}" font-size="11" fill="currentColor">'
-        f"{axes}{dots}{words}</svg>"
-    )
+    return f"<figure><figcaption>J{j + 1} <span>N·m</span></figcaption>{drawn}</figure>"
 
 
-def scatter(trace: Trace, j: int, speed: float, high: float, colour: str) -> str:
+def scatter(trace: Trace, j: int, scales: Scales, colour: str) -> str:
     """One log's dots as a single path of short strokes."""
     pick = np.unique(np.linspace(0, len(trace.motion.t) - 1, DOTS).astype(int))
-    x = EDGE + (WIDTH - EDGE) * (trace.motion.dq[pick, j] / speed + 1.0) / 2.0
-    y = HEIGHT / 2 * (1.0 - np.clip(trace.residual[pick, j] / high, -1.0, 1.0))
+    x = scales.across(trace.motion.dq[pick, j])
+    y = scales.up(np.clip(trace.residual[pick, j], *scales.y))
     # One path of strokes without length: 600 circles a log and joint would make a slow page.
     path = "".join(f"M{a:.1f} {b:.1f}h.01" for a, b in zip(x, y, strict=True))
     return (
@@ -134,15 +139,14 @@ def scatter(trace: Trace, j: int, speed: float, high: float, colour: str) -> str
     )
 
 
-def series_section(found: Identification) -> str:
-    """Where the script draws torques over time."""
-    if not found.traces:
+def series_section(found: Identification, charts: Sequence[Chart]) -> str:
+    """One log's torques over time, measured, predicted and their difference."""
+    if not charts:
         return ""
-    name = escape(shown_trace(found).motion.recording.name)
-    return (
-        f"<h2>Torques over time: {name}</h2>"
-        f"{soft('The Rerun recording holds every log.')}{chart_places()}"
-    )
+    name = shown_trace(found).motion.recording.name
+    drawn = "".join(f"<h3>{escape(c.title)}</h3>{multiples(c)}{large(c)}" for c in charts)
+    words = soft("The Rerun recording holds every log.")
+    return section("Torques over time", drawn + words, name)
 
 
 def shown_trace(found: Identification) -> Trace:
@@ -152,26 +156,26 @@ def shown_trace(found: Identification) -> Trace:
     return (held or list(found.traces))[0]
 
 
-def payload(found: Identification) -> dict[str, Any]:
-    """What the script draws: one log's torques, their difference, its velocities."""
-    trace = shown_trace(found)
+def torque_charts(found: Identification) -> tuple[Chart, ...]:
+    """Measured and predicted torque of one log, and what is left."""
+    if not found.traces:
+        return ()
+    trace, n = shown_trace(found), found.robot.joints
     measured = ChartLine("measured", trace.measured)
-    predicted = ChartLine("predicted", trace.predicted, SPARE[1])
-    charts = (
-        Chart("torque", "Drive torque, filtered", "N·m", (measured, predicted), height=1.5),
-        Chart("left", "Measured − predicted", "N·m", (ChartLine("residual", trace.residual),)),
-        Chart("dq", "Velocity", "rad/s", (ChartLine("velocity", trace.motion.dq),)),
+    predicted = ChartLine("predicted", trace.predicted, SPARE[1], "5 2")
+    panels, families = joint_panels(trace.measured), families_of(found.robot.limits.tau_max)
+    left = ChartLine("measured − predicted", trace.residual)
+    return tuple(
+        Chart(key, title, ("N·m",) * n, panels, trace.motion.t, lines, families=families)
+        for key, title, lines in (
+            ("torque", "Drive torque, filtered", (measured, predicted)),
+            ("left", "Measured − predicted", (left,)),
+        )
     )
-    return {
-        "joints": found.robot.joints,
-        "span": [float(trace.motion.t[0]), float(trace.motion.t[-1])],
-        "charts": [packed(chart, trace.motion.t) for chart in charts],
-        "responses": [],
-    }
 
 
 def provenance_section(record: Mapping[str, Any]) -> str:
     """The command, digests of all logs, versions: what is needed to make it again."""
     lines = [f"{log.get('path')}: sha256 {log.get('sha256')}" for log in record.get("inputs", ())]
     command = f"<pre>{escape(str(record.get('command', '')))}</pre>"
-    return f"<h2>Provenance</h2>{command}{bullets(lines)}{pairs(record.get('versions', {}))}"
+    return section("Provenance", command + bullets(lines) + pairs(record.get("versions", {})))

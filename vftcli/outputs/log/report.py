@@ -15,7 +15,8 @@ from vftcli.outputs.log.estimates import extra_files, write_estimates, write_ext
 from vftcli.outputs.log.rerun_recording import write_rrd
 from vftcli.outputs.log.run_record import jsonable, run_record, seal, versions
 from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds
-from vftcli.outputs.page.page import render, render_index
+from vftcli.outputs.page.index_page import render_index
+from vftcli.outputs.page.page import render
 from vftcli.outputs.seals import SEAL
 
 if TYPE_CHECKING:

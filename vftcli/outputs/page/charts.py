@@ -1,139 +1,294 @@
-"""Charts as the page's script takes them: JSON with base64 float32 arrays."""
+"""Charts of the page: small pictures that stand still, and what the script draws large from them.
+
+Every chart is drawn as SVG, one small picture a joint or axis, for print and for readers without a
+script; with a script the plotting library draws the chosen one large beside them.
+"""
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.outputs.decimation import Line, decimated
+from vftcli.outputs.decimation import decimated
+from vftcli.outputs.page import figures
+from vftcli.outputs.page.figures import Box, Scales, Span
+from vftcli.outputs.palette import colours_of
 from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import ExternalTorque
 
-STRETCHES = 2000
-"""Stretches a long log is cut into: two samples a stretch are about what a wide screen can show."""
+ROOM, LONG = 350_000, 4.0
+"""Bytes that the large charts of a page may take; a long log's may take more, up to this factor."""
+
+FEWEST, MOST = 250, 2000
+"""Stretches a long log is cut into, two samples each, however many lines there are."""
+
+POINT = 2 * (4 + 2) * 4 / 3
+"""Bytes of a stretch of a line: two samples of a float32 and an int16 as base64."""
+
+STEPS, UNKNOWN = 65534, -32768
+"""Steps between a line's lowest and highest value, finer than any screen; what stands for NaN."""
+
+DASHES = ("7 3", "2 2.5", "9 3 2 3", "4 2", "1.5 3.5", "12 3")
+"""How lines are broken, in turn: none is told by its colour alone."""
+
+INK, REFERENCE = "ink", "reference"
+"""Colours that follow the page: its text's, and the reference's."""
+
+LineStyle = tuple[str, str]
+"""Colour and dash of a line."""
 
 
 class ChartLine(NamedTuple):
-    """One line of a chart, for every joint.
+    """One line of a chart, for every panel.
 
     Attributes:
         name: What the legend calls it.
-        values: One column a joint. (T, n)
-        colour: ``#rrggbb``, or "ink" for the page's own text colour.
-        dashed: Whether the line is dashed.
+        values: One column a panel. (T, n)
+        colour: ``#rrggbb``, `INK` or `REFERENCE`.
+        dash: How it is broken, as SVG says it; "" for a line without gaps.
         half: Half the width of a ribbon about the line, NaN where it is not known. (T, n)
-        leads: Whether it is the line to look at: drawn thicker, and on top of the others.
+        leads: Whether it is the line to look at: drawn thicker.
+        shown: Whether it is drawn at once, rather than when asked for.
+        x: Its own horizontal places, None for the chart's. (T,)
     """
 
     name: str
     values: Array
-    colour: str = "ink"
-    dashed: bool = False
+    colour: str = INK
+    dash: str = ""
     half: Array | None = None
     leads: bool = False
+    shown: bool = True
+    x: Array | None = None
 
 
 class Chart(NamedTuple):
-    """One chart, for the joint that is chosen.
+    """A picture for every joint or axis.
 
     Attributes:
         key: Its name on the page.
         title: What it shows, in words.
-        unit: Unit of its vertical axis.
-        series: Its lines.
-        band: Half the width of a band about zero, one a joint, or None. (n,)
+        units: Unit of each panel's vertical axis. (n,)
+        panels: Their names. (n,)
+        x: Horizontal places. (T,)
+        series: Its lines, the last on top.
+        families: Which panels share a scale: those of one number. (n,)
+        band: Half the width of a band about zero, one a panel, or None. (n,)
         band_label: What the band is.
-        height: Relative height.
+        spans: Stretches that are marked, as contacts. [s]
+        unit: Unit of the horizontal axis.
+        log: Whether the horizontal axis is logarithmic.
+        lowest: Least end of the vertical axis, None for what the lines need.
     """
 
     key: str
     title: str
-    unit: str
+    units: tuple[str, ...]
+    panels: tuple[str, ...]
+    x: Array
     series: tuple[ChartLine, ...]
+    families: tuple[int, ...] = ()
     band: Array | None = None
     band_label: str = ""
-    height: float = 1.0
+    spans: Sequence[tuple[float, float]] = ()
+    unit: str = "s"
+    log: bool = False
+    lowest: float | None = None
 
 
-def packed(chart: Chart, t: Array) -> dict[str, Any]:
+def observer_lines(estimates: Sequence[ExternalTorque]) -> dict[str, LineStyle]:
+    """Colour and dash of every observer: the first has a line without gaps."""
+    colours = colours_of(estimates)
+    dashes = ("", *DASHES)
+    return {
+        name: (colour, dashes[k % len(dashes)]) for k, (name, colour) in enumerate(colours.items())
+    }
+
+
+def multiples(chart: Chart) -> str:
+    """One small picture a panel, below the legend; panels of a family have one scale."""
+    return (
+        f'{legend(chart)}<div class="multiples" data-of="{escape(chart.key)}">'
+        f"{pictures_of(chart)}</div>"
+    )
+
+
+def pictures_of(chart: Chart) -> str:
+    """The small pictures of a chart alone."""
+    return "".join(picture(chart, j, ends_of_family(chart, j)) for j in range(len(chart.panels)))
+
+
+def legend(chart: Chart) -> str:
+    """The lines that are drawn at once, where there is more than one, and the band."""
+    shown = [s for s in chart.series if s.shown]
+    parts = [f"{swatch(s.colour, s.dash, leads=s.leads)} {escape(s.name)}" for s in shown]
+    if chart.band is not None:
+        parts.append(f'<span class="patch floor"></span> {escape(chart.band_label)}')
+    ribbons = dict.fromkeys(s.colour for s in shown if s.half is not None)
+    parts += [f"{patch(colour)} 95 % band" for colour in ribbons]
+    if chart.spans:
+        parts.append('<span class="patch contact"></span> contact')
+    if len(parts) < 2:
+        return ""
+    return f'<p class="legend">{"".join(f"<span>{part}</span>" for part in parts)}</p>'
+
+
+def patch(colour: str) -> str:
+    """A small piece of a ribbon."""
+    box = f'<rect width="26" height="8" fill="{colour}" class="rim"/>'
+    return f'<svg class="swatch" viewBox="0 0 26 8" aria-hidden="true">{box}</svg>'
+
+
+def swatch(colour: str, dash: str, *, leads: bool = False) -> str:
+    """A short piece of a line."""
+    return (
+        '<svg class="swatch" viewBox="0 0 26 8" aria-hidden="true">'
+        f'<path d="M0 4H26" {look_of(colour, dash, leads=leads)}/></svg>'
+    )
+
+
+def look_of(colour: str, dash: str, *, leads: bool = False) -> str:
+    """The attributes of a line."""
+    if colour == REFERENCE:
+        return 'class="reference"'
+    paint = "var(--ink)" if colour == INK else colour
+    broken = f' stroke-dasharray="{dash}"' if dash else ""
+    return f'stroke="{paint}" stroke-width="{1.9 if leads else 1.3}"{broken}'
+
+
+def ends_of_family(chart: Chart, panel: int) -> Span:
+    """Ends of a panel's vertical axis: those of all panels of its family."""
+    family = chart.families or tuple(range(len(chart.panels)))
+    members = [j for j, number in enumerate(family) if number == family[panel]]
+    values = []
+    for series in chart.series:
+        if series.shown:
+            half = 0.0 if series.half is None else np.nan_to_num(series.half[:, members])
+            drawn = series.values[:, members]
+            values += [drawn - half, drawn + half]
+    if chart.band is not None:
+        bounds = np.array([chart.band[j] for j in members])
+        values += [bounds, -bounds]
+    span = figures.ends_of(values)
+    return span if chart.lowest is None else Span(max(span.low, chart.lowest), span.high)
+
+
+def picture(chart: Chart, panel: int, ends: Span) -> str:
+    """One panel as a figure with its head."""
+    box = Box()
+    scales = Scales(box, Span(float(chart.x[0]), float(chart.x[-1])), ends, chart.log)
+    parts = [figures.stripes(scales, chart.spans, 'class="contact"')]
+    if chart.band is not None and np.isfinite(chart.band[panel]):
+        top, foot = (float(scales.up(sign * chart.band[panel])) for sign in (1.0, -1.0))
+        foot = min(foot, scales.floor)
+        parts.append(
+            figures.rectangle(box.left, top, scales.side - box.left, foot - top, 'class="floor"')
+        )
+    parts.append(figures.axes(scales, chart.unit, (4, 3)))
+    parts += [drawn_line(scales, chart, series, panel) for series in chart.series if series.shown]
+    name, unit = escape(chart.panels[panel]), escape(chart.units[panel])
+    title = f"{chart.title}, {chart.panels[panel]}"
+    return (
+        f'<figure data-panel="{panel}"><figcaption>{name} <span>{unit}</span></figcaption>'
+        f"{figures.svg(box, title, ''.join(parts))}</figure>"
+    )
+
+
+def drawn_line(scales: Scales, chart: Chart, series: ChartLine, panel: int) -> str:
+    """A line of a panel with its ribbon."""
+    x = chart.x if series.x is None else series.x
+    values = series.values[:, panel]
+    if chart.log:
+        t, y = figures.thinned_log(x, values)
+        return figures.line(scales, t, y, look_of(series.colour, series.dash))
+    t, y = figures.thinned(x, values)
+    under = ""
+    if series.half is not None:
+        half = np.interp(t, x, series.half[:, panel])
+        under = figures.ribbon(scales, t, y - half, y + half, f'fill="{series.colour}" class="rim"')
+    return under + figures.line(
+        scales, t, y, look_of(series.colour, series.dash, leads=series.leads)
+    )
+
+
+def large(chart: Chart) -> str:
+    """Where the script draws the chosen panel large, with every line on demand."""
+    return f'<div class="large" data-chart="{escape(chart.key)}"></div>'
+
+
+def families_of(limits: Array) -> tuple[int, ...]:
+    """Joints of one drive size, by their torque limits: neighbours of one limit are a family."""
+    numbers, last = [], 0
+    for j, limit in enumerate(limits):
+        same = j > 0 and (limit == limits[j - 1] or not np.isfinite([limit, limits[j - 1]]).any())
+        last += not same
+        numbers.append(last)
+    return tuple(numbers)
+
+
+def packed_charts(charts: Iterable[Chart]) -> list[dict[str, Any]]:
+    """Charts over time as the script takes them, all together within the page's room."""
+    charts = list(charts)
+    lines = sum(len(c.panels) * (1 if s.half is None else 2) for c in charts for s in c.series)
+    duration = max((float(c.x[-1] - c.x[0]) for c in charts), default=0.0)
+    room = ROOM * float(np.clip(duration / 60.0, 1.0, LONG))
+    stretches = int(np.clip(room / (POINT * max(lines, 1)), FEWEST, MOST))
+    return [packed(chart, stretches) for chart in charts]
+
+
+def packed(chart: Chart, stretches: int) -> dict[str, Any]:
     """A chart over time as JSON can hold it."""
     return {
-        **frame_of(chart),
+        "key": chart.key,
+        "title": chart.title,
+        "units": list(chart.units),
+        "panels": list(chart.panels),
+        "unit": chart.unit,
+        "band": known(chart.band),
+        "bandLabel": chart.band_label,
+        "spans": [list(span) for span in chart.spans],
         "series": [
             {
-                **style_of(line),
-                "lines": [
-                    {**packed_line(part), **ribbon_of(line, j, t, part.t)}
-                    for j, part in enumerate(decimated(t, line.values, STRETCHES))
-                ],
+                "name": series.name,
+                "colour": series.colour,
+                "dash": [float(part) for part in series.dash.split()],
+                "leads": series.leads,
+                "shown": series.shown,
+                "lines": packed_lines(chart, series, stretches),
             }
-            for line in chart.series
+            for series in chart.series
         ],
     }
 
 
-def packed_over_frequency(
-    chart: Chart, frequencies: Sequence[Array], extra: Mapping[str, Any] | None = None
-) -> dict[str, Any]:
-    """A chart over frequency as JSON can hold it, its horizontal axis logarithmic.
-
-    Args:
-        chart: Its lines hold one row a frequency. (F, n)
-        frequencies: One array a line. (F,) [Hz]
-        extra: Further settings of the chart.
-    """
-    series = [
-        {**style_of(line), "lines": [packed_line(Line(f, column)) for column in line.values.T]}
-        for line, f in zip(chart.series, frequencies, strict=True)
-    ]
-    return {**frame_of(chart), "log": True, **(extra or {}), "series": series}
+def packed_lines(chart: Chart, series: ChartLine, stretches: int) -> list[dict[str, Any]]:
+    """A line's points, panel by panel: of every stretch its lowest and its highest sample."""
+    x = chart.x if series.x is None else series.x
+    found = []
+    for j, part in enumerate(decimated(x, series.values, stretches)):
+        line: dict[str, Any] = {"x": base64_of(part.t, "<f4"), "y": quantised(part.y)}
+        if series.half is not None:
+            line["half"] = quantised(np.interp(part.t, x, series.half[:, j]))
+        found.append(line)
+    return found
 
 
-def frame_of(chart: Chart) -> dict[str, Any]:
-    """A chart's name, title, unit and band: what holds for all of its lines."""
-    return {
-        "key": chart.key,
-        "title": chart.title,
-        "unit": chart.unit,
-        "height": chart.height,
-        "band": known(chart.band),
-        "bandLabel": chart.band_label,
-    }
+def quantised(values: Array) -> dict[str, Any]:
+    """Values in `STEPS` steps between the lowest and the highest, as base64 int16."""
+    finite = values[np.isfinite(values)]
+    low = float(finite.min()) if finite.size else 0.0
+    step = (float(finite.max()) - low) / STEPS if finite.size else 0.0
+    # A constant line has no steps; any will do.
+    step = step or 1.0
+    numbers = np.where(np.isfinite(values), np.round((values - low) / step) - STEPS // 2, UNKNOWN)
+    return {"low": low, "step": step, "points": base64_of(numbers, "<i2")}
 
 
-def style_of(line: ChartLine) -> dict[str, Any]:
-    """A line's name, colour, dashes and rank, as the script takes them."""
-    return {
-        "name": line.name,
-        "colour": line.colour,
-        "dashed": line.dashed,
-        "leads": line.leads,
-    }
-
-
-def packed_line(line: Line) -> dict[str, str]:
-    """A line's points: both coordinates as base64 float32."""
-    return {"x": base64_float32(line.t), "y": base64_float32(line.y)}
-
-
-def ribbon_of(line: ChartLine, j: int, t: Array, drawn: Array) -> dict[str, str]:
-    """Half the width of one column's ribbon at the times that are drawn; nothing without one.
-
-    Args:
-        line: The line.
-        j: The column.
-        t: Times of its samples. (T,) [s]
-        drawn: Times that are drawn. (P,) [s]
-    """
-    if line.half is None:
-        return {}
-    return {"half": base64_float32(np.interp(drawn, t, line.half[:, j]))}
-
-
-def base64_float32(values: Array) -> str:
-    """Little-endian float32 as base64: seven digits are more than a screen can show."""
-    # Text of numbers would be three times as long, and slower to read.
-    return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
+def base64_of(values: Array, kind: str) -> str:
+    """Numbers of a kind as base64: as text they would be three times as long."""
+    return base64.b64encode(np.asarray(values).astype(kind).tobytes()).decode("ascii")
 
 
 def known(values: Array | None) -> list[float | None] | None:

@@ -6,7 +6,7 @@ from vftcli.analysis import Analysis
 from vftcli.evaluation.print_table import Comparison
 from vftcli.evaluation.selection import Facts, advice, facts
 from vftcli.outputs.grid import DASH, Column, Grid, html
-from vftcli.outputs.page.shell import bullets, soft
+from vftcli.outputs.page.shell import bullets, section, soft
 
 HEADS = (
     "90 % of a step [ms]",
@@ -42,7 +42,7 @@ def selection_guide(analysis: Analysis) -> str:
         "These follow from the gains more than from the method: <code>--match delay=S</code> or "
         "<code>--match bandwidth=HZ</code> puts all observers on the same footing first."
     )
-    return f"<h2>Selection guide</h2>{soft(words)}{html(guide)}{html(computed)}"
+    return f"<h3>Selection guide</h3>{soft(words)}{html(guide)}{html(computed)}"
 
 
 def facts_row(found: Facts) -> tuple[str | float, ...]:
@@ -71,4 +71,6 @@ def beside_print(comparison: Comparison | None) -> str:
         swatches=True,
     )
     source = soft(escape(comparison.published.source))
-    return f"<h2>Beside the paper</h2>{html(grid)}{source}{bullets(comparison.remarks)}"
+    return section(
+        "Beside the paper", html(grid) + source + bullets(comparison.remarks), name="paper"
+    )

@@ -1,85 +1,106 @@
-"""The report of one log as one HTML page, and the index over the reports of several."""
+"""The report of one log as one HTML page: the answer first, then what it rests on."""
 
-from collections.abc import Sequence
-from html import escape
-from urllib.parse import quote
+import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.grid import DASH, Column, Grid, GridCell, html, significant
-from vftcli.outputs.log.rmse_tables import blocks, mean_of, rmse_grid
+from vftcli.outputs.believability import grounds
 from vftcli.outputs.log.run_record import run_record
-from vftcli.outputs.page import comparisons, sections
-from vftcli.outputs.page.payload import payload
+from vftcli.outputs.page import comparisons, contacts_part, sections
+from vftcli.outputs.page.believability_part import believability_section
+from vftcli.outputs.page.charts import Chart, observer_lines
+from vftcli.outputs.page.hero import hero
 from vftcli.outputs.page.refinement_part import refinement_section
-from vftcli.outputs.page.shell import document, headline, health, pairs, provenance, remarks
-from vftcli.outputs.page.wrench_part import wrench_section
+from vftcli.outputs.page.shell import (
+    alarms,
+    all_remarks,
+    document,
+    health,
+    lead,
+    pairs,
+    provenance,
+    section,
+    top,
+)
+from vftcli.outputs.page.torque_part import torque_chart, torque_section
+from vftcli.outputs.page.wrench_part import wrench_chart, wrench_section
+from vftcli.signals.remarks import sentence
 
 
 def render(analysis: Analysis) -> str:
     """The report of one log: self-contained, nothing is loaded from anywhere."""
     record = analysis.run or run_record(analysis, "")
-    name = analysis.recording.name
+    torques, wrench = torque_chart(analysis), wrench_chart(analysis)
     parts = (
-        headline(name, f"External joint torques of {analysis.robot.name} from {name}"),
-        sections.facts_section(analysis),
-        health(analysis.examinations),
-        remarks([*record.get("warnings", ()), *record.get("notes", ())]),
+        alarms(analysis.examinations),
+        answer_part(analysis, torques),
+        believability_section(grounds(analysis)),
+        "<h2>Details</h2>",
+        torque_section(torques) if analysis.contacts is not None else "",
         sections.errors_section(analysis),
         comparisons.beside_print(analysis.published),
-        sections.series_section(analysis),
-        wrench_section(analysis),
+        wrench_section(analysis, wrench),
+        contact_section(analysis),
         sections.observers_section(analysis),
         refinement_section(analysis),
-        comparisons.selection_guide(analysis),
-        f"<h2>Conventions</h2>{pairs(record.get('conventions', {}))}",
+        health(analysis.examinations),
+        all_remarks([*record.get("warnings", ()), *record.get("repairs", ()), *record["notes"]]),
         provenance(record),
     )
-    return document(f"{name}: external torques", "".join(parts), payload(analysis))
+    title = f"{headline(analysis)} – {analysis.recording.name}"
+    styles = observer_lines(analysis.estimates)
+    charts = [chart for chart in (torques, wrench) if chart is not None]
+    return document(title, "".join(parts), charts, styles)
 
 
-def render_index(analyses: Sequence[tuple[str, Analysis]]) -> str:
-    """The page over several reports, each told by its sub-folder, relative to the index."""
-    words = (Column(head, words=True) for head in ("Log", "Robot", "Reference"))
-    numbers = map(Column, ("Span [s]", "Samples", "Best mean RMSE [N·m]", "Floor"))
-    overview = Grid(
-        title="Every log has its own page",
-        columns=(*words, *numbers),
-        rows=tuple(index_row(folder, analysis) for folder, analysis in analyses),
+def answer_part(analysis: Analysis, torques: Chart) -> str:
+    """The first screen: what touched the arm, or the torques where no contacts are listed."""
+    found = analysis.contacts
+    if found is None:
+        reasons = [r for r in analysis.remarks if r.code == "contacts-not-told"]
+        words = [f"What touched the arm is not told: {sentence(r)}." for r in reasons]
+        first = top(eyebrow(analysis), headline(analysis), lead(*words))
+        return first + torque_section(torques, opened=True)
+    return "".join(
+        (
+            top(eyebrow(analysis), headline(analysis), contacts_part.lead(found)),
+            hero(analysis, found),
+            contacts_part.contact_table(analysis, found),
+        )
     )
-    tables = "".join(
-        f"<h2>{link(folder, analysis.recording.name)}</h2>"
-        f"{''.join(html(rmse_grid(block)) for block in blocks(analysis.errors))}"
-        for folder, analysis in analyses
-        if analysis.errors is not None
-    )
-    title = f"External joint torques from {len(analyses)} logs"
-    top = f"<header><h1>{escape(title)}</h1></header>"
-    found = [one for _, analysis in analyses for one in analysis.examinations]
-    return document(title, f"{top}{html(overview)}{health(found)}{tables}")
 
 
-def index_row(folder: str, analysis: Analysis) -> tuple[GridCell | str | float | None, ...]:
-    """One log's entries in the overview: its name links to its own page."""
-    recording, reference = analysis.recording, analysis.reference
-    found = blocks(analysis.errors) if analysis.errors is not None else ()
-    best, floor = DASH, DASH
-    if found:
-        means = [mean_of(row) for row in found[0].rmse]
-        # A mean that is not known comes last.
-        k = min(range(len(means)), key=lambda i: (means[i] != means[i], means[i]))
-        best = f"{significant(means[k])} ({found[0].observers[k]})"
-        floor = significant(mean_of(found[0].floor))
+def headline(analysis: Analysis) -> str:
+    """The answer in one sentence."""
+    if analysis.contacts is not None:
+        return contacts_part.headline(analysis.contacts)
+    return f"External torques of the {analysis.recording.joints} joints."
+
+
+def eyebrow(analysis: Analysis) -> tuple[str, ...]:
+    """The log, the robot, the span at its rate, and what measured the force."""
+    recording, robot, reference = analysis.recording, analysis.robot, analysis.reference
+    measured = "nothing else measured the force"
+    if reference is not None:
+        measured = f"compared with {reference.name}"
+    elif recording.wrench is not None:
+        measured = "beside a sensor's own wrench"
+    elif recording.tau_ext is not None:
+        measured = "beside the controller's own estimate"
+    rate = 1.0 / recording.median_step if recording.samples > 1 else float("nan")
+    span = f"{recording.duration:.1f} s"
     return (
-        GridCell(recording.name, html=link(folder, recording.name)),
-        analysis.robot.name,
-        reference.name if reference is not None else DASH,
-        f"{recording.duration:.3f}",
-        recording.samples,
-        best,
-        floor,
+        recording.name,
+        robot.title or robot.name,
+        f"{span} at {rate:.0f} Hz" if np.isfinite(rate) else span,
+        measured,
     )
 
 
-def link(folder: str, name: str) -> str:
-    """HTML of a link to the report in a sub-folder; both texts may hold any letter."""
-    return f'<a href="{escape(quote(folder))}/index.html">{escape(name)}</a>'
+def contact_section(analysis: Analysis) -> str:
+    """Every contact's numbers and what the list rests on."""
+    found = analysis.contacts
+    if found is None:
+        return ""
+    details = contacts_part.contact_details(found)
+    model = f"<h3>What the list rests on</h3>{pairs(contacts_part.model_pairs(found))}"
+    return section("Contacts in numbers", details + model, f"{len(found.contacts)}", name="numbers")

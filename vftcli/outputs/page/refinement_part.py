@@ -1,14 +1,16 @@
 """What the complete log told, on the page: free part, error budget, consistency, spectra."""
 
 from collections.abc import Iterable, Mapping
+from html import escape
 
 import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.observers.spectra import Spectra
 from vftcli.outputs.grid import Column, Entry, Grid, html, joint_columns
-from vftcli.outputs.page.charts import Chart, ChartLine
-from vftcli.outputs.page.shell import bullets, folded
+from vftcli.outputs.page.charts import Chart, ChartLine, LineStyle, multiples, observer_lines
+from vftcli.outputs.page.shell import section
+from vftcli.outputs.page.torque_part import joint_panels
 from vftcli.refinement.refine import Refinement
 from vftcli.signals.arrays import Array
 
@@ -17,7 +19,7 @@ FREE, LOADED = "#3b7ea1", "#c2410c"
 
 
 def refinement_section(analysis: Analysis) -> str:
-    """Remarks, error budget and innovations of a complete log, "" where nothing asked for it."""
+    """Error budget, innovations, spectra and tuning of a complete log, "" without one."""
     found = analysis.refinement
     if found is None:
         return ""
@@ -25,8 +27,16 @@ def refinement_section(analysis: Analysis) -> str:
         "Error budget in N·m rms, estimated from the log itself": budget_grid(found),
         "Innovations; in brackets what a true model would give": consistency_grid(found),
     }
-    shown = "".join(folded(caption, html(grid)) for caption, grid in tables.items() if grid.rows)
-    return f"<h2>What the complete log tells</h2>{bullets(found.remarks)}{shown}"
+    shown = "".join(
+        f"<h3>{escape(caption)}</h3>{html(grid)}" for caption, grid in tables.items() if grid.rows
+    )
+    charts = []
+    if (spectra := found.baseline.spectra) is not None:
+        charts.append(spectra_chart(spectra))
+    if found.curves:
+        charts.append(tuning_chart(found, observer_lines(analysis.estimates)))
+    drawn = "".join(f"<h3>{escape(c.title)}</h3>{multiples(c)}" for c in charts)
+    return section("What the complete log tells", shown + drawn, name="complete-log")
 
 
 def budget_grid(found: Refinement) -> Grid:
@@ -74,16 +84,41 @@ def spectra_chart(found: Spectra) -> Chart:
         decibels: Array = 10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny))
         return decibels
 
+    free = level(found.free)
     lines = (
-        ChartLine("free part, S_n", level(found.free), FREE),
-        ChartLine("loaded part, S_d", level(found.loaded), LOADED),
+        ChartLine("free part, S_n", free, FREE),
+        ChartLine("loaded part, S_d", level(found.loaded), LOADED, "5 2"),
     )
-    title = "Spectrum of d: free part (blue), loaded part (orange)"
-    return Chart("spectra", title, "dB, 1 (N·m)²/Hz", lines)
+    n = free.shape[1]
+    return Chart(
+        "spectra",
+        "Spectrum of the disturbance, dB of 1 (N·m)²/Hz",
+        ("dB",) * n,
+        joint_panels(free),
+        found.frequency[1:],
+        lines,
+        families=(1,) * n,
+        unit="Hz",
+        log=True,
+    )
 
 
-def tuning_chart(found: Refinement, colours: Mapping[str, str]) -> Chart:
+def tuning_chart(found: Refinement, styles: Mapping[str, LineStyle]) -> Chart:
     """What was minimised for every observer that the log tuned."""
-    lines = (ChartLine(name, curve.rmse, colours[name]) for name, curve in found.curves.items())
-    title = "Expected error against natural frequency ω_n/2π"
-    return Chart("curve", title, "N·m", tuple(lines))
+    lines = tuple(
+        ChartLine(name, curve.rmse, *styles[name], x=curve.omega_n / (2.0 * np.pi))
+        for name, curve in found.curves.items()
+    )
+    values = lines[0].values
+    x = [line.x for line in lines if line.x is not None]
+    ends = np.array([min(float(v.min()) for v in x), max(float(v.max()) for v in x)])
+    return Chart(
+        "curve",
+        "Expected error against natural frequency ω_n/2π",
+        ("N·m",) * values.shape[1],
+        joint_panels(values),
+        ends,
+        lines,
+        unit="Hz",
+        log=True,
+    )

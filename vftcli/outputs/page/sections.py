@@ -1,11 +1,10 @@
-"""Sections of the report of one log: facts, errors, charts over time, observers."""
+"""Sections of the report of one log: errors and observers."""
 
 from html import escape
 from itertools import groupby
 from operator import itemgetter
 from typing import Any
 
-import numpy as np
 import polars as pl
 
 from vftcli.analysis import Analysis
@@ -16,50 +15,42 @@ from vftcli.outputs.log.rmse_tables import (
     blocks,
     detail_grids,
     marks_on_page,
+    mean_of,
     rmse_grid,
 )
 from vftcli.outputs.log.run_record import observer_record
 from vftcli.outputs.log.wrench_tables import axis_grids, paper_bounds
-from vftcli.outputs.page.charts import STRETCHES
-from vftcli.outputs.page.shell import chart_places, fact_list, folded, soft
+from vftcli.outputs.page.charts import legend, pictures_of
+from vftcli.outputs.page.comparisons import selection_guide
+from vftcli.outputs.page.shell import section, soft
+from vftcli.outputs.page.torque_part import response_charts
 from vftcli.signals.arrays import Array
 
 
-def facts_section(analysis: Analysis) -> str:
-    """Which log, which robot, how long, how fast."""
-    recording, robot = analysis.recording, analysis.robot
-    return fact_list(
-        {
-            "Robot": robot.title or robot.name,
-            "Log format": recording.source.format,
-            "Span": f"{recording.t[0]:.3f} – {recording.t[-1]:.3f} s",
-            "Samples": f"{recording.samples}",
-            "Rate (median step)": f"{1.0 / recording.median_step:.4g} Hz",
-            "Longest step": f"{1e3 * float(np.diff(recording.t).max()):.4g} ms",
-            "Reference": analysis.reference.name if analysis.reference else "none",
-        }
-    )
-
-
 def errors_section(analysis: Analysis) -> str:
-    """The RMSE table with its floors and everything below it, or why there is none."""
-    table = analysis.errors
+    """The RMSE table with its floors and everything below it, or how to get one."""
+    table, title = analysis.errors, "Errors against a reference"
     found = blocks(table) if table is not None else ()
     if table is None or not found:
-        return (
-            "<h2>Errors</h2><p>No reference was given, so no errors can be told. "
-            "<code>--reference two-cycle|sensor|vendor|zero|file:PATH</code> gives one.</p>"
+        words = (
+            "Nothing was given that measures the force. <code>--reference "
+            "two-cycle|sensor|vendor|zero|file:PATH</code> adds the table."
         )
+        return section(title, soft(words), "none given", name="errors")
+    best = found[0]
+    means = [mean_of(row) for row in best.rmse]
+    k = min(range(len(means)), key=lambda i: (means[i] != means[i], means[i]))
+    state = f"{significant(means[k])} N·m ({best.observers[k]}) against {best.reference}"
     parts = [
         *(html(rmse_grid(block)) for block in found),
         soft(marks_on_page(found)),
         *map(html, axis_grids(table, paper_bounds([analysis]))),
-        folded(
+        section(
             "Confidence intervals, lags and significance", "".join(map(html, detail_grids(table)))
         ),
-        folded("Bias, largest error and correlation", html(bias_grid(table))),
+        section("Bias, largest error and correlation", html(bias_grid(table))),
     ]
-    return f"<h2>Errors against the reference</h2>{''.join(parts)}"
+    return section(title, "".join(parts), state, name="errors")
 
 
 def bias_grid(table: pl.DataFrame) -> Grid:
@@ -81,19 +72,6 @@ def bias_grid(table: pl.DataFrame) -> Grid:
     )
 
 
-def series_section(analysis: Analysis) -> str:
-    """The charts over time; the script fills them."""
-    count = analysis.recording.samples
-    drawn = f"All {count} samples are drawn."
-    if count > 2 * STRETCHES:
-        drawn = (
-            f"The log has {count} samples. The page keeps the lowest and the highest sample of "
-            f"each of {STRETCHES} equal stretches, at their own times, so that no spike is lost; "
-            "every sample is in <code>estimates.parquet</code>."
-        )
-    return f"<h2>Torques over time</h2>{soft(drawn)}{chart_places()}"
-
-
 def observers_section(analysis: Analysis) -> str:
     """What each observer's parameters are and mean, and its frequency response."""
     heads = ("ω_n [rad/s]", "ζ", "delay [ms]", "−3 dB [Hz]", "to tune")
@@ -109,11 +87,17 @@ def observers_section(analysis: Analysis) -> str:
         swatches=True,
     )
     parameters = "".join(parameter_row(o) for o in analysis.observers)
-    return (
-        f'<h2>Observers</h2>{html(grid)}<h3>Frequency response</h3><div class="responses" '
-        'id="responses"></div><h3>Parameters</h3>'
-        f'<dl class="pairs">{parameters}</dl>'
+    responses = response_charts(analysis)
+    legend_of_all = legend(responses[0]) if responses else ""
+    pictures = "".join(pictures_of(chart) for chart in responses)
+    parts = (
+        html(grid),
+        f'<h3>Frequency response</h3>{legend_of_all}<div class="multiples">{pictures}</div>',
+        f'<h3>Parameters</h3><dl class="pairs">{parameters}</dl>',
+        selection_guide(analysis),
     )
+    names = ", ".join(observer.name for observer in analysis.observers)
+    return section("Observers", "".join(parts), names, name="observers")
 
 
 def observer_row(analysis: Analysis, name: str) -> tuple[GridCell | str | float | None, ...]:

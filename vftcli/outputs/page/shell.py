@@ -4,13 +4,15 @@ Every word that comes from outside is escaped here or in `vftcli.outputs.grid`.
 """
 
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from vftcli.doctor import Examination, in_words
-from vftcli.outputs.examination import warnings_of
+from vftcli.outputs.examination import overridden_lines, warnings_of
+from vftcli.outputs.page.charts import INK, Chart, LineStyle, packed_charts
 from vftcli.signals.remarks import Remark, explanation
 
 HERE = Path(__file__).parent
@@ -19,19 +21,27 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inli
 """The browser loads nothing from anywhere."""
 
 
-def document(title: str, body: str, data: Mapping[str, Any] | None = None) -> str:
+def document(
+    title: str,
+    body: str,
+    charts: Sequence[Chart] = (),
+    styles: Mapping[str, LineStyle] | None = None,
+) -> str:
     """A whole HTML page with its style: self-contained, nothing is loaded from anywhere.
 
     Args:
         title: What the browser's tab is called.
         body: HTML of all sections.
-        data: What the script draws, None for a page without charts.
+        charts: What the script draws large, none for a page without `large` charts.
+        styles: Colour and dash of the names that head the rows of tables.
     """
-    script = ""
+    script, style = "", asset("page.css") + swatch_rules(styles or {})
     # JSON in an element of its own cannot run, so that a name in a log cannot either.
-    if data is not None:
+    if charts:
+        style += asset("uplot.css")
         script = (
-            f'<script type="application/json" id="data">{script_json(data)}</script>'
+            f'<script type="application/json" id="data">{script_json(packed_charts(charts))}'
+            f"</script><script>/*{asset('uplot_licence.txt')}*/{asset('uplot.js')}</script>"
             f"<script>{asset('page.js')}</script>"
         )
     return (
@@ -39,9 +49,21 @@ def document(title: str, body: str, data: Mapping[str, Any] | None = None) -> st
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         '<meta name="generator" content="vftcli">'
-        f"<title>{escape(title)}</title><style>{asset('page.css')}</style></head>"
+        f"<title>{escape(title)}</title><style>{style}</style></head>"
         f"<body>{body}{script}</body></html>\n"
     )
+
+
+def swatch_rules(styles: Mapping[str, LineStyle]) -> str:
+    """Style of the short line before a name that heads a row: the line's own colour and dash."""
+    rules = []
+    for name, (colour, dash) in styles.items():
+        # A name from a file could end the rule: it goes without a colour.
+        if re.fullmatch(r"[\w.,=× -]+", name):
+            kind = "solid" if not dash else "dashed" if float(dash.split()[0]) > 3 else "dotted"
+            paint = "var(--ink)" if colour == INK else colour
+            rules.append(f'[data-swatch="{name}"]::before{{border-top:3px {kind} {paint}}}')
+    return "".join(rules)
 
 
 def asset(name: str) -> str:
@@ -49,27 +71,29 @@ def asset(name: str) -> str:
     return (HERE / name).read_text(encoding="utf-8")
 
 
-def script_json(data: Mapping[str, Any]) -> str:
+def script_json(data: object) -> str:
     """JSON for a ``<script type="application/json">``: nothing in it can end the element."""
     # "<" could begin "</script>"; the two separators end a line in JavaScript but not in JSON.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
 
 
-def headline(name: str, text: str) -> str:
-    """The top of a report: its name, one sentence, the button for dark pages."""
-    return (
-        f'<header><h1>{escape(name)}</h1><p class="soft">{escape(text)}</p>'
-        '<button type="button" id="theme">dark page</button></header>'
-    )
+def top(eyebrow: Sequence[str], headline: str, lead: str = "") -> str:
+    """The top of a page: what it is about, the answer in words, and what follows from it.
+
+    Args:
+        eyebrow: Facts of the log, in a line.
+        headline: The answer.
+        lead: Its paragraphs, as HTML.
+    """
+    facts = " · ".join(escape(part) for part in eyebrow if part)
+    return f'<header><p class="eyebrow">{facts}</p><h1>{escape(headline)}</h1>{lead}</header>'
 
 
-def fact_list(facts: Mapping[str, str]) -> str:
-    """Terms and their short descriptions, side by side below the headline."""
-    items = (
-        f"<div><dt>{escape(name)}</dt><dd>{escape(text)}</dd></div>" for name, text in facts.items()
-    )
-    return f'<dl class="facts">{"".join(items)}</dl>'
+def lead(*sentences: str) -> str:
+    """A paragraph below a headline, "" without a word."""
+    text = " ".join(escape(sentence) for sentence in sentences if sentence)
+    return f'<p class="lead">{text}</p>' if text else ""
 
 
 def pairs(table: Mapping[str, Any]) -> str:
@@ -86,43 +110,38 @@ def bullets(lines: Iterable[Remark | str]) -> str:
     return f'<ul class="plain">{items}</ul>'
 
 
-def remarks(lines: Sequence[Remark]) -> str:
-    """What the reader should know before believing a number, "" where there is nothing."""
-    if not lines:
-        return ""
-    return f'<section class="remarks"><h2>Read this first</h2>{bullets(lines)}</section>'
+def all_remarks(lines: Iterable[Remark]) -> str:
+    """Every remark once, the most serious first; "" without any."""
+    texts = {explanation(remark): remark.level for remark in lines}
+    order = ("warning", "caution", "fact")
+    found = sorted(texts, key=lambda text: order.index(texts[text]))
+    return section("Remarks", bullets(found), f"{len(found)}") if found else ""
 
 
-def health(examinations: Sequence[Examination], *, fitting: bool = True) -> str:
-    """What is wrong with the logs: evidence, consequence and remedy of every finding.
+def alarms(examinations: Sequence[Examination], *, fitting: bool = True) -> str:
+    """What stands above everything where results were wanted in spite of a finding."""
+    lines = overridden_lines(examinations, fitting=fitting)
+    return "".join(f'<p class="alarm">{escape(line)}</p>' for line in lines)
 
-    Warnings stand open, above everything that they may make wrong; what only informs is folded.
-    """
+
+def health(examinations: Sequence[Examination], *, opened: bool = False) -> str:
+    """What is wrong with the logs: evidence, consequence and remedy of every finding."""
     if not examinations:
         return ""
-    several = len(examinations) > 1
-    parts = [log_health(one, named=several, fitting=fitting) for one in examinations]
-    kind = "remarks" if any(map(warnings_of, examinations)) else "soft"
-    return f'<section class="{kind}" id="health"><h2>Log health</h2>{"".join(parts)}</section>'
+    named = len(examinations) > 1
+    parts = [log_health(one, named=named) for one in examinations]
+    count = sum(len(warnings_of(one)) for one in examinations)
+    state = f"{count} warning{'s' * (count > 1)}" if count else "sound"
+    return section("Log health", "".join(parts), state, name="health", opened=opened and count > 0)
 
 
-def log_health(examination: Examination, *, named: bool, fitting: bool) -> str:
-    """One log's warnings, each with what it does and what to do, and its notes folded."""
+def log_health(examination: Examination, *, named: bool) -> str:
+    """One log's findings, its warnings first."""
     warnings = warnings_of(examination)
-    count = f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}" if warnings else "sound"
-    head = f"{examination.recording.name}: {count}" if named else count
-    refused = {finding.code for finding in examination.refusals(fitting=fitting)}
-    alarm = (
-        '<p class="alarm">MEANINGLESS unless the finding is wrong: these results were made with '
-        f"--anyway in spite of {escape(', '.join(sorted(refused)))}.</p>"
-        if refused
-        else ""
-    )
     notes = [finding for finding in examination.findings if finding.level != "warning"]
-    return (
-        f'<p class="verdict">{escape(head)}</p>{alarm}{"".join(map(finding_block, warnings))}'
-        + folded(f"{len(notes)} more noted", "".join(map(finding_block, notes)))
-    )
+    head = f"<h3>{escape(examination.recording.name)}</h3>" if named else ""
+    found = "".join(map(finding_block, (*warnings, *notes)))
+    return head + (found or soft("Nothing was found."))
 
 
 def finding_block(finding: Remark) -> str:
@@ -140,28 +159,22 @@ def soft(text: str) -> str:
     return f'<p class="soft">{text}</p>'
 
 
-def folded(summary: str, html: str) -> str:
-    """Something the reader opens with a click, "" where there is nothing."""
-    return f"<details><summary>{escape(summary)}</summary>{html}</details>" if html else ""
-
-
-def chart_places(chosen: str = "Joint", series: str = "Series") -> str:
-    """Where the script puts the charts over time, with the buttons that steer them.
+def section(title: str, html: str, state: str = "", *, name: str = "", opened: bool = False) -> str:
+    """A part of the details that the reader opens with a click, "" where there is nothing.
 
     Args:
-        chosen: What is chosen by a button: a joint or an axis.
-        series: What the legend lists.
+        title: What it is about.
+        html: What it holds.
+        state: What it says, in a few words.
+        name: Its name, for links.
+        opened: Whether it is open at once.
     """
-    return (
-        '<p class="soft help">Drag to zoom in, double-click to see all, shift and drag to pan; '
-        f"keys + − ← → Home. Click a small chart to choose its {chosen.lower()}.</p>"
-        f'<div id="toolbar"><div class="buttons" id="joints" role="group" aria-label="{chosen}">'
-        f'<span class="name">{chosen}</span></div>'
-        f'<div id="legend" role="group" aria-label="{series}"><span class="name">{series}</span>'
-        '</div><div class="buttons"><button type="button" id="all">Whole span</button></div></div>'
-        '<div id="overview"></div><div id="detail"></div>'
-        "<noscript><p>The charts need JavaScript; the tables do not.</p></noscript>"
-    )
+    if not html:
+        return ""
+    words = f" <span>· {escape(state)}</span>" if state else ""
+    mark = f' id="{name}"' if name else ""
+    head = f"<summary>{escape(title)}{words}</summary>"
+    return f"<details{mark}{' open' * opened}>{head}{html}</details>"
 
 
 def provenance(record: Mapping[str, Any]) -> str:
@@ -183,11 +196,17 @@ def provenance(record: Mapping[str, Any]) -> str:
         "Robot sha256": robot.get("sha256") or "–",
         "Versions": versions,
     }
-    parts = [f"<h2>Provenance</h2><pre>{escape(command)}</pre>", pairs(table)]
-    for name in ("repairs", "warnings", "notes"):
-        lines = record.get(name) or ()
-        parts.append(f"<h3>{name.capitalize()}</h3>")
-        parts.append(bullets(lines) if lines else soft("none"))
-    if notes := robot.get("notes"):
-        parts.append(f"<h3>Notes on the robot file</h3>{bullets(notes)}")
-    return "".join(parts)
+    notes = robot.get("notes")
+    more = f"<h3>Notes on the robot file</h3>{bullets(notes)}" if notes else ""
+    return section(
+        "Conventions and provenance",
+        "".join(
+            (
+                pairs(record.get("conventions", {})),
+                f"<pre>{escape(command)}</pre>",
+                pairs(table),
+                more,
+            )
+        ),
+        name="provenance",
+    )

@@ -6,12 +6,22 @@ from html import escape
 import numpy as np
 
 from vftcli.analysis import Analysis
+from vftcli.observers.table import BEST
 from vftcli.outputs.grid import Column, Entry, Grid, html, significant
 from vftcli.outputs.log.wrench_tables import drift_grid
-from vftcli.outputs.page.charts import Chart, ChartLine
-from vftcli.outputs.page.shell import soft
-from vftcli.outputs.palette import styles_of
+from vftcli.outputs.page.charts import (
+    REFERENCE,
+    Chart,
+    ChartLine,
+    large,
+    multiples,
+    observer_lines,
+)
+from vftcli.outputs.page.shell import section, soft
+from vftcli.outputs.page.torque_part import contact_spans, legend_name
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.external_torque import COVERS
+from vftcli.signals.wrench import AXES, unit_of
 from vftcli.virtual_sensor.detection import ContactScore
 from vftcli.virtual_sensor.frames import FRAMES
 from vftcli.virtual_sensor.sensor_reading import SensorReading
@@ -20,17 +30,61 @@ SHOWN = (0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0)
 """Thresholds of the operating curve that the table lists, in half widths of the free band."""
 
 
+def wrench_chart(analysis: Analysis) -> Chart | None:
+    """Force and moment axis by axis: the first wrench with its band, the reference below it."""
+    found = [wrench for wrench in analysis.wrenches if wrench.name != "reference"]
+    if not found:
+        return None
+    styles = observer_lines(analysis.estimates)
+    first = next((w.name for w in found if w.name == BEST), found[0].name)
+    lines = [
+        ChartLine(
+            w.name,
+            w.known,
+            *styles[w.name],
+            half=COVERS * w.sd if w.sd is not None and w.name == first else None,
+            leads=w.name == first,
+            shown=w.name == first,
+        )
+        for w in sorted(found, key=lambda wrench: wrench.name == first)
+    ]
+    reference = [w for w in analysis.wrenches if w.name == "reference"]
+    below = [ChartLine(legend_name(analysis, w.name), w.known, REFERENCE) for w in reference]
+    return Chart(
+        "wrench",
+        f"Wrench in {found[0].frame} axes",
+        tuple(map(unit_of, AXES)),
+        AXES,
+        analysis.t,
+        (*below, *lines),
+        families=(1, 1, 1, 2, 2, 2),
+        spans=contact_spans(analysis),
+    )
+
+
 def condition_charts(analysis: Analysis) -> Iterator[Chart]:
     """σ_min with the masked zone, what the solver says there, and the null-space channel."""
     sensed = analysis.virtual_sensor
     if sensed is None or not sensed.wrenches:
         return
     # σ_min and the mask follow from the pose, so that every observer has the same.
-    first, styles = sensed.wrenches[0], styles_of(analysis.estimates)
+    first, t = sensed.wrenches[0], analysis.t
+    styles = observer_lines(analysis.estimates)
     if first.sigma_min is not None:
         least = np.array([sensed.sensor.least_sigma])
         sigma = (ChartLine("σ_min of J", column(first.sigma_min)),)
-        yield Chart("sigma_min", "What the pose can tell: σ_min", "m", sigma, least, "masked below")
+        title = "What the pose can tell: σ_min"
+        yield Chart(
+            "sigma_min",
+            title,
+            ("m",),
+            (title,),
+            t,
+            sigma,
+            band=least,
+            band_label="masked below",
+            lowest=0.0,
+        )
     if sensed.hides:
         blown = tuple(
             ChartLine(w.name, masked_force(w.values, w.hidden), *styles[w.name])
@@ -38,7 +92,7 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
             if w.hidden.any()
         )
         title = f"|force| by {sensed.sensor.solver} in the masked samples, not to be believed"
-        yield Chart("blow-up", title, "N", blown)
+        yield Chart("blow-up", title, ("N",), (title,), t, blown)
     if first.null_space is not None:
         left = tuple(
             ChartLine(w.name, column(w.null_space), *styles[w.name])
@@ -48,7 +102,9 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
         limit = np.array([e.threshold for e in sensed.elsewhere[:1]])
         band = limit if limit.size else None
         title = "Torque that no wrench at the flange explains"
-        yield Chart("null_space", title, "N·m", left, band, "free part")
+        yield Chart(
+            "null_space", title, ("N·m",), (title,), t, left, band=band, band_label="free part"
+        )
 
 
 def column(values: Array) -> Array:
@@ -62,28 +118,29 @@ def masked_force(values: Array, hidden: Mask) -> Array:
     return column(np.where(hidden, norm, np.nan))
 
 
-def wrench_section(analysis: Analysis) -> str:
-    """Words, tables and the place of the charts, "" where no wrench was asked for."""
+def wrench_section(analysis: Analysis, chart: Chart | None) -> str:
+    """Words, charts and tables, "" without a wrench."""
     sensed = analysis.virtual_sensor
-    if sensed is None or not analysis.wrenches:
+    if sensed is None or chart is None:
         return ""
     grids = [drift_grid(sensed.drifts, spans=True)] if sensed.drifts else []
     if scores := analysis.contact_scores:
         grids += [contact_grid(scores), trade_off_grid(scores)]
     axes, solver = FRAMES[sensed.sensor.frame], sensed.solver
-    return "".join(
-        (
-            "<h2>Wrench over time</h2>",
-            soft(
-                "Force and moment on the robot, as the virtual sensor tells them; the line breaks "
-                "where the pose cannot."
-            ),
-            soft(f"Force and moment ON the robot in {escape(axes)}; solver {escape(solver)}."),
-            masked_words(sensed),
-            *map(html, grids),
-            '<div class="responses" id="wrenches"></div>',
-        )
+    parts = (
+        multiples(chart),
+        soft(
+            f"Force and moment ON the robot in {escape(axes)}; solver {escape(solver)}. The three "
+            "forces share a scale, and so do the three moments."
+        ),
+        large(chart),
+        masked_words(sensed),
+        *map(html, grids),
+        *map(multiples, condition_charts(analysis)),
     )
+    shown = next(line.name for line in chart.series if line.leads)
+    state = f"{shown}, {sensed.sensor.frame} axes"
+    return section("Wrench axes", "".join(parts), state, name="wrench")
 
 
 def masked_words(sensed: SensorReading) -> str:

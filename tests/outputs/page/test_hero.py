@@ -1,0 +1,64 @@
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import ContactList
+from vftcli.outputs.page.hero import WIDE, caption, content, free_spans, hero, highest, told
+
+
+def listed(analysis: Analysis) -> ContactList:
+    assert analysis.contacts is not None
+    return analysis.contacts
+
+
+def test_every_contact_has_its_stripe_its_number_and_its_course(pushed: Analysis) -> None:
+    found = listed(pushed)
+    drawn = content(pushed, found, WIDE)
+    scale = (WIDE.width - WIDE.left - WIDE.right) / float(pushed.t[-1] - pushed.t[0])
+    for contact in found.contacts:
+        stripe = re.search(
+            rf'<rect x="([\d.]+)"[^>]*width="([\d.]+)"[^>]*id="mark-{contact.number}"', drawn
+        )
+        assert stripe is not None
+        # drawn to a tenth of a unit
+        assert abs(float(stripe[1]) - WIDE.left - scale * contact.start) < 0.06
+        assert abs(float(stripe[2]) - scale * (contact.stop - contact.start)) < 0.06
+        assert f'href="#contact-{contact.number}"' in drawn
+    assert drawn.count('class="force"') == drawn.count('class="band"') == len(found.contacts)
+    assert drawn.count('class="peak"') == len(found.contacts)
+    assert drawn.count('class="untold"') == 1
+    assert re.search(r'fill="url\(#free-1024\)"', drawn)
+
+
+def test_both_widths_stand_once_each_with_one_set_of_names(pushed: Analysis) -> None:
+    html = hero(pushed, listed(pushed))
+    assert html.count("<svg") == 2
+    names = re.findall(r'id="([^"]+)"', html)
+    assert len(names) == len(set(names))
+
+
+def test_the_axis_holds_every_peak_with_its_band(pushed: Analysis) -> None:
+    found = listed(pushed)
+    tops = [(c.peak_force or 0.0) + (c.peak_band or 0.0) for c in found.contacts]
+    assert highest(found) > max(tops)
+    assert highest(replace(found, contacts=())) == 2.5 * (told(found) or 0.0)
+    assert highest(replace(found, contacts=(), smallest_force=None)) == 1.0
+
+
+def test_only_what_is_there_is_explained(pushed: Analysis, without_reference: Analysis) -> None:
+    words = caption(pushed, listed(pushed))
+    assert "Hatched: motion known to be free." in words
+    assert "stopped" not in words
+    stopped = replace(listed(pushed), stops=(3.0,), contacts=(), smallest_force=float("nan"))
+    assert told(stopped) is None
+    words = caption(without_reference, stopped)
+    assert "Dashed: the arm stopped abruptly." in words
+    assert "Grey" not in words
+    assert 'class="stop"' in content(pushed, stopped, WIDE)
+
+
+def test_the_free_part_is_the_first_round(pushed: Analysis) -> None:
+    ((start, stop),) = free_spans(pushed)
+    np.testing.assert_allclose((start, stop), (0.0, 4.0), atol=0.02)  # a round of 4 s
