@@ -23,7 +23,7 @@ from contact_scores import score, touched, true_contacts
 from vftcli.contacts.contact_list import ContactList
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse_log, contact_lists
+from vftcli.pipeline import AnalysisChoice, analyse_log, analyse_logs, list_touches
 from vftcli.readers.reader import ReadChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
@@ -45,7 +45,8 @@ def ur10e(*names: str, free: str | None = None) -> list[ContactList]:
         robot=RobotChoice(name="ur10e"),
         free=FreeChoice.parsed(free=[folder / free] if free else None),
     )
-    return list(contact_lists([folder / name for name in names], choice))
+    logs = analyse_logs([folder / name for name in names], choice, work=list_touches)
+    return [made.contacts for made in logs if made.contacts is not None]
 
 
 def shown(found: ContactList) -> None:
