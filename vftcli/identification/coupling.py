@@ -24,6 +24,9 @@ LEFT = 0.7
 HINTED = 0.97
 """Share from which down on the other joint's own friction hints at a coupling to be looked for."""
 
+PROMISING = 0.8
+"""Share that it may leave on the coarse grid for the finer ones to be worth their while."""
+
 KNOWN = 0.02
 """Standard deviation over value up to which a coupling counts as determined. Where wrong links
 feign one in logs of arms without any, it is .07 to .3."""
@@ -34,8 +37,9 @@ LEAST = 0.1
 REACH = 2
 """A motor sits at most so many joints before its own: those of a wrist in the forearm."""
 
-SPAN, STEPS = 2.0, 41
-"""Couplings are looked for from −SPAN to SPAN, then between two of these steps. [1]"""
+SPAN, STEPS, FINER = 2.0, 20, (5, 5, 5)
+"""Couplings are looked for from −SPAN to SPAN in so many steps to either side, then in a step of
+these in so many finer ones each. [1]"""
 
 TERMS = (*PLAIN, "quadratic", "load_coulomb")
 
@@ -121,8 +125,11 @@ class MotorRow:
         self.shape = Shape(tellable_terms(TERMS, self.given))
         other = np.concatenate([motion.ddq[:, j] for motion in data.motions])
         self.accelerations = np.column_stack([self.given.fixed, other])
-        self.weights = fit_column(self.columns(0.0), self.given.y, self.given.weights).weights
-        self.parts = self.given.parts(i)
+        self.weights, self.parts = self.robust_weights(0.0), self.given.parts(i)
+
+    def robust_weights(self, c: float) -> Array:
+        """Weights of the samples, outliers of the fit at a coupling c held down. (M,)"""
+        return fit_column(self.columns(c), self.given.y, self.given.weights).weights
 
     def friction(self, c: float) -> Array:
         """The friction's columns at a coupling c. (M, k)"""
@@ -156,26 +163,25 @@ class MotorRow:
 
 def fit_pair(data: Training, i: int, j: int) -> Coupling | None:
     """The best coupling of motor i with joint j (from 0), None where nothing hints at any."""
-    from scipy.optimize import minimize_scalar
-
     row = MotorRow(data, i, j)
     plain = row.columns(0.0)
     before = row.error(plain)
     if not before > 0.0 or row.error(np.hstack([plain, row.hint()])) > HINTED * before:
         return None
-    grid = np.linspace(-SPAN, SPAN, STEPS)
-    errors = [row.error(row.columns(c)) for c in grid]
-    best = float(grid[int(np.argmin(errors))])
-    step = float(grid[1] - grid[0])
-    found = minimize_scalar(
-        lambda c: row.error(row.columns(c)), bounds=(best - step, best + step), method="bounded"
-    )
-    c = float(found.x)
+    # Sign changes make the error rough: it is searched on finer and finer grids.
+    c, step = 0.0, SPAN / STEPS
+    for size in (STEPS, *FINER):
+        grid = c + step * np.arange(-size, size + 1)
+        c = float(min(grid, key=lambda at: row.error(row.columns(at))))
+        if row.error(row.columns(c)) > PROMISING * row.error(plain):
+            return None
+        step /= size
+        row.weights = row.robust_weights(c)
     A = row.columns(c)
     fit = fit_column(A, row.given.y, row.given.weights)
     # The friction's slope along c, beside the other columns, tells how well c is known.
-    width = 0.5 * step
+    width = 0.01
     slope = (row.columns(c + width) - row.columns(c - width)) @ fit.values / (2.0 * width)
     sd = fit_column(np.column_stack([A, slope]), row.given.y, row.given.weights).sd[-1]
     rubs = bool(np.all(fit.values[:2] > 0.0))  # Coulomb and viscous friction
-    return Coupling(i, j, c, float(sd), row.error(A) / before, rubs)
+    return Coupling(i, j, c, float(sd), row.error(A) / row.error(plain), rubs)
