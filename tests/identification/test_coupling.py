@@ -30,7 +30,7 @@ def made(rubbing_arm, sines):
         T[5, 4] = coupling
         share = 1.0 + 0.1 * np.array([1, -1, 1, -1, 1, -1])
         chain = replace(rubbing_arm.chain, mass=rubbing_arm.chain.mass * share)
-        t, q, dq, ddq = sines(seconds=15.0, seed=seed)
+        t, q, dq, ddq = sines(seconds=12.0, seed=seed)
         torque = motor_torque(T, torque_regressor(chain, q, dq, ddq) @ chain_parameters(chain))
         torque = torque + chain.rotor_inertia * at_motors(T, ddq)
         torque = torque + friction_torque(rubbing_arm.friction, at_motors(T, dq))
@@ -46,7 +46,7 @@ def training(log, robot=UR5, rubs=True):
     return prepare_training([log], robot, Processing(), False, rubs)
 
 
-@pytest.mark.parametrize(("coupling", "currents"), [(1.0, True), (1.0, False), (-0.3, True)])
+@pytest.mark.parametrize(("coupling", "currents"), [(1.0, True), (-0.3, False)])
 def test_a_planted_coupling_is_found_within_2_per_cent(made, coupling, currents):
     found = identify([made(coupling, currents)], UR5, Task(), [made(coupling, currents, seed=5)])
     T = found.robot.chain.transmission

@@ -370,8 +370,7 @@ def test_a_simulators_arm_has_no_friction(method):
 
 def test_torques_behind_the_gears_leave_the_friction_method_nothing_to_find():
     """Without friction: the rotor is before the gear, the links are the profile's."""
-    panda = load_robot("fr3")
-    robot = replace(panda, torque_source="link_torque").without_friction()
+    robot = replace(UR5, torque_source="link_torque", torque_constant=None).without_friction()
     with pytest.raises(IdentificationError, match="nothing to find"):
         identify([log(robot)], robot, Task(friction=False))
     found = identify([log(robot)], robot, Task(method="base", friction=False))
