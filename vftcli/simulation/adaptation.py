@@ -2,17 +2,18 @@
 
 A circle keeps what the arm can do: first the whole of it, then its place and size with a longer
 period, then another start, then a smaller radius. An excitation without an optimised series is made
-for the arm. What the user states stays as it is.
+for the arm. Hands push no harder than the arm can hold. What the user states stays as it is.
 """
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from vftcli.robots import Robot
 from vftcli.robots.kinematics import flange_jacobian, link_poses
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.simulation.calibration_motions import TABLE, ExcitationSpec, is_optimised
@@ -25,7 +26,12 @@ from vftcli.simulation.excitation import (
     torque_share,
 )
 from vftcli.simulation.kinematics import HOMES, FlangePose, check_limits, follow, reach
-from vftcli.simulation.trajectories import CircleSpec, TrajectorySpec
+from vftcli.simulation.motion import Reference
+from vftcli.simulation.pushes import PushesSpec
+from vftcli.simulation.scenario import Scenario
+from vftcli.simulation.servo import STIFFNESS
+from vftcli.simulation.touch import ContactSpec
+from vftcli.simulation.trajectories import CircleSpec
 
 DRAWS = 8000
 """Poses among which a start is looked for."""
@@ -44,6 +50,10 @@ LONGER = 1.5
 """Growth of the period beyond which another start is looked for."""
 INSTANTS = 192
 """Instants of a round at which speeds and torques are looked at."""
+GIVING = 0.1
+"""How far a push may move a joint. [rad]"""
+UNITS = {"force": "N", "torque": "Nm"}
+"""What a hand pushes with → its unit."""
 DECIMALS = 4
 """Digits to which what is found is rounded. [rad, m, s]"""
 
@@ -61,19 +71,22 @@ class Suited:
     growth: float
 
 
-def adapt(
-    spec: TrajectorySpec, robot: Robot, stated: Collection[str]
-) -> tuple[TrajectorySpec, tuple[Remark, ...]]:
-    """Suit a motion to a robot, and say what was changed; a motion that fits stays as it is.
+def adapt(scenario: Scenario, robot: Robot, stated: Collection[str]) -> Scenario:
+    """Suit a scenario's motion to a robot, and say what was changed; what fits stays as it is.
 
     Args:
-        spec: The motion.
-        robot: The arm.
-        stated: Keys of ``[trajectory]`` that the user has set; they are not changed.
+        scenario: The scenario.
+        robot: Its arm.
+        stated: Keys that the user has set, as ``trajectory.radius``; they are not changed.
     """
+    spec = scenario.trajectory
+    remarks: list[Remark] = []
     if isinstance(spec, CircleSpec):
         circle = adapt_circle(spec, robot, stated)
-        return circle, tuple(circle_remarks(spec, circle, robot))
+        remarks += circle_remarks(spec, circle, robot)
+        contacts, weaker = adapt_contacts(scenario.contacts, circle, robot, stated)
+        scenario = replace(scenario, trajectory=circle, contacts=contacts)
+        remarks += weaker
     if isinstance(spec, ExcitationSpec) and not spec.mean and not is_optimised(robot.name):
         made = make_excitation(robot, spec.period, spec.cycles)
         series = made.series
@@ -84,17 +97,18 @@ def adapt(
             cosine=tuple(map(tuple, series.cosine.tolist())),
             sine=tuple(map(tuple, series.sine.tolist())),
         )
-        about = {"robot": robot.name, "condition": made.condition, "columns": made.rank}
-        remark = fact("excitation-made", **about, period_s=series.period)
-        return excitation, (remark, *open_limits(robot))
-    return spec, ()
+        values = {"robot": robot.name, "condition": made.condition, "columns": made.rank}
+        remarks.append(Remark("excitation-made", "fact", values | {"period_s": series.period}))
+        remarks += open_limits(robot)
+        scenario = replace(scenario, trajectory=excitation)
+    return replace(scenario, adapted=tuple(map(str, remarks))) if remarks else scenario
 
 
 def open_limits(robot: Robot) -> Iterator[Remark]:
     """What was assumed of an excitation where the robot's limits leave it open."""
     limits = robot.limits
     endless = ~(np.isfinite(limits.q_min) & np.isfinite(limits.q_max))
-    assumed = (
+    assumed: tuple[tuple[str, Mask, dict[str, float]], ...] = (
         ("no-position-limit", endless, {"way_rad": np.pi}),
         ("no-speed-limit", ~np.isfinite(limits.qd_max), {"speed_rad_s": SPEED}),
         (
@@ -115,17 +129,19 @@ def adapt_circle(spec: CircleSpec, robot: Robot, stated: Collection[str]) -> Cir
     if spec.radius <= 0 or spec.period <= 0 or spec.cycles <= 0:
         return spec
     start = spec.start
-    if "start" not in stated and len(start) != robot.joints:
+    if "trajectory.start" not in stated and len(start) != robot.joints:
         start = HOMES.get(robot.joints, (0.0,) * robot.joints)
     same = replace(spec, start=start)
     found = suit(same, robot)
     if found is not None and found.growth == 1.0:
         return found.circle
-    free_period = "period" not in stated
+    free_period = "trajectory.period" not in stated
     if not free_period and found is not None:
         found = None
-    if "start" not in stated and (found is None or found.growth > LONGER):
-        others = other_circles(same, robot, longer=free_period, smaller="radius" not in stated)
+    if "trajectory.start" not in stated and (found is None or found.growth > LONGER):
+        others = other_circles(
+            same, robot, longer=free_period, smaller="trajectory.radius" not in stated
+        )
         found = min([*others, *([found] if found else [])], key=lambda s: s.growth, default=None)
     return spec if found is None else found.circle
 
@@ -133,26 +149,33 @@ def adapt_circle(spec: CircleSpec, robot: Robot, stated: Collection[str]) -> Cir
 def suit(circle: CircleSpec, robot: Robot) -> Suited | None:
     """The circle with a period that speeds and torques allow, None if it cannot be run at all."""
     try:
-        motion = circle.motion(robot)
-        at_rest = motion.at(np.linspace(0.0, circle.period, INSTANTS, endpoint=False))
-        check_limits(robot, at_rest.q, np.zeros_like(at_rest.q), "the circle")
+        once = one_round(circle, robot)
+        check_limits(robot, once.q, np.zeros_like(once.q), "the circle")
     except ParameterError:
         return None
+    fastest = np.where(np.isfinite(robot.limits.qd_max), robot.limits.qd_max, np.inf)
     growth = 1.0
     for _ in range(20):
-        reference = replace(motion, period=circle.period * growth).at(
-            np.linspace(0.0, circle.period * growth, INSTANTS, endpoint=False)
-        )
-        speed = np.nanmax(
-            np.append(np.max(np.abs(reference.dq), axis=0) / robot.limits.qd_max, 0.0)
-        )
+        # The same places, passed more slowly.
+        reference = Reference(once.q, once.dq / growth, once.ddq / growth**2)
+        speed = float(np.max(np.max(np.abs(reference.dq), axis=0) / fastest))
         torque = float(np.max(torque_share(robot, reference)))
         most = 1.0 if growth == 1.0 else SHARE
         if speed <= most and torque <= most:
             period = circle.period if growth == 1.0 else round(circle.period * growth, 1)
             return Suited(replace(circle, period=period), growth)
-        growth *= max(float(speed) / SHARE, 1.1)
+        growth *= max(speed / SHARE, 1.1)
     return None
+
+
+def one_round(circle: CircleSpec, robot: Robot) -> Reference:
+    """One round of the circle. (INSTANTS, n) each
+
+    Raises:
+        ParameterError: If it is out of reach, or winds a joint up.
+    """
+    t = np.linspace(0.0, circle.period, INSTANTS, endpoint=False)
+    return circle.motion(robot).at(t)
 
 
 def other_circles(
@@ -230,7 +253,7 @@ def centre_poses(robot: Robot) -> list[Array]:
 def start_of(
     robot: Robot, centre: Array, radius: float, towards: float
 ) -> tuple[float, ...] | None:
-    """The start of a circle about the flange of a pose, turned to look straight down, or None."""
+    """The start of a circle about the flange of a pose, or None where it cannot be reached."""
     here = link_poses(robot.loaded_chain, centre[None])
     rotation, place = here.rotation[0, -1], here.translation[0, -1]
     if rotation[2, 2] < -DOWN:
@@ -255,8 +278,66 @@ def circle_remarks(asked: CircleSpec, made: CircleSpec, robot: Robot) -> Iterato
     if made.start != asked.start:
         yield fact("start-adapted", robot=robot.name, start_rad=list(made.start))
     if made.radius != asked.radius:
-        values = {"radius_m": made.radius, "asked_m": asked.radius}
-        yield fact("radius-adapted", robot=robot.name, reach_m=reach_of(robot), **values)
+        values = {"radius_m": made.radius, "asked_m": asked.radius, "reach_m": reach_of(robot)}
+        yield Remark("radius-adapted", "fact", {"robot": robot.name, **values})
     if made.period != asked.period:
-        values = {"period_s": made.period, "asked_s": asked.period}
-        yield fact("period-adapted", robot=robot.name, share_percent=100 * SHARE, **values)
+        values = {"period_s": made.period, "asked_s": asked.period, "share_percent": 100 * SHARE}
+        yield Remark("period-adapted", "fact", {"robot": robot.name, **values})
+
+
+def adapt_contacts(
+    contacts: tuple[ContactSpec, ...], circle: CircleSpec, robot: Robot, stated: Collection[str]
+) -> tuple[tuple[ContactSpec, ...], list[Remark]]:
+    """Hands that push no harder than the arm can hold along the circle, and what that changed.
+
+    An arm without rotors, whose position loop is as soft as its links are light, would be pushed
+    round; one with weak drives would give way.
+    """
+    pushing = [c for c in contacts if isinstance(c, PushesSpec) and c.link == 0]
+    try:
+        most = bearable(robot, one_round(circle, robot)) if pushing else {}
+    except ParameterError:  # it is refused where it is planned
+        return contacts, []
+    made, remarks = list(contacts), []
+    for contact in pushing:
+        style = contact.ranges()
+        weaker: dict[str, Any] = {}
+        for key, largest in most.items():
+            low, high = getattr(style, key)
+            if high > largest and f"contacts.{contact.name}.{key}" not in stated:
+                digits = [float(f"{v * largest / high:.2g}") for v in (low, high)]
+                weaker[key] = (digits[0], digits[1])
+        if not weaker:
+            continue
+        made[contacts.index(contact)] = replace(contact, **weaker)
+        ranges = {"force_N": style.force, "torque_Nm": style.torque}
+        ranges |= {f"{key}_{UNITS[key]}": pair for key, pair in weaker.items()}
+        values = {"robot": robot.name, **ranges}
+        remarks.append(Remark("pushes-weakened", "caution", values, Where(contact.name)))
+    return tuple(made), remarks
+
+
+def bearable(robot: Robot, motion: Reference) -> dict[str, float]:
+    """Largest force [N] and moment [N·m] on the flange that an arm holds along a motion.
+
+    What it holds leaves every drive within its limit and, without friction, no joint farther from
+    its place than `GIVING` under a stiff position loop, whose stiffness is M(q) ω².
+    """
+    import pinocchio as pin
+
+    q = motion.q[:: INSTANTS // 24]
+    data = robot.model.createData()
+    inertia = np.array([pin.crba(robot.model, data, row) for row in q])
+    pull = flange_jacobian(robot.loaded_chain, q).transpose(0, 2, 1)
+    giving = np.linalg.solve(inertia, pull) / STIFFNESS["stiff"] ** 2
+    limit = np.where(np.isfinite(robot.limits.tau_max), robot.limits.tau_max, np.inf)
+    room = np.maximum(1.0 - torque_share(robot, motion), 0.0) * limit
+    most = {}
+    for key, part in (("force", slice(0, 3)), ("torque", slice(3, 6))):
+        # The wrench of unit length that is worst for a joint lies along its row.
+        worst = np.max(np.linalg.norm(giving[:, :, part], axis=2))
+        lever = np.max(np.linalg.norm(pull[:, :, part], axis=2), axis=0)
+        # A joint whose axis passes through the flange point feels no force there.
+        held = np.min(room / np.maximum(lever, 1e-6))
+        most[key] = float(min(GIVING / worst, held))
+    return most

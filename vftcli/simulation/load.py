@@ -1,7 +1,7 @@
 """Scenarios by name or file, with the user's overrides, and back to TOML."""
 
-from collections.abc import Collection, Sequence
-from dataclasses import fields, is_dataclass, replace
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -58,22 +58,9 @@ def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     scenario = section_from(Scenario, table, "")
     if scenario.robot == written_for and not isinstance(scenario.trajectory, ExcitationSpec):
         return scenario
-    keys = [override.partition("=")[0].strip() for override in overrides]
-    stated = {key.removeprefix("trajectory.") for key in keys} | set(own)
-    return suited(scenario, stated)
-
-
-def suited(scenario: Scenario, stated: Collection[str]) -> Scenario:
-    """The scenario with its motion suited to its robot, and what that changed.
-
-    Args:
-        scenario: The scenario.
-        stated: Keys of ``[trajectory]`` that the user has set.
-    """
-    trajectory, remarks = adapt(scenario.trajectory, load_robot(scenario.robot), stated)
-    if not remarks:
-        return replace(scenario, trajectory=trajectory)
-    return replace(scenario, trajectory=trajectory, adapted=tuple(map(str, remarks)))
+    stated = {override.partition("=")[0].strip() for override in overrides}
+    stated |= {f"trajectory.{key}" for key in own}
+    return adapt(scenario, load_robot(scenario.robot), stated)
 
 
 def read_table(path: Path) -> dict[str, Any]:
