@@ -17,7 +17,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.simulation.calibration_motions import TABLE, ExcitationSpec, is_optimised
-from vftcli.simulation.excitation import (
+from vftcli.simulation.fourier_excitation import (
     ACCELERATION,
     SHARE,
     SPEED,

@@ -10,7 +10,7 @@ import numpy as np
 from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.excitation import make_excitation
+from vftcli.simulation.fourier_excitation import make_excitation
 from vftcli.simulation.kinematics import check_start, flange_pose
 from vftcli.simulation.motion import Command, Periodic, Stretches, straight_paths
 

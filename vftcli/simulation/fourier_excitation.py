@@ -77,7 +77,8 @@ def base_columns(robot: Robot) -> list[int]:
     rng = np.random.default_rng(0)
     shape = (60, robot.joints)
     states = Reference(*(rng.uniform(-scale, scale, shape) for scale in (np.pi, 2.0, 5.0)))
-    columns = np.linalg.qr(full_regressor(robot, states), mode="r").T
+    R: Array = np.asarray(np.linalg.qr(full_regressor(robot, states), mode="r"))
+    columns = R.T
     largest = float(np.max(np.linalg.norm(columns, axis=1)))
     kept: list[int] = []
     basis = np.zeros((columns.shape[1], 0))
