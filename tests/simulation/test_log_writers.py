@@ -9,9 +9,10 @@ import pytest
 from vftcli.outputs.simulation import companions, save
 from vftcli.readers import read
 from vftcli.readers.references import read_reference
+from vftcli.robots import load_robot
 from vftcli.signals.errors import OutputError, ParameterError
 from vftcli.simulation import Simulation, load_scenario, simulate
-from vftcli.simulation.writers import WRITERS
+from vftcli.simulation.writers import WRITERS, vendor_format
 
 LOSSY = ["duration=2.0", "sensing.repeated=0.02", "sensing.dropped=0.02"]
 
@@ -154,3 +155,17 @@ def test_a_robot_logs_only_in_its_own_formats(
 
 def test_every_writer_is_tried() -> None:
     assert {form for _, form, _, _ in CASES} == set(WRITERS)
+
+
+@pytest.mark.parametrize(
+    ("robot", "form"),
+    [
+        ("ur3e", "rtde"),
+        ("fr3", "libfranka"),
+        ("m1013", "parquet"),
+        ("gen3", "parquet"),
+        ("xarm7", "parquet"),
+    ],
+)
+def test_an_arm_logs_as_its_vendor_does(robot: str, form: str) -> None:
+    assert vendor_format(load_robot(robot)) == form

@@ -161,6 +161,9 @@ class SeriesMaker:
         bounds = (self.way, self.fastest, self.hardest)
         size = np.min([b / most for b, most in zip(bounds, largest, strict=True)], axis=0)
         mean = self.middle + place * (self.half - size * largest[0])
+        at_rest = Reference(mean[None], nothing[None], nothing[None])
+        if np.max(torque_share(self.robot, at_rest)) > SHARE:
+            return None
         for _ in range(SHRINKINGS):
             made = replace(series, mean=mean, cosine=size * cosine, sine=size * sine)
             needed = torque_share(self.robot, made.at(self.t))
@@ -188,6 +191,8 @@ def make_excitation(robot: Robot, period: float = 0.0, cycles: float = 2.0) -> M
     best: MadeExcitation | None = None
     shape: tuple[Array, Array] = (np.zeros(n), np.zeros((2 * HARMONICS, n)))
     for k in range(DRAWS + BETTERINGS):
+        if k == DRAWS and best is None:
+            break
         if k < DRAWS or best is None:
             place, waves = rng.uniform(-1.0, 1.0, n), rng.standard_normal((2 * HARMONICS, n))
         else:
