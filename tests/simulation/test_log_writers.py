@@ -165,6 +165,8 @@ def test_the_truth_says_what_its_columns_hold(ur5: Simulation, tmp_path: Path) -
     assert all((field.metadata or {}).get(b"unit") for field in schema)
     assert schema.field("wrench/mx").metadata[b"frame"] == TRUTH_FRAME.encode()
     assert schema.field("tau_ext/1").metadata[b"sign"] == b"on the robot"
+
+
 @pytest.mark.parametrize(
     ("robot", "form"),
     [
