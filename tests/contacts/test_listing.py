@@ -204,3 +204,10 @@ def test_a_load_that_stays_to_the_end_of_the_log_is_listed() -> None:
     assert row.stop == pytest.approx(9.0, abs=0.1)
     assert row.wrench is not None
     assert row.wrench[2] < 0.0
+
+
+def test_a_load_that_is_struck_is_listed_as_a_whole(listed: Lister) -> None:
+    """The bearing hangs from 4 s to 16 s; only what strikes it in the meantime changes quickly."""
+    first = listed("panda_bearing.csv", "panda", "0.3:3.9").contacts[0]
+    assert first.start == pytest.approx(4.2, abs=0.3)
+    assert first.stop > 16.0

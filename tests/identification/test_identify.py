@@ -273,6 +273,7 @@ def test_an_unknown_load_is_suspected():
     [
         ({"method": "magic"}, "friction, base, consistent, targets"),
         ({"method": None}, "nothing to identify"),
+        ({"method": "targets", "friction": False}, "leave out --friction none"),
         ({"method": "base", "fit_constants": True}, "--method friction"),
     ],
 )
@@ -347,3 +348,30 @@ def test_the_heavier_log_is_refused_as_the_free_one_whatever_its_name():
     free, loaded = two_folders(log(UR5, 1), log(UR5.with_payload(load), 1))
     with pytest.raises(IdentificationError, match="swap the two logs"):
         identify([free], UR5, Task(find_payload=True), free=loaded)
+
+
+@pytest.mark.parametrize("method", ["friction", "base"])
+def test_a_simulators_arm_has_no_friction(method):
+    """Rotors and links are fitted, friction neither competes nor stands in the file."""
+    rotor = UR5.chain.rotor_inertia * 1.2
+    true = replace(UR5, chain=replace(UR5.chain, rotor_inertia=rotor), friction=())
+    profile = UR5.without_friction()
+    found = identify([log(true)], profile, Task(method=method, friction=False), [log(true, 7)])
+    assert found.robot.friction == ()
+    assert not any("friction" in joint for joint in found.robot.document["joints"])
+    assert found.shape_choices.is_empty()
+    assert "presliding-length" not in [remark.code for remark in found.remarks]
+    # white noise of .2 N·m, 8 of 62.5 Hz of which pass the filter: .07
+    assert np.all(found.traces[1].rms <= 0.09)
+    if method == "friction":
+        # five standard deviations by the noise at these slow accelerations
+        np.testing.assert_allclose(found.robot.chain.rotor_inertia, rotor, rtol=0.05)
+
+
+def test_torques_behind_the_gears_leave_the_friction_method_nothing_to_find():
+    """Without friction: the rotor is before the gear, the links are the profile's."""
+    robot = replace(UR5, torque_source="link_torque", torque_constant=None).without_friction()
+    with pytest.raises(IdentificationError, match="nothing to find"):
+        identify([log(robot)], robot, Task(friction=False))
+    found = identify([log(robot)], robot, Task(method="base", friction=False))
+    assert found.robot.friction == ()

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from vftcli.identification import training
-from vftcli.identification.friction_method import friction_method, refuse_sign, rotor_number
-from vftcli.identification.method_result import check_friction, held_joints
+from vftcli.identification.friction_method import (
+    friction_method,
+    refuse_sign,
+    rotor_remarks,
+)
+from vftcli.identification.method_result import check_friction, held_joints, rotor_number
 from vftcli.identification.processing import Processing
 from vftcli.identification.training import (
     all_residuals,
@@ -26,6 +30,7 @@ from vftcli.identification.whole_arm import (
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.remarks import Where
 
 RUBBING = JointFriction(
     model="coulomb-viscous-offset", parameters={"coulomb": 4.0, "viscous": 6.0, "offset": 0.5}
@@ -123,11 +128,24 @@ def test_joints_that_are_held_are_told(data):
 
 
 @pytest.mark.parametrize(
-    ("value", "sd", "known"), [(1.0, 0.29, True), (1.0, 0.31, False), (-1.0, 0.1, False)]
+    ("value", "sd", "known"), [(1.0, 0.29, True), (1.0, 0.34, False), (-1.0, 1.1, False)]
 )
 def test_a_rotor_inertia_is_known_to_thirty_per_cent(value, sd, known):
     found = rotor_number(3, value, sd, 2.0)
     assert (found.joint, found.unit, found.determined) == (4, "kg·m²", known)
+    assert found.value == value
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "taken"), [(0.2, 0.6, 0.2), (0.2, 0.601, None), (-1.0, 0.9, 0.0)]
+)
+def test_a_rotor_inertia_three_standard_deviations_off_is_taken(value, sd, taken):
+    """The profile's 2 kg·m² is wrong then, whatever the right one; none is below zero."""
+    found = rotor_number(3, value, sd, 2.0)
+    assert found.determined is (taken is not None)
+    assert found.value == (value if taken is None else taken)
+    code = "undetermined-rotor-inertia" if taken is None else "refuted-rotor-inertia"
+    assert [remark.code for remark in rotor_remarks(found, Where(joints=(4,)))] == [code]
 
 
 def test_a_current_that_falls_with_the_torque_is_refused(data):

@@ -117,3 +117,17 @@ def test_a_frictionless_arm_has_none():
     torque, slope = friction.smooth(np.ones(7))
     assert not np.any([torque, slope, friction.dry(np.ones(7))])
     assert not friction.has_sigmoid
+
+
+def test_an_arm_without_friction_figures_has_those_stated():
+    robot = load_robot("xarm6")
+    stated = FrictionSpec(coulomb=(3.0,) * 6, viscous=(1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
+    friction = true_friction(robot, stated)
+    np.testing.assert_array_equal(friction.dry(np.ones(6)), 3.0)
+    np.testing.assert_array_equal(friction.smooth(np.ones(6))[0], stated.viscous)
+    assert not np.any(true_friction(robot, FrictionSpec()).dry(np.ones(6)))
+    for wrong in ((1.0,), (-1.0,) * 6, (1e9,) * 6):
+        with pytest.raises(ParameterError, match="one number a joint, 6 of them"):
+            true_friction(robot, FrictionSpec(coulomb=wrong))
+    with pytest.raises(ParameterError, match="'ur5' has some"):
+        true_friction(load_robot("ur5"), stated)

@@ -10,9 +10,10 @@ import pytest
 from vftcli.outputs.simulation import companions, save
 from vftcli.readers import read
 from vftcli.readers.references import read_reference
+from vftcli.robots import load_robot
 from vftcli.signals.errors import OutputError, ParameterError
 from vftcli.simulation import Simulation, load_scenario, simulate
-from vftcli.simulation.writers import WRITERS
+from vftcli.simulation.writers import WRITERS, vendor_format
 from vftcli.simulation.writers.parquet import TRUTH_FRAME
 
 LOSSY = ["duration=2.0", "sensing.repeated=0.02", "sensing.dropped=0.02"]
@@ -164,3 +165,17 @@ def test_the_truth_says_what_its_columns_hold(ur5: Simulation, tmp_path: Path) -
     assert all((field.metadata or {}).get(b"unit") for field in schema)
     assert schema.field("wrench/mx").metadata[b"frame"] == TRUTH_FRAME.encode()
     assert schema.field("tau_ext/1").metadata[b"sign"] == b"on the robot"
+
+
+@pytest.mark.parametrize(
+    ("robot", "form"),
+    [
+        ("ur3e", "rtde"),
+        ("fr3", "libfranka"),
+        ("m1013", "parquet"),
+        ("gen3", "parquet"),
+        ("xarm7", "parquet"),
+    ],
+)
+def test_an_arm_logs_as_its_vendor_does(robot: str, form: str) -> None:
+    assert vendor_format(load_robot(robot)) == form

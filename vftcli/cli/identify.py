@@ -22,7 +22,8 @@ class TaskOptions(Bundle):
     method: str | None = option(
         "--method",
         "METHOD",
-        "friction, base, consistent or targets. Default: friction; none with --find-payload.",
+        "friction, base, consistent, targets or auto. Default: auto, friction but base where the "
+        "robot's links are wrong; none with --find-payload.",
     )
     find_payload: bool = flag(
         "--find-payload",
@@ -31,16 +32,18 @@ class TaskOptions(Bundle):
     fit_constants: bool = flag("--fit-constants", "Friction method: drive constants K too.")
     cutoff: float = option("--cutoff", "HZ", "Cutoff of the zero-phase filter.", 8.0)
 
-    def task(self, name: str) -> "Task":
-        """What shall be identified, for a robot of this name.
+    def task(self, name: str, friction: bool = True) -> "Task":
+        """What shall be identified, for a robot of this name whose joints rub or not.
 
         Raises:
             ParameterError: If the method does not exist, or the options contradict each other.
         """
         from vftcli.identification import Processing, Task
 
+        usual = "friction" if self.fit_constants else "auto"
         return Task(
-            method=self.method or (None if self.find_payload else "friction"),
+            method=self.method or (None if self.find_payload else usual),
+            friction=friction,
             name=name,
             find_payload=self.find_payload,
             fit_constants=self.fit_constants,
@@ -118,7 +121,7 @@ def identify_robot(
     from vftcli.outputs.identification.tables import tables_text
     from vftcli.readers.library import Library
 
-    task = asked.task(output.stem)
+    task = asked.task(output.stem, friction=robot.friction != "none")
     OutputFolder(output.parent, force, [file.name for file in beside(output).values()]).check()
     choice, chosen = reading.choice(), robot.choice()
     # An episode is one of LOG's; the others are logs of their own.
@@ -127,8 +130,9 @@ def identify_robot(
     validated, without_load = validation.validate or [], free.logs(asked.find_payload)
     library = Library([*logs, *validated, *without_load])
     # That the profile is not the arm's is what this command is there to change; but the friction
-    # method keeps the profile's links.
-    examiner = health_of(library, anyway=anyway.anyway, fitting=task.method == "friction")
+    # method keeps the profile's links, and the default begins with it.
+    keeps = task.method in {"friction", "auto"}
+    examiner = health_of(library, anyway=anyway.anyway, fitting=keeps)
     profile = examiner.robot(next(library.open_each(logs, choice)), chosen)
 
     def opened(paths: list[Path] | tuple[Path, ...], how: "ReadChoice") -> list["Recording"]:

@@ -33,7 +33,7 @@ class ExperimentOptions(Bundle):
     log_format: str = option(
         "--as",
         "FORMAT",
-        "rtde, ur-rtde, libfranka, rosbag2 or parquet; default: the vendor's own.",
+        "rtde, ur-rtde, libfranka, rosbag2 or parquet; default: the vendor's own, else parquet.",
         "",
     )
     settings: Words = option(
@@ -72,6 +72,8 @@ def simulate_log(
             typer.echo(f"{name:<16} {title}")
         return
     setup = load_scenario(scenario, experiment.settings or ())
+    for words in setup.adapted or ():
+        say(f"note: {words}")
     paths = [output, free_path(output)] if setup.pair else [output]
     log_folder(paths, force)
     runs = simulate_pair(setup, experiment.seed, progress_bar())
@@ -80,6 +82,7 @@ def simulate_log(
     if json:
         about = {"scenario": setup.name, "seed": runs[0].seed, "files": files}
         about |= {"samples": len(runs[0].measured.rows), "robot": setup.robot}
+        about |= {"adapted": list(setup.adapted or ())}
         say_json(about)
         return
     for file in files:

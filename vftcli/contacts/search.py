@@ -17,6 +17,10 @@ from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import runs_of
 
+LASTING = 1.0
+"""A torque that stays beyond the threshold for longer than this beside a contact is part of it: the
+observer's lag is over, friction has turned. [s]"""
+
 
 class Found(NamedTuple):
     """What may be contacts along a log.
@@ -62,8 +66,11 @@ def search(run: ModelledRun, noise: ErrorNoise, level: Array, seconds: float) ->
     J = there[0].jacobian
     ahead, back = error_course(noise, blocks), error_course(noise, turned_round(blocks))
     taken = filtered_contacts(blocks, (ahead, back), J)
-    runs = [*runs_of(taken), *beyond_threshold(run, level, blocks, taken)]
-    runs.sort()
+    beyond = beyond_threshold(run, level, blocks)
+    for piece in lasting_beside(blocks, taken, beyond):
+        taken[piece] = True
+    apart = [r for r in beyond if not taken[max(r[0] - 1, 0) : r[1] + 1].any()]
+    runs = sorted([*runs_of(taken), *apart])
     for start, stop in runs:
         taken[start:stop] = True
     # What is no candidate keeps its spikes, whatever hypothesis is weighed.
@@ -92,8 +99,24 @@ def turned_round(blocks: Blocks) -> Blocks:
     )
 
 
-def beyond_threshold(run: ModelledRun, level: Array, blocks: Blocks, taken: Mask) -> list[Run]:
-    """Runs of blocks in which a joint's torque is beyond its threshold, away from those taken."""
+def lasting_beside(blocks: Blocks, taken: Mask, beyond: Sequence[Run]) -> list[slice]:
+    """Where a torque beyond the threshold goes on, before, between or behind blocks that are taken.
+
+    The two-state filter takes a load that hangs on for many seconds for an error of the model, and
+    sees only what strikes it in the meantime.
+    """
+    found = []
+    for start, stop in beyond:
+        within = taken[start:stop]
+        pieces = runs_of(~within) if within.any() else []
+        for first, last in pieces:
+            if blocks.t[start + last - 1] - blocks.t[start + first] > LASTING:
+                found.append(slice(start + first, start + last))
+    return found
+
+
+def beyond_threshold(run: ModelledRun, level: Array, blocks: Blocks) -> list[Run]:
+    """Runs of blocks in which a joint's torque is beyond its threshold."""
     t = run.recording.t
     above = threshold_contacts(t, observed(run), expected_torque(run, level))
     above &= t >= t[0] + SETTLED
@@ -103,6 +126,5 @@ def beyond_threshold(run: ModelledRun, level: Array, blocks: Blocks, taken: Mask
         span = np.array([t[start], t[stop - 1]]) - 1.0 / GAIN
         first, last = (int(k) for k in np.searchsorted(blocks.t, span))
         last = max(last, first + 1)
-        if not taken[max(first - 1, 0) : last + 1].any():
-            found.append((first, min(last, len(blocks.t))))
+        found.append((first, min(last, len(blocks.t))))
     return [each for each in found if each[0] < each[1]]

@@ -36,10 +36,11 @@ OTHER_LINKS = 3.0
 """Times what free links leave from which on the profile's links are another arm's: of right ones
 1.0 to 2.5 where friction or contact hide the torque, of wrong ones 4 to 12."""
 
+CleanFit = tuple[list[JointFit | None], list[Array], list[Remark]]
+"""The fits, the weights of every sample (M, n) a log, and remarks."""
 
-def fit_without_contacts(
-    data: Training, strict: bool
-) -> tuple[list[JointFit | None], list[Array], list[Remark]]:
+
+def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
     """Fit friction, leave out contacts, and fit again without them.
 
     Args:

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from vftcli.identification.clean_fit import fit_without_contacts
+from vftcli.identification.clean_fit import CleanFit, fit_without_contacts
 from vftcli.identification.friction_shapes import round_digits
 from vftcli.identification.method_result import (
     DETERMINED,
@@ -13,22 +13,38 @@ from vftcli.identification.method_result import (
     held_joints,
     identified_friction,
     presliding_remark,
+    profile_constant,
     profile_friction,
+    rotor_number,
     temperature_remarks,
 )
 from vftcli.identification.result import Number, number
 from vftcli.identification.training import Training
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.remarks import Where, caution
+from vftcli.signals.remarks import Remark, Where, caution
 
 LEAST_SLOPE = 0.05
 """Slope of measured over expected torque below which a current does not follow its torque."""
 
 
-def friction_method(data: Training) -> MethodResult:
-    """Friction, rotor inertia and, if asked, drive constants; links at the maker's table."""
-    fits, _, remarks = fit_without_contacts(data, strict=True)
-    robot = data.robot
+def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodResult:
+    """Friction, rotor inertia and, if asked, drive constants; links at the maker's table.
+
+    Args:
+        data: The training logs.
+        fitted: What `fit_without_contacts` gives for them, None to ask it.
+
+    Raises:
+        IdentificationError: If nothing is left to be found, or the links are another robot's.
+    """
+    if not (data.rubs or data.rotor):
+        raise IdentificationError(
+            f"robot {data.robot.name!r} has its torque behind the gears: without friction the "
+            "friction method has nothing to find; use --method base or consistent"
+        )
+    fits, _, remarks = fitted or fit_without_contacts(data, strict=True)
+    remarks, robot = [*remarks], data.robot
     rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
     constants = None if robot.torque_constant is None else robot.torque_constant.copy()
     numbers: list[Number] = []
@@ -41,42 +57,54 @@ def friction_method(data: Training) -> MethodResult:
             missed = {"found_Nm": found_rms, "profile_Nm": profile_rms}
             remarks.append(caution("profile-kept", where, **missed))
             continue
-        values, sd = found.fit.values.copy(), found.fit.sd.copy()
+        values, sd = found.fit.values, found.fit.sd
         if data.fit_constants and not found.constant:
             remarks.append(caution("unloaded-drive-constant", where))
         if found.constant and constants is not None:
-            # Torque was made from currents with the profile's K. Where the rigid body's torque
-            # comes out as scale times what it must be, the true K is K / scale, and so are all
-            # coefficients beside it.
-            scale, scale_sd = float(values[-1]), float(sd[-1])
-            refuse_sign(data, j, scale)
-            values, sd = values / scale, sd / scale
-            before = float(constants[j])
-            K, K_sd = before / scale, before * scale_sd / scale**2
-            numbers.append(number(j, "torque_constant", K, K_sd, before, True))
-            constants[j] = round_digits(K)
+            values, sd, K = by_constant(data, j, values, sd)
+            numbers.append(K)
+            constants[j] = round_digits(K.value)
         if data.rotor:
             J = rotor_number(j, values[count], sd[count], rotor[j])
             numbers.append(J)
-            if J.determined:
-                rotor[j] = round_digits(J.value)
-            else:
-                found_here = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
-                remarks.append(caution("undetermined-rotor-inertia", where, **found_here))
-        source = friction_source(data, "friction", sd)
-        frictions[j] = identified_friction(data, j, found.shape, values[:count], source)
-        numbers += friction_numbers(j, found.shape, values, sd, profile_friction(robot)[j])
-        remarks += check_friction(j, frictions[j], data)
+            remarks += rotor_remarks(J, where)
+            rotor[j] = round_digits(J.value) if J.determined else rotor[j]
+        if data.rubs:
+            source = friction_source(data, "friction", sd)
+            frictions[j] = identified_friction(data, j, found.shape, values[:count], source)
+            numbers += friction_numbers(j, found.shape, values, sd, profile_friction(robot)[j])
+            remarks += check_friction(j, frictions[j], data)
     chain = replace(robot.chain, rotor_inertia=rotor)
-    new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
+    friction = tuple(frictions) if data.rubs else ()
+    new = replace(robot, chain=chain, friction=friction, torque_constant=constants)
     choices = [c for f in fits if f is not None for c in f.choices]
-    return MethodResult(
-        new,
-        numbers,
-        choices,
-        None,
-        [*remarks, *presliding_remark(fits), *temperature_remarks(data), *held_joints(data)],
-    )
+    remarks += [*presliding_remark(fits), *temperature_remarks(data), *held_joints(data)]
+    return MethodResult(new, numbers, choices, None, remarks)
+
+
+def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array, Array, Number]:
+    """Coefficients of joint j (from 0) and their sd by the drive constant fitted last, and it.
+
+    Torque was made from currents with the profile's K. Where the rigid body's torque comes out as
+    scale times what it must be, the true K is K / scale, and so are all coefficients beside it.
+
+    Raises:
+        IdentificationError: If the current does not follow the torque.
+    """
+    scale, scale_sd = float(values[-1]), float(sd[-1])
+    refuse_sign(data, j, scale)
+    before = profile_constant(data.robot, j)
+    K, K_sd = before / scale, before * scale_sd / scale**2
+    return values / scale, sd / scale, number(j, "torque_constant", K, K_sd, before, True)
+
+
+def rotor_remarks(J: Number, where: Where) -> list[Remark]:
+    """That a rotor inertia is not known to `DETERMINED`, and which one is taken."""
+    if J.determined and J.sd < DETERMINED * J.value:
+        return []
+    found = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
+    code = "refuted-rotor-inertia" if J.determined else "undetermined-rotor-inertia"
+    return [caution(code, where, **found)]
 
 
 def refuse_sign(data: Training, j: int, scale: float) -> None:
@@ -87,9 +115,3 @@ def refuse_sign(data: Training, j: int, scale: float) -> None:
             f"(slope {scale:.2g}); wrong robot, sign or joint order, or the joint carries no load: "
             "leave out --fit-constants"
         )
-
-
-def rotor_number(j: int, value: float, sd: float, before: float) -> Number:
-    """The rotor inertia of joint j (from 0) as a number, determined or not. [kg·m²]"""
-    known = bool(value > 0 and sd < DETERMINED * value)
-    return number(j, "rotor_inertia", value, sd, before, known)

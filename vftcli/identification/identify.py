@@ -7,7 +7,9 @@ from functools import partial
 import numpy as np
 import polars as pl
 
+from vftcli.identification.coupling import with_couplings
 from vftcli.identification.friction_method import friction_method
+from vftcli.identification.links_choice import chosen_method
 from vftcli.identification.method_result import MethodResult
 from vftcli.identification.payload import (
     LoadFit,
@@ -43,16 +45,20 @@ METHODS: dict[str, Callable[[Training], MethodResult]] = {
 }
 """Name at the command line → method."""
 
+AUTO = "auto"
+"""Name of the choice between "friction" and "base" by what the profile's links leave."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
     """What shall be identified.
 
     Attributes:
-        method: A name in `METHODS`, or None for a payload alone.
+        method: A name in `METHODS`, `AUTO`, or None for a payload alone.
         name: Name of the new robot.
         find_payload: Whether a load on the flange is sought.
         fit_constants: Whether the friction method also fits drive constants.
+        friction: Whether the joints have friction to be fitted; a simulator's may have none.
         processing: Filters and decimation.
     """
 
@@ -60,15 +66,21 @@ class Task:
     name: str = ""
     find_payload: bool = False
     fit_constants: bool = False
+    friction: bool = True
     processing: Processing = field(default_factory=Processing)
 
     def __post_init__(self) -> None:
-        if self.method is not None and self.method not in METHODS:
-            raise ParameterError(f"--method {self.method!r}; there is {', '.join(METHODS)}")
+        if self.method is not None and self.method not in (*METHODS, AUTO):
+            there = ", ".join((*METHODS, AUTO))
+            raise ParameterError(f"--method {self.method!r}; there is {there}")
         if self.method is None and not self.find_payload:
             raise ParameterError(f"nothing to identify: give --method {'|'.join(METHODS)}")
         if self.fit_constants and self.method != "friction":
             raise ParameterError("--fit-constants is an option of --method friction")
+        if self.method == "targets" and not self.friction:
+            raise ParameterError(
+                "--method targets reads the controller's friction; leave out --friction none"
+            )
 
 
 def identify(
@@ -99,9 +111,7 @@ def identify(
     if load is not None and (task.method is None or not train):
         method, result = "payload", MethodResult(robot, [], [], None, [])
     else:
-        method = task.method or "payload"
-        data = prepare_training(train, robot, task.processing, task.fit_constants)
-        result = METHODS[method](data)
+        method, result = found_by_method(task, train, robot)
     new, numbers, remarks = result.robot, [*result.numbers], [*result.remarks]
     scored = [
         score(log, role, robot, new, task.processing)
@@ -132,6 +142,22 @@ def identify(
     )
     sources = logs if free is None else [*logs, free]
     return replace(found, robot=with_provenance(found, task.name, sources, train, load))
+
+
+def found_by_method(
+    task: Task, train: Sequence[Recording], robot: Robot
+) -> tuple[str, MethodResult]:
+    """What the asked method finds of the arm, and the method's name."""
+    method = task.method or "payload"
+    data = prepare_training(train, robot, task.processing, task.fit_constants, task.friction)
+    if method == "targets":
+        return method, METHODS[method](data)
+    data, coupled = with_couplings(data)
+    if method == AUTO:
+        method, result = chosen_method(data)
+    else:
+        result = METHODS[method](data)
+    return method, result._replace(remarks=[*coupled, *result.remarks])
 
 
 def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:

@@ -21,6 +21,9 @@ from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 DETERMINED = 0.3
 """Standard deviation over value up to which a number counts as determined by the logs."""
 
+REFUTED = 3.0
+"""Standard deviations from the profile's rotor inertia from which on what was found is taken."""
+
 
 class MethodResult(NamedTuple):
     """What a method found.
@@ -31,6 +34,7 @@ class MethodResult(NamedTuple):
         shape_choices: Friction candidates.
         base: Base parameters, if the method has them.
         remarks: What the reader of the numbers should know.
+        is_narrow: Whether the motion tells the links too little.
     """
 
     robot: Robot
@@ -38,6 +42,7 @@ class MethodResult(NamedTuple):
     shape_choices: list[ShapeChoice]
     base: BaseParameters | None
     remarks: list[Remark]
+    is_narrow: bool = False
 
 
 def friction_numbers(
@@ -55,13 +60,25 @@ def friction_numbers(
     ]
 
 
+def rotor_number(j: int, value: float, sd: float, before: float) -> Number:
+    """The rotor inertia of joint j (from 0) as a number, determined or not. [kg·m²]
+
+    It counts as determined too where it is `REFUTED` standard deviations from the profile's: then
+    that one is wrong, and what was found, zero at least, is nearer to the truth.
+    """
+    if refuted := abs(value - before) >= REFUTED * sd:
+        value = max(value, 0.0)
+    known = refuted or (value > 0 and sd < DETERMINED * value)
+    return number(j, "rotor_inertia", value, sd, before, bool(known))
+
+
 def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
     """A remark if the friction found would push joint j (from 0) at some speed, or falls.
 
     Raises:
         IdentificationError: If it pushes at all speeds: sign or unit are wrong.
     """
-    speed = max(float(np.max(np.abs(m.dq[:, j]))) for m in data.motions)
+    speed = max(float(np.max(np.abs(m.motor_dq[:, j]))) for m in data.motions)
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
     noise = max(robust_sd(m.tau[:, j]) for m in data.motions)
     # A hundredth of the torque's spread: friction of nothing comes out on either side of zero.
@@ -83,7 +100,7 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> list[Rema
 def presliding_remark(fits: Sequence[JointFit | None]) -> list[Remark]:
     """Which presliding length the arm got, and what every length left of the error without."""
     for fit in fits:
-        if fit is not None:
+        if fit is not None and len(fit.presliding.errors) > 1:
             lengths = [1e3 * length for length in fit.presliding.errors]
             return [
                 fact(
@@ -140,3 +157,8 @@ def temperature_remarks(data: Training) -> list[Remark]:
 def profile_friction(robot: Robot) -> tuple[JointFriction, ...]:
     """The profile's friction, one a joint even where it has none."""
     return robot.friction or tuple(JointFriction() for _ in range(robot.joints))
+
+
+def profile_constant(robot: Robot, j: int) -> float:
+    """The profile's drive constant of joint j (from 0), nan if it has none. [N·m/A]"""
+    return float(robot.torque_constant[j]) if robot.torque_constant is not None else float("nan")

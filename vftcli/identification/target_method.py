@@ -11,6 +11,7 @@ from vftcli.identification.method_result import (
     friction_numbers,
     friction_source,
     identified_friction,
+    profile_constant,
     profile_friction,
     temperature_remarks,
 )
@@ -47,11 +48,6 @@ def targets_method(data: Training) -> MethodResult:
     chain = replace(robot.chain, rotor_inertia=rotor)
     new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
     return MethodResult(new, numbers, [], None, remarks)
-
-
-def profile_constant(robot: Robot, j: int) -> float:
-    """The profile's drive constant of joint j (from 0), nan if it has none. [N·m/A]"""
-    return float(robot.torque_constant[j]) if robot.torque_constant is not None else float("nan")
 
 
 def target_numbers(j: int, model: ControllerModel, robot: Robot) -> list[Number]:

@@ -55,6 +55,7 @@ class Training:
         excited: Which joints move.
         source: The logs in words, for the robot file.
         fit_constants: Whether drive constants are unknowns of the friction method.
+        rubs: Whether the joints have friction to be fitted.
     """
 
     robot: Robot
@@ -66,6 +67,7 @@ class Training:
     excited: Excitation
     source: str
     fit_constants: bool = False
+    rubs: bool = True
 
     @property
     def rotor(self) -> bool:
@@ -74,14 +76,18 @@ class Training:
 
     def top_speed(self, j: int) -> float:
         """Speed limit of joint j (from 0), its fastest motion where the robot has none. [rad/s]"""
-        fastest = max(float(np.max(np.abs(m.dq[:, j]), initial=0.0)) for m in self.motions)
+        fastest = max(float(np.max(np.abs(m.motor_dq[:, j]), initial=0.0)) for m in self.motions)
         return float(np.fmax(self.robot.limits.qd_max[j], fastest))
 
 
 def prepare_training(
-    recordings: Sequence[Recording], robot: Robot, processing: Processing, fit_constants: bool
+    recordings: Sequence[Recording],
+    robot: Robot,
+    processing: Processing,
+    fit_constants: bool,
+    rubs: bool = True,
 ) -> Training:
-    """Prepare the training logs.
+    """Prepare the training logs, of joints that rub or not.
 
     Raises:
         MissingSignalError: If velocities or efforts are missing.
@@ -110,6 +116,7 @@ def prepare_training(
         excited=excited,
         source=digests,
         fit_constants=fit_constants,
+        rubs=rubs,
     )
 
 
@@ -154,14 +161,13 @@ def fit_frictions(data: Training, weights: Sequence[Array]) -> list[JointFit | N
     """Fit every joint that moves, the links held at the profile; None for the others."""
     moving = [j for j in range(data.robot.joints) if data.excited.moves[j]]
     presliding = choose_presliding(
-        [(j, data_of_joint(data, j, weights, data.fit_constants)) for j in moving]
+        [(j, data_of_joint(data, j, weights, data.fit_constants)) for j in moving if data.rubs]
     )
     fits: list[JointFit | None] = [None] * data.robot.joints
     for j in moving:
         found = fit_joint(data, j, weights, presliding, data.fit_constants)
         # A joint that carries little cannot tell its constant, the last coefficient, from friction.
-        known = found.fit.sd[-1] < CONSTANT_KNOWN * abs(found.fit.values[-1])
-        if data.fit_constants and not known:
+        if data.fit_constants and found.fit.sd[-1] >= CONSTANT_KNOWN * abs(found.fit.values[-1]):
             found = fit_joint(data, j, weights, presliding, False)
         fits[j] = found
     return fits
@@ -172,6 +178,11 @@ def fit_joint(
 ) -> JointFit:
     """Choose and fit one joint's model, with its drive constant or without."""
     given = data_of_joint(data, j, weights, constant)
+    if not data.rubs:
+        fit = ColumnFit(np.zeros(0), np.zeros(0), given.y, given.weights)
+        if given.fixed.shape[1]:
+            fit = fit_column(given.fixed, given.y, given.weights)
+        return JointFit(Shape(()), fit, [], constant, presliding)
     shape, choices = choose_shape(j, given, presliding.length)
     fit = fit_column(given.columns(j, shape), given.y, given.weights)
     errors = (np.nan, np.nan)
@@ -192,7 +203,7 @@ def data_of_joint(data: Training, j: int, weights: Sequence[Array], constant: bo
     rigid = np.concatenate([r[:, j] for r in data.rigid])
     fixed = []
     if data.rotor:
-        fixed.append(np.concatenate([m.ddq[:, j] for m in motions]))
+        fixed.append(np.concatenate([m.motor_ddq[:, j] for m in motions]))
     if constant:
         fixed.append(rigid)
     load = np.concatenate([c.load[:, j] for c in data.columns])

@@ -78,7 +78,7 @@ def whole_arm(data: Training, method: str) -> MethodResult:
     numbers = []
     frictions = list(profile_friction(data.robot))
     for j, (shape, place) in enumerate(zip(layout.shapes, layout.frictions, strict=True)):
-        if (found := fits[j]) is not None:
+        if (found := fits[j]) is not None and data.rubs:
             sd = base.sd[-(layout.size - place.start) :][: place.stop - place.start]
             values = x[place]
             # Beside the links' errors a rise may turn into a fall; the joint's own fit does not.
@@ -89,7 +89,7 @@ def whole_arm(data: Training, method: str) -> MethodResult:
             )
             numbers += friction_numbers(j, shape, values, sd, profile_friction(data.robot)[j])
             remarks += check_friction(j, frictions[j], data)
-    robot = with_vector(data.robot, layout, x, tuple(frictions))
+    robot = with_vector(data.robot, layout, x, tuple(frictions) if data.rubs else ())
     choices = [c for f in fits if f is not None for c in f.choices]
     return MethodResult(
         robot,
@@ -97,6 +97,7 @@ def whole_arm(data: Training, method: str) -> MethodResult:
         choices,
         base,
         [*remarks, *presliding_remark(fits), *temperature_remarks(data), *held_joints(data)],
+        narrow,
     )
 
 
@@ -140,7 +141,10 @@ def initial_columns(
     """The unknowns of the whole arm, and the profile with its fitted friction. (size,)"""
     shapes, values = [], []
     for j, fit in enumerate(fits):
-        if fit is None:
+        if fit is None and not data.rubs:
+            shapes.append(Shape(()))
+            values.append(np.zeros(0))
+        elif fit is None:
             known = profile_friction(data.robot)[j].parameters
             shapes.append(Shape(PLAIN, float(known.get("smoothing", 0.01))))
             values.append(np.array([float(known.get(term, 0.0)) for term in PLAIN]))

@@ -58,6 +58,7 @@ class Maps:
             state of frame j. (n, 9, 18)
         first_moment: What the composite masses add to the rows of h. (n, 3, 1)
         rotor_inertia: Reflected rotor inertia. (n, 1) [kg·m²]
+        rotor_coupling: Inertia of rotors driven through other joints, or None. (n, n) [kg·m²]
         start: Motion state of the base: gravity alone. (9, 1)
     """
 
@@ -65,6 +66,7 @@ class Maps:
     back: Array
     first_moment: Array
     rotor_inertia: Array
+    rotor_coupling: Array | None
     start: Array
 
 
@@ -96,7 +98,8 @@ def maps_of(chain: Chain) -> Maps:
         first_moment[j, :, 0] = moment
     start = np.zeros((9, 1))
     start[2::3, 0] = chain.gravity
-    return Maps(outward, back, first_moment, chain.rotor_inertia[:, None].copy(), start)
+    rotor = chain.rotor_inertia[:, None].copy()
+    return Maps(outward, back, first_moment, rotor, chain.rotor_coupling, start)
 
 
 class Workspace:
@@ -136,6 +139,8 @@ def momentum_chunk(
         project(below, momentum, p[j], coriolis[j], gravity[j], room[0, 0])
         p[j] += maps.rotor_inertia[j] * dq[j]
         turn(momentum, cosine[j], sine[j], room)
+    if maps.rotor_coupling is not None:
+        p += maps.rotor_coupling @ dq
 
 
 def turn(vectors: Array, cosine: Array, sine: Array, room: Array) -> None:

@@ -70,13 +70,17 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
     q, dq = recording.q, recording.require("dq")
     effort, scale = effort_of(recording, robot)
     p, mu = empty_series(*q.shape), empty_series(*q.shape)
-    friction, temperature = RunningFriction(robot.friction), measured_temperature(recording)
+    friction = RunningFriction(robot.friction, robot.chain.transmission)
+    temperature, coupling = measured_temperature(recording), robot.chain.rotor_coupling
     chunks = momentum_chunks(robot.loaded_chain, q, dq)
     if literal:
         from vftcli.robots.literal import literal_momentum_terms
 
         # The paper's method takes the whole log at once.
-        chunks = iter([(slice(0, len(q)), dq, literal_momentum_terms(robot.model, q, dq))])
+        found = literal_momentum_terms(robot.model, q, dq)
+        if coupling is not None:
+            found = found._replace(p=found.p + dq @ coupling)
+        chunks = iter([(slice(0, len(q)), dq, found)])
     for span, velocity, chunk in chunks:
         p[span] = chunk.p
         mu[span] = effort[span]
@@ -90,6 +94,7 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
 
 def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]:
     """The measured effort (T, n) and what turns it into torque: K [N·m/A], or 1 for torques."""
-    if uses_current(recording, robot) and robot.torque_constant is not None:
+    coupled = robot.chain.transmission is not None
+    if uses_current(recording, robot) and robot.torque_constant is not None and not coupled:
         return recording.require("current"), robot.torque_constant
     return drive_torque(recording, robot), 1.0

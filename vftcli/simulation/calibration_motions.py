@@ -10,9 +10,9 @@ import numpy as np
 from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.simulation.fourier_excitation import make_excitation
 from vftcli.simulation.kinematics import check_start, flange_pose
 from vftcli.simulation.motion import Command, Periodic, Stretches, straight_paths
-from vftcli.simulation.schema import unknown_name
 
 EXCITATIONS = Path(__file__).parent / "scenarios" / "excitation"
 """Optimised trajectories, a file a robot."""
@@ -117,12 +117,12 @@ class JointwiseSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class ExcitationSpec:
-    """A persistently exciting Fourier trajectory; the built-in ones are optimised for a robot.
+    """A persistently exciting Fourier trajectory, stated, optimised for a robot, or made for it.
 
     Attributes:
         period: Time of one round; 0 takes the optimised one. [s]
         cycles: Rounds.
-        mean: Mean positions; empty takes the optimised ones. (n,) [rad]
+        mean: Mean positions; empty takes the optimised series, or makes one. (n,) [rad]
         cosine: Cosine coefficients, one row a harmonic. (H, n) [rad]
         sine: Sine coefficients. (H, n) [rad]
     """
@@ -135,9 +135,11 @@ class ExcitationSpec:
     sine: tuple[tuple[float, ...], ...] = ()
 
     def motion(self, robot: Robot) -> Command:
-        """The stated series, or the one optimised for `robot`."""
-        if not self.mean:
+        """The stated series, the one optimised for `robot`, or one made for it."""
+        if not self.mean and is_optimised(robot.name):
             return optimised_excitation(robot.name, self.period, self.cycles)
+        if not self.mean:
+            return make_excitation(robot, self.period, self.cycles).series
         check_start(robot, self.mean)
         shape = (len(self.cosine), robot.joints)
         cosine, sine = np.array(self.cosine), np.array(self.sine)
@@ -155,6 +157,11 @@ class ExcitationSpec:
         )
 
 
+def is_optimised(robot: str) -> bool:
+    """Whether there is a trajectory optimised for a robot of this name."""
+    return (EXCITATIONS / f"{robot}.toml").is_file()
+
+
 def optimised_excitation(robot: str, period: float, cycles: float) -> Periodic:
     """The trajectory optimised for a built-in robot.
 
@@ -166,18 +173,8 @@ def optimised_excitation(robot: str, period: float, cycles: float) -> Periodic:
         robot: Name of the profile.
         period: Time of one round; 0 takes the one it was optimised for. [s]
         cycles: Rounds.
-
-    Raises:
-        ParameterError: If there is none for the robot.
     """
-    path = EXCITATIONS / f"{robot}.toml"
-    if not path.is_file():
-        there = sorted(p.stem for p in EXCITATIONS.glob("*.toml"))
-        raise ParameterError(
-            unknown_name(f"optimised excitation for robot {robot!r}", robot, there)
-            + " Give trajectory.period, mean, cosine and sine yourself."
-        )
-    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    table = tomllib.loads((EXCITATIONS / f"{robot}.toml").read_text(encoding="utf-8"))
     mean, cosine, sine = (np.array(table[key]) for key in ("mean", "cosine", "sine"))
     return Periodic(
         period=period or table["period"], cycles=cycles, mean=mean, cosine=cosine, sine=sine

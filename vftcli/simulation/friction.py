@@ -138,6 +138,7 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
         raise ParameterError(f"friction.{why}")
     n = robot.joints
     table = {name: np.zeros(n) for name in SHAPES}
+    table |= stated_friction(robot, spec)
     table["logarithmic_velocity"] += 1.0  # where there is no rise, any velocity will do
     table["presliding_length"] += spec.presliding_length
     joints = (robot.friction if spec.enabled else ()) or (JointFriction(),) * n
@@ -154,6 +155,31 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
     table["presliding"] = table["presliding"] + giving
     table["bends"], table["bend_slopes"] = bends_of(joints)
     return TrueFriction(**table, stribeck=spec.stribeck, stribeck_velocity=spec.stribeck_velocity)
+
+
+def stated_friction(robot: Robot, spec: FrictionSpec) -> dict[str, Array]:
+    """The friction that the scenario gives an arm whose robot file has none. (n,) each
+
+    Raises:
+        ParameterError: If the file has some, or it is not one positive number a joint.
+    """
+    given = {"coulomb": spec.coulomb, "viscous": spec.viscous}
+    table = {name: np.array(values) for name, values in given.items() if values is not None}
+    for name, values in table.items():
+        if robot.friction:
+            raise ParameterError(
+                f"friction.{name} is for an arm whose file has no friction; {robot.name!r} has some"
+            )
+        if (
+            len(values) != robot.joints
+            or np.any(values < 0)
+            or out_of_bounds(name, values.tolist())
+        ):
+            raise ParameterError(
+                f"friction.{name} must have one number a joint, {robot.joints} of them, none "
+                "negative or beyond what robots have"
+            )
+    return table if spec.enabled else {}
 
 
 def bends_of(joints: Sequence[JointFriction]) -> tuple[Array, Array]:

@@ -229,15 +229,23 @@ class PushesSpec:
     link: int = 0
     point: Vector = ORIGIN
 
+    def ranges(self) -> PushStyle:
+        """The style's ranges, with those that are stated in their place.
+
+        Raises:
+            ParameterError: If there is no such style.
+        """
+        check_choice("style", self.style, STYLES)
+        given = {k: v for k in PushStyle._fields if (v := getattr(self, k)) is not None}
+        return STYLES[self.style]._replace(**given)
+
     def start(self, rng: np.random.Generator, duration: float) -> Segments:
         """Draw the pushes of a run of `duration` [s], one after another until none fits.
 
         Raises:
             ParameterError: If there is no such style, or lengths and pauses are not positive.
         """
-        check_choice("style", self.style, STYLES)
-        given = {k: v for k in PushStyle._fields if (v := getattr(self, k)) is not None}
-        style = STYLES[self.style]._replace(**given)
+        style = self.ranges()
         if min(style.length[0], style.pause[0]) <= 0:
             raise ParameterError(f"contacts.{self.name}: length and pause must be positive")
         stop, t = self.end or duration, self.begin

@@ -31,6 +31,8 @@ class FrictionSpec:
 
     Attributes:
         enabled: False for a frictionless arm.
+        coulomb: Dry friction of an arm whose robot file has no friction. (n,) [N·m]
+        viscous: Its viscous friction, likewise. (n,) [N·m·s/rad]
         stribeck: Torque at breakaway above the sliding Coulomb torque, as a share of it.
         stribeck_velocity: Velocity over which that excess fades. [rad/s]
         sticking: For sigmoid friction: share of its amplitude that is dry and can stick.
@@ -43,6 +45,8 @@ class FrictionSpec:
     """
 
     enabled: bool = True
+    coulomb: tuple[float, ...] | None = None
+    viscous: tuple[float, ...] | None = None
     stribeck: float = 0.0
     stribeck_velocity: float = 0.05
     sticking: float = 0.0
@@ -181,6 +185,7 @@ class Scenario:
         force_sensor: A force/torque sensor on the flange.
         contacts: Everything that touches the arm.
         sensing: What the log sees.
+        adapted: What of the motion was suited to the robot, in words; None if nothing was.
     """
 
     name: str
@@ -200,3 +205,4 @@ class Scenario:
     force_sensor: ForceSensorSpec | None = None
     contacts: tuple[ContactSpec, ...] = ()
     sensing: SensingSpec = field(default_factory=SensingSpec)
+    adapted: tuple[str, ...] | None = None

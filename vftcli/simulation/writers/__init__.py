@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from vftcli.robots import Robot
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.schema import unknown_name
 from vftcli.simulation.writers.libfranka import write_libfranka
 from vftcli.simulation.writers.parquet import write_parquet
-from vftcli.simulation.writers.rosbag2 import write_rosbag2
-from vftcli.simulation.writers.rtde import write_rtde, write_ur_rtde
+from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
+from vftcli.simulation.writers.rtde import UR_JOINTS, write_rtde, write_ur_rtde
 
 WRITERS: dict[str, Callable[[Path, Simulation], None]] = {
     "rtde": write_rtde,
@@ -20,17 +21,21 @@ WRITERS: dict[str, Callable[[Path, Simulation], None]] = {
 }
 """Name at ``--as`` → the function that writes it."""
 
-USUAL = {"current": "rtde", "link_torque": "libfranka", "joint_torque": "parquet"}
-"""Kind of drive measurement → the format such a robot logs in."""
-
 
 def usual_format(simulation: Simulation, wanted: str = "") -> str:
     """Return the format asked for, the scenario's, or the vendor's usual one.
 
     Raises:
-        ParameterError: If there is no such format, or the robot cannot log in it.
+        ParameterError: If there is no such format.
     """
-    name = wanted or simulation.scenario.format or USUAL[simulation.robot.torque_source]
+    name = wanted or simulation.scenario.format or vendor_format(simulation.robot)
     if name not in WRITERS:
         raise ParameterError(unknown_name(f"log format {name!r}", name, WRITERS))
     return name
+
+
+def vendor_format(robot: Robot) -> str:
+    """The format an arm's vendor logs in: RTDE for a UR, libfranka's for a Franka, else a table."""
+    if robot.torque_source == "current" and robot.joints == UR_JOINTS:
+        return "rtde"
+    return "libfranka" if robot.ros_state == ROBOT_STATE else "parquet"

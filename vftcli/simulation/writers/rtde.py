@@ -17,6 +17,7 @@ from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.writers.flange import flange_signals
 from vftcli.virtual_sensor.solvers import LEAST_SIGMA, wrench_of
 
+UR_JOINTS = 6
 DIGITS = 9
 """Decimals kept; the client prints all seventeen digits, noise included."""
 
@@ -114,7 +115,7 @@ def recipe(simulation: Simulation) -> list[str]:
 def ur_columns(simulation: Simulation, names: Sequence[str]) -> dict[str, list[Any]]:
     """Columns of a UR log by name, every row of the log in it."""
     current, target_current = simulation.measured.current, simulation.vendor.target_current
-    if current is None or target_current is None or simulation.robot.joints != 6:
+    if current is None or target_current is None or simulation.robot.joints != UR_JOINTS:
         raise ParameterError(
             f"robot {simulation.robot.name!r} has no motor currents or not six joints and cannot "
             "log in a UR format; choose libfranka, rosbag2 or parquet with --as"

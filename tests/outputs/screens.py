@@ -1,0 +1,112 @@
+"""What the terminal shows of five logs: docs/screens.md is made, and tested, by running them.
+
+Example: VFT_LOGS=logs python tests/outputs/screens.py
+"""
+
+import os
+import re
+import shlex
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from typer.testing import CliRunner
+
+from vftcli.cli import app
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "screens.md"
+COLUMNS = "88"
+"""Width of the terminal."""
+
+
+class Screen(NamedTuple):
+    """One command of the page.
+
+    Attributes:
+        command: As it is typed, beside the logs.
+        files: Every file that it names → where that is, under the fixtures or the real logs.
+        real: Whether they are under the real logs.
+    """
+
+    command: str
+    files: Mapping[str, str]
+    real: bool
+
+
+SCREENS = {
+    "push_pose": Screen(
+        "vftcli report push_pose.csv --robot ur10e --free free_14harm.csv -o push",
+        {name: f"ur10e/{name}" for name in ("push_pose.csv", "free_14harm.csv")},
+        real=True,
+    ),
+    "load_14harm": Screen(
+        "vftcli report load_14harm.csv --robot ur10e --free free_14harm.csv -o load",
+        {name: f"ur10e/{name}" for name in ("load_14harm.csv", "free_14harm.csv")},
+        real=True,
+    ),
+    "ur5_circle": Screen(
+        "vftcli report ur5_circle.csv --robot ur5 --free 0.3:4 --reference two-cycle -o circle",
+        {"ur5_circle.csv": "ur5_circle.csv"},
+        real=False,
+    ),
+    "libfranka_sim": Screen(
+        "vftcli report pushes.csv.gz --robot robot.toml --free 0.3:4 -o franka",
+        {name: f"libfranka_sim/{name}" for name in ("pushes.csv.gz", "robot.toml")},
+        real=True,
+    ),
+    "panda_bearing": Screen(
+        "vftcli report panda_bearing.csv --robot panda --free 0.3:3.9 -o bearing",
+        {"panda_bearing.csv": "panda_bearing.csv"},
+        real=False,
+    ),
+}
+"""Name of the log → what is run."""
+
+
+def shown(screen: Screen, logs: Path, folder: Path) -> str:
+    """What a command prints, run in a folder that holds the logs it names.
+
+    Args:
+        screen: The command.
+        logs: Where its files are looked for.
+        folder: An empty folder.
+    """
+    for name, place in screen.files.items():
+        (folder / name).symlink_to((logs / place).resolve())
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        result = CliRunner(env={"COLUMNS": COLUMNS}).invoke(app, shlex.split(screen.command)[1:])
+    finally:
+        os.chdir(before)
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def printed() -> dict[str, str]:
+    """What the page says of each command. Command → output."""
+    text = PAGE.read_text(encoding="utf-8")
+    blocks = re.findall(r"^```console\n\$ (.*?)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    return dict(blocks)
+
+
+def pages(logs: Path) -> Iterator[str]:
+    """The text of the page with every command run anew."""
+    text = PAGE.read_text(encoding="utf-8")
+    yield text[: text.index("## ")]
+    for name, screen in SCREENS.items():
+        with TemporaryDirectory() as folder:
+            output = shown(screen, logs if screen.real else ROOT / "fixtures", Path(folder))
+        yield f"## {name}\n\n```console\n$ {screen.command}\n{output.rstrip()}\n```\n\n"
+
+
+def main() -> None:
+    """Write the page anew."""
+    text = "".join(pages(Path(os.environ["VFT_LOGS"]))).rstrip() + "\n"
+    PAGE.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
