@@ -175,3 +175,20 @@ def test_several_logs_tell_their_errors_where_there_is_a_reference(analysis: Ana
     text = logs_screen([listed(analysis, 1), listed(analysis, 1)], CANVAS, {})
     assert "error" in text
     assert "N·m" in text
+
+
+def test_columns_stay_columns_in_ascii(analysis: Analysis) -> None:
+    rows = (contact(), contact(number=2, where="cannot tell", places=(2, 6)))
+    text = log_screen(
+        replace(analysis, contacts=contact_list(*rows, remarks=())), Canvas(unicode=False)
+    )
+    table = [line for line in text.splitlines() if line.rstrip().endswith(("good", "trust"))]
+    assert len({line.rstrip().rindex(" ") for line in table}) == 1
+    assert "link 2 ... link 6" in text
+
+
+def test_a_thousand_samples_a_second_are_written_out(analysis: Analysis) -> None:
+    t = np.arange(analysis.recording.samples) * 1e-3
+    fast = replace(analysis.recording, t=t)
+    run = replace(analysis.motion.log, recording=fast)
+    assert facts(replace(analysis, motion=replace(analysis.motion, log=run))).endswith("at 1000 Hz")

@@ -91,6 +91,9 @@ def otherwise(found: ContactList) -> str:
     if least is None or not np.isfinite(least) or any(c.is_load for c in found.contacts):
         return ""
     cause = "friction alone" if found.method == "threshold" else "the error in free motion"
+    if any(c.peak_force is not None and c.peak_force < least for c in found.contacts):
+        # Along the axes that are felt best less is told than along all.
+        return f"else: nothing above {least:.0f} N, and less where the arm feels a push best"
     return f"else: nothing above {least:.0f} N, below which {cause} explains what is read"
 
 

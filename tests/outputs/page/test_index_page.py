@@ -50,6 +50,8 @@ def test_the_headline_counts_logs(pushed: Analysis) -> None:
         "Hardest in ur5_circle.csv: 91 ± 7 N at 11.3 s. "
         "1 more bears a load, or a wrong payload or model."
     )
+    title, words = headline([("b", quiet), ("b", quiet)])
+    assert (title, words) == ("Nothing pushed the arm, as far as these logs can tell.", "")
     none = replace(pushed, contacts=None)
     assert headline([("a", none)]) == ("External joint torques from 1 logs.", "")
 

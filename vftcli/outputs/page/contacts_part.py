@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import SURE_NATS, TIGHT, Contact, ContactList
-from vftcli.outputs.contacts import direction, place_words
+from vftcli.outputs.contacts import answer, direction, place_words
 from vftcli.outputs.grid import Column, Entry, Grid, html, significant
 from vftcli.outputs.page.arm_drawing import arm_drawing
 from vftcli.outputs.page.hero import told
@@ -32,6 +32,8 @@ HEADS = ("", "When", "How hard (95 %)", "Direction, base axes", "Where", "Trust"
 def headline(found: ContactList) -> str:
     """The answer as a headline. Plain text."""
     contacts = found.contacts
+    if not contacts and found.false_on_free:
+        return answer(found)
     if not contacts:
         return "Nothing pushed the arm, as far as this log can tell."
     hardest = found.hardest
@@ -42,7 +44,11 @@ def headline(found: ContactList) -> str:
     often += "" if count < 3 else " times"
     if hardest is None:
         return f"Something pushed the arm {often}."
-    return f"Something pushed the arm {often}, {'hardest ' * (count > 1)}with {size(hardest)}."
+    if not hardest.has_size:
+        return f"Something pushed the arm {often}; how hard cannot be told."
+    weak = " (weak)" if hardest.trust == "weak" else ""
+    how = "hardest " if count > 1 else ""
+    return f"Something pushed the arm {often}, {how}with {size(hardest)}{weak}."
 
 
 def size(contact: Contact) -> str:
@@ -118,7 +124,9 @@ def belief_words(found: ContactList) -> str:
             f"±{float(np.median(bands)):.0f} N."
         )
     if (least := told(found)) is not None and not any(c.is_load for c in found.contacts):
-        parts.append(f"A touch below <b>{least:.0f} N</b> would not be seen.")
+        fainter = any(c.peak_force is not None and c.peak_force < least for c in found.contacts)
+        seen = "is seen only where the arm feels it best" if fainter else "would not be seen"
+        parts.append(f"A touch below <b>{least:.0f} N</b> {seen}.")
     weak = [c.number for c in found.contacts if c.trust == "weak" and not c.is_load]
     if weak and len(weak) < len(found.contacts) <= FEW:
         verb = "Contact {} is weak" if len(weak) == 1 else "Contacts {} are weak"

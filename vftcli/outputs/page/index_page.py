@@ -6,7 +6,7 @@ from urllib.parse import quote
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.believability import Ground, grounds, health
-from vftcli.outputs.contacts import hardest_words
+from vftcli.outputs.contacts import by_force, hardest_words
 from vftcli.outputs.grid import DASH, Column, Grid, GridCell, html, significant
 from vftcli.outputs.log.rmse_tables import blocks, mean_of, rmse_grid
 from vftcli.outputs.page.shell import alarms, document, lead, section, soft, top
@@ -53,10 +53,12 @@ def headline(analyses: Sequence[tuple[str, Analysis]]) -> tuple[str, str]:
     if not lists:
         return f"External joint torques from {len(analyses)} logs.", ""
     title = f"Something pushed the arm in {len(pushed)} of {len(analyses)} logs."
+    if not pushed and not loads:
+        title = "Nothing pushed the arm, as far as these logs can tell."
     hard = [found for found in pushed if found.hardest is not None]
     words = ""
     if hard:
-        most = max(hard, key=lambda found: (found.hardest and found.hardest.peak_force) or 0.0)
+        most = max(hard, key=lambda found: by_force(found.hardest) if found.hardest else ())
         words = f"Hardest in {most.recording}: {hardest_words(most)}."
     if loads:
         words += f" {loads} more bear{'s' * (loads == 1)} a load, or a wrong payload or model."
