@@ -17,6 +17,7 @@ from vftcli.outputs.believability import (
     headline,
     health,
     joint_words,
+    load_doubt,
     otherwise,
     percent_words,
     resting,
@@ -69,6 +70,15 @@ def test_a_load_nobody_told_stands_first_with_its_command(without_reference: Ana
     assert first.sentence == in_words(load).evidence
     assert first.remedy is not None
     assert "--find-payload" in first.remedy
+
+
+def test_rows_that_may_be_a_load_are_doubted(without_reference: Analysis) -> None:
+    load = warning("light-load", load_kg=1.2, sd_kg=0.1, robot="ur5")
+    made = replace(examined(without_reference, load), contacts=contact_list(contact()))
+    assert headline(made).endswith("they may be its weight.")
+    assert load_doubt(replace(made, contacts=contact_list(contact(is_load=True)))) == ""
+    assert load_doubt(replace(made, contacts=contact_list())) == ""
+    assert load_doubt(replace(made, examinations=())) == ""
 
 
 def test_one_remedy_is_given_once(without_reference: Analysis) -> None:

@@ -77,9 +77,18 @@ class Ground:
 def headline(analysis: Analysis) -> str:
     """The answer in one sentence."""
     if analysis.contacts is not None:
-        return answer(analysis.contacts)
+        return f"{answer(analysis.contacts)} {load_doubt(analysis)}".rstrip()
     names = ", ".join(estimate.name for estimate in analysis.estimates)
     return f"External torque of {analysis.robot.joints} joints by {names}; no contacts are listed."
+
+
+def load_doubt(analysis: Analysis) -> str:
+    """What is said where rows may be the weight of a load that the doctor found; else ""."""
+    contacts = analysis.contacts.contacts if analysis.contacts is not None else ()
+    found = {f.code for one in analysis.examinations[:1] for f in one.warnings}
+    if not contacts or any(c.is_load for c in contacts) or not found & LOADS:
+        return ""
+    return "But the arm bears a load that nobody told: they may be its weight."
 
 
 def otherwise(found: ContactList) -> str:
