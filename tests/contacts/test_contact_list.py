@@ -41,3 +41,11 @@ def test_a_row_without_a_size_needs_sure_evidence() -> None:
     assert not contact(peak_force=2.0, peak_band=3.0, evidence=49.0).is_told
     assert not contact(peak_force=2.0, peak_band=3.0, evidence=None).is_told
     assert contact(peak_force=None, peak_band=None, evidence=None).is_told
+
+
+@pytest.mark.parametrize(("least", "told"), [(6.5, 6.5), (3473.0, None), (None, None)])
+def test_a_pose_that_is_blind_along_an_axis_tells_no_least_force(
+    least: float | None, told: float | None
+) -> None:
+    assert contact_list(smallest_force=least).told_force == told
+    assert contact_list(smallest_force=float("nan")).told_force is None

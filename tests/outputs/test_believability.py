@@ -181,6 +181,8 @@ def test_the_rest_of_the_log(without_reference: Analysis) -> None:
     threshold = contact_list(contact(), method="threshold", smallest_force=29.7)
     assert otherwise(threshold).startswith("else: nothing above 30 N, below which friction alone")
     assert otherwise(contact_list(contact(is_load=True))) == ""
+    assert otherwise(contact_list(smallest_force=float("nan"))) == ""
+    assert "a push along one axis may go unseen" in otherwise(contact_list(smallest_force=3473.0))
     faint = contact_list(contact(peak_force=5.0, peak_band=2.0))
     assert otherwise(faint) == "else: nothing above 6 N, and less where the arm feels a push best"
     assert otherwise(contact_list(smallest_force=None)) == ""

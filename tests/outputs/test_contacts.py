@@ -128,5 +128,7 @@ def test_the_answer_is_no_force_within_its_band() -> None:
     )
     assert hardest_words(contact_list(wide)) == "not told (88 ± 170 N at 4.7 s)"
     assert [row.number for row in hardest_rows([wide, contact()], 1)] == [1]
+    load = contact(peak_force=3.0, peak_band=5.0, is_load=True)
+    assert answer(contact_list(load)).endswith("or a wrong model: below 8 N on average.")
     weak = contact(peak_band=30.0, where="cannot tell")
     assert answer(contact_list(weak)) == "1 contact. The hardest, at 4.7 s: 65 ± 30 N (weak)."

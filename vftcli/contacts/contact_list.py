@@ -15,6 +15,10 @@ SURE_NATS, TIGHT, WIDE = 50.0, 0.25, 0.4
 """Evidence and band of a row that is good; a wider band makes it weak."""
 
 
+BLIND = 500.0
+"""Where only forces larger than this are told along an axis, the pose is blind to it. [N]"""
+
+
 class ForceCourse(NamedTuple):
     """How hard a contact pushes from its start to its end, at the place whose force it states.
 
@@ -180,6 +184,12 @@ class ContactList:
     def tells_untouched(self) -> bool:
         """Whether nothing touches the arm outside of the rows: known from its free motion."""
         return self.method == "smoother" and not any(c.is_load for c in self.contacts)
+
+    @property
+    def told_force(self) -> float | None:
+        """`smallest_force`, None without one or where the pose does not tell an axis. [N]"""
+        least = self.smallest_force
+        return least if least is not None and least < BLIND else None
 
     @property
     def hardest(self) -> Contact | None:

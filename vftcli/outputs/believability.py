@@ -96,9 +96,13 @@ def otherwise(found: ContactList) -> str:
 
     A load leaves no rest, and an arm of few joints tells no force.
     """
-    least = found.smallest_force
-    if least is None or not np.isfinite(least) or any(c.is_load for c in found.contacts):
+    least = found.told_force
+    if found.smallest_force is None or any(c.is_load for c in found.contacts):
         return ""
+    if least is None and np.isnan(found.smallest_force):
+        return ""
+    if least is None:
+        return "else: a push along one axis may go unseen, since the pose hardly tells it"
     cause = "friction alone" if found.method == "threshold" else "the error in free motion"
     if any(c.peak_force is not None and c.peak_force < least for c in found.contacts):
         # Along the axes that are felt best less is told than along all.

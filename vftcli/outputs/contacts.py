@@ -140,6 +140,9 @@ def answer(found: ContactList) -> str:
     first = found.contacts[0]
     if first.is_load and first.peak_force is not None and first.mean_force is not None:
         size = f"{first.peak_force:.0f} ± {first.peak_band:.0f} N"
+        if not first.has_size:
+            most = first.peak_force + (first.peak_band or 0.0)
+            return f"A load, or a wrong payload, or a wrong model: below {most:.0f} N on average."
         return (
             f"A load, or a wrong payload, or a wrong model: {size} on average, "
             f"{direction(first.mean_force)}."

@@ -375,8 +375,8 @@ def log_row(analysis: Analysis, *, judged: bool) -> list[str]:
         load = any(contact.is_load for contact in found.contacts)
         count = "load" if load else str(len(found.contacts))
         hardest = hardest_words(found)
-        if found.smallest_force is not None and not load:
-            rest = f"{found.smallest_force:.0f} N"
+        if found.told_force is not None and not load:
+            rest = f"{found.told_force:.0f} N"
     row = [recording.name, f"{recording.duration:.1f} s", count, hardest, rest]
     if judged:
         means = (

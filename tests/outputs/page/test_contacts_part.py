@@ -60,6 +60,9 @@ def test_the_headline_is_no_force_within_its_band(found: ContactList) -> None:
     assert "is seen only where the arm feels it best" in belief_words(
         replace(found, contacts=(sized(found.contacts[0], 1.0, 0.5),))
     )
+    load = replace(found, contacts=(sized(found.contacts[0], 3.0, 5.0, is_load=True),))
+    assert headline(load).startswith("The arm bears a load below 8 N, or its payload")
+    assert "±14 N" in belief_words(both)
     untrue = replace(found, contacts=(), false_on_free=2)
     assert headline(untrue).startswith("No contact stands out from the free part")
 

@@ -16,6 +16,12 @@ def test_the_index_links_every_report(pushed: Analysis, without_reference: Analy
     assert "RMSE in N·m" in html
 
 
+def test_a_log_that_is_left_out_is_named(pushed: Analysis) -> None:
+    html = render_index([("a", pushed)], {"<bad>.csv": "no log"})
+    assert "✗ &lt;bad&gt;.csv is left out: no log" in html
+    assert "2 logs" in html
+
+
 def test_a_line_says_how_many_how_hard_and_how_sound(pushed: Analysis) -> None:
     sound = Ground(standing="good", subject="clock", sentence="no gap")
     log, robot, span, contacts, hardest, least, error, state = index_row("a", pushed, sound)

@@ -113,7 +113,8 @@ def write_reports(
             fill(folder, f"{place}/", analysis, command, extras)
             for place, analysis in zip(places, analyses, strict=True)
         ]
-        folder.write("index.html", render_index(list(zip(places, analyses, strict=True))))
+        pages = list(zip(places, analyses, strict=True))
+        folder.write("index.html", render_index(pages, failed))
         found = [a.errors for a in analyses if a.errors is not None]
         together = pl.concat(found, how="diagonal") if found else None
         put_errors(folder, "", together, analyses)

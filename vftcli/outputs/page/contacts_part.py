@@ -38,7 +38,10 @@ def headline(found: ContactList) -> str:
         return "Nothing pushed the arm, as far as this log can tell."
     hardest = found.hardest
     if contacts[0].is_load and hardest is not None:
-        return f"The arm bears a load of {size(hardest)}, or its payload or its model is wrong."
+        how = f"of {size(hardest)}"
+        if not hardest.has_size:
+            how = f"below {(hardest.peak_force or 0.0) + (hardest.peak_band or 0.0):.0f} N"
+        return f"The arm bears a load {how}, or its payload or its model is wrong."
     count = len(contacts)
     often = TIMES[count - 1] if count <= len(TIMES) else str(count)
     often += "" if count < 3 else " times"
@@ -102,7 +105,7 @@ def touched(numbers: list[int], count: int) -> str:
     if len(numbers) == count:
         subject = "it" if count == 1 else "they"
     elif count > FEW:
-        subject = f"the other {len(numbers)}"
+        subject = f"the other {len(numbers) if len(numbers) > 1 else 'one'}"
     else:
         subject = f"{'contact' if len(numbers) == 1 else 'contacts'} {listed(numbers)}"
     return f"where {subject} touched cannot be told, since several places fit"
@@ -117,7 +120,7 @@ def listed(numbers: Sequence[int]) -> str:
 def belief_words(found: ContactList) -> str:
     """How far times and sizes may be believed, and what would not be seen. HTML."""
     parts = []
-    bands = [c.peak_band for c in found.contacts if c.peak_band is not None and not c.is_load]
+    bands = [c.peak_band or 0.0 for c in found.contacts if c.has_size and not c.is_load]
     if bands:
         parts.append(
             f"Believe times to about ±{ONSET:g} s and sizes to about "
