@@ -113,6 +113,16 @@ def test_against_tells_the_lead_the_others_and_the_floor(analysis: Analysis) -> 
     assert np.isnan(mean_of(np.array([np.nan])))
 
 
+def test_a_joint_whose_reference_rests_counts_in_no_mean(analysis: Analysis) -> None:
+    (block,) = blocks(analysis.errors)
+    floor = np.array([9.0, *[0.2] * (len(block.joints) - 1)])
+    left = block._replace(untrusted=(1,), floor=floor)
+    assert against(left, analysis).startswith("Against vendor without J1 (floor 0.20): ")
+    assert mean_errors(left)["best"] == pytest.approx(mean_of(block.rmse[0, 1:]))
+    every = block._replace(untrusted=block.joints)
+    assert mean_errors(every) == mean_errors(block)
+
+
 def test_results_made_anyway_say_so(analysis: Analysis) -> None:
     (own, *_) = analysis.examinations
     bad = warning("effort-sign", signal="current", misfit_percent=190.0, healed_percent=3.0,

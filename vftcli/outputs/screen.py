@@ -209,8 +209,12 @@ def against(block: Block, analysis: Analysis) -> str:
     if not means:
         return f"Against {block.reference}: no sample in common with the estimates"
     (name, least), *others = means.items()
-    floor = f" (floor {significant(mean_of(block.floor), 2)})" if block.has_floor else ""
-    text = f"Against {printable(block.reference)}{floor}: {significant(least, 2)} N·m ({name})"
+    use = trusted(block)
+    floor = f" (floor {significant(mean_of(block.floor[use]), 2)})" if block.has_floor else ""
+    left = [f"J{j}" for j, used in zip(block.joints, use, strict=True) if not used]
+    without = f" without {', '.join(left)}" if left else ""
+    text = f"Against {printable(block.reference)}{without}{floor}: "
+    text += f"{significant(least, 2)} N·m ({name})"
     if others:
         low, high = min(value for _, value in others), max(value for _, value in others)
         paper = any(remark.code in MEASURED for remark in analysis.remarks)
@@ -223,10 +227,15 @@ def against(block: Block, analysis: Analysis) -> str:
 
 def mean_errors(block: Block) -> dict[str, float]:
     """RMSE of each observer, mean of the joints whose reference is to be trusted. [N·m]"""
-    use = [j not in block.untrusted for j in block.joints]
-    rows = block.rmse[:, use] if any(use) else block.rmse
+    rows = block.rmse[:, trusted(block)]
     means = {name: mean_of(row) for name, row in zip(block.observers, rows, strict=True)}
     return {name: value for name, value in means.items() if np.isfinite(value)}
+
+
+def trusted(block: Block) -> list[bool]:
+    """The joints whose reference is to be trusted, all where none is. (n,)"""
+    use = [j not in block.untrusted for j in block.joints]
+    return use if any(use) else [True] * len(use)
 
 
 def mean_of(values: np.ndarray) -> float:

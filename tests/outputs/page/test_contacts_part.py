@@ -54,9 +54,11 @@ def test_the_headline_counts(found: ContactList, count: int, words: str) -> None
 def test_the_headline_is_no_force_within_its_band(found: ContactList) -> None:
     wide, sized_one = sized(found.contacts[0], 88.0, 170.0), sized(found.contacts[1], 30.0, 14.0)
     both = replace(found, contacts=(wide, sized_one))
-    assert headline(both) == "Something pushed the arm twice, hardest with 30 ± 14 N (weak)."
+    assert headline(both) == (
+        "Something may have pushed the arm twice, hardest with 30 ± 14 N (weak)."
+    )
     alone = replace(found, contacts=(wide,))
-    assert headline(alone) == "Something pushed the arm once; how hard cannot be told."
+    assert headline(alone) == ("Something may have pushed the arm once; how hard cannot be told.")
     assert "is seen only where the arm feels it best" in belief_words(
         replace(found, contacts=(sized(found.contacts[0], 1.0, 0.5),))
     )

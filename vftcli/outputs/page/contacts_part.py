@@ -45,13 +45,15 @@ def headline(found: ContactList) -> str:
     count = len(contacts)
     often = TIMES[count - 1] if count <= len(TIMES) else str(count)
     often += "" if count < 3 else " times"
+    pushed = "Something pushed"
+    if hardest is not None and all(contact.trust == "weak" for contact in contacts):
+        pushed = "Something may have pushed"
     if hardest is None:
-        return f"Something pushed the arm {often}."
+        return f"{pushed} the arm {often}."
     if not hardest.has_size:
-        return f"Something pushed the arm {often}; how hard cannot be told."
+        return f"{pushed} the arm {often}; how hard cannot be told."
     weak = " (weak)" if hardest.trust == "weak" else ""
-    how = "hardest " if count > 1 else ""
-    return f"Something pushed the arm {often}, {how}with {size(hardest)}{weak}."
+    return f"{pushed} the arm {often}, {'hardest ' * (count > 1)}with {size(hardest)}{weak}."
 
 
 def size(contact: Contact) -> str:

@@ -60,7 +60,7 @@ def answer_part(analysis: Analysis, torques: Chart) -> str:
         words = [f"What touched the arm is not told: {sentence(r)}." for r in reasons]
         first = top(eyebrow(analysis), headline(analysis), lead(*words))
         return first + torque_section(torques, opened=True)
-    doubt = lead(words) if (words := load_doubt(analysis)) else ""
+    doubt = lead(load_doubt(analysis))
     return "".join(
         (
             top(eyebrow(analysis), headline(analysis), doubt + contacts_part.lead(found)),
