@@ -27,3 +27,25 @@ def test_the_hardest_is_the_one_with_the_largest_force() -> None:
     assert contact_list(soft, hard).hardest is hard
     assert contact_list().hardest is None
     assert contact(peak_force=None).numbered(3).number == 3
+
+
+def test_a_force_within_its_band_is_the_hardest_only_among_its_like() -> None:
+    wide, sized = contact(peak_force=88.0, peak_band=170.0), contact(peak_force=10.0)
+    assert contact_list(wide, sized).hardest is sized
+    assert contact_list(wide).hardest is wide
+    assert (wide.has_size, sized.has_size) == (False, True)
+
+
+def test_a_row_without_a_size_needs_sure_evidence() -> None:
+    assert contact(peak_force=2.0, peak_band=3.0).is_told
+    assert not contact(peak_force=2.0, peak_band=3.0, evidence=49.0).is_told
+    assert not contact(peak_force=2.0, peak_band=3.0, evidence=None).is_told
+    assert contact(peak_force=None, peak_band=None, evidence=None).is_told
+
+
+@pytest.mark.parametrize(("least", "told"), [(6.5, 6.5), (3473.0, None), (None, None)])
+def test_a_pose_that_is_blind_along_an_axis_tells_no_least_force(
+    least: float | None, told: float | None
+) -> None:
+    assert contact_list(smallest_force=least).told_force == told
+    assert contact_list(smallest_force=float("nan")).told_force is None

@@ -109,6 +109,13 @@ def ur10e(logs: Path, name: str) -> Recording:
     return read(logs / "ur10e" / name, columns=UR10E)
 
 
+def test_two_samples_do_not_say_that_nothing_touched() -> None:
+    made = motion(read(FIXTURES / "ur5_circle.csv"), "ur5")
+    few = np.arange(made.log.recording.samples) < 2
+    with pytest.raises(ParameterError, match=r"lasts 0.008 s; of less than 0.5 s no contact"):
+        list_contacts(motion(part(made.log.recording, few), "ur5"))
+
+
 def test_four_hands_on_a_held_pose(logs: Path) -> None:
     free = ur10e(logs, "free_14harm.csv")
     found = list_contacts(motion(ur10e(logs, "push_pose.csv"), "ur10e", run=free))

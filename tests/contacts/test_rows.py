@@ -64,6 +64,8 @@ def test_a_sensors_force_needs_no_frame() -> None:
     told = still(wrench=wrench, wrench_frame=WrenchFrame("sensor", "sensor"))
     assert sensor_force(told, 0.5) == pytest.approx(13.0)
     assert sensor_force(still(), 0.5) is None
+    # A field that the log's writer left at zero measures nothing.
+    assert sensor_force(still(wrench=0.0 * wrench), 0.5) is None
 
 
 def test_a_points_arm_leads_from_the_flange() -> None:

@@ -66,3 +66,13 @@ def test_most_pushes_are_told_by_the_drives_friction_alone() -> None:
     # The row's torque is the mean over .03 s about the peak, the course's that of the sample.
     assert np.median(np.abs(off)) < 0.1
     assert 5.0 < float(axes_told(run)[2]) < 60.0
+
+
+def test_a_force_within_its_band_is_no_row() -> None:
+    """A load, a guide and two knocks; friction at reversals reads as less than its own band."""
+    run = motion(read(FIXTURES / "panda_bearing.csv"), "panda").log
+    rows = threshold_rows(run)
+    scored = score(rows, true_contacts(*true_wrench("panda_bearing.csv")))
+    assert len(scored.pairs) == 3
+    assert not scored.false
+    assert all(row.has_size for row in rows)

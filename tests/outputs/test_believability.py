@@ -17,6 +17,7 @@ from vftcli.outputs.believability import (
     headline,
     health,
     joint_words,
+    load_doubt,
     otherwise,
     percent_words,
     resting,
@@ -69,6 +70,15 @@ def test_a_load_nobody_told_stands_first_with_its_command(without_reference: Ana
     assert first.sentence == in_words(load).evidence
     assert first.remedy is not None
     assert "--find-payload" in first.remedy
+
+
+def test_rows_that_may_be_a_load_are_doubted(without_reference: Analysis) -> None:
+    load = warning("light-load", load_kg=1.2, sd_kg=0.1, robot="ur5")
+    made = replace(examined(without_reference, load), contacts=contact_list(contact()))
+    assert headline(made).endswith("they may be its weight.")
+    assert load_doubt(replace(made, contacts=contact_list(contact(is_load=True)))) == ""
+    assert load_doubt(replace(made, contacts=contact_list())) == ""
+    assert load_doubt(replace(made, examinations=())) == ""
 
 
 def test_one_remedy_is_given_once(without_reference: Analysis) -> None:
@@ -171,6 +181,10 @@ def test_the_rest_of_the_log(without_reference: Analysis) -> None:
     threshold = contact_list(contact(), method="threshold", smallest_force=29.7)
     assert otherwise(threshold).startswith("else: nothing above 30 N, below which friction alone")
     assert otherwise(contact_list(contact(is_load=True))) == ""
+    assert otherwise(contact_list(smallest_force=float("nan"))) == ""
+    assert "a push along one axis may go unseen" in otherwise(contact_list(smallest_force=3473.0))
+    faint = contact_list(contact(peak_force=5.0, peak_band=2.0))
+    assert otherwise(faint) == "else: nothing above 6 N, and less where the arm feels a push best"
     assert otherwise(contact_list(smallest_force=None)) == ""
     listed = replace(without_reference, contacts=contact_list())
     assert headline(listed) == "Nothing touched the arm, as far as this log can tell."

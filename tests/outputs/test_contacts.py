@@ -14,6 +14,7 @@ from vftcli.outputs.contacts import (
     contacts_record,
     direction,
     hardest_rows,
+    hardest_words,
     place_words,
     toward,
 )
@@ -115,3 +116,19 @@ def test_the_table_names_every_axis_that_holds_much(
 ) -> None:
     """More than .35 of the force: 0.35² is an eighth of its square."""
     assert toward(np.array(force)) == words
+
+
+def test_the_answer_is_no_force_within_its_band() -> None:
+    wide = contact(number=2, peak_force=88.0, peak_band=170.0)
+    assert answer(contact_list(contact(), wide)) == (
+        "2 contacts. The hardest whose size can be told, at 4.7 s: 65 ± 7 N on the wrist."
+    )
+    assert answer(contact_list(wide)) == (
+        "1 contact. How hard cannot be told: the band is wider than the force."
+    )
+    assert hardest_words(contact_list(wide)) == "not told (88 ± 170 N at 4.7 s)"
+    assert [row.number for row in hardest_rows([wide, contact()], 1)] == [1]
+    load = contact(peak_force=3.0, peak_band=5.0, is_load=True)
+    assert answer(contact_list(load)).endswith("or a wrong model: below 8 N on average.")
+    weak = contact(peak_band=30.0, where="cannot tell")
+    assert answer(contact_list(weak)) == "1 contact. The hardest, at 4.7 s: 65 ± 30 N (weak)."

@@ -113,6 +113,16 @@ def test_against_tells_the_lead_the_others_and_the_floor(analysis: Analysis) -> 
     assert np.isnan(mean_of(np.array([np.nan])))
 
 
+def test_a_joint_whose_reference_rests_counts_in_no_mean(analysis: Analysis) -> None:
+    (block,) = blocks(analysis.errors)
+    floor = np.array([9.0, *[0.2] * (len(block.joints) - 1)])
+    left = block._replace(untrusted=(1,), floor=floor)
+    assert against(left, analysis).startswith("Against vendor without J1 (floor 0.20): ")
+    assert mean_errors(left)["best"] == pytest.approx(mean_of(block.rmse[0, 1:]))
+    every = block._replace(untrusted=block.joints)
+    assert mean_errors(every) == mean_errors(block)
+
+
 def test_results_made_anyway_say_so(analysis: Analysis) -> None:
     (own, *_) = analysis.examinations
     bad = warning("effort-sign", signal="current", misfit_percent=190.0, healed_percent=3.0,
@@ -175,3 +185,20 @@ def test_several_logs_tell_their_errors_where_there_is_a_reference(analysis: Ana
     text = logs_screen([listed(analysis, 1), listed(analysis, 1)], CANVAS, {})
     assert "error" in text
     assert "N·m" in text
+
+
+def test_columns_stay_columns_in_ascii(analysis: Analysis) -> None:
+    rows = (contact(), contact(number=2, where="cannot tell", places=(2, 6)))
+    text = log_screen(
+        replace(analysis, contacts=contact_list(*rows, remarks=())), Canvas(unicode=False)
+    )
+    table = [line for line in text.splitlines() if line.rstrip().endswith(("good", "trust"))]
+    assert len({line.rstrip().rindex(" ") for line in table}) == 1
+    assert "link 2 ... link 6" in text
+
+
+def test_a_thousand_samples_a_second_are_written_out(analysis: Analysis) -> None:
+    t = np.arange(analysis.recording.samples) * 1e-3
+    fast = replace(analysis.recording, t=t)
+    run = replace(analysis.motion.log, recording=fast)
+    assert facts(replace(analysis, motion=replace(analysis.motion, log=run))).endswith("at 1000 Hz")

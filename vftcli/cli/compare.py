@@ -9,6 +9,9 @@ from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, taken_apart
 from vftcli.cli.help import COMPARE, OUTPUT
 
+MORE = "Intervals, lags and significance: --details"
+"""What the tables on the terminal leave out."""
+
 
 class TableOptions(Bundle):
     """The form of the table; one at most."""
@@ -63,12 +66,11 @@ def compare(
     from vftcli.readers.library import Library
 
     show = {
-        "terminal": tables.to_terminal,
         "json": tables.to_json,
         "csv": tables.to_csv,
         "markdown": tables.to_markdown,
         "latex": tables.to_latex,
-    }[table.form]
+    }
     library = Library(logs)
     choice = analysis.choice(library, reference)
     # The list is for the wrench and for judging contacts; a table of torques needs none.
@@ -97,5 +99,10 @@ def compare(
         if a.reference is not None
     ]
     together = pl.concat([*errors, evaluate_pooled(members)], how="diagonal")
-    typer.echo(show(tables.marked(together, analyses), paper_bounds(analyses)))
+    rows, bounds = tables.marked(together, analyses), paper_bounds(analyses)
+    if table.form == "terminal":
+        text = tables.to_terminal(rows, bounds, every=analysis.talk.details)
+        typer.echo(text if analysis.talk.details else f"{text}{MORE}")
+    else:
+        typer.echo(show[table.form](rows, bounds))
     left_out.end(len(analyses))

@@ -83,24 +83,30 @@ def report(
     if json:
         typer.echo(record)
     else:
-        show_report(analyses, output, failed, details=analysis.talk.details)
+        show_report(analyses, output, failed, extras, details=analysis.talk.details)
     if show:
         open_made(output)
     left_out.end(len(analyses))
 
 
 def show_report(
-    analyses: "Sequence[Analysis]", output: Path, failed: "Mapping[str, str]", *, details: bool
+    analyses: "Sequence[Analysis]",
+    output: Path,
+    failed: "Mapping[str, str]",
+    extras: "Sequence[str]",
+    *,
+    details: bool,
 ) -> None:
     """Print the screen; with details every table behind it too."""
     from vftcli.cli.console import canvas, show
+    from vftcli.outputs.log.estimates import extra_files
     from vftcli.outputs.log.report import FILES, SUMMARY_FILES
     from vftcli.outputs.log.tables import print_text, to_terminal
     from vftcli.outputs.log.wrench_tables import paper_bounds
     from vftcli.outputs.screen import log_screen, logs_screen, written_lines
 
     several = len(analyses) + len(failed) > 1
-    screen, names = canvas(), SUMMARY_FILES if several else FILES
+    screen, names = canvas(), SUMMARY_FILES if several else (*FILES, *extra_files(extras))
     below = written_lines(output, names, screen, "vftcli open", several=several)
     if several:
         show(logs_screen(analyses, screen, failed, below, every=details))

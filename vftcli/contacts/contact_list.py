@@ -15,6 +15,10 @@ SURE_NATS, TIGHT, WIDE = 50.0, 0.25, 0.4
 """Evidence and band of a row that is good; a wider band makes it weak."""
 
 
+BLIND = 500.0
+"""Where only forces larger than this are told along an axis, the pose is blind to it. [N]"""
+
+
 class ForceCourse(NamedTuple):
     """How hard a contact pushes from its start to its end, at the place whose force it states.
 
@@ -95,6 +99,21 @@ class Contact:
         return replace(self, number=number)
 
     @property
+    def has_size(self) -> bool:
+        """Whether its force is larger than the band of it."""
+        if self.peak_force is None or self.peak_band is None:
+            return False
+        return self.peak_force > self.peak_band
+
+    @property
+    def is_told(self) -> bool:
+        """Whether it says more than that something may be there: a force, or sure evidence.
+
+        Where no force is told, its torques are what it says.
+        """
+        return self.peak_force is None or self.has_size or (self.evidence or 0.0) >= SURE_NATS
+
+    @property
     def trust(self) -> Trust:
         """How far the row may be believed: by its evidence, its band and its remarks."""
         if self.remarks or self.is_load or self.evidence is None or self.evidence < SURE_NATS:
@@ -167,7 +186,16 @@ class ContactList:
         return self.method == "smoother" and not any(c.is_load for c in self.contacts)
 
     @property
+    def told_force(self) -> float | None:
+        """`smallest_force`, None without one or where the pose does not tell an axis. [N]"""
+        least = self.smallest_force
+        return least if least is not None and least < BLIND else None
+
+    @property
     def hardest(self) -> Contact | None:
-        """The contact with the largest force, None without any."""
+        """The contact with the largest force, None without any.
+
+        One whose force is no larger than its band is taken only where all are so.
+        """
         felt = [contact for contact in self.contacts if contact.peak_force is not None]
-        return max(felt, key=lambda c: c.peak_force or 0.0, default=None)
+        return max(felt, key=lambda c: (c.has_size, c.peak_force or 0.0), default=None)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.contacts.contact_list import SURE_NATS, Contact, ContactList, ContactModel
+from vftcli.contacts.contact_list import Contact, ContactList, ContactModel
 from vftcli.contacts.evidence import LEAST_EVIDENCE
 from vftcli.contacts.loads import is_load, load_row
 from vftcli.contacts.model_error import UNKNOWN, UNSEEN_SHARE, error_course
@@ -17,6 +17,7 @@ from vftcli.contacts.threshold_list import axes_told, threshold_rows
 from vftcli.contacts.untouched import (
     BLOCK,
     MOVING_SHARE,
+    SETTLED,
     Untouched,
     block_length,
     untouched_motion,
@@ -28,12 +29,16 @@ from vftcli.robots.disturbance import disturbance_blocks
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.virtual_sensor.smoother.noise import dry_torques
 
 SHORT, FINE = 0.25, 0.008
 """A contact shorter than this [s] is measured in blocks of this length [s]: longer ones cut its
 peak."""
+
+SHORTEST = 0.5
+"""A log shorter than this tells no contact. [s]"""
 
 FALSE_MARGIN = 1.5
 """A contact's evidence must be this much above that of any row in the log's own free part."""
@@ -47,9 +52,10 @@ def list_contacts(motion: FreeMotion) -> ContactList:
 
     Raises:
         VftError: If a free part that the user names does not exist or holds no samples, or the log
-            holds numbers that are not finite.
+            holds numbers that are not finite, or is so short that it tells nothing.
     """
     check_finite(motion.log)
+    check_length(motion.log.recording)
     seconds = block_length(motion.log.recording.t)
     free = untouched_motion(motion, seconds)
     made = by_threshold(motion) if free is None else by_smoother(free, seconds)
@@ -70,6 +76,20 @@ def check_finite(run: ModelledRun) -> None:
         raise ParameterError(
             f"{run.recording.name}: {np.count_nonzero(~known)} of its {len(known)} samples are not "
             "finite; leave them out with --interval"
+        )
+
+
+def check_length(recording: Recording) -> None:
+    """Raise unless a log is longer than what its observer takes to settle.
+
+    Raises:
+        ParameterError: If it is not.
+    """
+    if recording.duration < SHORTEST:
+        raise ParameterError(
+            f"{recording.name} lasts {recording.duration:.2g} s; of less than {SHORTEST:g} s "
+            f"no contact can be told, since the first {SETTLED:g} s settle the observer: give a "
+            "longer log"
         )
 
 
@@ -98,7 +118,7 @@ def by_smoother(free: Untouched, seconds: float) -> ContactList:
     return ContactList(
         recording=run.recording.name,
         duration=run.recording.duration,
-        contacts=numbered([rows[k] for k in sorted(rows) if is_told(rows[k])]),
+        contacts=numbered([rows[k] for k in sorted(rows) if rows[k].is_told]),
         method="smoother",
         free=free.remarks,
         free_seconds=free.noise.free_seconds,
@@ -115,13 +135,6 @@ def by_smoother(free: Untouched, seconds: float) -> ContactList:
         ),
         remarks=tuple(limits(run, free, stops, measurer.test.smallest_force)),
     )
-
-
-def is_told(row: Contact) -> bool:
-    """Whether a row says more than that something may be there: a force, or sure evidence."""
-    if row.peak_force is None or row.peak_band is None:
-        return True
-    return row.peak_force > row.peak_band or (row.evidence or 0.0) >= SURE_NATS
 
 
 def numbered(rows: Sequence[Contact]) -> tuple[Contact, ...]:

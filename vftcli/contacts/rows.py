@@ -362,9 +362,9 @@ def vendor_force(run: ModelledRun, J: Array, peak: int, t: Array) -> float | Non
 
 
 def sensor_force(run: ModelledRun, at: float) -> float | None:
-    """|F| of the log's own wrench at a time, None without one. [N]"""
+    """|F| of the log's own wrench at a time, None without one or where it is all zeros. [N]"""
     own = run.recording.wrench
-    if own is None:
+    if own is None or not own.any():
         return None
     force = [np.interp(at, run.recording.t, column) for column in own[:, :3].T]
     found = float(np.linalg.norm(force))

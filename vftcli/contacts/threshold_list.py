@@ -80,7 +80,7 @@ def threshold_rows(run: ModelledRun) -> tuple[Contact, ...]:
             peak = start + first + int(np.argmax(size[first:last]))
             row = peak_row(run, (start + first, start + last), peak, torque, sd)
             # Less than is told along the best of axes is no contact, whatever joint shows it.
-            if row.peak_force is None or row.peak_force >= best:
+            if row.is_told and (row.peak_force is None or row.peak_force >= best):
                 rows.append(row)
     return tuple(rows[i].numbered(i + 1) for i in range(len(rows)))
 

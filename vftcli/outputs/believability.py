@@ -77,9 +77,18 @@ class Ground:
 def headline(analysis: Analysis) -> str:
     """The answer in one sentence."""
     if analysis.contacts is not None:
-        return answer(analysis.contacts)
+        return f"{answer(analysis.contacts)} {load_doubt(analysis)}".rstrip()
     names = ", ".join(estimate.name for estimate in analysis.estimates)
     return f"External torque of {analysis.robot.joints} joints by {names}; no contacts are listed."
+
+
+def load_doubt(analysis: Analysis) -> str:
+    """What is said where rows may be the weight of a load that the doctor found; else ""."""
+    contacts = analysis.contacts.contacts if analysis.contacts is not None else ()
+    found = {f.code for one in analysis.examinations[:1] for f in one.warnings}
+    if not contacts or any(c.is_load for c in contacts) or not found & LOADS:
+        return ""
+    return "But the arm bears a load that nobody told: they may be its weight."
 
 
 def otherwise(found: ContactList) -> str:
@@ -87,10 +96,17 @@ def otherwise(found: ContactList) -> str:
 
     A load leaves no rest, and an arm of few joints tells no force.
     """
-    least = found.smallest_force
-    if least is None or not np.isfinite(least) or any(c.is_load for c in found.contacts):
+    least = found.told_force
+    if found.smallest_force is None or any(c.is_load for c in found.contacts):
         return ""
+    if least is None and np.isnan(found.smallest_force):
+        return ""
+    if least is None:
+        return "else: a push along one axis may go unseen, since the pose hardly tells it"
     cause = "friction alone" if found.method == "threshold" else "the error in free motion"
+    if any(c.peak_force is not None and c.peak_force < least for c in found.contacts):
+        # Along the axes that are felt best less is told than along all.
+        return f"else: nothing above {least:.0f} N, and less where the arm feels a push best"
     return f"else: nothing above {least:.0f} N, below which {cause} explains what is read"
 
 

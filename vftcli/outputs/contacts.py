@@ -118,8 +118,13 @@ def flat(record: Mapping[str, Any]) -> dict[str, Any]:
 
 def hardest_rows(contacts: Sequence[Contact], most: int = MOST_ROWS) -> list[Contact]:
     """So many contacts with the largest force, else the most evidence, in time's order."""
-    order = sorted(contacts, key=lambda c: (c.peak_force or 0.0, c.evidence or 0.0), reverse=True)
+    order = sorted(contacts, key=by_force, reverse=True)
     return sorted(order[:most], key=lambda contact: contact.start)
+
+
+def by_force(contact: Contact) -> tuple[bool, float, float]:
+    """By what contacts are ordered: those with a size before the others, then force, evidence."""
+    return contact.has_size, contact.peak_force or 0.0, contact.evidence or 0.0
 
 
 def answer(found: ContactList) -> str:
@@ -135,6 +140,9 @@ def answer(found: ContactList) -> str:
     first = found.contacts[0]
     if first.is_load and first.peak_force is not None and first.mean_force is not None:
         size = f"{first.peak_force:.0f} ± {first.peak_band:.0f} N"
+        if not first.has_size:
+            most = first.peak_force + (first.peak_band or 0.0)
+            return f"A load, or a wrong payload, or a wrong model: below {most:.0f} N on average."
         return (
             f"A load, or a wrong payload, or a wrong model: {size} on average, "
             f"{direction(first.mean_force)}."
@@ -143,9 +151,21 @@ def answer(found: ContactList) -> str:
     hardest = found.hardest
     if hardest is None:
         return what
+    if not hardest.has_size:
+        return f"{what} How hard cannot be told: the band is wider than the force."
     where = "" if hardest.where == "cannot tell" else f" on the {hardest.where}"
     size = f"{hardest.peak_force:.0f} ± {hardest.peak_band:.0f} N"
-    return f"{what} The hardest, at {hardest.peak:.1f} s: {size}{where}."
+    weak = " (weak)" if hardest.trust == "weak" else ""
+    return f"{what} {hardest_name(found)}, at {hardest.peak:.1f} s: {size}{where}{weak}."
+
+
+def hardest_name(found: ContactList) -> str:
+    """What the hardest contact is called: a row may state a larger force within a wider band."""
+    hardest = found.hardest
+    most = max((c.peak_force or 0.0 for c in found.contacts), default=0.0)
+    if hardest is None or (hardest.peak_force or 0.0) >= most:
+        return "The hardest"
+    return "The hardest whose size can be told"
 
 
 def contact_grid(contacts: Sequence[Contact]) -> Grid:
@@ -217,7 +237,8 @@ def hardest_words(found: ContactList) -> str:
     contact = found.hardest
     if contact is None or contact.peak_force is None:
         return "–"
-    return f"{contact.peak_force:.0f} ± {contact.peak_band:.0f} N at {contact.peak:.1f} s"
+    size = f"{contact.peak_force:.0f} ± {contact.peak_band:.0f} N at {contact.peak:.1f} s"
+    return size if contact.has_size else f"not told ({size})"
 
 
 def beginning(contact: Contact) -> str:

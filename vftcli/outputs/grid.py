@@ -163,13 +163,18 @@ def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ..
     return tuple(Column(f"J{j}", symbol=f"$J_{{{j}}}$", **shape) for j in numbers)
 
 
-def terminal(grid: Grid) -> str:
-    """A table as text, two blanks between columns, each line ended."""
+def terminal(grid: Grid, letters: Callable[[str], str] = str) -> str:
+    """A table as text, two blanks between columns, each line ended.
+
+    Args:
+        grid: It.
+        letters: Puts an entry into letters that the terminal has, before columns are made.
+    """
     # Where numbers may bear a mark, those without one keep its place.
     rooms = [" " * (grid.marked and not column.words) for column in grid.columns]
-    heads = [c.heading + room for c, room in zip(grid.columns, rooms, strict=True)]
+    heads = [letters(c.heading) + room for c, room in zip(grid.columns, rooms, strict=True)]
     table = [
-        [cell.text + (cell.mark or room) for cell, room in zip(row, rooms, strict=True)]
+        [letters(cell.text) + (cell.mark or room) for cell, room in zip(row, rooms, strict=True)]
         for row in grid.cells
     ]
     if any(heads):

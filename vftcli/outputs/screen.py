@@ -34,10 +34,11 @@ from vftcli.signals.remarks import sentence
 MOST_LINES = 40
 """Lines of a screen."""
 
-FORMS = ((None, None), (2, 20), (1, 20), *((0, rows) for rows in range(20, 2, -1)))
+FORMS = ((None, None), (3, 20), (2, 20), (1, 20), *((0, rows) for rows in range(20, 2, -1)))
 """Lines of a ground and rows of the table, None for all; then less and less, till it fits.
 
-With none, the good grounds share a line and the others have one each.
+A good ground has a line less than the others, one at least. With none, the good grounds share a
+line and the others have one each.
 """
 
 MOST_LOGS, WORST = 20, 3
@@ -68,7 +69,7 @@ def log_screen(
     tail = [*doubt_lines(analysis), *against_lines(analysis, canvas)]
     text = ""
     for each, rows in FORMS[:1] if every else FORMS[1:]:
-        believed, table = belief_lines(found, canvas, each), table_lines(analysis, rows)
+        believed, table = belief_lines(found, canvas, each), table_lines(analysis, rows, canvas)
         parts = [part for part in (head, bars, table, [*believed, *tail], list(below)) if part]
         text = "\n\n".join("\n".join(block) for block in parts) + "\n"
         if text.count("\n") <= MOST_LINES:
@@ -87,22 +88,25 @@ def list_screen(found: ContactList, canvas: Canvas, *, every: bool = False) -> s
     """A list that was made earlier: its log, the answer, the rows."""
     head = f"{printable(found.recording)} · {found.duration:.1f} s · as listed when it was written"
     lines = [canvas.painted(head, "bold"), "", f"  {answer(found)}", ""]
-    rows = list_lines(found, None if every else MOST_ROWS)
+    rows = list_lines(found, None if every else MOST_ROWS, canvas)
     end = "Whether it can be believed, and |F| over time: vftcli contacts on the log itself"
     return canvas.shown("\n".join([*lines, *rows, "", end])) + "\n"
 
 
 def answer_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
     """The answer in a sentence."""
-    return [f"  {line}" for line in canvas.wrapped(printable(headline(analysis)), 2)]
+    lines = canvas.wrapped(printable(headline(analysis)), 2)
+    return [f"  {line.strip()}" for line in lines]
 
 
 def facts(analysis: Analysis) -> str:
     """Which log, which arm and how well it fits, how long, how fast."""
     recording, match = analysis.recording, own_match(analysis)
     fit = f" (fits {percent_words(match.misfit)})" if match is not None else ""
-    rate = f" at {1.0 / recording.median_step:.3g} Hz" if recording.samples > 1 else ""
-    span = f"{recording.duration:.1f} s{rate}"
+    span = f"{recording.duration:.1f} s"
+    if recording.samples > 1:
+        rate = 1.0 / recording.median_step
+        span += f" at {rate:.0f} Hz" if rate >= 100.0 else f" at {rate:.3g} Hz"
     return " · ".join((printable(recording.name), f"{printable(analysis.robot.name)}{fit}", span))
 
 
@@ -116,23 +120,24 @@ def bar_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
     return force_bars(analysis.t, force, shown, canvas)
 
 
-def table_lines(analysis: Analysis, most: int | None) -> list[str]:
+def table_lines(analysis: Analysis, most: int | None, canvas: Canvas) -> list[str]:
     """The contacts, the hardest of them where they are many, and what can be said of the rest.
 
     Args:
         analysis: What was found.
         most: Rows that are shown at most, None for all.
+        canvas: What the terminal can show.
     """
-    return [] if analysis.contacts is None else list_lines(analysis.contacts, most)
+    return [] if analysis.contacts is None else list_lines(analysis.contacts, most, canvas)
 
 
-def list_lines(found: ContactList, most: int | None) -> list[str]:
+def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str]:
     """The rows of a list, and what can be said of the rest of its log."""
     contacts, rest = found.contacts, otherwise(found)
     if not contacts:
         return [f"  {rest}"] if rest else []
     shown = hardest_rows(contacts, len(contacts) if most is None else most)
-    lines = [f"  {line}" for line in terminal(contact_grid(shown)).splitlines()]
+    lines = [f"  {line}" for line in terminal(contact_grid(shown), canvas.shown).splitlines()]
     if len(shown) < len(contacts):
         lines.append(f"  the {len(shown)} hardest of {len(contacts)}; --details shows all")
     if rest:
@@ -151,8 +156,8 @@ def belief_lines(found: Sequence[Ground], canvas: Canvas, most: int | None) -> l
         lines.append(f"  {mark} {' · '.join(dict.fromkeys(g.subject for g in good))}")
         found = [ground for ground in found if ground not in good]
     for ground in found:
-        short = most is not None and (most == 0 or ground.standing == "good")
-        lines += ground_lines(ground, canvas, 1 if short else most)
+        less = ground.standing == "good"
+        lines += ground_lines(ground, canvas, None if most is None else max(most - less, 1))
     return lines
 
 
@@ -204,8 +209,12 @@ def against(block: Block, analysis: Analysis) -> str:
     if not means:
         return f"Against {block.reference}: no sample in common with the estimates"
     (name, least), *others = means.items()
-    floor = f" (floor {significant(mean_of(block.floor), 2)})" if block.has_floor else ""
-    text = f"Against {printable(block.reference)}{floor}: {significant(least, 2)} N·m ({name})"
+    use = trusted(block)
+    floor = f" (floor {significant(mean_of(block.floor[use]), 2)})" if block.has_floor else ""
+    left = [f"J{j}" for j, used in zip(block.joints, use, strict=True) if not used]
+    without = f" without {', '.join(left)}" if left else ""
+    text = f"Against {printable(block.reference)}{without}{floor}: "
+    text += f"{significant(least, 2)} N·m ({name})"
     if others:
         low, high = min(value for _, value in others), max(value for _, value in others)
         paper = any(remark.code in MEASURED for remark in analysis.remarks)
@@ -218,10 +227,15 @@ def against(block: Block, analysis: Analysis) -> str:
 
 def mean_errors(block: Block) -> dict[str, float]:
     """RMSE of each observer, mean of the joints whose reference is to be trusted. [N·m]"""
-    use = [j not in block.untrusted for j in block.joints]
-    rows = block.rmse[:, use] if any(use) else block.rmse
+    rows = block.rmse[:, trusted(block)]
     means = {name: mean_of(row) for name, row in zip(block.observers, rows, strict=True)}
     return {name: value for name, value in means.items() if np.isfinite(value)}
+
+
+def trusted(block: Block) -> list[bool]:
+    """The joints whose reference is to be trusted, all where none is. (n,)"""
+    use = [j not in block.untrusted for j in block.joints]
+    return use if any(use) else [True] * len(use)
 
 
 def mean_of(values: np.ndarray) -> float:
@@ -349,7 +363,8 @@ def log_table(
     columns = [Column("log", words=True)]
     columns += [Column(head, words=head == "hardest") for head in heads]
     columns += [Column("error")] * judged
-    head, *table = terminal(Grid(columns=tuple(columns), rows=tuple(rows))).splitlines()
+    grid = Grid(columns=tuple(columns), rows=tuple(rows))
+    head, *table = terminal(grid, canvas.shown).splitlines()
     room = max(len(line) for line in (head, *table)) + 2
     worst = [health(each) for _, each in found]
     states = [(g.standing, "sound" if g.standing == "good" else g.subject) for g in worst]
@@ -369,8 +384,8 @@ def log_row(analysis: Analysis, *, judged: bool) -> list[str]:
         load = any(contact.is_load for contact in found.contacts)
         count = "load" if load else str(len(found.contacts))
         hardest = hardest_words(found)
-        if found.smallest_force is not None and not load:
-            rest = f"{found.smallest_force:.0f} N"
+        if found.told_force is not None and not load:
+            rest = f"{found.told_force:.0f} N"
     row = [recording.name, f"{recording.duration:.1f} s", count, hardest, rest]
     if judged:
         means = (

@@ -9,7 +9,13 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.outputs.log import report
 from vftcli.outputs.log.estimates import extra_files, write_estimate_folder
-from vftcli.outputs.log.report import ERROR_TABLES, FILES, write_report, write_reports
+from vftcli.outputs.log.report import (
+    ERROR_TABLES,
+    FILES,
+    SUMMARY_FILES,
+    write_report,
+    write_reports,
+)
 from vftcli.outputs.seals import digests
 from vftcli.signals.errors import OutputError
 
@@ -63,6 +69,18 @@ def labelled(analysis: Analysis, label: str, as_if: Callable) -> Analysis:
     errors = analysis.errors.with_columns(recording=pl.lit(label))
     recording = replace(analysis.recording, source=source)
     return replace(as_if(analysis, recording), errors=errors)
+
+
+def test_of_several_logs_one_that_is_left_is_written_as_one_of_several(
+    touched: Analysis, tmp_path: Path
+) -> None:
+    write_reports(tmp_path, [touched], command="", failed={"bad.csv": "no log"})
+    (place,) = (p for p in tmp_path.iterdir() if p.is_dir())
+    assert {p.name for p in tmp_path.iterdir() if p.is_file()} <= set(SUMMARY_FILES)
+    (record,) = json.loads((tmp_path / "contacts.json").read_text(encoding="utf-8"))
+    assert record == json.loads((place / "contacts.json").read_text(encoding="utf-8"))
+    with pytest.raises(OutputError, match="exists"):
+        write_reports(tmp_path, [touched], command="")
 
 
 def test_several_logs_get_a_folder_each_and_an_index(

@@ -105,6 +105,15 @@ def test_pairs_name_the_better_first() -> None:
     assert json.loads(tables.pairs_text(rows, as_json=True)) == rows.to_dicts()
 
 
+def test_what_is_for_details_can_be_left_out(errors: pl.DataFrame) -> None:
+    known = errors.with_columns(
+        rmse_low_Nm=pl.lit(0.4), rmse_high_Nm=pl.lit(0.7), p_vs_best=pl.lit(1.0)
+    )
+    assert "95 % interval" in tables.to_terminal(known)
+    assert "95 % interval" not in tables.to_terminal(known, every=False)
+    assert tables.to_terminal(errors, every=False) == tables.to_terminal(errors)
+
+
 def test_no_errors_are_said() -> None:
     assert "no errors to show" in tables.to_terminal(pl.DataFrame(schema=SCHEMA))
 

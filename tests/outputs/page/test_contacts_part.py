@@ -51,6 +51,24 @@ def test_the_headline_counts(found: ContactList, count: int, words: str) -> None
     assert headline(replace(found, contacts=tuple(contacts[:count]))) == words
 
 
+def test_the_headline_is_no_force_within_its_band(found: ContactList) -> None:
+    wide, sized_one = sized(found.contacts[0], 88.0, 170.0), sized(found.contacts[1], 30.0, 14.0)
+    both = replace(found, contacts=(wide, sized_one))
+    assert headline(both) == (
+        "Something may have pushed the arm twice, hardest with 30 ± 14 N (weak)."
+    )
+    alone = replace(found, contacts=(wide,))
+    assert headline(alone) == ("Something may have pushed the arm once; how hard cannot be told.")
+    assert "is seen only where the arm feels it best" in belief_words(
+        replace(found, contacts=(sized(found.contacts[0], 1.0, 0.5),))
+    )
+    load = replace(found, contacts=(sized(found.contacts[0], 3.0, 5.0, is_load=True),))
+    assert headline(load).startswith("The arm bears a load below 8 N, or its payload")
+    assert "±14 N" in belief_words(both)
+    untrue = replace(found, contacts=(), false_on_free=2)
+    assert headline(untrue).startswith("No contact stands out from the free part")
+
+
 def test_a_load_is_called_one(found: ContactList, pushed: Analysis) -> None:
     load = sized(
         found.contacts[0], 27.4, 2.2, is_load=True, mean_force=np.array([-0.2, 0.4, -27.4])

@@ -47,6 +47,25 @@ def test_the_axis_holds_every_peak_with_its_band(pushed: Analysis) -> None:
     assert highest(replace(found, contacts=(), smallest_force=None)) == 1.0
 
 
+def test_a_band_wider_than_its_force_stretches_no_axis_and_labels_no_peak(
+    pushed: Analysis,
+) -> None:
+    found = listed(pushed)
+    first, *rest = found.contacts
+    course = first.course
+    assert course is not None
+    wide = replace(first, peak_force=88.0, peak_band=900.0)
+    wide = replace(wide, course=course._replace(band=np.full(len(course.t), 900.0)))
+    unsure = replace(found, contacts=(wide, *rest))
+    assert highest(unsure) < 250.0
+    drawn = content(pushed, unsure, WIDE)
+    assert "88 ± 900" not in drawn
+    assert drawn.count('class="peak"') == len(found.contacts)
+    (band, *_) = re.findall(r'<path d="([^"]+)" class="band"', drawn)
+    heights = [float(number) for number in re.findall(r"[\d.-]+", band)[1::2]]
+    assert min(heights) >= WIDE.top - 0.1
+
+
 def test_only_what_is_there_is_explained(pushed: Analysis, without_reference: Analysis) -> None:
     words = caption(pushed, listed(pushed))
     assert "Hatched: motion known to be free." in words

@@ -16,6 +16,12 @@ def test_the_index_links_every_report(pushed: Analysis, without_reference: Analy
     assert "RMSE in N·m" in html
 
 
+def test_a_log_that_is_left_out_is_named(pushed: Analysis) -> None:
+    html = render_index([("a", pushed)], {"<bad>.csv": "no log"})
+    assert "✗ &lt;bad&gt;.csv is left out: no log" in html
+    assert "2 logs" in html
+
+
 def test_a_line_says_how_many_how_hard_and_how_sound(pushed: Analysis) -> None:
     sound = Ground(standing="good", subject="clock", sentence="no gap")
     log, robot, span, contacts, hardest, least, error, state = index_row("a", pushed, sound)
@@ -50,6 +56,8 @@ def test_the_headline_counts_logs(pushed: Analysis) -> None:
         "Hardest in ur5_circle.csv: 91 ± 7 N at 11.3 s. "
         "1 more bears a load, or a wrong payload or model."
     )
+    title, words = headline([("b", quiet), ("b", quiet)])
+    assert (title, words) == ("Nothing pushed the arm, as far as these logs can tell.", "")
     none = replace(pushed, contacts=None)
     assert headline([("a", none)]) == ("External joint torques from 1 logs.", "")
 

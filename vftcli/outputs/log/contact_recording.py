@@ -64,10 +64,10 @@ def force_lines(analysis: Analysis) -> Lines | None:
     title = (
         "|F| on the robot as at the flange, 95 % band [N]; bars: touched; diamonds: peaks by place"
     )
-    if found.smallest_force is not None and np.isfinite(found.smallest_force):
-        least = np.full(len(size), found.smallest_force)
+    if found.told_force is not None:
+        least = np.full(len(size), found.told_force)
         lines.append(PlotLine("smallest that can be told", least, SPARE[7], 1.0))
-        title += f"; green: {found.smallest_force:.0f} N, the smallest told"
+        title += f"; green: {found.told_force:.0f} N, the smallest told"
     points = peaks(found)
     tallest = np.nanmax(np.concatenate([size, [1.0], points.values if points else []]))
     lines += span_lines(analysis.t, found, -BELOW * float(tallest))

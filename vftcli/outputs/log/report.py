@@ -36,7 +36,7 @@ CONTACTS = ("contacts.json", "contacts.csv")
 FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *CONTACTS, *ERROR_TABLES)
 """What a report of one log may hold; the error tables only where there is a reference."""
 
-SUMMARY_FILES = ("index.html", SEAL, *ERROR_TABLES)
+SUMMARY_FILES = ("index.html", SEAL, *CONTACTS, *ERROR_TABLES)
 """What stands above the sub-folders of several logs."""
 
 
@@ -47,11 +47,15 @@ def places_of(labels: Sequence[str]) -> list[str]:
 
 def report_files(labels: Sequence[str], extras: Sequence[str] = ()) -> list[str]:
     """Names of all files that a report of logs with these labels may hold, with these extras."""
-    own = [*FILES, *extra_files(extras)]
     if len(labels) == 1:
-        return own
-    below = [f"{place}/{name}" for place in places_of(labels) for name in own]
-    return [*SUMMARY_FILES, *below]
+        return [*FILES, *extra_files(extras)]
+    return files_of_several(labels, extras)
+
+
+def files_of_several(labels: Sequence[str], extras: Sequence[str] = ()) -> list[str]:
+    """Those of a report with a sub-folder a log, even where one log alone could be analysed."""
+    own = [*FILES, *extra_files(extras)]
+    return [*SUMMARY_FILES, *(f"{place}/{name}" for place in places_of(labels) for name in own)]
 
 
 def write_report(
@@ -104,16 +108,17 @@ def write_reports(
 
     labels = [a.recording.name for a in analyses]
     places = places_of(labels)
-    with OutputFolder(path, force, report_files(labels, extras)) as folder:
+    with OutputFolder(path, force, files_of_several(labels, extras)) as folder:
         records = [
             fill(folder, f"{place}/", analysis, command, extras)
             for place, analysis in zip(places, analyses, strict=True)
         ]
-        folder.write("index.html", render_index(list(zip(places, analyses, strict=True))))
+        pages = list(zip(places, analyses, strict=True))
+        folder.write("index.html", render_index(pages, failed))
         found = [a.errors for a in analyses if a.errors is not None]
         together = pl.concat(found, how="diagonal") if found else None
         put_errors(folder, "", together, analyses)
-        put_contacts(folder, "", analyses)
+        put_contacts(folder, "", analyses, several=True)
         logs = dict(zip(places, labels, strict=True))
         seal(
             folder,
@@ -139,13 +144,15 @@ def fill(
     return seal(folder, f"{place}{SEAL}", record)
 
 
-def put_contacts(folder: OutputFolder, place: str, analyses: Sequence[Analysis]) -> None:
+def put_contacts(
+    folder: OutputFolder, place: str, analyses: Sequence[Analysis], *, several: bool = False
+) -> None:
     """Write the lists of contacts, if there are any: as `vftcli contacts` prints them."""
     lists = [analysis.contacts for analysis in analyses if analysis.contacts is not None]
     if not lists:
         return
     records = [jsonable(contacts_record(found)) for found in lists]
-    shown = records[0] if len(analyses) == 1 else records
+    shown = records if several else records[0]
     text = json.dumps(shown, indent=2, ensure_ascii=False, allow_nan=False)
     folder.write(f"{place}contacts.json", f"{text}\n")
     folder.write(f"{place}contacts.csv", contacts_csv(lists))

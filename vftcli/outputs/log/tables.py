@@ -71,13 +71,22 @@ def doubts_of(errors: pl.DataFrame) -> list[str]:
     ]
 
 
-def to_terminal(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
-    """All tables of the tidy error table as text, with the meaning of their marks."""
+def to_terminal(
+    errors: pl.DataFrame, bounds: PaperBounds | None = None, *, every: bool = True
+) -> str:
+    """The tables of the tidy error table as text, with the meaning of their marks.
+
+    Args:
+        errors: It.
+        bounds: What the paper allows an error of the wrench.
+        every: Whether intervals, lags and significance are shown too.
+    """
     found = blocks(errors)
     if not found:
         return "no errors to show: the estimates and the reference have no sample in common\n"
     joints = "\n".join(terminal(rmse_grid(table)) for table in found) + marks_in_words(found)
-    below = [*detail_grids(errors), *axis_grids(errors, bounds), *contact_grids(errors)]
+    below = [*axis_grids(errors, bounds), *contact_grids(errors)]
+    below = [*(detail_grids(errors) if every else ()), *below]
     above = "".join(f"{printable(line)}\n" for line in doubts_of(errors))
     return above + "\n".join([joints, *map(terminal, below)])
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import SURE_NATS, TIGHT, Contact, ContactList
-from vftcli.outputs.contacts import direction, place_words
+from vftcli.outputs.contacts import answer, direction, place_words
 from vftcli.outputs.grid import Column, Entry, Grid, html, significant
 from vftcli.outputs.page.arm_drawing import arm_drawing
 from vftcli.outputs.page.hero import told
@@ -32,17 +32,28 @@ HEADS = ("", "When", "How hard (95 %)", "Direction, base axes", "Where", "Trust"
 def headline(found: ContactList) -> str:
     """The answer as a headline. Plain text."""
     contacts = found.contacts
+    if not contacts and found.false_on_free:
+        return answer(found)
     if not contacts:
         return "Nothing pushed the arm, as far as this log can tell."
     hardest = found.hardest
     if contacts[0].is_load and hardest is not None:
-        return f"The arm bears a load of {size(hardest)}, or its payload or its model is wrong."
+        how = f"of {size(hardest)}"
+        if not hardest.has_size:
+            how = f"below {(hardest.peak_force or 0.0) + (hardest.peak_band or 0.0):.0f} N"
+        return f"The arm bears a load {how}, or its payload or its model is wrong."
     count = len(contacts)
     often = TIMES[count - 1] if count <= len(TIMES) else str(count)
     often += "" if count < 3 else " times"
+    pushed = "Something pushed"
+    if hardest is not None and all(contact.trust == "weak" for contact in contacts):
+        pushed = "Something may have pushed"
     if hardest is None:
-        return f"Something pushed the arm {often}."
-    return f"Something pushed the arm {often}, {'hardest ' * (count > 1)}with {size(hardest)}."
+        return f"{pushed} the arm {often}."
+    if not hardest.has_size:
+        return f"{pushed} the arm {often}; how hard cannot be told."
+    weak = " (weak)" if hardest.trust == "weak" else ""
+    return f"{pushed} the arm {often}, {'hardest ' * (count > 1)}with {size(hardest)}{weak}."
 
 
 def size(contact: Contact) -> str:
@@ -96,7 +107,7 @@ def touched(numbers: list[int], count: int) -> str:
     if len(numbers) == count:
         subject = "it" if count == 1 else "they"
     elif count > FEW:
-        subject = f"the other {len(numbers)}"
+        subject = f"the other {len(numbers) if len(numbers) > 1 else 'one'}"
     else:
         subject = f"{'contact' if len(numbers) == 1 else 'contacts'} {listed(numbers)}"
     return f"where {subject} touched cannot be told, since several places fit"
@@ -111,14 +122,16 @@ def listed(numbers: Sequence[int]) -> str:
 def belief_words(found: ContactList) -> str:
     """How far times and sizes may be believed, and what would not be seen. HTML."""
     parts = []
-    bands = [c.peak_band for c in found.contacts if c.peak_band is not None and not c.is_load]
+    bands = [c.peak_band or 0.0 for c in found.contacts if c.has_size and not c.is_load]
     if bands:
         parts.append(
             f"Believe times to about ±{ONSET:g} s and sizes to about "
             f"±{float(np.median(bands)):.0f} N."
         )
     if (least := told(found)) is not None and not any(c.is_load for c in found.contacts):
-        parts.append(f"A touch below <b>{least:.0f} N</b> would not be seen.")
+        fainter = any(c.peak_force is not None and c.peak_force < least for c in found.contacts)
+        seen = "is seen only where the arm feels it best" if fainter else "would not be seen"
+        parts.append(f"A touch below <b>{least:.0f} N</b> {seen}.")
     weak = [c.number for c in found.contacts if c.trust == "weak" and not c.is_load]
     if weak and len(weak) < len(found.contacts) <= FEW:
         verb = "Contact {} is weak" if len(weak) == 1 else "Contacts {} are weak"

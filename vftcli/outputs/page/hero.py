@@ -7,6 +7,7 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.outputs.contacts import by_force
 from vftcli.outputs.page import figures
 from vftcli.outputs.page.figures import Box, Scales, Span
 from vftcli.signals.errors import VftError
@@ -54,8 +55,7 @@ def caption(analysis: Analysis, found: ContactList) -> str:
 
 def told(found: ContactList) -> float | None:
     """The smallest force that the log can tell, None where that is not known. [N]"""
-    least = found.smallest_force
-    return least if least is not None and np.isfinite(least) else None
+    return found.told_force
 
 
 def free_spans(analysis: Analysis) -> list[tuple[float, float]]:
@@ -92,7 +92,7 @@ def highest(found: ContactList) -> float:
     tops = [2.5 * (told(found) or 0.0)]
     for contact in found.contacts:
         if contact.peak_force is not None and contact.peak_band is not None:
-            tops.append(1.12 * (contact.peak_force + contact.peak_band))
+            tops.append(1.12 * (contact.peak_force + min(contact.peak_band, contact.peak_force)))
         if (course := contact.course) is not None:
             tops.append(1.05 * float((course.force + np.minimum(course.band, course.force)).max()))
     return max(*tops, 0.0) or 1.0
@@ -139,7 +139,9 @@ def course_of(scales: Scales, contact: Contact, stretches: int) -> str:
     share = float(course.t[-1] - course.t[0]) / (scales.x.high - scales.x.low)
     t, force = figures.thinned(course.t, course.force, max(round(share * stretches), FEWEST))
     half = np.interp(t, course.t, course.band)
-    band = figures.ribbon(scales, t, np.maximum(force - half, 0.0), force + half, 'class="band"')
+    # What is wider than the force may be leaves the chart.
+    above = np.minimum(force + half, scales.y.high)
+    band = figures.ribbon(scales, t, np.maximum(force - half, 0.0), above, 'class="band"')
     return band + figures.line(scales, t, force, 'class="force"')
 
 
@@ -169,12 +171,14 @@ def peaks(scales: Scales, contacts: Sequence[Contact]) -> list[str]:
     """A dot at every peak; the hardest ones' sizes beside it, as far as there is room."""
     parts: list[str] = []
     taken: list[tuple[float, float]] = []
-    hardest = sorted(contacts, key=lambda c: c.peak_force or 0.0, reverse=True)
+    hardest = sorted(contacts, key=by_force, reverse=True)
     for contact in hardest:
         if contact.peak_force is None or contact.peak_band is None or contact.is_load:
             continue
         x, y = float(scales.across(contact.peak)), float(scales.up(contact.peak_force))
         parts.append(f'<circle class="peak" cx="{x:.1f}" cy="{y:.1f}" r="3.5"/>')
+        if not contact.has_size:
+            continue
         text = f"{contact.peak_force:.0f} ± {contact.peak_band:.0f}"
         half = 0.5 * LETTER * len(text)
         middle = min(max(x, scales.box.left + half), scales.side - half)

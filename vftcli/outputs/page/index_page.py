@@ -1,12 +1,13 @@
 """The index over the reports of several logs: one line a log, the worst first."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
+from types import MappingProxyType
 from urllib.parse import quote
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.believability import Ground, grounds, health
-from vftcli.outputs.contacts import hardest_words
+from vftcli.outputs.contacts import by_force, hardest_words
 from vftcli.outputs.grid import DASH, Column, Grid, GridCell, html, significant
 from vftcli.outputs.log.rmse_tables import blocks, mean_of, rmse_grid
 from vftcli.outputs.page.shell import alarms, document, lead, section, soft, top
@@ -18,8 +19,15 @@ HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Not told below", "Mean 
 """Heads of the overview."""
 
 
-def render_index(analyses: Sequence[tuple[str, Analysis]]) -> str:
-    """The page over several reports, each told by its sub-folder, relative to the index."""
+def render_index(
+    analyses: Sequence[tuple[str, Analysis]], failed: Mapping[str, str] = MappingProxyType({})
+) -> str:
+    """The page over several reports.
+
+    Args:
+        analyses: Each told by its sub-folder, relative to the index.
+        failed: Why each of the other logs could not be analysed, by its label.
+    """
     lines = [(folder, analysis, health(grounds(analysis))) for folder, analysis in analyses]
     lines.sort(key=rank)
     overview = Grid(
@@ -37,8 +45,9 @@ def render_index(analyses: Sequence[tuple[str, Analysis]]) -> str:
     title, words = headline(analyses)
     parts = (
         alarms(found),
-        top((f"{len(analyses)} logs", ", ".join(robots)), title, lead(words)),
+        top((f"{len(analyses) + len(failed)} logs", ", ".join(robots)), title, lead(words)),
         html(overview),
+        *(soft(escape(f"✗ {name} is left out: {reason}")) for name, reason in failed.items()),
         soft("The worst first: by the health of the log, then by the hardest contact."),
         section("Errors against a reference", tables),
     )
@@ -53,10 +62,12 @@ def headline(analyses: Sequence[tuple[str, Analysis]]) -> tuple[str, str]:
     if not lists:
         return f"External joint torques from {len(analyses)} logs.", ""
     title = f"Something pushed the arm in {len(pushed)} of {len(analyses)} logs."
+    if not pushed and not loads:
+        title = "Nothing pushed the arm, as far as these logs can tell."
     hard = [found for found in pushed if found.hardest is not None]
     words = ""
     if hard:
-        most = max(hard, key=lambda found: (found.hardest and found.hardest.peak_force) or 0.0)
+        most = max(hard, key=lambda found: by_force(found.hardest) if found.hardest else ())
         words = f"Hardest in {most.recording}: {hardest_words(most)}."
     if loads:
         words += f" {loads} more bear{'s' * (loads == 1)} a load, or a wrong payload or model."
@@ -78,8 +89,8 @@ def index_row(folder: str, analysis: Analysis, ground: Ground) -> tuple[GridCell
         is_load = bool(found.contacts) and found.contacts[0].is_load
         contacts = "load" if is_load else str(len(found.contacts))
         hardest = hardest_words(found)
-        if found.smallest_force is not None:
-            least = f"{found.smallest_force:.0f} N"
+        if found.told_force is not None:
+            least = f"{found.told_force:.0f} N"
     best, errors = DASH, blocks(analysis.errors) if analysis.errors is not None else ()
     if errors:
         means = [mean_of(row) for row in errors[0].rmse]

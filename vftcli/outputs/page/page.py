@@ -3,7 +3,7 @@
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.believability import grounds
+from vftcli.outputs.believability import grounds, load_doubt
 from vftcli.outputs.log.run_record import run_record
 from vftcli.outputs.page import comparisons, contacts_part, sections
 from vftcli.outputs.page.believability_part import believability_section
@@ -60,9 +60,10 @@ def answer_part(analysis: Analysis, torques: Chart) -> str:
         words = [f"What touched the arm is not told: {sentence(r)}." for r in reasons]
         first = top(eyebrow(analysis), headline(analysis), lead(*words))
         return first + torque_section(torques, opened=True)
+    doubt = lead(load_doubt(analysis))
     return "".join(
         (
-            top(eyebrow(analysis), headline(analysis), contacts_part.lead(found)),
+            top(eyebrow(analysis), headline(analysis), doubt + contacts_part.lead(found)),
             hero(analysis, found),
             contacts_part.contact_table(analysis, found),
         )
