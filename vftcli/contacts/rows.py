@@ -176,10 +176,7 @@ class Measurer:
         band = NORMAL * float(np.sqrt(u @ covariance[:3, :3] @ u))
         anywhere = site.sizes(size, band)
         told = named == "wrist" and lead >= SURE_NATS
-        remarks: tuple[Remark, ...] = ()
-        if not told and NORMAL * site.spread(size) > WIDE * size:
-            # Where another part may have been touched, another force touched it.
-            remarks = (caution("size-goes-with-place", least_N=anywhere[0], most_N=anywhere[1]),)
+        remarks = () if told else site.limits(size, anywhere)
         sd = np.sqrt(np.diag(covariance))
         J = site.jacobian[peak]
         torque_sd = np.sqrt(np.einsum("in,ij,jn->n", J, covariance, J))
@@ -270,6 +267,12 @@ class Site(NamedTuple):
         likely = np.exp(-0.5 * np.array([fit.score - self.fits[0].score for fit in self.fits]))
         apart = np.array([fit.size for fit in self.fits]) - size
         return float(np.sqrt(likely @ apart**2 / likely.sum()))
+
+    def limits(self, size: float, anywhere: tuple[float, float]) -> tuple[Remark, ...]:
+        """Where another part may have been touched, another force touched it: a remark if so."""
+        if NORMAL * self.spread(size) <= WIDE * size:
+            return ()
+        return (caution("size-goes-with-place", least_N=anywhere[0], most_N=anywhere[1]),)
 
     def sizes(self, size: float, band: float) -> tuple[float, float]:
         """Smallest and largest |F| over the places that fit, bands included. [N]"""

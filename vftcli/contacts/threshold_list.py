@@ -144,7 +144,7 @@ def peak_row(
     force = flange_forces(flange_jacobian(chain, recording.q[inside]), torque[inside], sd[inside])[
         0
     ][:, :3]
-    parts = site.parts
+    parts, anywhere = site.parts, site.sizes(size, band)
     quiet = float(np.sum((tau / spread) ** 2))
     return Contact(
         number=0,
@@ -157,7 +157,7 @@ def peak_row(
         wrench_sd=np.sqrt(np.diag(covariance)),
         mean_force=force.mean(axis=0),
         impulse=np.asarray(np.trapezoid(force, t[inside], axis=0)),
-        anywhere=site.sizes(size, band),
+        anywhere=anywhere,
         where=parts[0] if len(parts) == 1 else "cannot tell",
         lead=None,
         places=site.links(n),
@@ -168,6 +168,7 @@ def peak_row(
         vendor_force=vendor_force(run, J[0], peak, t),
         sensor_force=sensor_force(run, float(t[peak])),
         course=course_at(run, inside, best, torque, sd),
+        remarks=site.limits(size, anywhere),
     )
 
 
