@@ -77,7 +77,7 @@ def test_the_log_must_settle_its_robot_or_be_told() -> None:
     assert told.robot.name == "ur5"
     assert "robot-guessed" in [remark.code for remark in told.robot.remarks]
     measured = ReadChoice(signals=frozenset({"dq", "current"}))
-    with pytest.raises(RobotError, match="choose one with --robot: ur5, ur5e, ur10e"):
+    with pytest.raises(RobotError, match="choose one with --robot: ur3, ur5, ur10, ur3e, ur5e"):
         analyse_log(FIXTURE, AnalysisChoice(read=measured))
 
 
@@ -151,7 +151,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
     alignments: int,
 ) -> None:
     """In a command; the same --free F --zero F read F 3 times, modelled it 4 times."""
-    counted = {"read": 0, "dynamics_terms": 0, "align": 0}
+    counted = {"read_chosen": 0, "dynamics_terms": 0, "align": 0}
 
     def count(module: object, name: str) -> None:
         whole = getattr(module, name)
@@ -162,7 +162,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
 
         monkeypatch.setattr(module, name, wrapped)
 
-    count(readers, "read")
+    count(readers, "read_chosen")
     count(free_run, "dynamics_terms")
     count(alignment, "align")
     names = {"LOAD": runs[0], "FREE": runs[1], "MORE": runs[2], "OUT": tmp_path / "out"}
@@ -172,7 +172,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
         app, [str(names.get(word, word)) for word in [*line.split(), "--robot", "ur5"]]
     )
     assert done.exit_code == 0, done.output
-    assert counted == {"read": reads, "dynamics_terms": models, "align": alignments}
+    assert counted == {"read_chosen": reads, "dynamics_terms": models, "align": alignments}
 
 
 def test_the_order_of_two_free_runs_on_one_clock_does_not_matter(runs: list[Path]) -> None:

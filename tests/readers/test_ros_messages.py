@@ -8,6 +8,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from vftcli.readers.bags.layout import fields_of, short
 from vftcli.readers.bags.ros_messages import (
+    DEFINITIONS,
     FRANKA,
     ROS,
     in_parts,
@@ -29,14 +30,14 @@ def header(time, frame):
     return STORE.types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
 
 
-@pytest.mark.parametrize("kind", sorted(ROS))
+@pytest.mark.parametrize("kind", sorted(kind for kind in ROS if long_name(kind) in STORE.fielddefs))
 def test_the_types_of_ros_are_those_of_rosbags(kind):
     assert own_types()[kind] == fields_of(STORE.fielddefs[long_name(kind)][1])
 
 
-@pytest.mark.parametrize("kind", sorted(FRANKA))
-def test_the_fields_of_frankas_types_are_those_that_rosbags_parses(kind):
-    parsed = get_types_from_msg(FRANKA[kind], long_name(kind))[long_name(kind)][1]
+@pytest.mark.parametrize("kind", sorted({*FRANKA, "foxglove_msgs/Log"}))
+def test_the_fields_of_other_types_are_those_that_rosbags_parses(kind):
+    parsed = get_types_from_msg(DEFINITIONS[kind], long_name(kind))[long_name(kind)][1]
     assert own_types()[kind] == fields_of(parsed)
 
 

@@ -88,7 +88,7 @@ def test_a_joint_of_the_arm_may_be_locked(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("toml", "words"),
     [
-        ("lock = {finger = 1}", r"line 1: lock: no joint 'finger'\. Did you mean .* There is jo"),
+        ("lock = {finger = 1}", r"line 1: lock: no joint 'finger'\. There is jo"),
         ("lock = {finger_joint1 = true}", "finger_joint1 is True; it must be a finite number"),
         ("lock = {finger_joint1 = 1e9}", "finger_joint1 is 1e.09; on a robot|must be a finite"),
         ("lock = 3", r"lock must be a section \[lock\]"),
