@@ -84,7 +84,7 @@ def test_a_peak_lies_in_its_band(name: str, bar: float) -> None:
         ("ur5-circle", slice(3, 6), 0.65),
         ("ur5-table1", slice(3, 6), 0.85),
         ("taps", slice(3, 6), 0.85),
-        short("panda-bearing", slice(3), 0.88, "f_z .83: a push of 13 s is told in pieces"),
+        ("panda-bearing", slice(3), 0.88),
         ("ur5-sensor", slice(3), 0.80),
     ],
 )
