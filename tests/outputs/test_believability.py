@@ -22,6 +22,7 @@ from vftcli.outputs.believability import (
     percent_words,
     resting,
 )
+from vftcli.outputs.screen import facts
 from vftcli.robots import load_robot
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.external_torque import ExternalTorque
@@ -55,6 +56,15 @@ def test_an_arm_that_does_not_fit_is_a_caution(without_reference: Analysis) -> N
     assert "30.0 %" in ground.sentence
     assert ground.remedy is not None
     assert ground.remedy.startswith("vftcli inspect")
+
+
+def test_an_arm_that_leaves_most_of_the_torque_is_bad(without_reference: Analysis) -> None:
+    """As a turned sign of the current does, which leaves twice of what gravity needs."""
+    made = examined(without_reference, misfit=1.66)
+    (ground,) = of(made, "robot, gravity")
+    assert ground.standing == "bad"
+    assert "(does not fit: 166.0 % unexplained)" in facts(made)
+    assert "(fits 0.1 %)" in facts(examined(without_reference))
 
 
 def test_without_a_match_the_arm_is_not_checked(without_reference: Analysis) -> None:

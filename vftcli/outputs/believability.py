@@ -142,6 +142,11 @@ def grounds_record(found: Iterable[Ground]) -> list[dict[str, Any]]:
     ]
 
 
+MOST_UNEXPLAINED = 0.5
+"""Share of a log's torques beyond which what the model leaves is no contact's: the arm, a sign or
+the effort is another."""
+
+
 def robot_ground(analysis: Analysis) -> Ground:
     """How well the arm's model explains the log."""
     subject, name = "robot, gravity", analysis.robot.name
@@ -156,7 +161,7 @@ def robot_ground(analysis: Analysis) -> Ground:
     percent = percent_words(own.misfit)
     if not own.fits:
         return Ground(
-            standing="caution",
+            standing="bad" if own.misfit > MOST_UNEXPLAINED else "caution",
             subject=subject,
             sentence=f"{name} leaves {percent} of {own.evidence} unexplained{load}",
             remedy=command("inspect", analysis.recording, "--robot", name),

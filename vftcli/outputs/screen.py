@@ -102,7 +102,10 @@ def answer_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
 def facts(analysis: Analysis) -> str:
     """Which log, which arm and how well it fits, how long, how fast."""
     recording, match = analysis.recording, own_match(analysis)
-    fit = f" (fits {percent_words(match.misfit)})" if match is not None else ""
+    fit = ""
+    if match is not None:
+        left = percent_words(match.misfit)
+        fit = f" (fits {left})" if match.fits else f" (does not fit: {left} unexplained)"
     span = f"{recording.duration:.1f} s"
     if recording.samples > 1:
         rate = 1.0 / recording.median_step
