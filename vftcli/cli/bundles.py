@@ -124,9 +124,12 @@ def taken_apart(command: Callable[..., None]) -> Callable[..., None]:
     own = inspect.signature(command).parameters.values()
 
     def called(**values: Any) -> None:  # noqa: ANN401
+        from vftcli.cli.config import taken
         from vftcli.outputs.files import protected
 
-        with protected(inputs_of(values)), loudness(values):
+        kept = taken().path
+        inputs = [*inputs_of(values), *([kept] if kept is not None else [])]
+        with protected(inputs), loudness(values):
             command(**{p.name: put_together(p.name, p.annotation, values) for p in own})
 
     flat = [single for p in own for single in parameters(p.name, p.annotation, p.default)]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from vftcli.cli.config import effective
 from vftcli.cli.progress import STAGES
 from vftcli.signals.errors import VftError
 from vftcli.signals.letters import printable, printable_lines
@@ -55,8 +56,8 @@ PARTS = frozenset({"episode-taken", "episode-taken-first", "arm-side-taken"})
 
 
 def command_line() -> str:
-    """The command as the user typed it, for `run.json` and the report."""
-    return printable(shlex.join(["vftcli", *sys.argv[1:]]))
+    """The command for `run.json` and the report: as typed, with what a file of options gave it."""
+    return printable(shlex.join(["vftcli", *effective(sys.argv[1:])]))
 
 
 def say(text: str) -> None:

@@ -16,6 +16,7 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from vftcli.cli.bundles import SELDOM
 from vftcli.cli.commands import COMMANDS
+from vftcli.cli.config import config_option, is_configured, tell
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import did_you_mean, nearest
 
@@ -41,18 +42,22 @@ class GroupedCommand(TyperCommand):
     """A command whose `--help` shows the options wanted most, in groups, and `--help-all` all."""
 
     def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - typer carries its own click
-        """The command's parameters, and `--help-all`."""
-        return [*super().get_params(ctx), help_all()]
+        """The command's parameters, `--config` if it reads a log, and `--help-all`."""
+        config = [config_option()] if is_configured(self) else []
+        return [*super().get_params(ctx), *config, help_all()]
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """Parse the words; of an option that there is not, name the nearest if it is near."""
         try:
-            return super().parse_args(ctx, args)
+            rest = super().parse_args(ctx, args)
         except Exception as error:
             if found := getattr(error, "possibilities", None):
                 near = nearest(getattr(error, "option_name", ""), found)
                 vars(error)["possibilities"] = [near] if near else None
             raise
+        if is_configured(self):
+            tell(ctx)
+        return rest
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
         """Write the short help."""
@@ -157,7 +162,7 @@ def is_seldom(param: Any) -> bool:  # noqa: ANN401
 
 def group_of(param: Any) -> str:  # noqa: ANN401
     """The heading under which an option stands."""
-    if param.name in {"help", "help_all"}:
+    if param.name in {"help", "help_all", "config"}:
         return OUTPUT
     if param.param_type_name == "argument":
         return LOG

@@ -1,0 +1,261 @@
+"""Options kept in a TOML file: ``--config FILE``, or `vftcli.toml` in the working folder.
+
+Its values are handed to typer as defaults, so that they are read and checked as if they were typed,
+and typed ones go before them. What was taken is said, and stands in the command line of `run.json`.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from contextvars import ContextVar
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import typer
+from typer.core import TyperOption
+
+from vftcli.cli.commands import COMMANDS
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.letters import printable
+from vftcli.signals.parsing import did_you_mean, interval, shown, toml_tables
+
+NAME = "vftcli.toml"
+"""The file that is read unasked where it is in the working folder."""
+
+NONE = "none"
+"""Value of ``--config`` with which no file is read."""
+
+TYPED = frozenset({"config", "force", "help", "help-all"})
+"""Options that are only ever typed: what asks before it overwrites shall ask each time."""
+
+OTHERWISE = {
+    "identify": {"free"},  # the motion without the load that is sought
+    "thresholds": {"reference", "reference-columns"},  # of --check alone
+    "convert": {"derive"},  # it writes what was logged
+}
+"""Command → options that it takes otherwise than the rest: only its own table gives them."""
+
+LARGEST = 1 << 20
+"""Bytes that such a file has at most."""
+
+FILE = "file:"
+"""What a reference's file begins with."""
+
+
+class Taken(NamedTuple):
+    """What a command took from a file.
+
+    Attributes:
+        path: The file, None where none was read.
+        words: The options as they would be typed.
+    """
+
+    path: Path | None = None
+    words: tuple[str, ...] = ()
+
+
+NOTHING = Taken()
+"""What a command took that read no file."""
+
+_taken: ContextVar[Taken] = ContextVar("taken", default=NOTHING)
+
+
+def taken() -> Taken:
+    """What this command took from a file."""
+    return _taken.get()
+
+
+def effective(words: list[str]) -> list[str]:
+    """The words of a command line that does the same without a file of options."""
+    if not taken().words:
+        return words
+    # What stands behind -- are logs.
+    end = words.index("--") if "--" in words else len(words)
+    return [*words[:end], *taken().words, "--config", NONE, *words[end:]]
+
+
+def config_option() -> TyperOption:
+    """The option that names the file."""
+    return TyperOption(
+        param_decls=["--config"],
+        metavar="FILE",
+        is_eager=True,
+        expose_value=False,
+        callback=take,
+        help=f"Options in TOML; unasked {NAME} here; none: neither. See vftcli help config.",
+        type=str,
+    )
+
+
+def is_configured(command: Any) -> bool:  # noqa: ANN401 - typer carries its own click
+    """Whether a command takes options from a file: those that read a log, but what writes it."""
+    return command.name != "init" and any("--columns" in param.opts for param in command.params)
+
+
+def take(ctx: Any, _param: Any, named: str | None) -> None:  # noqa: ANN401
+    """Make what the file holds the defaults of a command.
+
+    Raises:
+        ParameterError: If it cannot be read, or holds an option or a value that there is not.
+    """
+    _taken.set(NOTHING)
+    unasked = Path(NAME)
+    if ctx.resilient_parsing or named == NONE or (named is None and not unasked.is_file()):
+        return
+    path = unasked if named is None else Path(named)
+    options = options_of(ctx.command)
+    kept = {
+        options[key].name: value_of(ctx, options[key], key, value, path)
+        for key, value in keys_for(ctx.command, path).items()
+        if key in options
+    }
+    ctx.default_map = {name: value for name, value in kept.items() if value is not None}
+    _taken.set(Taken(path))
+
+
+def tell(ctx: Any) -> None:  # noqa: ANN401
+    """Say what a command, its words parsed, took from the file and not from what was typed."""
+    path = taken().path
+    if path is None:
+        return
+    words = []
+    for param in ctx.command.params:
+        source = ctx.get_parameter_source(param.name)
+        if source is not None and source.name == "DEFAULT_MAP":
+            value, name = ctx.default_map[param.name], f"--{key_of(param)}"
+            if value is True:
+                words.append(name)
+            else:
+                each = value if isinstance(value, list) else [value]
+                words += [word for one in each for word in (name, one)]
+    _taken.set(Taken(path, tuple(words)))
+    said = " ".join(words) or "nothing that this command takes and is not typed"
+    typer.echo(printable(f"note: {path} gives {said} (--config none: without it)"), err=True)
+
+
+def keys_for(command: Any, path: Path) -> dict[str, Any]:  # noqa: ANN401
+    """What a file holds for a command: what stands on top, then what is in the command's table.
+
+    Raises:
+        ParameterError: If it cannot be read, or holds what is no option of a command.
+    """
+    top, known = tables_of(path), known_options()
+    every = dict.fromkeys(key for options in known.values() for key in options)
+    tables = {
+        key: top.pop(key)
+        for key, value in list(top.items())
+        if isinstance(value, dict) and (key in known or key not in every)
+    }
+    for name, table in tables.items():
+        if name not in known:
+            near = did_you_mean(name, known)
+            raise ParameterError(
+                f"{path}: [{name}] is no command that reads a log; there is {', '.join(known)}."
+                f"{near}"
+            )
+        check_keys(path, f"of {name}", table, known[name])
+    check_keys(path, "of a command that reads a log", top, every)
+    others = OTHERWISE.get(command.name, set())
+    own: dict[str, Any] = tables.get(command.name, {})
+    return {key: value for key, value in top.items() if key not in others} | own
+
+
+def check_keys(
+    path: Path, whose: str, table: Mapping[str, Any], there: Mapping[str, object]
+) -> None:
+    """Check that every key of a table is an option.
+
+    Raises:
+        ParameterError: If one is not, with the nearest that is.
+    """
+    for key in table:
+        if key in TYPED:
+            raise ParameterError(f"{path}: {key} is not kept in a file; type --{key}")
+        if key not in there:
+            near = did_you_mean(key, there) or " A key is an option without its dashes, as robot."
+            raise ParameterError(f"{path}: {shown(key)} is no option {whose}.{near}")
+
+
+def tables_of(path: Path) -> dict[str, Any]:
+    """What a file holds.
+
+    Raises:
+        ParameterError: If it cannot be read.
+    """
+    if not (path.is_file() or path.is_fifo()):
+        raise ParameterError(f"--config {path}: no such file; vftcli init LOG writes one")
+    with path.open("rb") as file:
+        content = file.read(LARGEST + 1)
+    if len(content) > LARGEST:
+        raise ParameterError(f"--config {path}: too large for a file of options")
+    try:
+        return toml_tables(content.decode("utf-8-sig"))
+    except (ParameterError, UnicodeDecodeError) as error:
+        raise ParameterError(f"--config {path}: {error}") from None
+
+
+def known_options() -> dict[str, dict[str, Any]]:
+    """The options that may be kept, by key, of each command that takes them from a file."""
+    # All are loaded: a key that this command does not have may be another's.
+    group = typer.main.get_command(import_module("vftcli.cli").make_app())
+    commands: Mapping[str, Any] = vars(group)["commands"]
+    return {name: options_of(commands[name]) for name in COMMANDS if is_configured(commands[name])}
+
+
+def options_of(command: Any) -> dict[str, Any]:  # noqa: ANN401
+    """Key → option of a command."""
+    options = (p for p in command.params if p.param_type_name == "option")
+    return {key: p for p in options if (key := key_of(p)) not in TYPED}
+
+
+def key_of(option: Any) -> str:  # noqa: ANN401
+    """An option's name as it is typed, without its dashes."""
+    return str(max(option.opts, key=len)).lstrip("-")
+
+
+def value_of(ctx: Any, option: Any, key: str, value: object, path: Path) -> Any:  # noqa: ANN401
+    """A value as typer takes it for an option: words, or True of one that is given or not.
+
+    Returns:
+        None of an option that the file says is not given.
+
+    Raises:
+        ParameterError: If it is not a value of the option.
+    """
+    if option.is_flag:
+        if not isinstance(value, bool):
+            raise ParameterError(f"{path}: {key} = {shown(value)} is neither true nor false")
+        return value or None
+    words = list(words_in(value))
+    if not words or (len(words) > 1 and not option.multiple):
+        several = "a text, a number or a list of them" if option.multiple else "a text or a number"
+        raise ParameterError(f"{path}: {key} = {shown(value)} is not {several}")
+    words = [beside(path.parent, word, option) for word in words]
+    made = words if option.multiple else words[0]
+    try:
+        option.type_cast_value(ctx, made)
+    except typer.BadParameter as error:
+        raise ParameterError(f"{path}: {key} = {shown(value)}: {error.message}") from None
+    return made
+
+
+def words_in(value: object) -> Iterator[str]:
+    """The words that a value of TOML would be typed as; none where it is of another kind."""
+    for word in value if isinstance(value, list) else [value]:
+        if isinstance(word, bool) or not isinstance(word, str | int | float):
+            return
+        yield str(word)
+
+
+def beside(folder: Path, word: str, option: Any) -> str:  # noqa: ANN401
+    """A word, from the file's folder on where it is the name of a file or folder."""
+    prefix = FILE if word.startswith(FILE) else ""
+    name = word.removeprefix(FILE)
+    with suppress(ParameterError):
+        interval(name)
+        return word
+    takes_file = any(kind in str(option.metavar) for kind in ("FILE", "LOG", "REF"))
+    # A word without an ending is a name of ours, as of a robot, unless a log is called so.
+    is_file = Path(name).suffix or len(Path(name).parts) > 1
+    is_file = is_file or ("LOG" in str(option.metavar) and (folder / name).exists())
+    return f"{prefix}{folder / name}" if takes_file and (prefix or is_file) else word
