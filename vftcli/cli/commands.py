@@ -53,6 +53,11 @@ COMMANDS = {
         "Examine a log: format, signals, clock, and what looks wrong.",
         PREPARE,
     ),
+    "init": ListedCommand(
+        "init:write_config",
+        "Write vftcli.toml: the options that a log calls for.",
+        PREPARE,
+    ),
     "identify": ListedCommand(
         "identify:identify_robot",
         "Make a robot file from logs: friction, inertias, payload.",

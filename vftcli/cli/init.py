@@ -1,0 +1,77 @@
+"""`vftcli init`: the options that a log calls for, written down once."""
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vftcli.cli import options as opt
+from vftcli.cli.bundles import taken_apart
+from vftcli.cli.config import NAME
+from vftcli.cli.help import WRITE
+from vftcli.cli.log_options import ReadOptions, RobotOptions
+
+
+@taken_apart
+def write_config(
+    logs: opt.Logs,
+    reading: ReadOptions,
+    robot: RobotOptions,
+    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="The file of options.", rich_help_panel=WRITE
+        ),
+    ] = Path(NAME),
+    json: opt.Json = False,
+    force: opt.Force = False,
+) -> None:
+    """Write vftcli.toml: the options that a log calls for.
+
+    Robot, columns, effort, reference, each with its reason; further LOGs are taken as free motion
+    where nothing touches the arm. Commands in that folder then need none of these options.
+
+    Example: vftcli init fixtures/ur5_circle.csv -o vftcli.toml
+    """
+    from vftcli.cli.console import health_of, say, say_json
+    from vftcli.outputs.files import check_file, write_text
+    from vftcli.pipeline import AnalysisChoice
+    from vftcli.proposal import config_text, propose
+    from vftcli.readers.library import Library
+
+    check_file(output, force)
+    words = {**reading.words(), **robot.words()}
+    given = {name.replace("_", "-"): value for name, value in words.items() if value is not None}
+    library = Library(logs)
+    choice = AnalysisChoice(
+        read=reading.choice(),
+        robot=robot.choice(),
+        library=library,
+        examiner=health_of(library, anyway=False),
+    )
+    proposed = [
+        option._replace(value=from_folder(output.parent, option.key, option.value))
+        for option in propose(logs, choice, given)
+    ]
+    write_text(output, config_text(proposed), force)
+    taken = {option.key: option.value for option in proposed if option.key and option.taken}
+    for option in proposed:
+        if not option.key:
+            say(f"note: {option.why}")
+    if json:
+        say_json({"output": str(output), "options": taken, "notes": [o.why for o in proposed]})
+    said = ", ".join(taken) or "nothing that is settled"
+    say(f"wrote {output}: {said}. Commands run beside it take them.")
+    if "robot" not in taken:
+        say("which arm it is stands open: name it with --robot, or in the file")
+
+
+def from_folder(folder: Path, key: str, value: str | list[str]) -> str | list[str]:
+    """A value with files named from a folder on."""
+    if isinstance(value, list):
+        return [str(from_folder(folder, key, word)) for word in value]
+    if key not in {"robot", "free"} or not Path(value).exists():
+        return value
+    return Path(os.path.relpath(value, folder)).as_posix()

@@ -1,0 +1,220 @@
+"""Proposal: the options that a log calls for, each with its reason; `vftcli init` writes them."""
+
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from vftcli.doctor.examination import examine
+from vftcli.doctor.examiner import CORRECTIONS
+from vftcli.doctor.findings import in_words
+from vftcli.doctor.fit import guess_robot
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.observers.choice import ObserverChoice
+from vftcli.pipeline import AnalysisChoice, analyse, list_touches, prepared, read
+from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.free_run import Models
+from vftcli.robots.drive import effort_name
+from vftcli.robots.robot import Robot
+from vftcli.robots.writing import lines_of
+from vftcli.signals.errors import MissingSignalError, RobotError, VftError
+from vftcli.signals.letters import printable
+from vftcli.signals.recording import Recording
+
+MOST_ROBOTS = 5
+"""Profiles that are named where none is settled."""
+
+REFERENCES = {
+    "sensor": "the log holds a wrench that was measured",
+    "two-cycle": "the motion is known without contact too, and the difference of the two is taken",
+    "vendor": "the log holds an external torque of its controller: an estimate as well",
+}
+"""What estimates can be compared with, the most telling first, and what for."""
+
+
+class ProposedOption(NamedTuple):
+    """One option for a file of options, or a remark alone.
+
+    Attributes:
+        why: Its reason.
+        key: The option without its dashes; "" of a remark.
+        value: Its value: a text or several.
+        taken: Whether it holds, or is only there to be taken.
+    """
+
+    why: str
+    key: str = ""
+    value: str | list[str] = ""
+    taken: bool = True
+
+
+def propose(
+    logs: Sequence[Path], choice: AnalysisChoice, given: Mapping[str, str | list[str]]
+) -> Iterator[ProposedOption]:
+    """The options that logs call for.
+
+    Args:
+        logs: The log; further ones are offered as free motion where nothing touches the arm.
+        choice: How they are read, and which arm it is, as far as the user says.
+        given: What the user says, by key.
+
+    Raises:
+        VftError: If the first log cannot be read, or a robot that is named is none.
+    """
+    yield from (ProposedOption("as given", key, value) for key, value in given.items())
+    recording = choice.library.open(logs[0], choice.read)
+    for option in read_so(recording):
+        if option.key not in given:
+            yield option
+    try:
+        robot = choice.examiner.robot(recording, choice.robot)
+    except RobotError as error:
+        if choice.robot.name is not None:
+            raise
+        yield from possible_robots(recording, error)
+        return
+    if "robot" not in given:
+        fits = [remark.values["fit"] for remark in robot.remarks if remark.code == "robot-guessed"]
+        yield ProposedOption(f"by {fits[0]}" if fits else "the log names it", "robot", robot.name)
+    if "effort" not in given:
+        effort = effort_of(recording, robot, choice)
+        yield effort
+        if effort.taken:
+            choice = replace(choice, read=replace(choice.read, effort=str(effort.value)))
+    yield from of_known_arm(logs, choice)
+
+
+def of_known_arm(logs: Sequence[Path], choice: AnalysisChoice) -> Iterator[ProposedOption]:
+    """The free motion and the references that logs of a known arm call for."""
+    recording, robot = prepared(choice.library.open(logs[0], choice.read), choice)
+    refused = examine(recording, robot).refusals()
+    if refused:
+        yield from (ProposedOption(f"MEANINGLESS unless mended: {in_words(f)}") for f in refused)
+        return
+    models = Models()
+    free = []
+    for log in logs[1:]:
+        option = free_log(log, choice, models)
+        yield option
+        free += [log] if option.taken else []
+    if free:
+        yield ProposedOption("nothing touches the arm in them", "free", [str(log) for log in free])
+    choice = replace(choice, free=FreeChoice(logs=tuple(free)))
+    yield from free_part(recording, robot, choice, models)
+    yield from references(recording, robot, choice, models)
+
+
+def read_so(recording: Recording) -> Iterator[ProposedOption]:
+    """How a log was read."""
+    source = recording.source
+    yield ProposedOption(
+        f"{source.label} is recognised by its content; a file that is not needs this",
+        "format",
+        source.format,
+        taken=False,
+    )
+    for remark in source.remarks:
+        if remark.code == "columns-by-value":
+            yield ProposedOption(remark.values["why"], "columns", remark.values["columns"])
+    if "dq" in source.derived:
+        yield ProposedOption("the log has no velocities", "derive", "dq")
+    if recording.payload_mass:
+        told = f"the controller was told of {recording.payload_mass:.3g} kg"
+        yield ProposedOption(told, "payload", "log", taken=False)
+
+
+def possible_robots(recording: Recording, error: RobotError) -> Iterator[ProposedOption]:
+    """The arms that a log may be from, where it does not settle which."""
+    fits = guess_robot(recording)[1][:MOST_ROBOTS]
+    if not fits:
+        yield ProposedOption(str(error))
+    else:
+        yield ProposedOption(
+            "the log does not settle which arm it is: take one, then run init again with --robot. "
+            "What each leaves unexplained:"
+        )
+    for fit in fits:
+        yield ProposedOption(str(fit), "robot", fit.robot, taken=False)
+
+
+def effort_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> ProposedOption:
+    """What the effort of a log is, by its robot's model."""
+    as_called = choice.examiner.taken(recording, robot, replace(choice.read, effort=None))
+    for finding in examine(as_called, robot).findings:
+        if (right := CORRECTIONS.get(finding.code)) is not None:
+            # A sign or a unit has no name of its own.
+            named = right.kind.replace("_", "-") if right.factor == 1.0 else "auto"
+            return ProposedOption(in_words(finding).evidence, "effort", named)
+    called = effort_name(recording, robot).replace("_", "-")
+    told = "as the log calls it; the robot's model explains no other reading clearly better"
+    return ProposedOption(told, "effort", called, taken=False)
+
+
+def free_log(log: Path, choice: AnalysisChoice, models: Models) -> ProposedOption:
+    """Whether nothing touches the arm along a further log, as a remark that holds or not."""
+    label = choice.library.label(log)
+    try:
+        recording, robot = prepared(choice.library.open(log, choice.read.whole), choice)
+        contacts = list_touches(recording, robot, choice, models).contacts
+    except VftError as error:
+        return ProposedOption(f"{label} is left out: {error}", taken=False)
+    count = len(contacts.contacts) if contacts is not None else 0
+    if count:
+        return ProposedOption(f"{label} is not free: {count} contacts", taken=False)
+    return ProposedOption(f"{label}: no contact in {recording.duration:.3g} s")
+
+
+def free_part(
+    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Models
+) -> Iterator[ProposedOption]:
+    """What nobody touched of the log itself; each log's own is found unasked."""
+    try:
+        found = read(recording, robot, choice, models).part.remarks
+    except VftError as error:
+        yield ProposedOption(f"no free part: {error}")
+        return
+    for remark in found:
+        yield ProposedOption(f"{remark}; each log's own is found unasked")
+
+
+def references(
+    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Models
+) -> Iterator[ProposedOption]:
+    """What estimates can be compared with: each is tried, and the first that does is taken."""
+    plain = replace(choice, observers=ObserverChoice(names=("gmo",)), contacts=False)
+    taken = False
+    for name, why in REFERENCES.items():
+        try:
+            analyse(recording, robot, replace(plain, reference=ReferenceChoice(name=name)), models)
+        except MissingSignalError:
+            continue
+        except VftError as error:
+            yield ProposedOption(f"no reference {name}: {error}")
+        else:
+            yield ProposedOption(why, "reference", name, taken=not taken)
+            taken = True
+
+
+HEADING = """\
+# Options of every command that reads a log, as they are typed, without their dashes. What is typed
+# goes before them; --config none leaves them out. Files are named from this file's folder on.
+# Tables as [compare] hold what is for one command. More: vftcli help config
+"""
+"""Begins a file of options."""
+
+WIDTH = 98
+"""Letters of a reason's line."""
+
+
+def config_text(options: Iterable[ProposedOption]) -> str:
+    """A file of options, each under its reason, those to be taken behind a ``#``."""
+    parts = [HEADING]
+    for option in options:
+        why = printable(" ".join(option.why.split()))
+        part = "".join(f"# {line}\n" for line in textwrap.wrap(why, WIDTH))
+        if option.key:
+            line = "".join(lines_of({option.key: option.value}))
+            part += line if option.taken else f"# {line}"
+        parts.append(part)
+    return "\n".join(parts)
