@@ -33,6 +33,7 @@ ORDER = (
     "analysis",
     "outputs",
     "pipeline",
+    "proposal",
     "notebook",
     "benchmark",
     "cli",

@@ -23,11 +23,12 @@ READING = {
     "thresholds": (),
     "convert": ("-o", "log.parquet"),
     "contacts": (),
+    "init": (),
 }
 """Command that reads a log → what else it has to be given."""
 
 OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
-       ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
+       ("init", "--output"), ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, what is written where, and --csv, which
 the contract makes a file of `estimate` and a table of the others."""
@@ -64,6 +65,7 @@ BAD = {
     "--torque-sd": ("some", "--torque-sd"),
     "--derive": ("tau", "--derive 'tau'"),
     "--reference": ("magic", "no reference 'magic'"),
+    "--config": ("nowhere.toml", "--config nowhere.toml: no such file"),
 }
 """Shared option → a value it does not take, and what the one line on it says."""
 

@@ -1,5 +1,6 @@
 """A path that no reader knows is told what it is, and the nearest thing to do."""
 
+import shlex
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,15 @@ from vftcli.signals.errors import UnknownFormatError
         (b"<!DOCTYPE html>\n<html>\n", "XML"),
         (b"PK\x03\x04" + bytes(50), "a zip archive; unpack it"),
         (b'schema = 1\nname = "arm"\n', "a TOML file; a robot file goes to --robot"),
+        (b'robot = "ur5"\nfree = ["free.csv"]\n', "a TOML file; .* options to --config"),
+        (b"<svg xmlns='http://www.w3.org/2000/svg'></svg>", "a page or document in XML"),
+        (b"header: \n  seq: 0\n  stamp: \n", "a text in YAML; .* -p and --csv"),
+        (b"\\documentclass{article}\n\\begin{document}\n", "a LaTeX text"),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\n", "git lfs pull"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(50), "save the sheet as CSV"),
+        (b"PK\x03\x04" + bytes(50) + b"xl/workbook.xml", "an Excel workbook; save the sheet"),
+        (b"PK\x03\x04" + bytes(50) + b"word/document.xml", "a Word document"),
+        (b"RIFF\x24\0\0\0WAVEfmt ", "a sound"),
         ("t,q1\n0,1\n".encode("utf-16"), "UTF-16"),
         (
             b"# A title\nSome words.\n\nAnd more of them.\n",
@@ -38,10 +48,22 @@ def test_a_folder_of_logs_says_how_to_run_all(tmp_path: Path) -> None:
         read(tmp_path)
     for name in ("a.csv", "b.csv", "c.npy", "readme.md"):
         (tmp_path / name).write_text("t,q1\n", "utf-8")
-    with pytest.raises(UnknownFormatError, match=r"3 files that may be logs .*FOLDER/\*\.csv") as e:
+    with pytest.raises(
+        UnknownFormatError, match=r"3 files that may be logs .*/\*\.csv -o OUT\)"
+    ) as e:
         read(tmp_path)
     assert "\n" not in str(e.value)
+    assert f"for f in {shlex.quote(str(tmp_path))}/*.csv; do vftcli" in str(e.value)
     for path in tmp_path.iterdir():
         path.rename(path.with_suffix(".md"))
     with pytest.raises(UnknownFormatError, match="a folder without a log"):
         read(tmp_path)
+
+
+def test_a_table_is_not_taken_for_a_document(tmp_path: Path) -> None:
+    """Names that begin as other files do: MZ of a moment, ID3 of a motor, a unit behind a colon."""
+    rows = "".join(f"{k / 100},{k},{k},{k}\n" for k in range(30))
+    for first in ("MZ", "BM", "%!PS"):
+        path = tmp_path / "log.csv"
+        path.write_text(f"{first},q_1,q_2,q_3\n{rows}", "utf-8")
+        assert read(path, columns=f"t={first},q=q_{{i}}").joints == 3

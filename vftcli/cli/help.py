@@ -41,10 +41,14 @@ TOPICS = Path(__file__).parent / "topics.toml"
 class GroupedCommand(TyperCommand):
     """A command whose `--help` shows the options wanted most, in groups, and `--help-all` all."""
 
+    def __init__(self, *words: Any, **more: Any) -> None:  # noqa: ANN401 - typer's own
+        super().__init__(*words, **more)
+        if is_configured(self):
+            self.params.append(config_option())
+
     def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - typer carries its own click
-        """The command's parameters, `--config` if it reads a log, and `--help-all`."""
-        config = [config_option()] if is_configured(self) else []
-        return [*super().get_params(ctx), *config, help_all()]
+        """The command's parameters, and `--help-all`."""
+        return [*super().get_params(ctx), help_all()]
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """Parse the words; of an option that there is not, name the nearest if it is near."""

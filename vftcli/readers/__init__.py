@@ -27,7 +27,7 @@ from vftcli.readers.cleaning import RestartError, cleaned
 from vftcli.readers.opening import Digest
 from vftcli.readers.parts import refuse_arm
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
-from vftcli.readers.unrecognised import description
+from vftcli.readers.unrecognised import description, known_kind
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 from vftcli.signals.parsing import did_you_mean
 from vftcli.signals.recording import Recording
@@ -186,7 +186,8 @@ def _recognise(file: LogFile) -> Reader:
     """The one reader that knows the content; a general one only where no other does."""
     # A general reader would take nearly any text, also that of a vendor: it is asked last.
     found = [r for r in READERS.values() if not r.general and r.recognises(file)]
-    found = found or [r for r in READERS.values() if r.general and r.recognises(file)]
+    if not found and known_kind(file) is None:
+        found = [r for r in READERS.values() if r.general and r.recognises(file)]
     if len(found) == 1:
         return found[0]
     if not found:

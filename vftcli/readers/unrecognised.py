@@ -1,7 +1,9 @@
 """What a path is that no reader knows, and the nearest thing to do: the words of a refusal."""
 
 import re
+import shlex
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers.opening import HEAD_BYTES
@@ -34,54 +36,81 @@ KINDS = tuple(
         (rb"\x89PNG|\xff\xd8\xff|GIF8|BM....\0\0\0\0", "a picture; give the log it was drawn from"),
         (rb"....ftyp|\x1aE\xdf\xa3|RIFF....AVI", "a video; give the log that was recorded with it"),
         (rb"%PDF", "a PDF; give the log it tells of"),
+        (rb"RIFF....WAVE|ID3|OggS|fLaC", "a sound; give the log that was recorded with it"),
         (rb"RRF2|RRIO", "a Rerun recording, which vftcli writes and does not read; give the log"),
-        (rb"\x7fELF|MZ", "a program; give the log that it wrote"),
+        (rb"\x7fELF|MZ[^\r\n]{0,60}\0", "a program; give the log that it wrote"),
         (
             rb"\s*(<\?xml[^>]*>\s*)?(<!--.*?-->\s*)*<(robot|mujoco|sdf)\b",
             "a robot's description, no log; give it with --robot, beside a log",
         ),
-        (rb"\s*<(!DOCTYPE|html|\?xml)", "a page or document in XML; give the log it tells of"),
+        (rb"\s*<(!DOCTYPE|html|svg|\?xml)", "a page or document in XML; give the log it tells of"),
         (rb"ULog\x01\x12\x35", "a PX4 ULog of a drone, which has no arm to estimate torques of"),
         (rb"PK\x03\x04", "a zip archive; unpack it and give the log inside"),
         (rb"(7z\xbc\xaf|Rar!|BZh|\xfd7zXZ)", "an archive; unpack it and give the log inside"),
         (rb".{257}ustar", "a tar archive; unpack it and give the log inside"),
         (rb"\xff\xfe|\xfe\xff", "a text in UTF-16; save it as UTF-8 (plain CSV)"),
-        (rb"schema\s*=|\[\[?[a-z_.]+\]\]?\s*\n", "a TOML file; a robot file goes to --robot"),
+        (
+            rb"(#[^\n]*\n|\s)*(\[\[?[\w.-]+\]\]?\s*\n|[\w-]+\s*=\s*\"|schema\s*=)",
+            "a TOML file; a robot file goes to --robot, one of options to --config",
+        ),
+        (
+            rb"(#[^\n]*\n|---\s)*[A-Za-z_]\w*:( [^\n,;\t]*)?\r?\n(\s*-?\s*[A-Za-z_]\w*:|- )",
+            "a text in YAML; what rostopic or ros2 topic echo printed is read with their options "
+            "-p and --csv, a recorded bag as it is",
+        ),
+        (
+            rb"\s*(%[^\n]*\n\s*)*\\(documentclass|documentstyle|begin|input|section)\b",
+            "a LaTeX text; give the log that its numbers are from",
+        ),
+        (rb"version https://git-lfs", "a pointer of Git LFS; fetch the file itself: git lfs pull"),
+        (rb"\xd0\xcf\x11\xe0", "an old Office document; save the sheet as CSV and give that"),
     )
 )
 """Kinds of files that users give by mistake, by their first bytes."""
 
 
-WORKBOOK = "an Excel workbook; save the sheet as CSV and give that"
+OFFICE = {
+    b"xl/workbook": "an Excel workbook; save the sheet as CSV and give that",
+    b"word/document": "a Word document; give the log it tells of",
+    b"META-INF/manifest": "an OpenDocument; save the sheet as CSV and give that",
+}
+"""File inside a zip archive → what the archive is."""
 
 
 def description(file: LogFile) -> str:
     """What a path is and what to do, behind its name."""
     if file.is_folder:
-        return of_folder(file.entries)
+        return of_folder(file.path, file.entries)
+    return known_kind(file) or (of_text(file) if file.lines else of_bytes(file.head))
+
+
+def known_kind(file: LogFile) -> str | None:
+    """What a file is that begins as no log does, and what to do; None of any other."""
     # The end of a zip archive names what it holds.
-    if file.head.startswith(b"PK\x03\x04") and b"xl/workbook" in bytes(file.content[-HEAD_BYTES:]):
-        return WORKBOOK
-    told = next((kind.told for kind in KINDS if kind.begins.match(file.head)), None)
-    if told is None:
-        told = of_text(file) if file.lines else of_bytes(file.head)
-    return told
+    if file.head.startswith(b"PK\x03\x04"):
+        end = bytes(file.content[-HEAD_BYTES:])
+        for name, told in OFFICE.items():
+            if name in end:
+                return told
+    return next((kind.told for kind in KINDS if kind.begins.match(file.head)), None)
 
 
-def of_folder(entries: Sequence[str]) -> str:
+def of_folder(path: Path, entries: Sequence[str]) -> str:
     """A folder that is no bag and no data set."""
     if not entries:
         return "an empty folder; give a log, or the folder of a bag"
-    logs = [name for name in entries if name.lower().endswith(LOGS)]
+    ours = (".truth.parquet", "estimates.parquet")
+    logs = [n for n in entries if n.lower().endswith(LOGS) and not n.lower().endswith(ours)]
     if not logs:
         shown = listed(entries)
         return f"a folder without a log ({shown}); give a log, or the folder of a bag"
     ending = most_common([name[name.rindex(".") :] for name in logs])
     count = f"{len(logs)} files that may be logs" if len(logs) > 1 else "a file that may be a log"
+    every = f"{shlex.quote(printable(str(path)))}/*{ending}"
     return (
         f"a folder of {count} ({listed(logs)}), no bag and no data set; give them by name, all at "
-        f"once where the command takes several (FOLDER/*{ending}), or one by one: "
-        f"for f in FOLDER/*{ending}; do vftcli inspect $f; done"
+        f"once where the command takes several (vftcli report {every} -o OUT), or one by one: "
+        f"for f in {every}; do vftcli inspect $f; done"
     )
 
 

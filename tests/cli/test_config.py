@@ -1,0 +1,162 @@
+"""Options kept in a file do what the same options typed do, are said, and are checked alike."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from vftcli.cli import config
+
+FIXTURES = Path(__file__).parent.parent.parent / "fixtures"
+LOG = FIXTURES / "ur5_circle.csv"
+KEPT = """
+robot = "ur5"
+observer = ["fdo", "gmo"]
+interval = "0:4"
+reference = "file:truth.csv"
+[compare]
+reference = "zero"
+contacts = false
+"""
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def keep(folder: Path, text: str, name: str = config.NAME) -> Path:
+    (folder / name).write_text(text, "utf-8")
+    return folder / name
+
+
+def test_kept_options_give_the_numbers_of_typed_ones(run, here: Path) -> None:
+    typed = ("--robot", "ur5", "--observer", "fdo", "--observer", "gmo", "--interval", "0:4")
+    _, expected, _ = run("compare", LOG, *typed, "--reference", "zero", "--json")
+    keep(here, KEPT)
+    code, out, err = run("compare", LOG, "--json", "--quiet")
+    assert (code, out) == (0, expected)
+    # Said even where little else is: a file nobody thinks of changes the results.
+    assert err.splitlines()[0].startswith("note: vftcli.toml gives ")
+    for option in ("--robot ur5", "--observer fdo --observer gmo", "--reference zero"):
+        assert option in err
+
+
+def test_what_is_typed_goes_before_what_is_kept(run, here: Path) -> None:
+    keep(here, KEPT)
+    _, out, err = run("compare", LOG, "--observer", "gmo", "--json")
+    assert {row["observer"] for row in json.loads(out)} == {"gmo"}
+    assert "--observer" not in err
+    code, _, err = run("compare", LOG, "--config", "none")
+    assert (code, "note: " in err) == (2, False)
+    assert "Missing option '--reference'" in err
+
+
+def test_a_named_file_is_read_in_place_of_the_folder_s(run, here: Path) -> None:
+    keep(here, "no TOML")
+    keep(here, 'robot = "ur5"', "other.toml")
+    code, _, err = run("inspect", LOG, "--config", "other.toml")
+    assert (code, err) == (0, "note: other.toml gives --robot ur5 (--config none: without it)\n")
+
+
+def test_the_command_line_of_run_json_needs_no_file(run, here: Path) -> None:
+    keep(here, 'robot = "ur5"\nobserver = ["gmo"]\nno-contacts = true\nwrench = false\n')
+    assert run("estimate", LOG, "-o", "out")[0] == 0
+    command = json.loads((here / "out/run.json").read_text("utf-8"))["command"]
+    kept = "--observer gmo --robot ur5 --no-contacts --config none"
+    assert sorted(command.split()) == sorted(f"vftcli estimate {LOG} -o out {kept}".split())
+    (here / config.NAME).unlink()
+    assert run(*command.split()[1:], "-o", "again")[0] == 0
+    files = [here / folder / "estimates.parquet" for folder in ("out", "again")]
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_logs_behind_two_dashes_stay_behind_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken = config.Taken(Path("a"), ("--robot", "ur5"))
+    monkeypatch.setattr(config, "taken", lambda: taken)
+    words = ["report", "--", "-log.csv"]
+    kept = ["--robot", "ur5", "--config", "none"]
+    assert config.effective(words) == ["report", *kept, "--", "-log.csv"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('robt = "ur5"', "'robt' is no option of a command that reads a log. Did you mean robot?"),
+        ("dance = 1", "A key is an option without its dashes, as robot."),
+        ('[compare]\nrobt = "ur5"', "'robt' is no option of compare. Did you mean robot?"),
+        ("[compre]\nwrench = true", "[compre] is no command that reads a log; there is contacts"),
+        ("force = true", "force is not kept in a file; type --force"),
+        ("robot = ", "not valid TOML"),
+        ("robot = true", "robot = True is not a text or a number"),
+        ('robot = ["ur5", "ur3"]', "is not a text or a number"),
+        ("robot = {name = 'ur5'}", "is not a text or a number"),
+        ("free = [[1, 2]]", "is not a text, a number or a list of them"),
+        ("free = []", "is not a text, a number or a list of them"),
+        ('wrench = "yes"', "wrench = 'yes' is neither true nor false"),
+        ('period = "long"', "period = 'long': 'long' is not a valid float"),
+        ('alignment = "odd"', "no alignment 'odd'"),
+        ('robot = "mine.toml"', f"{Path('sub/mine.toml')}: no such robot file"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said_in_one_line(
+    run, here: Path, text: str, said: str
+) -> None:
+    (here / "sub").mkdir()
+    file = keep(here / "sub", text, "kept.toml").relative_to(here)
+    code, out, err = run("report", LOG, "-o", "out", "--config", file)
+    errors = [line for line in err.splitlines() if line.startswith("error: ")]
+    assert (code, out, len(errors)) == (1, "", 1)
+    assert said in errors[0]
+    assert not (here / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["nowhere.toml", ".", os.devnull, str(LOG)])
+def test_what_is_no_such_file_is_refused(run, here: Path, name: str) -> None:
+    code, _, err = run("inspect", LOG, "--config", name)
+    assert (code, err.count("\n")) == (1, 1)
+    assert f"--config {name}: " in err
+
+
+def test_a_file_with_bytes_that_are_no_letters_is_refused(run, here: Path) -> None:
+    (here / config.NAME).write_bytes(b"robot = '\xff'")
+    code, _, err = run("inspect", LOG)
+    assert (code, err.count("\n")) == (1, 1)
+    # Help needs no such file.
+    assert run("inspect", "--help")[0] == 0
+    assert run("robots")[0] == 0
+
+
+def test_files_are_named_from_the_folder_of_the_file(run, here: Path) -> None:
+    (here / "sub").mkdir()
+    (here / "sub/free.csv").write_bytes(LOG.read_bytes())
+    keep(here / "sub", 'robot = "ur5"\nfree = ["free.csv", "0.3:4"]\n')
+    code, _, err = run("contacts", LOG, "--config", Path("sub") / config.NAME)
+    assert f"--free {Path('sub/free.csv')} --free 0.3:4" in err
+    assert (code, "free.csv is the log itself" in err) == (1, True)
+
+
+def test_an_option_that_a_command_takes_otherwise_is_its_own_table_s(run, here: Path) -> None:
+    """`identify --free` is the motion without a load; `thresholds --reference` is of --check."""
+    keep(here, 'robot = "ur5"\nreference = "two-cycle"\n')
+    code, _, err = run("thresholds", LOG, "--interval", "0:4", "--json")
+    assert (code, "two-cycle" in err) == (0, False)
+    keep(here, 'robot = "ur5"\n[thresholds]\nreference = "two-cycle"\n')
+    assert "--check" in run("thresholds", LOG)[2]
+
+
+def test_the_file_is_an_input_that_nothing_writes_over(run, here: Path) -> None:
+    kept = keep(here, 'robot = "ur5"\n')
+    code, _, err = run("tune", LOG, "-o", kept, "--force")
+    assert (code, kept.read_text("utf-8")) == (1, 'robot = "ur5"\n')
+    assert "what this command reads" in err
+
+
+def test_every_option_kept_otherwise_exists() -> None:
+    known = config.known_options()
+    assert "init" not in known
+    for command, keys in config.OTHERWISE.items():
+        assert keys <= set(known[command])
