@@ -14,6 +14,7 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, list_touches, prepared, read
 from vftcli.repetition.choice import FreeChoice
+from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import Models
 from vftcli.robots.drive import effort_name
 from vftcli.robots.robot import Robot
@@ -161,7 +162,8 @@ def free_log(log: Path, choice: AnalysisChoice, models: Models) -> ProposedOptio
         return ProposedOption(f"{label} is left out: {error}", taken=False)
     count = len(contacts.contacts) if contacts is not None else 0
     if count:
-        return ProposedOption(f"{label} is not free: {count} contacts", taken=False)
+        told = f"{label}: {count} contacts by this robot's model; take it if nobody touched the arm"
+        return ProposedOption(told, "free", [str(log)], taken=False)
     return ProposedOption(f"{label}: no contact in {recording.duration:.3g} s")
 
 
@@ -184,16 +186,36 @@ def references(
     """What estimates can be compared with: each is tried, and the first that does is taken."""
     plain = replace(choice, observers=ObserverChoice(names=("gmo",)), contacts=False)
     taken = False
-    for name, why in REFERENCES.items():
+    for name, why in reasons(recording).items():
+        asked = replace(plain, reference=ReferenceChoice(name=name))
         try:
-            analyse(recording, robot, replace(plain, reference=ReferenceChoice(name=name)), models)
+            motion = analyse(recording, robot, asked, models).motion
+            doubt = "" if name != "two-cycle" else doubt_of(motion)
         except MissingSignalError:
             continue
         except VftError as error:
             yield ProposedOption(f"no reference {name}: {error}")
         else:
-            yield ProposedOption(why, "reference", name, taken=not taken)
-            taken = True
+            yield ProposedOption(doubt or why, "reference", name, taken=not (taken or doubt))
+            taken = taken or not doubt
+
+
+def reasons(recording: Recording) -> dict[str, str]:
+    """Each reference and what speaks for it, the most telling first."""
+    frame, others = recording.wrench_frame, dict(REFERENCES)
+    if frame is None or frame.axes != "base":
+        return others
+    # A sensor measures in axes of its own; what stands in base axes is its controller's.
+    del others["sensor"]
+    told = "the log holds a wrench of its controller: an estimate as well where no sensor is"
+    return {"two-cycle": others.pop("two-cycle"), "sensor": told, **others}
+
+
+def doubt_of(motion: FreeMotion) -> str:
+    """Why a difference of cycles may tell nothing, "" where it does."""
+    if motion.choice.is_given or motion.cycles.whole > 1:
+        return ""
+    return "the log holds one whole cycle, which has to be free of contact: say so with free-cycles"
 
 
 HEADING = """\

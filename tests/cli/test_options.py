@@ -28,7 +28,8 @@ READING = {
 """Command that reads a log → what else it has to be given."""
 
 OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
-       ("init", "--output"), ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
+       ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
+       ("init", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, what is written where, and --csv, which
 the contract makes a file of `estimate` and a table of the others."""

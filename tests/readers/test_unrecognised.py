@@ -61,8 +61,8 @@ def test_a_folder_of_logs_says_how_to_run_all(tmp_path: Path) -> None:
 
 
 def test_a_table_is_not_taken_for_a_document(tmp_path: Path) -> None:
-    """Names that begin as other files do: MZ of a moment, ID3 of a motor, a unit behind a colon."""
-    rows = "".join(f"{k / 100},{k},{k},{k}\n" for k in range(30))
+    """Columns called as other files begin: MZ of a moment."""
+    rows = "".join(f"{k / 100},.{k},.{k},.{k}\n" for k in range(30))
     for first in ("MZ", "BM", "%!PS"):
         path = tmp_path / "log.csv"
         path.write_text(f"{first},q_1,q_2,q_3\n{rows}", "utf-8")

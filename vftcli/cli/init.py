@@ -62,8 +62,8 @@ def write_config(
             say(f"note: {option.why}")
     if json:
         say_json({"output": str(output), "options": taken, "notes": [o.why for o in proposed]})
-    said = ", ".join(taken) or "nothing that is settled"
-    say(f"wrote {output}: {said}. Commands run beside it take them.")
+    how = "unasked by commands run beside it" if output.name == NAME else f"with --config {output}"
+    say(f"wrote {output}: {', '.join(taken) or 'nothing that is settled'}; read {how}")
     if "robot" not in taken:
         say("which arm it is stands open: name it with --robot, or in the file")
 

@@ -1,0 +1,110 @@
+"""What `vftcli init` writes runs: commands beside it give the numbers of the options typed."""
+
+import json
+import shutil
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from vftcli.cli.config import NAME
+from vftcli.cli.init import from_folder
+
+FIXTURES = Path(__file__).parent.parent.parent / "fixtures"
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def options(folder: Path) -> dict[str, object]:
+    return tomllib.loads((folder / NAME).read_text("utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("log", "given", "expected"),
+    [
+        ("ur5_circle.csv", (), {"robot": "ur5", "reference": "two-cycle"}),
+        ("ur5_sensor.parquet", (), {"robot": "ur5", "reference": "sensor"}),
+        ("panda_bag", ("--robot", "panda"), {"robot": "panda", "reference": "sensor"}),
+    ],
+)
+def test_what_is_written_gives_the_numbers_of_typed_options(
+    run, here: Path, log: str, given: tuple[str, ...], expected: dict[str, str]
+) -> None:
+    code, _, err = run("init", FIXTURES / log, *given)
+    assert (code, options(here)) == (0, expected)
+    assert f"wrote {NAME}: robot, reference; read unasked" in err
+    asked = ("compare", FIXTURES / log, "--observer", "gmo", "--json")
+    code, kept, _ = run(*asked)
+    typed = [word for key, value in expected.items() for word in (f"--{key}", value)]
+    assert (code, kept) == (0, run(*asked, *typed, "--config", "none")[1])
+    assert json.loads(kept)
+
+
+def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> None:
+    """The load's own log, the same motion without the load, and a pose that hands push."""
+    for name in ("load_14harm.csv", "free_14harm.csv", "push_pose.csv"):
+        shutil.copy(logs / "ur10e" / name, here)
+    named = ("load_14harm.csv", "free_14harm.csv", "push_pose.csv")
+    code, out, err = run("init", *named, "--robot", "ur10e", "--json")
+    assert code == 0
+    found = {
+        "robot": "ur10e",
+        "columns": "t,q:6,dq:6,current:6,target_current:6,target_torque:6",
+        "free": ["free_14harm.csv"],
+        "reference": "two-cycle",
+    }
+    assert options(here) == found == json.loads(out)["options"]
+    assert '# free = ["push_pose.csv"]' in (here / NAME).read_text("utf-8")
+    asked = ("load_14harm.csv", "--observer", "gmo", "--no-contacts")
+    assert run("report", *asked, "-o", "kept")[0] == 0
+    typed = ["--robot", "ur10e", "--columns", found["columns"], "--free", "free_14harm.csv"]
+    (here / NAME).unlink()
+    assert run("report", *asked, "-o", "typed", *typed, "--reference", "two-cycle")[0] == 0
+    for file in ("errors.csv", "estimates.parquet"):
+        assert (here / "kept" / file).read_bytes() == (here / "typed" / file).read_bytes()
+    assert "note: vftcli.toml" not in err
+
+
+def test_an_effort_that_is_not_what_it_is_called_is_written(run, here: Path, samples: Path) -> None:
+    log = samples / "reach" / "ros2_ur_effort_torque"
+    assert run("init", log, "--robot", "ur5")[0] == 0
+    assert options(here) == {"robot": "ur5", "effort": "torque-without-gravity"}
+    assert run("compare", log, "--reference", "zero", "--interval", "0.5:3.9")[0] == 0
+
+
+def test_what_is_not_settled_is_there_to_be_taken(run, here: Path, logs: Path) -> None:
+    code, _, err = run("init", logs / "libfranka_sim" / "pushes.csv.gz")
+    assert (code, options(here)) == (0, {})
+    assert "which arm it is stands open" in err
+    assert '# robot = "panda"\n' in (here / NAME).read_text("utf-8")
+
+
+def test_a_file_that_is_there_is_not_written_over(run, here: Path) -> None:
+    (here / NAME).write_text("robot = 'ur3'\n", "utf-8")
+    code, _, err = run("init", FIXTURES / "panda_bag")
+    assert (code, err.count("\n")) == (1, 1)
+    assert "--force" in err
+    assert options(here) == {"robot": "ur3"}
+    assert run("init", FIXTURES / "panda_bag", "--force", "-q")[0] == 0
+    assert options(here)["robot"] == "panda"
+
+
+def test_what_cannot_be_read_leaves_no_file(run, here: Path) -> None:
+    for words in (("nowhere.csv",), (FIXTURES / "panda_bag", "--robot", "ur9")):
+        code, _, err = run("init", *words)
+        assert (code, err.count("error: ")) == (1, 1)
+        assert not (here / NAME).exists()
+
+
+def test_files_are_named_from_the_folder_of_the_file(here: Path) -> None:
+    (here / "sub").mkdir()
+    (here / "arm.toml").touch()
+    assert from_folder(here / "sub", "robot", "arm.toml") == "../arm.toml"
+    assert from_folder(Path(), "free", ["arm.toml", "0:4"]) == ["arm.toml", "0:4"]
+    assert from_folder(here / "sub", "columns", "arm.toml") == "arm.toml"
+    assert from_folder(here / "sub", "robot", "ur5") == "ur5"
