@@ -27,7 +27,7 @@ def options(folder: Path) -> dict[str, object]:
 @pytest.mark.parametrize(
     ("log", "given", "expected"),
     [
-        ("ur5_circle.csv", (), {"robot": "ur5", "reference": "two-cycle"}),
+        ("ur5_circle.csv", ("--robot", "ur5"), {"robot": "ur5", "reference": "two-cycle"}),
         ("ur5_sensor.parquet", (), {"robot": "ur5", "reference": "sensor"}),
         ("panda_bag", ("--robot", "panda"), {"robot": "panda", "reference": "sensor"}),
     ],

@@ -65,6 +65,11 @@ def taken() -> Taken:
     return _taken.get()
 
 
+def forget() -> None:
+    """Begin a command: nothing is taken yet."""
+    _taken.set(NOTHING)
+
+
 def effective(words: list[str]) -> list[str]:
     """The words of a command line that does the same without a file of options."""
     if not taken().words:
@@ -98,7 +103,6 @@ def take(ctx: Any, _param: Any, named: str | None) -> None:  # noqa: ANN401
     Raises:
         ParameterError: If it cannot be read, or holds an option or a value that there is not.
     """
-    _taken.set(NOTHING)
     unasked = Path(NAME)
     if ctx.resilient_parsing or named == NONE or (named is None and not unasked.is_file()):
         return

@@ -16,7 +16,7 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from vftcli.cli.bundles import SELDOM
 from vftcli.cli.commands import COMMANDS
-from vftcli.cli.config import config_option, is_configured, tell
+from vftcli.cli.config import config_option, forget, is_configured, tell
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import did_you_mean, nearest
 
@@ -52,6 +52,7 @@ class GroupedCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """Parse the words; of an option that there is not, name the nearest if it is near."""
+        forget()
         try:
             rest = super().parse_args(ctx, args)
         except Exception as error:
