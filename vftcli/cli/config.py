@@ -4,6 +4,7 @@ Its values are handed to typer as defaults, so that they are read and checked as
 and typed ones go before them. What was taken is said, and stands in the command line of `run.json`.
 """
 
+import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from contextvars import ContextVar
@@ -133,7 +134,7 @@ def tell(ctx: Any) -> None:  # noqa: ANN401
                 each = value if isinstance(value, list) else [value]
                 words += [word for one in each for word in (name, one)]
     _taken.set(Taken(path, tuple(words)))
-    said = " ".join(words) or "nothing that this command takes and is not typed"
+    said = shlex.join(words) or "nothing that this command takes and is not typed"
     typer.echo(printable(f"note: {path} gives {said} (--config none: without it)"), err=True)
 
 
