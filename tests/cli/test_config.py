@@ -75,6 +75,15 @@ def test_the_command_line_of_run_json_needs_no_file(run, here: Path) -> None:
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
+def test_kept_columns_are_not_those_of_estimates(run, here: Path) -> None:
+    keep(here, 'robot = "ur5"\ncolumns = "-t,q:6"\nobserver = ["gmo"]\nno-contacts = true\n')
+    code, _, err = run("estimate", LOG, "-o", "out")
+    assert (code, "--columns=-t,q:6" in err) == (1, True)
+    assert run("estimate", LOG, "-o", "out", "--config", "none", "--robot", "ur5")[0] == 0
+    code, _, err = run("contacts", here / "out/estimates.parquet")
+    assert (code, "--columns" in err) == (0, False)
+
+
 def test_logs_behind_two_dashes_stay_behind_them(monkeypatch: pytest.MonkeyPatch) -> None:
     taken = config.Taken(Path("a"), ("--robot", "ur5"))
     monkeypatch.setattr(config, "taken", lambda: taken)
@@ -136,9 +145,13 @@ def test_files_are_named_from_the_folder_of_the_file(run, here: Path) -> None:
     (here / "sub").mkdir()
     (here / "sub/free.csv").write_bytes(LOG.read_bytes())
     keep(here / "sub", 'robot = "ur5"\nfree = ["free.csv", "0.3:4"]\n')
-    code, _, err = run("contacts", LOG, "--config", Path("sub") / config.NAME)
+    kept = ("--config", Path("sub") / config.NAME)
+    code, _, err = run("contacts", LOG, *kept)
     assert f"--free {Path('sub/free.csv')} --free 0.3:4" in err
     assert (code, "free.csv is the log itself" in err) == (1, True)
+    # A log is no free run of itself.
+    code, _, err = run("contacts", Path("sub/free.csv"), *kept)
+    assert (code, "gives --robot ur5 --free 0.3:4 (" in err) == (0, True)
 
 
 def test_an_option_that_a_command_takes_otherwise_is_its_own_table_s(run, here: Path) -> None:

@@ -97,7 +97,7 @@ def test_help_lists_topics_and_explains_commands(run: Run) -> None:
     ("words", "said"),
     [
         (("help", "colums"), "Did you mean columns?"),
-        (("help", "weather"), "there is columns, reference, wrench, gains, contacts, frames, config."),
+        (("help", "weather"), "there is columns, reference, wrench, gains, contacts, frames,"),
         (("reprot",), "No such command 'reprot'. Did you mean report?"),
         (("dance",), "No such command 'dance'."),
         (("report", "--freee", "x"), "No such option: --freee (Possible options: --free)"),

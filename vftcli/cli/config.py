@@ -5,7 +5,7 @@ and typed ones go before them. What was taken is said, and stands in the command
 """
 
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from contextvars import ContextVar
 from importlib import import_module
@@ -118,24 +118,53 @@ def take(ctx: Any, _param: Any, named: str | None) -> None:  # noqa: ANN401
     _taken.set(Taken(path))
 
 
-def tell(ctx: Any) -> None:  # noqa: ANN401
-    """Say what a command, its words parsed, took from the file and not from what was typed."""
+def settle(ctx: Any) -> None:  # noqa: ANN401
+    """Say what a command, its words parsed, takes from the file and not from what was typed.
+
+    What cannot be meant for its logs is left away.
+    """
     path = taken().path
     if path is None:
         return
+    arguments = [p for p in ctx.command.params if p.param_type_name == "argument"]
+    given = [ctx.params[argument.name] for argument in arguments]
+    each_log = (log for one in given for log in (one if isinstance(one, tuple) else (one,)))
+    logs = [Path(log) for log in each_log if log is not None]
     words = []
     for param in ctx.command.params:
         source = ctx.get_parameter_source(param.name)
-        if source is not None and source.name == "DEFAULT_MAP":
-            value, name = ctx.default_map[param.name], f"--{key_of(param)}"
-            if value is True:
-                words.append(name)
-            else:
-                each = value if isinstance(value, list) else [value]
-                words += [word for one in each for word in (name, one)]
+        if source is None or source.name != "DEFAULT_MAP":
+            continue
+        key, kept = key_of(param), ctx.default_map[param.name]
+        if (value := fitting(key, kept, logs)) != kept:
+            ctx.params[param.name] = value
+        each = value if isinstance(value, list) else [value]
+        words += [word for one in each if one is not None for word in as_typed(key, one)]
     _taken.set(Taken(path, tuple(words)))
     said = shlex.join(words) or "nothing that this command takes and is not typed"
     typer.echo(printable(f"note: {path} gives {said} (--config none: without it)"), err=True)
+
+
+def fitting(key: str, value: Any, logs: Sequence[Path]) -> Any:  # noqa: ANN401
+    """A kept value for these logs, None where it is not for them.
+
+    Columns are a log's, not those of estimates made from it; a log is no free run of itself.
+    """
+    if key == "columns":
+        from vftcli.readers.estimates import stored_observers
+
+        return None if any(map(stored_observers, logs)) else value
+    if key == "free" and len(logs) == 1:
+        own = logs[0].resolve()
+        return [word for word in value if Path(word).resolve() != own] or None
+    return value
+
+
+def as_typed(key: str, value: str | bool) -> tuple[str, ...]:
+    """The words of an option; a value that begins as an option does stands behind ``=``."""
+    if isinstance(value, bool):
+        return (f"--{key}",)
+    return (f"--{key}={value}",) if value.startswith("-") else (f"--{key}", value)
 
 
 def keys_for(command: Any, path: Path) -> dict[str, Any]:  # noqa: ANN401

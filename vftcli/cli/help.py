@@ -16,7 +16,7 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from vftcli.cli.bundles import SELDOM
 from vftcli.cli.commands import COMMANDS
-from vftcli.cli.config import config_option, forget, is_configured, tell
+from vftcli.cli.config import config_option, forget, is_configured, settle
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import did_you_mean, nearest
 
@@ -61,7 +61,7 @@ class GroupedCommand(TyperCommand):
                 vars(error)["possibilities"] = [near] if near else None
             raise
         if is_configured(self):
-            tell(ctx)
+            settle(ctx)
         return rest
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
