@@ -168,8 +168,8 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[Co
         )
     if robot.chain.transmission is not None:
         raise IdentificationError(
-            f"robot {robot.name!r} has joints driven through each other (transmission), and whether "
-            "its targets are joints' or motors' no log says; use --method friction, base or auto"
+            f"robot {robot.name!r} has joints driven through each other (transmission), and no log "
+            "says whether targets are joints' or motors'; use --method friction, base or auto"
         )
     logs = [read_targets(recording, robot) for recording in recordings]
     for log in logs:
