@@ -372,6 +372,11 @@ def checked(table: Table, picks: Picks) -> Picks:
             "(a reference goes to --reference file:PATH)."
         )
     for pick in picks.signals:
+        if len(set(pick.cells)) < len(pick.cells):
+            raise LogError(
+                f"{table.path}: --columns names a column of {pick.signal} twice; every joint has "
+                "one of its own."
+            )
         expected = 6 if pick.signal == "wrench" else joints
         if len(pick.cells) != expected:
             raise LogError(
