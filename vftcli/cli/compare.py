@@ -58,6 +58,7 @@ def compare(
     import polars as pl
 
     from vftcli.cli.console import LeftOut, say_analysis
+    from vftcli.cli.jacobian import JacobianLogs
     from vftcli.evaluation import paired_significance
     from vftcli.evaluation.pooling import PoolMember, evaluate_pooled
     from vftcli.outputs.log import tables
@@ -77,11 +78,12 @@ def compare(
     listed = choice.contacts and (analysis.wrench.asks or reference.contacts)
     choice = replace(choice, contacts=listed)
     left_out, analyses = LeftOut(library, logs), []
-    for made in analyse_logs(logs, choice, left_out.told):
+    by_jacobian = JacobianLogs(left_out, choice)
+    for made in analyse_logs(logs, choice, by_jacobian.told):
         if not table.json:
             say_analysis(made)
         analyses.append(made)
-    if not analyses:
+    if not (analyses or by_jacobian.judged):
         left_out.end(0)
     if significance:
         pairs = [
@@ -89,10 +91,13 @@ def compare(
             for a in analyses
             if a.reference is not None
         ]
+        if not pairs:
+            raise typer.BadParameter("--significance compares observers, and none ran")
         typer.echo(tables.pairs_text(pl.concat(pairs), as_json=table.json))
         left_out.end(len(analyses))
         return
     errors = [a.errors for a in analyses if a.errors is not None]
+    errors += [made.errors for made in by_jacobian.judged if made.errors is not None]
     members = [
         PoolMember(a.robot.name, a.estimates, a.reference)
         for a in analyses
@@ -105,4 +110,4 @@ def compare(
         typer.echo(text if analysis.talk.details else f"{text}{MORE}")
     else:
         typer.echo(show[table.form](rows, bounds))
-    left_out.end(len(analyses))
+    left_out.end(len(errors))

@@ -252,11 +252,14 @@ def text_of(path: Path) -> str:
     """The text of a description beside the data.
 
     Raises:
-        LogError: If it is too large to be one.
+        LogError: If it is too large to be one, or no text.
     """
     if path.stat().st_size > TOLD_LIMIT:
         raise LogError(f"{path}: larger than {TOLD_LIMIT >> 20} MiB; no description is.")
-    return path.read_text(encoding="utf-8")
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise LogError(f"{path}: not text in UTF-8; it is damaged") from None
 
 
 def features_of(info: dict[str, Any]) -> dict[str, Any]:
