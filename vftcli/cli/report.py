@@ -46,11 +46,11 @@ def report(
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
     """
-    from vftcli.cli.console import LeftOut, command_line, say_analysis
+    from vftcli.cli.console import LeftOut, command_line, say_analysis, say_left_out
     from vftcli.cli.opening import open_made
     from vftcli.evaluation.print_table import check_published, compare_with
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.report import report_files, write_report, write_reports
+    from vftcli.outputs.log.report import FILES, report_files, write_report, write_reports
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
 
@@ -80,6 +80,7 @@ def report(
         record = write_reports(
             output, analyses, command=command, force=force, extras=extras, failed=failed
         )
+    say_left_out(FILES)
     if json:
         typer.echo(record)
     else:

@@ -124,9 +124,7 @@ class Chain:
         Reflected rotor inertia becomes the model's `armature`, which `rnea`, `crba` and `aba`
         include; it has no room for `rotor_coupling`.
         """
-        pin = needed(
-            "pinocchio", "a model of Pinocchio, for simulations, replays and --as-printed,"
-        )
+        pin = needed("pinocchio", "a Pinocchio model (simulation, replay, --as-printed)")
 
         model = pin.Model()
         model.name = name

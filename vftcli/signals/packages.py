@@ -30,6 +30,21 @@ def installed(module: str) -> bool:
     return find_spec(module) is not None
 
 
+def remedy(module: str) -> str:
+    """How to install the package of a module."""
+    return PACKAGES[module][1]
+
+
+def check_installed(module: str, what: str) -> None:
+    """See whether the package that something needs is there; it is not loaded.
+
+    Raises:
+        PackageError: If it is not.
+    """
+    if not installed(module):
+        needed(module, what)
+
+
 def needed(
     module: str, what: str, otherwise: str = "", error: type[VftError] = PackageError
 ) -> Any:  # noqa: ANN401 - a module
