@@ -80,7 +80,7 @@ class PolarsParquet(ColumnarTable):
 
         if column in self.lists:
             return self._matrix(values, self.lists[column])
-        if values.dtype in {pl.Datetime, pl.Duration}:
+        if isinstance(values.dtype, pl.Datetime | pl.Duration):
             values = values.dt.cast_time_unit("ns").to_physical()
         elif values.dtype == pl.Boolean:
             values = values.cast(pl.UInt8)
