@@ -27,6 +27,7 @@ from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.literal import literal_momentum_terms
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array
+from vftcli.signals.packages import needed
 from vftcli.signals.recording import EFFORTS, Recording
 
 SAMPLES = 30_060
@@ -120,7 +121,7 @@ def driven(motion: Recording, robot: Robot) -> tuple[Recording, Array]:
 
 def rnea_loop(model: Any, q: Array, dq: Array) -> None:  # noqa: ANN401
     """The yardstick: one bare `pin.rnea` call a sample, one term, nothing else."""
-    import pinocchio as pin
+    pin = needed("pinocchio", "the benchmark")
 
     data, zero = model.createData(), np.zeros(model.nv)
     for k in range(len(q)):
@@ -129,7 +130,7 @@ def rnea_loop(model: Any, q: Array, dq: Array) -> None:  # noqa: ANN401
 
 def analytic_script(model: Any, recording: Recording, kalman: KalmanObserver) -> None:  # noqa: ANN401
     """What one would write at first: Pinocchio a sample, and a dense Kalman filter."""
-    import pinocchio as pin
+    pin = needed("pinocchio", "the benchmark")
 
     q, dq, tau = recording.q, recording.require("dq"), recording.require("torque")
     data, step = model.createData(), recording.median_step

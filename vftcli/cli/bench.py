@@ -32,7 +32,9 @@ def bench(measured: BenchOptions, json: opt.Json = False) -> None:
     from vftcli.cli.console import say_json
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import bench_grid
+    from vftcli.signals.packages import check_installed
 
+    check_installed("pinocchio", "vftcli bench")
     result = benchmark(measured.robot, measured.samples, measured.rounds)
     if measured.examination:
         result["examination"] = examined(measured)

@@ -45,12 +45,12 @@ def report(
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
     """
-    from vftcli.cli.console import LeftOut, command_line
+    from vftcli.cli.console import LeftOut, command_line, say_left_out
     from vftcli.cli.jacobian import write_by_jacobian
     from vftcli.cli.opening import open_made
     from vftcli.evaluation.print_table import check_published
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.report import report_files, write_report, write_reports
+    from vftcli.outputs.log.report import FILES, report_files, write_report, write_reports
     from vftcli.readers.library import Library
     from vftcli.readers.table import JacobianError
 
@@ -78,6 +78,7 @@ def report(
         record = write_reports(
             output, analyses, command=command, force=force, extras=extras, failed=failed
         )
+    say_left_out(FILES)
     if json:
         typer.echo(record)
     else:

@@ -22,6 +22,7 @@ from vftcli.outputs.log.run_record import (
 from vftcli.outputs.seals import SEAL
 from vftcli.robots.writing import robot_toml
 from vftcli.signals.errors import OutputError
+from vftcli.signals.packages import installed
 
 
 def beside(path: Path) -> dict[str, Path]:
@@ -66,7 +67,8 @@ def write_identification(
         "toml": robot_toml(found.robot, heading),
     }
     with OutputFolder(path.parent, force, names.values()) as folder:
-        write_identification_rrd(folder / names["rrd"], found)
+        if installed("rerun"):
+            write_identification_rrd(folder / names["rrd"], found)
         for kind, text in texts.items():
             folder.write(names[kind], text)
         return seal(folder, names["run"], record)
