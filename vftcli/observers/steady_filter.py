@@ -22,7 +22,7 @@ FORGOTTEN = 1e-20
 """What is left of a state that counts as nothing: far below the last digit of anything."""
 
 
-class Blocks(NamedTuple):
+class BlockFilter(NamedTuple):
     """What a filter of n joints makes of one block.
 
     Attributes:
@@ -60,7 +60,7 @@ def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> 
     return out, state.T
 
 
-def blocks_of(F: Array, g: Array, wanted: Array) -> Blocks:
+def blocks_of(F: Array, g: Array, wanted: Array) -> BlockFilter:
     """Prepare a filter, joints first: F (n, m, m), g and wanted (n, m)."""
     n, m = g.shape
     powers = np.empty((n, BLOCK + 1, m, m))
@@ -73,7 +73,7 @@ def blocks_of(F: Array, g: Array, wanted: Array) -> Blocks:
     impulse = np.zeros((n, 2 * BLOCK - 1))
     impulse[:, BLOCK - 1 :] = (response @ wanted[..., None])[..., 0]
     at = np.arange(BLOCK)
-    return Blocks(
+    return BlockFilter(
         toeplitz=impulse[:, BLOCK - 1 + at[None, :] - at[:, None]],
         ends=np.ascontiguousarray(response[:, ::-1]),
         carry=(wanted[:, None, None] @ powers[:, 1:])[:, :, 0].transpose(0, 2, 1).copy(),
@@ -81,7 +81,7 @@ def blocks_of(F: Array, g: Array, wanted: Array) -> Blocks:
     )
 
 
-def filter_piece(blocks: Blocks, d: Array, state: Array, out: Array) -> Array:
+def filter_piece(blocks: BlockFilter, d: Array, state: Array, out: Array) -> Array:
     """Filter d (n, N) into `out` (n, N); the state before it → the state after it. (n, m)"""
     n, samples = d.shape
     count = samples // BLOCK
