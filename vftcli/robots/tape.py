@@ -156,7 +156,7 @@ class Program:
         self._inputs = slice(len(outputs), len(outputs) + tape.inputs)
         self._constants = {k: v.factor for k, v in enumerate(outputs) if v.row is None}
         self._operations, self._rows = in_few_rows(needed(tape, wanted), tape.inputs, wanted)
-        self._memory = np.empty((self._rows, 0))
+        self._memory = empty_rows(self._rows, 0)
         self._samples, self._calls = 0, []  # type: tuple[int, list[tuple[Any, ...]]]
 
     def bind(self, samples: int) -> tuple[Array, Array]:
@@ -166,7 +166,7 @@ class Program:
             Where the inputs are to be written, and where the outputs will stand. (rows, samples)
         """
         if samples > self._memory.shape[1]:
-            self._memory = np.empty((self._rows, samples))
+            self._memory = empty_rows(self._rows, samples)
         if samples != self._samples:
             rows = list(self._memory[:, :samples])
             self._calls = [
@@ -182,6 +182,14 @@ class Program:
         """Fill the outputs from the inputs."""
         for work, a, b, out in self._calls:
             work(a, b, out)
+
+
+def empty_rows(rows: int, samples: int) -> Array:
+    """Uninitialised rows, each from the start of a cache line (64 B) on: a fifth of the time."""
+    width = -(-samples // 8) * 8
+    memory = np.empty(rows * width + 8)
+    start = -memory.ctypes.data // 8 % 8
+    return memory[start : start + rows * width].reshape(rows, width)[:, :samples]
 
 
 def rows_of_their_own(tape: Tape, outputs: Sequence[Value]) -> list[int | None]:
