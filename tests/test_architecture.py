@@ -34,6 +34,7 @@ ORDER = (
     "outputs",
     "pipeline",
     "notebook",
+    "yardsticks",
     "benchmark",
     "cli",
 )
