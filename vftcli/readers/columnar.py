@@ -100,16 +100,25 @@ class ColumnarTable(ABC):
         Raises:
             LogError: If a column holds no numbers or its lists differ in length.
         """
-        names = self._schema.names
-        # pyarrow would hand over both under one name.
-        if any(names.count(names[c]) > 1 for c in columns):
-            raise LogError(f"{self.path}: two columns have one name; rename one of them.")
+        names = self._names_of(columns)
         self._check_size(columns)
         with guarded(self.path):
             table = self._decoded(sorted(columns))
             if self._rows is not None:
                 table = table.take(self._rows)
             return {c: self._numbers(table.column(names[c]), c, clock) for c in columns}
+
+    def _names_of(self, columns: Sequence[int]) -> dict[int, str]:
+        """The names of some columns, each of one column only.
+
+        Raises:
+            LogError: If one is the name of two.
+        """
+        names = self._schema.names
+        # pyarrow would hand over both under one name.
+        if any(names.count(names[c]) > 1 for c in columns):
+            raise LogError(f"{self.path}: two columns have one name; rename one of them.")
+        return {c: names[c] for c in columns}
 
     def _check_size(self, columns: Sequence[int]) -> None:
         """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
