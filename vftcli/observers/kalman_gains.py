@@ -6,10 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.observers.kalman_model import Discrete
+from vftcli.observers.recursion import PIECE
 from vftcli.signals.arrays import Array
-
-PIECE = 1 << 14
-"""Samples handled at a time: the covariances of a piece are a dozen arrays of its size."""
 
 SETTLED = 4e-16
 """Relative change of a block's first covariance below which another pass would change nothing."""
@@ -102,7 +100,12 @@ def update(prior: Covariance, r: Array) -> Gains:
 
 
 def gain_pieces(
-    model_of: Callable[[slice], Discrete], samples: int, prior: Covariance, guess: Covariance
+    model_of: Callable[[slice], Discrete],
+    samples: int,
+    entering: Covariance,
+    guess: Covariance,
+    *,
+    begins: bool = True,
 ) -> Iterator[tuple[slice, Discrete, Gains]]:
     """Run the covariance recursion over a log's own sample times, a piece of the log at a time.
 
@@ -111,24 +114,30 @@ def gain_pieces(
     the result is then that of the plain loop. A filter that forgets slowly only takes more passes.
 
     Args:
-        model_of: The models of a span of samples, entries (N, n); that of sample 0 only has its
-            measurement noise used.
+        model_of: The models of a span of samples, entries (N, n); that of a log's first sample only
+            has its measurement noise used.
         samples: Number of samples T.
-        prior: Covariance before the first sample's update. (n,)
+        entering: Covariance before the first sample's update where the log begins, else after the
+            update of the sample before. (n,)
         guess: Where the blocks start before they know better, the stationary posterior. (n,)
+        begins: Whether the first sample is the log's first.
 
     Yields:
         A span of samples, its models, and its gains and posterior covariances. (N, n) each
     """
-    first = slice(0, 1)
-    model = model_of(first)
-    gains = update(Covariance(*(p[None] for p in prior)), model.r)
-    yield first, model, gains
-    for begin in range(1, samples, PIECE):
-        span = slice(begin, min(begin + PIECE, samples))
-        model = model_of(span)
+    begin = 0
+    if begins:
+        first, begin = slice(0, 1), 1
+        model = model_of(first)
+        gains = update(Covariance(*(p[None] for p in entering)), model.r)
         entering = Covariance(*(p[-1] for p in gains.posterior))
+        yield first, model, gains
+    while begin < samples:
+        # Pieces end at multiples of their length, whatever block they belong to.
+        span = slice(begin, min((begin // PIECE + 1) * PIECE, samples))
+        model = model_of(span)
         gains = settle(model, entering, guess)
+        entering, begin = Covariance(*(p[-1] for p in gains.posterior)), span.stop
         yield span, model, gains
 
 
