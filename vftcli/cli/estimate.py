@@ -49,6 +49,9 @@ def estimate(
     causal = analysis.observers.causal or analysis.contacts.no_contacts
     signals = EXAMINED if causal and not (analysis.wrench.asks or extras) else None
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
+    # What needs no complete log comes in blocks, so that memory does not grow with it.
+    long = causal and set(extras) <= {"csv"} and chosen.interval is None
+    chosen = replace(chosen, blocks=long)
     if chosen.columns is None:
         refuse_estimates(log)
     reading = Background(lambda: library.open(log, chosen))
@@ -57,15 +60,29 @@ def estimate(
     from vftcli.cli.opening import open_made
     from vftcli.observers.table import BEST
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
+    from vftcli.outputs.log.estimates import (
+        estimate_files,
+        write_estimate_folder,
+        write_long_estimates,
+    )
     from vftcli.pipeline import analyse, prepared
+    from vftcli.streaming import BlockAnalysis, comes_in_blocks
 
     OutputFolder(output, force, estimate_files(extras)).check()
     choice = analysis.choice(library)
     # The list comes with the smoothed wrench of best, the observer that sees the complete log.
     choice = replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
-    made = analyse(*prepared(reading.result(), choice), choice)
-    record = write_estimate_folder(output, made, command=command_line(), extras=extras, force=force)
+    recording, robot = prepared(reading.result(), choice)
+    if recording.long is not None and not comes_in_blocks(recording, robot, choice):
+        recording, robot = prepared(library.open(log, replace(chosen, blocks=False)), choice)
+    made = analyse(recording, robot, choice)
+    written = {"command": command_line(), "extras": extras, "force": force}
+    if recording.long is None:
+        record = write_estimate_folder(output, made, **written)
+    else:
+        run = BlockAnalysis(made, choice)
+        record = write_long_estimates(output, run.blocks(), lambda: run.made, **written)
+        made = run.made
     if json:
         typer.echo(record)
     else:

@@ -27,14 +27,11 @@ from vftcli.readers.cleaning import (
 )
 from vftcli.readers.reader import InOnePieceError, RawLog
 from vftcli.signals.arrays import Array
-from vftcli.signals.clock import ClockCount
 from vftcli.signals.errors import LogError
 from vftcli.signals.recording import LongLog, Recording
+from vftcli.signals.timing import TimingCount
 
-BLOCK_ROWS = 1 << 13
-"""Samples of a block, whatever the file hands out at a time."""
-
-STRETCH_ROWS, STRETCHES = 1 << 11, 16
+STRETCH_ROWS, STRETCHES = 1 << 11, 8
 """Samples of a stretch that is drawn, and stretches at least; at most twice as many."""
 
 Rows = dict[str, Array]
@@ -63,7 +60,7 @@ def long_recording(
         InOnePieceError: If it has to be read in one piece.
         LogError: If its positions can only be degrees.
     """
-    count, draw, cleaner = ClockCount(), Drawer(), Cleaner()
+    count, draw, cleaner = TimingCount(), Drawer(), Cleaner()
     for rows in cleaner.rows(raw):
         count.add(rows["t"])
         draw.add(rows)
@@ -73,36 +70,42 @@ def long_recording(
         count = counter
     if count.samples < 2:
         raise InOnePieceError
-    clock, last = count.clock, cleaner.last
-    span = clock.end - clock.start
+    timing, last = count.timing, cleaner.last
+    span = timing.end - timing.start
     source = source_of(cleaner.first, path, format_name, sha256, label)
     if not (
-        abs(source.t0) <= FARTHEST_START and clock.step >= SHORTEST_STEP and span <= LONGEST_LOG
+        abs(source.t0) <= FARTHEST_START and timing.step >= SHORTEST_STEP and span <= LONGEST_LOG
     ):
         raise InOnePieceError
     cleaner.finish(path)
     repeats = told_repeats(cleaner.repeats, cleaner.different) if cleaner.repeats else ()
     garbage = cleaner.first.remarks[len(raw.remarks) :]
+    gaps = timing.steps[timing.steps[:, 0] > GAP_STEPS * timing.step]
     source = replace(
         source,
         rows=cleaner.read,
         duplicates=cleaner.repeats,
-        remarks=(*last.remarks, *garbage, *repeats, *told_gaps(clock.gaps(GAP_STEPS))),
+        remarks=(
+            *last.remarks,
+            *garbage,
+            *repeats,
+            *told_gaps(gaps),
+        ),
     )
     told = replace(cleaner.first, payload_mass=last.payload_mass, payload_com=last.payload_com)
     told = told.told_payload(last.constants)
 
-    def blocks() -> Iterator[Recording]:
+    def blocks(size: int) -> Iterator[Recording]:
         samples = 0
-        for rows in in_blocks(Cleaner().rows(read()), BLOCK_ROWS):
+        for rows in in_blocks(Cleaner().rows(read()), size):
             samples += len(rows["t"])
             yield recording_of(told, rows.pop("t"), rows, source)
-        if samples != clock.samples:
+        if samples != timing.samples:
             raise LogError(f"{path}: it changed while it was read. Let its recorder end first.")
 
     rows = draw.drawn()
     drawn = recording_of(told, rows.pop("t"), rows, source)
-    return replace(drawn, long=LongLog(clock=clock, read=blocks))
+    return replace(drawn, long=LongLog(timing=timing, read=blocks))
 
 
 class Cleaner:
@@ -146,7 +149,7 @@ class Cleaner:
             if raw.segment is not None:
                 raise InOnePieceError
             self.first = raw = without_leading_garbage(raw)
-            self._low, self._high = np.inf * raw.signals["q"][0], -np.inf * raw.signals["q"][0]
+            self._low = self._high = raw.signals["q"][0]
         if raw.signals.keys() != self.first.signals.keys() or raw.tick != self.first.tick:
             raise InOnePieceError
         found = {"stamps": raw.stamps, **raw.signals}

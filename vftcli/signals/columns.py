@@ -82,15 +82,21 @@ def column_facts(name: str, frames: Mapping[str, StatedFrame]) -> dict[str, str]
     return facts
 
 
-def described_schema(table: "pl.DataFrame", frames: Mapping[str, StatedFrame] | None = None) -> Any:  # noqa: ANN401 - pyarrow is untyped
+def described_schema(
+    table: "pl.DataFrame",
+    frames: Mapping[str, StatedFrame] | None = None,
+    metadata: Mapping[str, str] | None = None,
+) -> Any:  # noqa: ANN401 - pyarrow is untyped
     """The table's pyarrow schema with what each column holds, for ``write_parquet``.
 
     Args:
         table: The table.
         frames: As in `column_facts`.
+        metadata: What is said of the table.
     """
     import pyarrow as pa
 
     schema = table.clear().to_arrow().schema
     known = frames or {}
-    return pa.schema(field.with_metadata(column_facts(field.name, known)) for field in schema)
+    fields = [field.with_metadata(column_facts(field.name, known)) for field in schema]
+    return pa.schema(fields, metadata=metadata)

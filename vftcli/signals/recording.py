@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
-from vftcli.signals.clock import Clock
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
+from vftcli.signals.timing import Timing
 from vftcli.signals.wrench import WrenchFrame
 
 MEANINGS = {
@@ -119,19 +119,19 @@ class LongLog:
     """A log that is read block by block, each block a recording, each time it is asked for.
 
     Attributes:
-        clock: The clock of all of it.
-        read: Reads it.
+        timing: What is known of its clock.
+        read: Reads it in blocks of so many samples, but for the last.
         changes: Make what is done to the blocks since; anew for each time it is read.
     """
 
-    clock: Clock
-    read: Callable[[], Iterator["Recording"]]
+    timing: Timing
+    read: Callable[[int], Iterator["Recording"]]
     changes: tuple[Callable[[], Change], ...] = ()
 
-    def blocks(self) -> Iterator["Recording"]:
-        """The blocks in order; their times are those of the whole log."""
+    def blocks(self, samples: int) -> Iterator["Recording"]:
+        """Blocks of so many samples, but for the last; their times are those of the whole log."""
         changes = [make() for make in self.changes]
-        for block in self.read():
+        for block in self.read(samples):
             changed = block
             for change in changes:
                 changed = change(changed)
@@ -227,7 +227,7 @@ class Recording:
     def median_step(self) -> float:
         """Median time between samples, the nominal sample time. [s]"""
         if self.long is not None:
-            return self.long.clock.step
+            return self.long.timing.step
         if self.samples < 2:
             raise ClockError(f"{self.name}: one sample has no sample time")
         return median_step(self.t)
@@ -235,7 +235,17 @@ class Recording:
     @property
     def all_samples(self) -> int:
         """Number of samples of the log, of which this may hold stretches only."""
-        return self.samples if self.long is None else self.long.clock.samples
+        return self.samples if self.long is None else self.long.timing.samples
+
+    @property
+    def steps(self) -> Array:
+        """Times between samples, and when they begin; of a long log those that may be gaps. (S, 2)
+
+        The longest is always among them. [s]
+        """
+        if self.long is not None:
+            return self.long.timing.steps
+        return np.column_stack([np.diff(self.t), self.t[:-1]])
 
     def changed(self, make: Callable[[], Change], **values: Any) -> "Recording":  # noqa: ANN401
         """The recording with other values, and the long log behind it changed alike.

@@ -1,4 +1,4 @@
-"""Clock: what observers and checks ask of all of a log's stamps, gathered block by block."""
+"""Timing: what observers and checks ask of all of a log's stamps, gathered block by block."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -6,6 +6,7 @@ from typing import Self
 import numpy as np
 
 from vftcli.signals.arrays import EVEN, Array, median
+from vftcli.signals.series import Clock
 
 DISTINCT = 1 << 17
 """Different steps that are counted one by one; of more, those around the median."""
@@ -14,7 +15,7 @@ LARGE = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Clock:
+class Timing:
     """The clock of a whole log.
 
     Attributes:
@@ -23,7 +24,8 @@ class Clock:
         end: Time of the last. [s]
         step: Median time between samples. [s]
         uniform: Whether all steps are equal, as `vftcli.signals.arrays.is_uniform` says.
-        large: Steps well beyond the median, and the times at which they begin. (G, 2) [s]
+        steps: The longest steps, all that may be gaps among them, and the times at which they
+            begin. (G, 2) [s]
     """
 
     samples: int
@@ -31,15 +33,16 @@ class Clock:
     end: float
     step: float
     uniform: bool
-    large: Array
+    steps: Array
 
-    def gaps(self, steps: float) -> Array:
-        """Steps of more than so many medians, and the times at which they begin. (G, 2) [s]"""
-        found: Array = self.large[self.large[:, 0] > steps * self.step]
-        return found
+    @property
+    def clock(self) -> Clock:
+        """How the log is sampled, as `vftcli.signals.series.clock_of` says."""
+        mean = (self.end - self.start) / (self.samples - 1)
+        return Clock(self.uniform, mean if self.uniform else self.step)
 
 
-class ClockCount:
+class TimingCount:
     """The stamps of a log, block by block; memory does not grow with an even or noisy clock.
 
     Args:
@@ -74,8 +77,9 @@ class ClockCount:
             self._limit = LARGE * median(steps)
         self.shortest = min(self.shortest, float(steps.min()))
         self.longest = max(self.longest, float(steps.max()))
-        if (large := steps > self._limit).any():
-            self._large.append(np.column_stack([steps[large], begun[large]]))
+        large = steps > self._limit
+        large[np.argmax(steps)] |= steps.max() >= self.longest
+        self._large.append(np.column_stack([steps[large], begun[large]]))
         self._count(steps)
 
     def _count(self, steps: Array) -> None:
@@ -117,8 +121,8 @@ class ClockCount:
         return None
 
     @property
-    def clock(self) -> Clock:
-        """The clock of all that was taken up; two samples or more."""
+    def timing(self) -> Timing:
+        """What is known of all that was taken up; two samples or more."""
         steps = self.samples - 1
         ends = self.below + np.cumsum(self._counts)
         low, high = (
@@ -128,11 +132,11 @@ class ClockCount:
         # As `vftcli.signals.arrays.median` does.
         usual = low if steps % 2 else 0.5 * (low + high)
         off = max(abs(self.longest - usual), abs(self.shortest - usual))
-        return Clock(
+        return Timing(
             samples=self.samples,
             start=self.start,
             end=self.last,
             step=usual,
             uniform=off <= EVEN * usual,
-            large=np.concatenate(self._large) if self._large else np.empty((0, 2)),
+            steps=np.concatenate(self._large),
         )
