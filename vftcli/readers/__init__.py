@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,7 @@ from vftcli.readers.reader import (
 from vftcli.readers.unrecognised import description
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 from vftcli.signals.parsing import did_you_mean
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import warning
 
 READERS: dict[str, Reader] = {
@@ -70,6 +71,10 @@ READERS: dict[str, Reader] = {
     )
 }
 """Every format by name: one reader, one line."""
+
+
+COMPUTED_WITH = frozenset(("dq", *EFFORTS, "temperature"))
+"""Signals that an estimate is made of, beside time and positions; others are only examined."""
 
 
 def read(
@@ -134,7 +139,9 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
         raw = found()
         if raw.rest is not None:
             digest.start()
-            return long_recording(raw, found, path, reader.name, digest.hexdigest, label)
+            used = None if choice.signals is None else choice.signals & COMPUTED_WITH
+            again = partial(found, replace(choice, signals=used))
+            return long_recording(raw, again, path, reader.name, digest.hexdigest, label)
     except InOnePieceError:
         raw = found(replace(choice, blocks=False))
     digest = Digest(raw.files) if raw.files else digest
