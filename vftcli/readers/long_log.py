@@ -150,7 +150,10 @@ class Cleaner:
                 raise InOnePieceError
             self.first = raw = without_leading_garbage(raw)
             self._low = self._high = raw.signals["q"][0]
-        if raw.signals.keys() != self.first.signals.keys() or raw.tick != self.first.tick:
+        if raw.signals.keys() != self.first.signals.keys() or (raw.tick, raw.clock) != (
+            self.first.tick,
+            self.first.clock,
+        ):
             raise InOnePieceError
         found = {"stamps": raw.stamps, **raw.signals}
         good = np.isfinite(raw.stamps).all() and all(
