@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.observers.kalman_gains import Covariance, Gains, Steady, gain_pieces, steady
+from vftcli.observers.kalman_gains import Covariance, Gains, Steady, steady, update
 from vftcli.observers.kalman_model import (
     DISCRETISATIONS,
     NOISE_CONVENTIONS,
@@ -14,8 +14,8 @@ from vftcli.observers.kalman_model import (
     discretise,
 )
 from vftcli.observers.observer import Complex, Tuning, per_joint
-from vftcli.observers.recursion import recursion
 from vftcli.observers.steady_filter import steady_filter
+from vftcli.observers.uneven_kalman import Fold, filter_blocks, last_covariance, settle, spans
 from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array, empty_series, frozen, handed_over
 from vftcli.signals.errors import ParameterError
@@ -137,21 +137,20 @@ class KalmanObserver:
     ) -> tuple[Array, Array, KalmanState]:
         """τ̂ and √P₂₂ with gains that follow each step's own sample time. (T, n) each"""
         samples, n = d.shape
-        dt = np.broadcast_to(terms.dt, (samples, 1))
         tau, sd = empty_series(samples, n), empty_series(samples, n)
-        entering = self.first_prior(settled) if state is None else state.posterior
-        error = np.zeros((2, n)) if state is None else state.error
-        for span, model, gains in gain_pieces(
-            lambda span: self.model(dt[span], n),
-            samples,
-            entering,
-            settled.gains.posterior,
-            begins=state is None,
-        ):
-            F, g = error_filter(gains, model.a12, model.a22)
-            states = recursion(F, g * d[span, None], error)
-            error, entering = states[-1], Covariance(*(p[-1] for p in gains.posterior))
-            tau[span], sd[span] = states[:, 1], np.sqrt(gains.posterior.p22)
+        dt, begins = np.broadcast_to(terms.dt, (samples, 1)), state is None
+        if state is None:
+            first = update(self.first_prior(settled), self.model(dt[:1], n).r[0]).posterior
+            state = KalmanState(np.zeros((2, n)), first)
+            tau[0], sd[0] = 0.0, np.sqrt(first.p22)
+        error, entering = state
+        for span in spans(samples, begins=begins):
+            fold = Fold.of(span.stop - span.start)
+            model = self.model(fold.fold(dt[span]), n)
+            gains = settle(model, entering, settled.gains.posterior)
+            entering = last_covariance(gains, fold)
+            answer, error = filter_blocks(model, gains, fold.fold(d[span]), error, fold)
+            tau[span], sd[span] = fold.unfold(answer), fold.unfold(np.sqrt(gains.posterior.p22))
         return tau, sd, KalmanState(error, entering)
 
     def unexplained(self, terms: DynamicsTerms) -> Array:

@@ -26,11 +26,12 @@ from vftcli.observers.kalman import (
     second_entry,
     transition,
 )
-from vftcli.observers.kalman_gains import Covariance, Gains, gain_sequence
+from vftcli.observers.kalman_gains import Covariance, Gains
 from vftcli.observers.kalman_model import Discrete
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.recursion import recursion
 from vftcli.observers.steady_filter import steady_filter
+from vftcli.observers.uneven_kalman import gain_sequence
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series, handed_over
 from vftcli.signals.external_torque import ExternalTorque

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.robots.drive import check_joints, drive_torque, uses_current
-from vftcli.robots.kernels import MomentumTerms, momentum_chunks
+from vftcli.robots.kernels import momentum_chunks
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction
 from vftcli.robots.temperature import measured_temperature
@@ -154,14 +154,15 @@ class RunningTerms:
         temperature = measured_temperature(recording)
         # One block of memory: the larger it is, the fewer pages the system has to find.
         p, mu, room = (rows.T for rows in np.empty((3, *q.T.shape)))
-        for span, velocity, chunk in self._chunks(q, dq):
-            p[span] = chunk.p
+        for span, velocity, (momentum, bias, *gravity) in self._chunks(q, dq):
+            p[span] = momentum
             mu[span] = effort[span]
             mu[span] *= scale
-            mu[span] += chunk.coriolis_transpose_dq - chunk.gravity
+            mu[span] += bias
             if self.robot.friction:
+                load = gravity[0] if gravity else None
                 warm = None if temperature is None else temperature[span]
-                mu[span] -= self._friction.torque(q[span], velocity, chunk.gravity, warm)
+                mu[span] -= self._friction.torque(q[span], velocity, load, warm)
         terms = DynamicsTerms(
             t=recording.t,
             p=handed_over(p),
@@ -173,17 +174,18 @@ class RunningTerms:
         self.before = terms.last
         return terms
 
-    def _chunks(self, q: Array, dq: Array) -> Iterator[tuple[slice, Array, MomentumTerms]]:
-        """The rigid body's terms, chunk by chunk; of the paper's method all at once."""
+    def _chunks(self, q: Array, dq: Array) -> Iterator[tuple[slice, Array, list[Array]]]:
+        """P, Cᵀq̇ − g and, if friction asks for it, g: by chunks, the paper's method all at once."""
         if not self.literal:
-            yield from momentum_chunks(self.robot.loaded_chain, q, dq)
+            wanted = ("p", "bias", *(("gravity",) if self._friction.takes_load else ()))
+            yield from momentum_chunks(self.robot.loaded_chain, q, dq, wanted)
             return
         from vftcli.robots.literal import literal_momentum_terms
 
-        found = literal_momentum_terms(self.robot.model, q, dq)
+        p, coriolis, gravity = literal_momentum_terms(self.robot.model, q, dq)
         if (rotors := self.robot.chain.rotor_coupling) is not None:
-            found = found._replace(p=found.p + dq @ rotors)
-        yield slice(0, len(q)), dq, found
+            p = p + dq @ rotors
+        yield slice(0, len(q)), dq, [p, coriolis - gravity, gravity]
 
 
 def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False) -> DynamicsTerms:
