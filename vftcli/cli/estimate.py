@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -50,8 +50,7 @@ def estimate(
     signals = EXAMINED if causal and not (analysis.wrench.asks or extras) else None
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
     # What needs no complete log comes in blocks, so that memory does not grow with it.
-    long = causal and set(extras) <= {"csv"} and chosen.interval is None
-    chosen = replace(chosen, blocks=long)
+    chosen = replace(chosen, blocks=causal and set(extras) <= {"csv"} and not chosen.interval)
     if chosen.columns is None:
         refuse_estimates(log)
     reading = Background(lambda: library.open(log, chosen))
@@ -65,28 +64,26 @@ def estimate(
         write_estimate_folder,
         write_long_estimates,
     )
-    from vftcli.pipeline import analyse, prepared
-    from vftcli.streaming import BlockAnalysis, comes_in_blocks
+    from vftcli.pipeline import analyse
+    from vftcli.streaming import BlockAnalysis, prepared_in_blocks
 
     OutputFolder(output, force, estimate_files(extras)).check()
     choice = analysis.choice(library)
     # The list comes with the smoothed wrench of best, the observer that sees the complete log.
     choice = replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
-    recording, robot = prepared(reading.result(), choice)
-    if recording.long is not None and not comes_in_blocks(recording, robot, choice):
-        recording, robot = prepared(library.open(log, replace(chosen, blocks=False)), choice)
-    made = analyse(recording, robot, choice)
-    written = {"command": command_line(), "extras": extras, "force": force}
+    recording, robot = prepared_in_blocks(
+        reading.result(), choice, lambda: library.open(log, replace(chosen, blocks=False))
+    )
+    run = BlockAnalysis(analyse(recording, robot, choice), choice)
+    how: dict[str, Any] = {"command": command_line(), "extras": extras, "force": force}
     if recording.long is None:
-        record = write_estimate_folder(output, made, **written)
+        record = write_estimate_folder(output, run.made, **how)
     else:
-        run = BlockAnalysis(made, choice)
-        record = write_long_estimates(output, run.blocks(), lambda: run.made, **written)
-        made = run.made
+        record = write_long_estimates(output, run.blocks(), lambda: run.made, **how)
     if json:
         typer.echo(record)
     else:
-        show_estimates(made, output, estimate_files(extras))
+        show_estimates(run.made, output, estimate_files(extras))
     if show:
         open_made(output)
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -102,7 +103,9 @@ def source_of(
 
 def recording_of(raw: RawLog, t: Array, signals: Mapping[str, Array], source: Source) -> Recording:
     """The recording of clean samples, with all else that a log says."""
-    arrays = {name: handed_over(np.ascontiguousarray(v)) for name, v in signals.items()}
+    arrays: dict[str, Any] = {
+        name: handed_over(np.ascontiguousarray(v)) for name, v in signals.items()
+    }
     return Recording(
         t=handed_over(t),
         **arrays,
