@@ -35,6 +35,7 @@ ORDER = (
     "pipeline",
     "streaming",
     "notebook",
+    "yardsticks",
     "benchmark",
     "cli",
 )

@@ -91,7 +91,7 @@ def test_repeated_stamps_over_a_border(tmp_path: Path) -> None:
     path = tmp_path / "log.parquet"
     rows.with_columns(t=pl.col("t").cum_max()).write_parquet(path)
     whole, long = both_ways(path)
-    assert whole.source.duplicates == 3
+    assert whole.source.duplicates == 2
     check_same(whole, long, 10)
 
 

@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.observers.observer import Complex, Tuning
-from vftcli.observers.recursion import PIECE, recursion
+from vftcli.observers.recursion import PIECE
 from vftcli.observers.steady_filter import steady_filter
+from vftcli.observers.uneven_kalman import Fold, sum_varying
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.remarks import Remark, caution
@@ -77,9 +78,27 @@ def run_first_order(
             decay[where], x[where] = 0.0, 0.0 if afresh is None else afresh[span][where]
             rows = where.any(axis=1)
             gaps, longest = gaps + int(np.sum(rows)), max(longest, float(np.max(dt[rows])))
-        states = recursion(decay[:, None, None], x[:, None], before)
-        tau[span], before = states[:, 0], states[-1]
+        tau[span] = scalar_recursion(decay, x, before[0])
+        before = tau[span][-1:]
     return tau, FirstOrderState(before, gaps, longest)
+
+
+def scalar_recursion(decay: Array, x: Array, before: Array) -> Array:
+    """Run y_t = decay_t y_{t−1} + x_t from `before` (n,), blocks of samples side by side. (N, n)"""
+    fold = Fold.of(len(x))
+    decay, y = fold.fold(decay), fold.fold(x)
+    reach = decay[0].copy()
+    for i in range(1, len(y)):
+        y[i] += decay[i] * y[i - 1]
+        reach *= decay[i]
+    ends = y[-1].copy()
+    ends[0] += reach[0] * before
+    sum_varying(ends[None], reach[None, None])
+    entering = np.concatenate([before[None], ends[:-1]])
+    for i in range(len(y)):
+        entering = decay[i] * entering
+        y[i] += entering
+    return fold.unfold(y)
 
 
 def coefficients(dt: Array, rate: Array) -> tuple[Array, Array]:

@@ -255,10 +255,10 @@ def filter_blocks(
 
 
 def sum_varying(x: Array, phi: Array) -> None:
-    """Run x_b ← x_b + Φ_b x_{b−1} over all blocks in place by doubling: (2, B, n), (2, 2, B, n)."""
+    """Run x_b ← x_b + Φ_b x_{b−1} over all blocks in place by doubling: (m, B, n), (m, m, B, n)."""
     apart = 1
     while apart < x.shape[1] and np.max(np.abs(phi[:, :, apart:])) > FORGOTTEN:
-        near, far = phi[:, :, apart:], phi[:, :, :-apart]
-        x[:, apart:] += near[:, 0] * x[0, :-apart] + near[:, 1] * x[1, :-apart]
-        phi[:, :, apart:] = near[:, :1] * far[0] + near[:, 1:] * far[1]
+        near = phi[:, :, apart:]
+        x[:, apart:] += np.sum(near * x[None, :, :-apart], axis=1)
+        near[:] = np.sum(near[:, :, None] * phi[None, :, :, :-apart], axis=1)
         apart *= 2
