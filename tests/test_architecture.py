@@ -33,6 +33,7 @@ ORDER = (
     "analysis",
     "outputs",
     "pipeline",
+    "streaming",
     "proposal",
     "notebook",
     "yardsticks",

@@ -271,15 +271,15 @@ def observe(motion: FreeMotion, baseline: "Baseline | None", choice: AnalysisCho
     from vftcli.signals.remarks import caution
 
     log, step = motion.log, motion.log.recording.median_step
-    shown = NOT_SHOWN
-    if baseline is not None:
-        shown = baseline.shown(gains=choice.observers.gains_of_log)
+    own = choice.observers.gains_of_log
+    shown = NOT_SHOWN if baseline is None else baseline.shown(gains=own)
     observers, remarks = choice.observers.build(log.robot, step, shown)
     printed = (caution("as-printed"),) if choice.observers.as_printed else ()
+    whole = observers if log.recording.long is None else ()  # of a long log, block by block
     return Analysis(
         motion=motion,
         observers=observers,
-        estimates=tuple(o.estimate(terms_of(baseline, o.name, log)) for o in observers),
+        estimates=tuple(o.estimate(terms_of(baseline, o.name, log)) for o in whole),
         tunings={o.name: o.tuning(step, log.robot.joints) for o in observers},
         remarks=(*remarks, *printed),
     )

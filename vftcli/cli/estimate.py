@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -52,6 +52,8 @@ def estimate(
     causal = analysis.observers.causal or analysis.contacts.no_contacts
     signals = EXAMINED if causal and not (analysis.wrench.asks or extras) else None
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
+    # What needs no complete log comes in blocks, so that memory does not grow with it.
+    chosen = replace(chosen, blocks=causal and set(extras) <= {"csv"} and not chosen.interval)
     if chosen.columns is None:
         refuse_estimates(log)
     reading = Background(lambda: library.open(log, chosen))
@@ -61,26 +63,38 @@ def estimate(
     from vftcli.cli.opening import open_made
     from vftcli.observers.table import BEST
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
-    from vftcli.pipeline import analyse, prepared
+    from vftcli.outputs.log.estimates import (
+        estimate_files,
+        write_estimate_folder,
+        write_long_estimates,
+    )
+    from vftcli.pipeline import analyse
     from vftcli.readers.table import JacobianError
+    from vftcli.streaming import BlockAnalysis, prepared_in_blocks
 
     OutputFolder(output, force, estimate_files(extras)).check()
     choice = analysis.choice(library)
     # The list comes with the smoothed wrench of best, the observer that sees the complete log.
     choice = replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
     try:
-        recording = reading.result()
+        read = reading.result()
     except JacobianError as found:
         write_by_jacobian(log, found, choice, output, force=force, json=json)
         return
-    made = analyse(*prepared(recording, choice), choice)
-    record = write_estimate_folder(output, made, command=command_line(), extras=extras, force=force)
+    recording, robot = prepared_in_blocks(
+        read, choice, lambda: library.open(log, replace(chosen, blocks=False))
+    )
+    run = BlockAnalysis(analyse(recording, robot, choice), choice)
+    how: dict[str, Any] = {"command": command_line(), "extras": extras, "force": force}
+    if recording.long is None:
+        record = write_estimate_folder(output, run.made, **how)
+    else:
+        record = write_long_estimates(output, run.blocks(), lambda: run.made, **how)
     say_left_out(estimate_files(extras))
     if json:
         typer.echo(record)
     else:
-        show_estimates(made, output, estimate_files(extras))
+        show_estimates(run.made, output, estimate_files(extras))
     if show:
         open_made(output)
 

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,13 +25,21 @@ from vftcli.readers import (
 )
 from vftcli.readers.bags import formats as bags
 from vftcli.readers.cleaning import RestartError, cleaned
+from vftcli.readers.long_log import long_recording
 from vftcli.readers.opening import Digest
 from vftcli.readers.parts import refuse_arm
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
+from vftcli.readers.reader import (
+    InOnePieceError,
+    LogFile,
+    RawLog,
+    ReadChoice,
+    Reader,
+    open_log,
+)
 from vftcli.readers.unrecognised import description, known_kind
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 from vftcli.signals.parsing import did_you_mean
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import warning
 
 READERS: dict[str, Reader] = {
@@ -62,6 +71,10 @@ READERS: dict[str, Reader] = {
     )
 }
 """Every format by name: one reader, one line."""
+
+
+COMPUTED_WITH = frozenset(("dq", *EFFORTS, "temperature"))
+"""Signals that an estimate is made of, beside time and positions; others are only examined."""
 
 
 def read(
@@ -116,9 +129,21 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     digest = Digest((path,))
     if "polars" not in sys.modules and reader.episodes is None:
         digest.start()  # its import takes longer than the hash and leaves a core idle
-    with np.errstate(all="ignore"):  # whatever a damaged file holds is judged when it is cleaned
-        raw = reader.read(file, choice)
-        raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
+
+    def found(choice: ReadChoice = choice) -> RawLog:
+        with np.errstate(all="ignore"):  # what a damaged file holds is judged when it is cleaned
+            raw = reader.read(file, choice)
+            return replace(raw, remarks=(*file.remarks, *raw.remarks))
+
+    try:
+        raw = found()
+        if raw.rest is not None:
+            digest.start()
+            used = None if choice.signals is None else choice.signals & COMPUTED_WITH
+            again = partial(found, replace(choice, signals=used))
+            return long_recording(raw, again, path, reader.name, digest.hexdigest, label)
+    except InOnePieceError:
+        raw = found(replace(choice, blocks=False))
     digest = Digest(raw.files) if raw.files else digest
     if not raw.part:
         digest.start()  # of one of many parts it may never be asked for

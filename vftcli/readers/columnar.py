@@ -123,13 +123,22 @@ class ColumnarTable(ABC):
         Raises:
             LogError: If a column holds no numbers or its lists differ in length.
         """
+        self._names_of(columns)
+        self._check_size(columns)
+        with self._guarded():
+            return self._numbers(sorted(columns), clock)
+
+    def _names_of(self, columns: Sequence[int]) -> dict[int, str]:
+        """The names of some columns, each of one column only.
+
+        Raises:
+            LogError: If one is the name of two.
+        """
         names = self._held.names
         # Decoders hand over both under one name.
         if any(names.count(names[c]) > 1 for c in columns):
             raise LogError(f"{self.path}: two columns have one name; rename one of them.")
-        self._check_size(columns)
-        with self._guarded():
-            return self._numbers(sorted(columns), clock)
+        return {c: names[c] for c in columns}
 
     def _check_size(self, columns: Sequence[int]) -> None:
         """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.

@@ -13,8 +13,9 @@ import numpy as np
 from vftcli.readers.aliases import ALIASES
 from vftcli.readers.hdf5 import Hdf5Table, is_hdf5, natural, opened, table_of
 from vftcli.readers.parts import arm_of, episode_of, refuse_arm
+from vftcli.readers.picking import rate_words
 from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Column, listed, rate_words
+from vftcli.readers.table import Column, listed
 from vftcli.readers.tables import ArrayTable, described, from_table, states_positions
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.remarks import fact

@@ -109,7 +109,11 @@ def median(values: Array) -> float:
     return 0.5 * float(lower + upper)
 
 
-def is_uniform(t: Array, tolerance: float = 1e-6) -> bool:
+EVEN = 1e-6
+"""How far the steps of an even clock are from their median at most, relative to it."""
+
+
+def is_uniform(t: Array, tolerance: float = EVEN) -> bool:
     """Whether all steps of a clock are equal to within `tolerance` of their median.
 
     The tolerance covers the rounding of stamps printed with nine digits; a clock that jitters more

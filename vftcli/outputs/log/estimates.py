@@ -1,9 +1,10 @@
 """What `vftcli estimate` writes: the estimates as flat columns, `run.json`, extras on demand."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -113,9 +114,6 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
         OutputError: If the disk is full.
     """
     table = estimates_table(analysis)
-    # For who finds the table alone, without the record beside it.
-    doubts = overridden_lines(analysis.examinations)
-    metadata = {"vftcli": json.dumps({"overridden": doubts})} if doubts else None
     schema = described_schema(table, frames_of(analysis))
     with table_file(path) as file:
         table.write_parquet(
@@ -123,9 +121,53 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
             compression="zstd",
             compression_level=1,
             statistics=False,
-            metadata=metadata,
+            metadata=doubts_of(analysis) or None,
             arrow_schema=schema,
         )
+
+
+def write_blocks(folder: OutputFolder, blocks: Iterable[Analysis], *, csv: bool) -> None:
+    """Write the tables of a long log's blocks one behind the other, each a group of rows.
+
+    Args:
+        folder: Where.
+        blocks: The analyses of the blocks, in order.
+        csv: Whether to write them as CSV as well.
+
+    Raises:
+        OutputError: If the disk is full.
+    """
+    from pyarrow.parquet import ParquetWriter
+
+    with ExitStack() as files:
+        schema: Any = None
+        for analysis in blocks:
+            table = estimates_table(analysis)
+            if schema is None:
+                schema = described_schema(table, frames_of(analysis), doubts_of(analysis))
+                path = folder / "estimates.parquet"
+                # Measured numbers hardly repeat: a dictionary of them costs time and room.
+                writer = ParquetWriter(
+                    path,
+                    schema,
+                    compression="zstd",
+                    compression_level=1,
+                    write_statistics=False,
+                    use_dictionary=False,
+                )
+                files.enter_context(writer)
+                if csv:
+                    text = files.enter_context((folder / "estimates.csv").open("wb"))
+                    table.clear().write_csv(text)
+            writer.write_table(table.to_arrow().cast(schema))
+            if csv:
+                table.write_csv(text, include_header=False, float_precision=9)
+
+
+def doubts_of(analysis: Analysis) -> dict[str, str]:
+    """What is said beside the columns for who finds the table without the record beside it."""
+    doubts = overridden_lines(analysis.examinations)
+    return {"vftcli": json.dumps({"overridden": doubts})} if doubts else {}
 
 
 def frames_of(analysis: Analysis) -> dict[str, StatedFrame]:
@@ -198,3 +240,32 @@ def write_estimate_folder(
         # After the record: it names the packages that are loaded, and these made no number.
         write_extras(folder, "", analysis, extras)
         return seal(folder, SEAL, record)
+
+
+def write_long_estimates(
+    path: Path,
+    blocks: Iterable[Analysis],
+    whole: Callable[[], Analysis],
+    command: str,
+    extras: Sequence[str] = (),
+    force: bool = False,
+) -> str:
+    """Write the folder of a long log as `write_estimate_folder` does, block by block.
+
+    Args:
+        path: The folder.
+        blocks: The analyses of the log's blocks, in order.
+        whole: Gives what is known of the log when the last has gone by.
+        command: The command line.
+        extras: "csv" or nothing.
+        force: Whether files that are there may be replaced.
+
+    Returns:
+        The text of `run.json`.
+
+    Raises:
+        OutputError: As `write_estimate_folder` does.
+    """
+    with OutputFolder(path, force, estimate_files(extras)) as folder:
+        write_blocks(folder, blocks, csv="csv" in extras)
+        return seal(folder, SEAL, run_record(whole(), command))
