@@ -12,6 +12,9 @@ from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, empty_series
 from vftcli.signals.remarks import Remark, caution
 
+GAP = 3.0
+"""A step of more than this many nominal ones is a gap."""
+
 
 @dataclass(frozen=True)
 class Piece:
@@ -38,8 +41,9 @@ def run_first_order(
     """Run y_t = decay_t y_{t−1} + x_t over a log, a piece at a time. (T, n), and remarks
 
     Past a gap so long that a > 1 the state would change its sign: there the filter starts afresh,
-    and a remark says so. Gains that give a > 1 at the nominal sample time are the user's own choice
-    and restart nothing.
+    and a remark says so. A gap is a step of more than `GAP` nominal ones: on a slow clock that
+    jitters, a passes 1 in many a step that misses nothing. Gains that give a > 1 at the nominal
+    sample time are the user's own choice and restart nothing.
 
     Args:
         terms: p and μ.
@@ -72,7 +76,8 @@ def restarts(a: Array, rate: Array, steps: Steps) -> Mask | None:
     """Where a gap makes the filter start afresh (N, n), or None where nothing does."""
     if steps.uniform:
         return None
-    where: Mask = (a > 1.0) & (0.5 * steps.median * rate <= 1.0)
+    nominal = 0.5 * steps.median * rate
+    where: Mask = (a > np.maximum(GAP * nominal, 1.0)) & (nominal <= 1.0)
     return where if where.any() else None
 
 
