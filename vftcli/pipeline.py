@@ -270,7 +270,7 @@ def observe(motion: FreeMotion, baseline: "Baseline | None", choice: AnalysisCho
     from vftcli.analysis import Analysis, terms_of
     from vftcli.signals.remarks import caution
 
-    log, step = motion.log, motion.log.recording.median_step
+    log, run, step = motion.log, choice.observers.run, motion.log.recording.median_step
     shown = NOT_SHOWN
     if baseline is not None:
         shown = baseline.shown(gains=choice.observers.gains_of_log)
@@ -279,7 +279,7 @@ def observe(motion: FreeMotion, baseline: "Baseline | None", choice: AnalysisCho
     return Analysis(
         motion=motion,
         observers=observers,
-        estimates=tuple(o.estimate(terms_of(baseline, o.name, log)) for o in observers),
+        estimates=tuple(run(o, terms_of(baseline, o.name, log)) for o in observers),
         tunings={o.name: o.tuning(step, log.robot.joints) for o in observers},
         remarks=(*remarks, *printed),
     )

@@ -23,7 +23,7 @@ from vftcli.readers import (
     tables,
 )
 from vftcli.readers.bags import formats as bags
-from vftcli.readers.cleaning import RestartError, cleaned
+from vftcli.readers.cleaning import RestartError, cleaned, without_unknown_rows
 from vftcli.readers.opening import Digest
 from vftcli.readers.parts import refuse_arm
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
@@ -119,6 +119,7 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     with np.errstate(all="ignore"):  # whatever a damaged file holds is judged when it is cleaned
         raw = reader.read(file, choice)
         raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
+        raw = without_unknown_rows(raw) if choice.skips_unknown else raw
     digest = Digest(raw.files) if raw.files else digest
     if not raw.part:
         digest.start()  # of one of many parts it may never be asked for

@@ -256,6 +256,20 @@ def episodes_in(file: LogFile) -> tuple[int, ...]:
         return numbers_of(layout_of(table_of(file.path, content))[1])
 
 
+def episode_places(file: LogFile) -> dict[int, str]:
+    """The group, as "observations/", in which each episode of an HDF5 file has its positions.
+
+    Raises:
+        LogError: If several groups have positions.
+    """
+    with opened(file) as content:
+        table = table_of(file.path, content)
+        layout, groups = layout_of(table)
+        anchor = layout.anchor or level_of(file.path, table.names or (), "/")
+    below = anchor[: anchor.rfind("/") + 1]
+    return dict(zip(numbers_of(groups), (group + below for group in groups), strict=True))
+
+
 HDF5 = Reader(
     name="hdf5",
     recognises=lambda file: is_hdf5(file.head) and not file.head.startswith(b"MATLAB"),

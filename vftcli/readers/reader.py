@@ -9,7 +9,7 @@ from pathlib import Path
 
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.derivation import is_fast, with_velocity
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
@@ -109,6 +109,8 @@ class RawLog:
         payload_com: Its centre of mass in flange axes. (3,) [m]
         part: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
         files: The files of a folder that it was read from; () for all.
+        rows: Which rows of the file these are, counted from 0; None for all. (T,)
+        unknown: Rows of the file that were left out because a value is no number.
     """
 
     stamps: Array
@@ -128,6 +130,8 @@ class RawLog:
     payload_com: tuple[float, ...] | None = None
     part: str = ""
     files: tuple[Path, ...] = ()
+    rows: Indices | None = None
+    unknown: Indices | None = None
 
 
 ARMS = ("left", "right")
@@ -163,6 +167,8 @@ class ReadChoice:
         arm: Which arm of a log of two, a member of `ARMS`; None for the only one.
         examining: Whether the log is only looked at, where a part and a word say more than a
             refusal.
+        skips_unknown: Whether rows with a value that is no number are left out and said, not
+            refused.
 
     Raises:
         ParameterError: If the effort, the derived signal or the arm is none of these.
@@ -178,6 +184,7 @@ class ReadChoice:
     all_episodes: bool = False
     arm: str | None = None
     examining: bool = False
+    skips_unknown: bool = False
 
     def __post_init__(self) -> None:
         if self.arm is not None:

@@ -1,13 +1,13 @@
 """Recording: one log, in SI units, on one strictly increasing clock."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
+from vftcli.signals.arrays import Array, Indices, check_clock, check_shape, frozen
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
@@ -79,6 +79,8 @@ class Source:
         remarks: Facts on what was dropped, turned or derived; cautions and warnings on what looks
             suspicious but was left as it is.
         part: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
+        row_samples: The sample that each of the rows is, or repeats; −1 for one that was dropped
+            otherwise. None where each row is the sample of its number. (rows,)
     """
 
     path: Path | None = None
@@ -93,6 +95,7 @@ class Source:
     derived: tuple[str, ...] = ()
     remarks: tuple[Remark, ...] = ()
     part: str = ""
+    row_samples: Indices | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if not self.label and self.path is not None:
@@ -157,9 +160,9 @@ class Recording:
     source: Source = Source()
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if isinstance(value := getattr(self, field.name), np.ndarray):
-                object.__setattr__(self, field.name, frozen(value))
+        for each in fields(self):
+            if isinstance(value := getattr(self, each.name), np.ndarray):
+                object.__setattr__(self, each.name, frozen(value))
         if self.q.ndim != 2:
             raise ShapeError(f"q of the recording has shape {self.q.shape}; expected (T, n)")
         if len(self.t) == 0:
