@@ -33,6 +33,7 @@ ORDER = (
     "analysis",
     "outputs",
     "pipeline",
+    "batch",
     "notebook",
     "benchmark",
     "cli",
