@@ -58,6 +58,11 @@ COMMANDS = {
         "Make a robot file from logs: friction, inertias, payload.",
         PREPARE,
     ),
+    "annotate": ListedCommand(
+        "annotate:annotate_dataset",
+        "Write the forces of every frame into a copy of a dataset.",
+        PREPARE,
+    ),
     "tune": ListedCommand(
         "tune:tune_gains",
         "Find gains on a log for a stated goal, for --gains.",

@@ -1,6 +1,6 @@
 """What is written back into a dataset: columns of forces, a value a frame, and whose they are."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -55,12 +55,13 @@ class Dataset(Protocol):
     """A folder of episodes that a copy is made of."""
 
     folder: Path
+    has_statistics: bool
 
-    def files(self) -> Sequence[Path]:
-        """The data files, by their paths in the folder."""
+    def files(self) -> Iterator[DataFile]:
+        """The data files with their episodes."""
 
-    def episodes_in(self, place: Path) -> DataFile:
-        """A data file with its episodes."""
+    def frames(self, file: DataFile, number: int) -> int:
+        """How many frames an episode has, also one that cannot be read as a log."""
 
     def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
         """Refuse a file that has such columns already.

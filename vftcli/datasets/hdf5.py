@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from vftcli.datasets.episodes import DataFile, ForceColumn, Forces, Statistics
@@ -20,34 +20,43 @@ def is_hdf5_file(path: Path) -> bool:
     return is_hdf5(open_log(path).head)
 
 
+def files_below(folder: Path) -> list[Path]:
+    """The files of such names in a folder, at any depth, in the order of their names."""
+    walked = os.walk(folder, followlinks=True)
+    names = [Path(place) / name for place, _, each in walked for name in each]
+    return sorted(path for path in names if path.suffix.lower() in ENDINGS)
+
+
 class Hdf5Dataset:
     """HDF5 files of one episode or many: DROID's, ALOHA's, robomimic's, any.
 
-    Attributes:
+    Args:
         folder: The folder in which they are, at any depth.
+        only: The only one of them that is meant, or None for all.
+        columns: What ``--columns`` says of them, or None.
     """
 
-    def __init__(self, folder: Path, paths: Sequence[Path], columns: str | None = None) -> None:
+    has_statistics = False
+
+    def __init__(self, folder: Path, only: Path | None = None, columns: str | None = None) -> None:
         self.folder = folder
-        self._paths = paths
+        self._only = only
         self._columns = columns
 
-    @classmethod
-    def below(cls, folder: Path) -> "Hdf5Dataset | None":
-        """The HDF5 files below a folder, None where there is none."""
-        walked = os.walk(folder, followlinks=True)
-        names = [Path(place) / name for place, _, each in walked for name in each]
-        found = sorted(path for path in names if path.suffix.lower() in ENDINGS)
-        return cls(folder, found) if found else None
+    def files(self) -> Iterator[DataFile]:
+        """The files with their episodes, by name."""
+        for path in [self._only] if self._only is not None else files_below(self.folder):
+            yield DataFile(path.relative_to(self.folder), path, tuple(episodes_in(open_log(path))))
 
-    def files(self) -> Sequence[Path]:
-        """The files, by name."""
-        return [path.relative_to(self.folder) for path in self._paths]
+    def frames(self, file: DataFile, number: int) -> int:
+        """How many frames an episode has: those of the first data set beside its positions."""
+        import h5py
 
-    def episodes_in(self, place: Path) -> DataFile:
-        """A file with its episodes."""
-        path = self.folder / place
-        return DataFile(place, path, tuple(episodes_in(open_log(path))))
+        path = self.folder / file.place
+        group = episode_places(open_log(path), self._columns)[number]
+        with h5py.File(path, "r") as content:
+            there = content[group or "/"].values()
+            return next(int(each.shape[0]) for each in there if isinstance(each, h5py.Dataset))
 
     def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
         """Refuse a file that has such data sets already.
@@ -58,7 +67,7 @@ class Hdf5Dataset:
         import h5py
 
         path = self.folder / file.place
-        places = episode_places(open_log(path))
+        places = episode_places(open_log(path), self._columns)
         with h5py.File(path, "r") as content:
             for name in (places[k] + c.name for k in file.episodes for c in columns):
                 if name in content:
@@ -71,7 +80,7 @@ class Hdf5Dataset:
         import h5py
 
         path = self.folder / file.place
-        places = episode_places(open_log(path))
+        places = episode_places(open_log(path), self._columns)
         shutil.copyfile(path, target)
         target.chmod(0o644)
         with h5py.File(target, "r+") as content:

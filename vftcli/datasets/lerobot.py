@@ -1,7 +1,7 @@
 """LeRobot datasets written back: columns, info.json, Parquet metadata and statistics."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,22 +25,34 @@ class LeRobotDataset:
 
     Attributes:
         folder: Its folder.
+        has_statistics: Whether statistics of its columns are kept: they are.
     """
+
+    has_statistics = True
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._episodes: dict[Path, list[int]] = {}
 
-    def files(self) -> Sequence[Path]:
-        """The data files, in the order of their episodes."""
+    def files(self) -> Iterator[DataFile]:
+        """The data files with their episodes, in the order of these."""
+        numbers: dict[Path, list[int]] = {}
         for episode in episodes_told(self.folder):
             place = data_file(self.folder, episode).relative_to(self.folder)
-            self._episodes.setdefault(place, []).append(episode.number)
-        return list(self._episodes)
+            numbers.setdefault(place, []).append(episode.number)
+        for place, own in numbers.items():
+            yield DataFile(place, self.folder, tuple(own))
 
-    def episodes_in(self, place: Path) -> DataFile:
-        """A data file with its episodes."""
-        return DataFile(place, self.folder, tuple(self._episodes[place]))
+    def frames(self, file: DataFile, number: int) -> int:
+        """How many frames an episode has."""
+        import pyarrow.parquet as pq
+
+        path = self.folder / file.place
+        with guarded(path):
+            source = pq.ParquetFile(path)
+            if EPISODE not in source.schema_arrow.names:
+                return int(source.metadata.num_rows)
+            numbers = source.read(columns=[EPISODE]).column(0).to_numpy()
+        return int(np.count_nonzero(numbers == number))
 
     def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
         """Refuse a file that has such columns already.

@@ -38,12 +38,11 @@ def estimate_from_rest(observer: Observer, terms: DynamicsTerms) -> ExternalTorq
     """
     count = lead_samples(observer, steps_of(terms.t).median, terms.joints)
     found = observer.estimate(led(terms, count))
-    cut = {"sd": found.sd, "error_sd": found.error_sd, "moving": found.moving}
     return replace(
         found,
         t=terms.t,
         tau=found.tau[count:],
-        **{name: value[count:] for name, value in cut.items() if value is not None},
+        sd=None if found.sd is None else found.sd[count:],
     )
 
 
@@ -57,7 +56,7 @@ def settling_samples(observer: Observer, step: float, joints: int) -> int:
     """
     samples = 2 + lead_samples(observer, step, joints)
     zero = np.zeros((samples, joints))
-    terms = DynamicsTerms(t=step * np.arange(samples), p=zero, mu=zero - 1.0)
+    terms = DynamicsTerms(t=step * np.arange(float(samples)), p=zero, mu=zero - 1.0)
     answer = observer.estimate(terms).tau
     left = np.max(np.abs(answer - answer[-1]), axis=1)
     return int(np.flatnonzero(left > SETTLED * np.max(np.abs(answer[-1])))[-1]) + 1

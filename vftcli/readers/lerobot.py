@@ -290,9 +290,7 @@ def episodes_told(folder: Path) -> list[Episode]:
 
 
 @lru_cache(maxsize=2)
-def remembered_episodes(
-    folder: Path, states: tuple[tuple[Path, int, int], ...]
-) -> list[Episode]:
+def remembered_episodes(folder: Path, states: tuple[tuple[Path, int, int], ...]) -> list[Episode]:
     """The episodes that tables of these paths, times and sizes tell."""
     each = [
         (episodes_of_table if path.suffix == ".parquet" else episodes_of_lines)(folder, path)
