@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -37,6 +38,13 @@ from vftcli.signals.errors import LogError
 
 TOGETHER = 16
 """Episodes that go to a worker together, and into one file of rows."""
+
+
+FEW = 32
+"""Episodes, and files to write, for which no processes are started unasked: that takes seconds."""
+
+HERE = WorkersChoice(workers=0)
+"""This process alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,10 +113,12 @@ def annotate(
     key = hashlib.sha256(f"{path.resolve()} {choice.key(files_beside)}".encode()).hexdigest()
     with unfinished(copy, key) as folder:
         work = folder / WORK
-        run = partial(run_tasks, choice=workers, tell=tell, seen=[str(path), str(work)])
         plan = Plan(dataset, work, key)
+        run = partial(run_tasks, tell=tell, seen=[str(path), str(work)])
         expected = force_columns(choice, (), derived=False, valid=how.allow_missing)
-        outcomes = run(plan.groups(expected), partial(estimate_episodes, choice))
+        outcomes = run(
+            plan.groups(expected), partial(estimate_episodes, choice), started(workers, dataset)
+        )
         made = gathered(outcomes, how, progress)
         told = first_known(made)
         columns = force_columns(
@@ -121,7 +131,7 @@ def annotate(
         tasks = [FileTask(f, tuple(r), folder / f.place) for f, r in plan.rows.items()]
         each = (tasks[k : k + TOGETHER] for k in range(0, len(tasks), TOGETHER))
         statistics: dict[int, Mapping[str, Statistics]] = {}
-        for outcome in run(each, write):
+        for outcome in run(each, write, workers if len(tasks) > FEW else HERE):
             progress(f"writing {value_of(outcome)['place']}")
             statistics |= outcome.value["statistics"]
         progress("writing descriptions")
@@ -132,6 +142,13 @@ def annotate(
         (folder / RECORD).parent.mkdir(exist_ok=True)
         put_text(folder / RECORD, to_json(record))
     return record
+
+
+def started(workers: WorkersChoice, dataset: Dataset) -> WorkersChoice:
+    """Where the episodes are done: here where nothing is asked and there are few."""
+    some = islice(dataset.files(), FEW + 1)
+    few = sum(len(file.episodes) for file in some) <= FEW
+    return HERE if few and workers == WorkersChoice() else workers
 
 
 class Plan:
@@ -276,7 +293,7 @@ def write_file(
     """Write a data file with its columns; return its place and the statistics of its episodes."""
     begin("writing")
     rows: dict[str, Any] = {}
-    for path in task.rows:
+    for path in filter(Path.is_file, task.rows):
         rows |= stored_rows(path)
     forces = {
         number: filled(number, rows, columns, suffix, dataset.frames(task.file, number))

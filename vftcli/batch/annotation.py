@@ -158,7 +158,8 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> dict[str, Any]
                 told["observer"] = observer_record(observer, analysis.tunings[observer.name])
         records.append(record)
     text = to_json(told)
-    put_rows(task.rows, told=np.array(text), **arrays)
+    if arrays:
+        put_rows(task.rows, told=np.array(text), **arrays)
     return dict(json.loads(text))
 
 

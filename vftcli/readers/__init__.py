@@ -139,6 +139,13 @@ def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
     return reader.episodes(file)
 
 
+def holds_episodes(path: str | Path, choice: ReadChoice) -> bool:
+    """Whether a file holds several episodes."""
+    file = open_log(Path(path))
+    reader = _reader(file, choice.format, choice.columns)
+    return reader.episodes is not None and len(reader.episodes(file)) > 1
+
+
 def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> Recording:
     """Read a log as `read` does; of a file that holds several recordings or arms, the first.
 
@@ -204,6 +211,7 @@ __all__ = [
     "ReadChoice",
     "Reader",
     "episode_numbers",
+    "holds_episodes",
     "read",
     "read_chosen",
     "read_first_recording",

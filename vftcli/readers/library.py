@@ -41,16 +41,24 @@ class Library:
             self._recordings[at, read] = read.taken(read_chosen(path, read, label))
         return choice.within(self._recordings[at, read])
 
-    def open_each(self, paths: Iterable[str | Path], choice: ReadChoice) -> Iterator[Recording]:
+    def open_each(
+        self, paths: Iterable[str | Path], choice: ReadChoice, *, whole: bool = False
+    ) -> Iterator[Recording]:
         """Read some logs, each episode as a log of its own where all are chosen.
+
+        Args:
+            paths: The logs.
+            choice: How they are read.
+            whole: Whether all episodes of a dataset are meant where none is chosen.
 
         Raises:
             LogError: If all episodes are chosen, of a log that has none.
         """
-        from vftcli.readers import episode_numbers
+        from vftcli.readers import episode_numbers, holds_episodes
 
         for path in paths:
-            if not choice.all_episodes:
+            unasked = whole and choice.episode is None and holds_episodes(path, choice)
+            if not (choice.all_episodes or unasked):
                 yield self.open(path, choice)
                 continue
             for number in episode_numbers(path, choice):
