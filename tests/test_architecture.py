@@ -32,6 +32,7 @@ ORDER = (
     "admittance",
     "analysis",
     "outputs",
+    "datasets",
     "pipeline",
     "batch",
     "notebook",
@@ -48,6 +49,7 @@ KNOWN = {("evaluation", "refinement")}
 
 FILES = (
     "cli/",  # asks before it overwrites
+    "datasets/",
     "outputs/",
     "readers/",
     "observers/settings.py",  # gains in a file of their own

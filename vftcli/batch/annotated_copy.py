@@ -251,7 +251,10 @@ def refuse_missing(record: Mapping[str, Any]) -> None:
         LogError: If some are.
     """
     if record["status"] == "missing":
-        raise LogError(f"{record['reason'].rstrip('.')}. {REMEDY}")
+        # Of DROID every file has the same name.
+        reason = record["reason"].removeprefix(Path(record["file"]).name).rstrip(".")
+        place = record["file"] if reason != record["reason"].rstrip(".") else ""
+        raise LogError(f"{place}{reason}. {REMEDY}")
     if record["status"] == "part":
         name, count = next(iter(record["missing_frames"].items()))
         why = (
