@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 Places = Annotated[
     list[Path],
     typer.Argument(
-        metavar="LOG|FOLDER|DATASET...",
-        help="Logs, folders of logs, patterns as 'logs/**/*.csv', data sets; an episode is a log.",
+        metavar="LOG|FOLDER...",
+        help="Logs, folders, data sets; an episode is a log.",
     ),
 ]
 EVERY = 2.0
@@ -36,16 +36,19 @@ class WorkerOptions(ChoiceBundle["WorkersChoice"]):
     workers: int | None = option(
         "--workers",
         "N",
-        "Processes of this machine (default: its cores, at most 8). 0 does one log after the "
-        "other in this process, and needs no Dask.",
+        "Processes of this machine. Default: one a core, at most 8. 0 does one log after the other "
+        "in this process, and needs no Dask.",
         min=0,
         max=4096,
     )
     scheduler: str | None = option(
-        "--scheduler", "ADDRESS", "A Dask cluster that stands: tcp://host:8786, tls://host:8786."
+        "--scheduler",
+        "ADDRESS",
+        "A Dask cluster that stands. As tcp://host:8786 or tls://host:8786.",
     )
     ship: bool = flag(
-        "--ship", "Send the logs to workers that do not see the files, at most 64 MB each."
+        "--ship",
+        "Send the logs to its workers. For those that do not see the files, at most 64 MB.",
     )
     worker_memory: float | None = option(
         "--worker-memory",
@@ -66,10 +69,10 @@ class WorkerOptions(ChoiceBundle["WorkersChoice"]):
 class ResumeOptions(Bundle):
     """Which logs are done, in a second run and at all."""
 
-    limit: int | None = option("--limit", "N", "Only the first N logs.", min=1)
+    limit: int | None = option("--limit", "N", "Only the first N logs.", seldom=True, min=1)
     retry_failed: bool = flag("--retry-failed", "Also logs that failed in an earlier run.")
     max_failures: int | None = option(
-        "--max-failures", "N", "Stop when so many logs failed.", min=1
+        "--max-failures", "N", "Stop when so many logs failed.", seldom=True, min=1
     )
 
 
@@ -81,8 +84,8 @@ def batch(
         str,
         typer.Option(
             "--do",
-            metavar="estimate|compare|report|contacts",
-            help="What is done with each log: the command of that name.",
+            metavar="COMMAND",
+            help="estimate, compare, report or contacts.",
         ),
     ],
     workers: WorkerOptions,
@@ -94,10 +97,10 @@ def batch(
 ) -> None:
     """Ask many logs the same, on every core or on a cluster.
 
-    Writes DIR/batch.parquet (a row a log, observer and joint or axis), failures.parquet,
-    index.html and run.json. A second run does no finished log again. Exit code 3: some failed.
+    Writes DIR/batch.parquet, failures.parquet, index.html and run.json; a second run does no
+    finished log again. Exit code 3: some failed.
 
-    Example: vftcli batch fixtures/ur5_*.csv --robot ur5 --do estimate -o out --workers 0
+    Example: vftcli batch fixtures/ur5_t*.csv --robot ur5 --do estimate -o out
     """
     from vftcli.batch.log_work import LogJob
     from vftcli.batch.run import BatchPlan, run_batch

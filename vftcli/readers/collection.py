@@ -1,15 +1,17 @@
 """Collection: every log that files, folders, patterns and data sets hold, in a fixed order."""
 
 import json
+import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers import lerobot, recognise
+from vftcli.readers.droid import DROID, TRAJECTORY
 from vftcli.readers.estimates import stored_observers
 from vftcli.readers.library import absolute
 from vftcli.readers.opening import files_of
-from vftcli.readers.reader import ReadChoice, Reader, open_log
+from vftcli.readers.reader import LogFile, ReadChoice, Reader, open_log
 from vftcli.signals.errors import LogError, UnknownFormatError
 
 TRUTH = ".truth.parquet"
@@ -21,8 +23,10 @@ BATCH = "batch.json"
 RECORD = "run.json"
 """The file that lists what a command of ours wrote beside it."""
 
-WALKED = "droid"
-"""The one format whose folders hold files that are logs themselves."""
+
+NUMBER = re.compile(rb"(?:^|[\s,;])[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?(?=$|[\s,;])")
+FEWEST = 3
+"""Numbers in a row: time, a position, an effort."""
 
 
 class LogEntry(NamedTuple):
@@ -102,12 +106,15 @@ class LogCollection:
             return
         try:
             reader = recognise(folder, self._choice)
-            if reader.name != WALKED:
+            if reader is not DROID:  # its files are logs themselves
                 yield from self._episodes(folder, reader)
                 return
         except LogError:
             pass
         written = files_written(folder)
+        if (folder / TRAJECTORY).is_file():
+            yield from self._parts(folder / TRAJECTORY)  # what lies beside it describes it
+            return
         for path in sorted(folder.iterdir()):
             if path.name.startswith("."):
                 continue
@@ -123,12 +130,22 @@ class LogCollection:
         if path.name.endswith(TRUTH):
             return False
         try:
-            recognise(path, self._choice)
+            reader = recognise(path, self._choice)
         except UnknownFormatError:
             return False
         except (LogError, OSError):
             return True
+        if reader.general and not holds_numbers(open_log(path)):
+            return False  # prose reads as a table of one column
         return not stored_observers(path)
+
+
+def holds_numbers(file: LogFile) -> bool:
+    """Whether a file that may be a table is binary, or has numbers in its second or third line."""
+    if not file.lines:
+        return True
+    rows = [NUMBER.findall(line) for line in file.lines[1:3]]
+    return any(len(numbers) >= FEWEST for numbers in rows)
 
 
 def matching(place: Path) -> list[Path]:
