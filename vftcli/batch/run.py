@@ -11,6 +11,7 @@ from vftcli.batch.choice import WorkersChoice
 from vftcli.batch.engine import Effort, Failure, Outcome, run_tasks
 from vftcli.batch.keys import content_digest, key_of, options_digest, with_files
 from vftcli.batch.log_work import LogJob, LogTask, work_on_log
+from vftcli.batch.rows import SCHEMA
 from vftcli.batch.shipping import Parcel, packed, work_on_parcel
 from vftcli.outputs.batch_folder import FAILED, BatchFolder
 from vftcli.outputs.log.run_record import versions
@@ -240,7 +241,7 @@ class _Run:
             },
             schema={"log": pl.String, "episode": pl.Int64, "key": pl.String},
         )
-        table = self.folder.gather(logs)
+        table = self.folder.gather(logs, SCHEMA)
         failures = pl.DataFrame(
             [
                 (self.labels[n], self.keys.get(n), *failure)

@@ -99,7 +99,7 @@ class BatchFolder:
             command = made_with.get("command", "")
         except (ValueError, AttributeError):
             same, command = False, ""
-        if not same and not force:
+        if not same and not force and self.keys():
             raise OutputError(
                 f"{self.path} holds a batch of other options or another version ({command}); give "
                 "another -o, or --force: finished logs of those options are kept beside"
@@ -150,21 +150,18 @@ class BatchFolder:
         """Take away why a log failed."""
         self.row_file(key, FAILED).unlink(missing_ok=True)
 
-    def gather(self, logs: "pl.DataFrame") -> "pl.DataFrame":
+    def gather(self, logs: "pl.DataFrame", schema: "Mapping[str, Any]") -> "pl.DataFrame":
         """The rows of all logs in one table, in the order of the logs whatever ended first.
 
         Args:
             logs: ``log``, ``episode`` and ``key`` of every log that is done. Two logs of equal
                 bytes have one key, and the same rows.
+            schema: Columns of the rows.
         """
         import polars as pl
 
         files = [self.row_file(key) for key in logs["key"].unique(maintain_order=True)]
-        rows = (
-            pl.read_parquet(files)
-            if files
-            else pl.DataFrame({"key": []}, schema={"key": pl.String})
-        )
+        rows = pl.read_parquet(files) if files else pl.DataFrame(schema=schema)
         return logs.join(rows, on="key", how="left", maintain_order="left_right")
 
     def put_gathered(

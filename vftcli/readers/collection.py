@@ -21,7 +21,7 @@ BATCH = "batch.json"
 """The file by which a folder of `vftcli batch` is known."""
 
 RECORD = "run.json"
-"""The file that lists what a command of ours wrote beside it."""
+"""The file that lists what a command of ours wrote beside it; beside other files its ending."""
 
 
 NUMBER = re.compile(rb"(?:^|[\s,;])[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?(?=$|[\s,;])")
@@ -127,7 +127,7 @@ class LogCollection:
 
     def _may_be_log(self, path: Path) -> bool:
         """Whether a file of a folder is taken; one that is damaged is, so that this is told."""
-        if path.name.endswith(TRUTH):
+        if path.name.endswith((TRUTH, RECORD)):
             return False
         try:
             reader = recognise(path, self._choice)
