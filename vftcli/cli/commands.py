@@ -43,6 +43,11 @@ COMMANDS = {
         "Print every observer's error against a reference, and its floor.",
         ASK,
     ),
+    "batch": ListedCommand(
+        "batch:batch",
+        "Ask many logs the same, on every core or on a cluster.",
+        ASK,
+    ),
     "thresholds": ListedCommand(
         "thresholds:contact_thresholds",
         "Learn from free motion the thresholds that a robot is given.",

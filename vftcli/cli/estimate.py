@@ -55,15 +55,12 @@ def estimate(
 
     from vftcli.cli.console import command_line
     from vftcli.cli.opening import open_made
-    from vftcli.observers.table import BEST
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
     from vftcli.pipeline import analyse, prepared
 
     OutputFolder(output, force, estimate_files(extras)).check()
-    choice = analysis.choice(library)
-    # The list comes with the smoothed wrench of best, the observer that sees the complete log.
-    choice = replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
+    choice = analysis.choice(library).for_estimates()
     made = analyse(*prepared(reading.result(), choice), choice)
     record = write_estimate_folder(output, made, command=command_line(), extras=extras, force=force)
     if json:

@@ -162,13 +162,15 @@ def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> 
         return replace(first, source=replace(first.source, remarks=remarks))
 
 
-def recognise(path: str | Path) -> Reader:
-    """Return the reader that a path's content calls for.
+def recognise(path: str | Path, choice: ReadChoice | None = None) -> Reader:
+    """Return the reader that a path's content calls for, or that is chosen.
 
     Raises:
         UnknownFormatError: If no format fits, or more than one.
+        LogError: If there is nothing at the path, or it cannot be opened.
     """
-    return _recognise(open_log(Path(path)))
+    choice = choice or ReadChoice()
+    return _reader(open_log(Path(path)), choice.format, choice.columns)
 
 
 def _reader(file: LogFile, name: str | None, columns: str | None) -> Reader:
