@@ -26,6 +26,7 @@ from vftcli.datasets.copying import (
     WORK,
     check_copy,
     copy_others,
+    finished,
     stored_rows,
     unfinished,
 )
@@ -34,7 +35,7 @@ from vftcli.datasets.statistics import statistics_of
 from vftcli.outputs.files import put_text
 from vftcli.outputs.log.run_record import to_json, versions
 from vftcli.outputs.seals import digest
-from vftcli.signals.errors import LogError
+from vftcli.signals.errors import LogError, ParameterError
 
 TOGETHER = 16
 """Episodes that go to a worker together, and into one file of rows."""
@@ -105,7 +106,12 @@ def annotate(
     Raises:
         LogError: If an episode tells nothing and none may be missing.
         OutputError: If the copy cannot be written.
+        ParameterError: If workers are not to see the folders.
     """
+    if workers.ship:
+        raise ParameterError(
+            "workers write the copy themselves, so they have to see its folder; leave --ship out"
+        )
     dataset = open_dataset(path, choice.read.columns)
     check_copy(path, copy, force=how.force)
     beside = [Path(n) for n in (choice.robot.name, choice.observers.gains_file) if n is not None]
@@ -139,8 +145,8 @@ def annotate(
             copy_others(path, folder, plan.places, link=how.link)
         dataset.finish(columns, dict(sorted(statistics.items())), folder)
         record = record_of_copy(path, command, choice, columns, made, plan.sources)
-        (folder / RECORD).parent.mkdir(exist_ok=True)
-        put_text(folder / RECORD, to_json(record))
+        with finished(folder / RECORD) as temporary:
+            put_text(temporary, to_json(record))
     return record
 
 
@@ -302,10 +308,8 @@ def write_file(
         number: filled(number, rows, columns, suffix, dataset.frames(task.file, number))
         for number in task.file.episodes
     }
-    task.target.parent.mkdir(parents=True, exist_ok=True)
-    temporary = task.target.with_name(f"{task.target.name}.partial")
-    dataset.write(task.file, columns, forces, temporary)
-    temporary.replace(task.target)
+    with finished(task.target) as temporary:
+        dataset.write(task.file, columns, forces, temporary)
     statistics = {
         number: {name: statistics_of(values) for name, values in own.items()}
         for number, own in forces.items()

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, flag, option, taken_apart
+from vftcli.cli.batch import WorkerOptions
+from vftcli.cli.bundles import Bundle, flag, taken_apart
 from vftcli.cli.help import WRITE
 from vftcli.cli.log_options import ReadOptions, RobotOptions
 
@@ -35,18 +36,6 @@ class ColumnOptions(Bundle):
     copy: bool = flag("--copy", "Copy videos too. They are linked else, where that can be.")
 
 
-class ProcessOptions(Bundle):
-    """Where the work is done."""
-
-    workers: int | None = option(
-        "--workers",
-        "N",
-        "Processes; 0: this one alone. Default: as many as there are cores and memory for, with "
-        "vftcli[cluster].",
-        None,
-    )
-
-
 @taken_apart
 def annotate_dataset(
     dataset: Annotated[
@@ -66,7 +55,7 @@ def annotate_dataset(
     observers: opt.ObserverOptions,
     wrench: opt.WrenchOptions,
     columns: ColumnOptions,
-    processes: ProcessOptions,
+    workers: WorkerOptions,
     anyway: opt.AnywayOptions,
     talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     json: opt.Json = False,
@@ -81,7 +70,6 @@ def annotate_dataset(
     """
     from vftcli.batch.annotated_copy import CopyChoice, annotate
     from vftcli.batch.annotation import USUAL, ForceChoice
-    from vftcli.batch.choice import WorkersChoice
     from vftcli.cli.console import command_line, detail, say, say_json, stages
 
     asked = ForceChoice(
@@ -99,7 +87,7 @@ def annotate_dataset(
         output,
         asked,
         how,
-        WorkersChoice(workers=processes.workers),
+        workers.choice(),
         command=command_line(),
         tell=detail,
         progress=stages(),

@@ -121,12 +121,19 @@ def take_place(partial: Path, copy: Path) -> None:
     shutil.rmtree(earlier, ignore_errors=True)
 
 
+@contextmanager
+def finished(path: Path) -> Iterator[Path]:
+    """Where to write a file of a copy: it has its name when the block ends well."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f"{path.name}.partial")
+    yield temporary
+    temporary.replace(path)
+
+
 def put_rows(path: Path, **arrays: NDArray[Any]) -> None:
     """Put arrays into a file that is whole or not there."""
-    unfinished = path.with_suffix(".partial")
-    with unfinished.open("wb") as file:
+    with finished(path) as temporary, temporary.open("wb") as file:
         np.savez(file, allow_pickle=False, **arrays)
-    unfinished.replace(path)
 
 
 def stored_rows(path: Path) -> dict[str, NDArray[Any]]:
