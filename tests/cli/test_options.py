@@ -26,7 +26,7 @@ READING = {
 }
 """Command that reads a log → what else it has to be given."""
 
-OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
+OWN = {("annotate", "--output"), ("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
        ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, what is written where, and --csv, which
