@@ -19,6 +19,7 @@ from vftcli.batch.choice import WorkersChoice
 from vftcli.datasets.copying import partial_of
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import silent
+from vftcli.readers import recognise
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import LogError, ParameterError, VftError
@@ -236,6 +237,8 @@ def test_droid_s_episodes_have_the_errors_of_the_model(
         true = truth.select(f"tau_ext/{j}" for j in range(1, 8)).to_numpy()
         error = np.sqrt(np.mean((found - true) ** 2, axis=0))
         assert np.all(error < 1.1 * np.array(SPECIFIED[observer][k]))
+    # the folder meta beside the episodes makes it no LeRobot dataset
+    assert recognise(copy).name == "droid"
     original = next((samples / "droid_raw").rglob("trajectory.h5"))
     assert original.stat().st_nlink == 1
 

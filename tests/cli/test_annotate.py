@@ -22,6 +22,18 @@ def test_it_says_what_was_written(tmp_path: Path) -> None:
     assert json.loads(again.stdout)["causal"] is False
 
 
+def test_a_load_is_sought_in_all_episodes_and_too_few_poses_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["identify", str(FIXTURE), "--find-payload", "-o", str(tmp_path / "robot.toml")]
+    monkeypatch.setattr("sys.argv", ["vftcli", *words])
+    with pytest.raises(SystemExit):
+        main()
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert "panda_episodes episode 0, panda_episodes episode 1, panda_episodes episode 2" in error
+    assert "of them different; a load needs 4 different ones" in error
+
+
 def test_refusals_are_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

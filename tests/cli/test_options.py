@@ -26,8 +26,9 @@ READING = {
 }
 """Command that reads a log → what else it has to be given."""
 
-OWN = {("annotate", "--output"), ("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
+OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
        ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
+       ("annotate", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, what is written where, and --csv, which
 the contract makes a file of `estimate` and a table of the others."""
