@@ -48,6 +48,7 @@ KNOWN = {("evaluation", "refinement")}
 """Pairs of those that do, the first the second."""
 
 FILES = (
+    "batch/shipping.py",  # unpacks what was sent
     "cli/",  # asks before it overwrites
     "datasets/",
     "outputs/",

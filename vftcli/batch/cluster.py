@@ -69,6 +69,7 @@ def connected(
         EngineError: If it does not answer, is of other versions, or does not see the files.
     """
     import dask.config
+    import distributed  # noqa: F401 - it adds its own settings, which must outlive the block
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # who dies is told in outcomes
     with dask.config.set(dict(CONFIG)):
@@ -98,7 +99,8 @@ def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Clien
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",
-            dashboard_address=None,
+            # Without an address of its own Dask's HTTP server is open to every network.
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
             memory_limit=memory,
             silence_logs=logging.CRITICAL + 1,
         ) as cluster,
@@ -135,7 +137,7 @@ def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Cl
             require_encryption=True,
         )
     try:
-        client = Client(choice.scheduler, security=security, timeout=ANSWER, set_as_default=False)
+        client = Client(choice.scheduler, security=security, timeout=ANSWER)
     except Exception as error:  # noqa: BLE001 - what answers there may be anything
         raise EngineError(
             f"no Dask scheduler answers at {choice.scheduler} within {ANSWER:g} s "
