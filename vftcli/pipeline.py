@@ -100,6 +100,15 @@ class AnalysisChoice:
         """Whether what touched the arm is listed: that needs the complete log."""
         return self.contacts and not self.observers.causal
 
+    def for_estimates(self) -> "AnalysisChoice":
+        """The same where estimates are written: the list comes with the wrench of `best`."""
+        return replace(self, contacts=self.contacts and BEST in self.observers.names)
+
+    def for_comparison(self) -> "AnalysisChoice":
+        """The same where errors are printed: the list is for the wrench, and to judge contacts."""
+        judged = self.reference is not None and self.reference.contacts
+        return replace(self, contacts=self.contacts and (self.wrench is not None or judged))
+
 
 Analyser = Callable[[Recording, Robot, AnalysisChoice, Models], "Analysis"]
 """What is done with each log of a command."""
@@ -270,7 +279,7 @@ def observe(motion: FreeMotion, baseline: "Baseline | None", choice: AnalysisCho
     from vftcli.analysis import Analysis, terms_of
     from vftcli.signals.remarks import caution
 
-    log, step = motion.log, motion.log.recording.median_step
+    log, run, step = motion.log, choice.observers.run, motion.log.recording.median_step
     own = choice.observers.gains_of_log
     shown = NOT_SHOWN if baseline is None else baseline.shown(gains=own)
     observers, remarks = choice.observers.build(log.robot, step, shown)
@@ -279,7 +288,7 @@ def observe(motion: FreeMotion, baseline: "Baseline | None", choice: AnalysisCho
     return Analysis(
         motion=motion,
         observers=observers,
-        estimates=tuple(o.estimate(terms_of(baseline, o.name, log)) for o in whole),
+        estimates=tuple(run(o, terms_of(baseline, o.name, log)) for o in whole),
         tunings={o.name: o.tuning(step, log.robot.joints) for o in observers},
         remarks=(*remarks, *printed),
     )

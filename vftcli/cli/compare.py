@@ -1,6 +1,5 @@
 """`vftcli compare`: errors of the observers against a reference."""
 
-from dataclasses import replace
 from typing import Annotated
 
 import typer
@@ -73,10 +72,7 @@ def compare(
         "latex": tables.to_latex,
     }
     library = Library(logs)
-    choice = analysis.choice(library, reference)
-    # The list is for the wrench and for judging contacts; a table of torques needs none.
-    listed = choice.contacts and (analysis.wrench.asks or reference.contacts)
-    choice = replace(choice, contacts=listed)
+    choice = analysis.choice(library, reference).for_comparison()
     left_out, analyses = LeftOut(library, logs), []
     by_jacobian = JacobianLogs(left_out, choice)
     for made in analyse_logs(logs, choice, by_jacobian.told):

@@ -11,9 +11,11 @@ from vftcli.cli.bundles import taken_apart
 from vftcli.cli.help import WRITE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from vftcli.analysis import Analysis
+    from vftcli.pipeline import AnalysisChoice
+    from vftcli.signals.recording import Recording
 
 
 @taken_apart
@@ -61,42 +63,61 @@ def estimate(
     from vftcli.cli.console import command_line, say_left_out
     from vftcli.cli.jacobian import write_by_jacobian
     from vftcli.cli.opening import open_made
-    from vftcli.observers.table import BEST
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.estimates import (
-        estimate_files,
-        write_estimate_folder,
-        write_long_estimates,
-    )
-    from vftcli.pipeline import analyse
+    from vftcli.outputs.log.estimates import estimate_files
     from vftcli.readers.table import JacobianError
-    from vftcli.streaming import BlockAnalysis, prepared_in_blocks
 
     OutputFolder(output, force, estimate_files(extras)).check()
-    choice = analysis.choice(library)
-    # The list comes with the smoothed wrench of best, the observer that sees the complete log.
-    choice = replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
+    choice = analysis.choice(library).for_estimates()
     try:
-        read = reading.result()
+        made, record = write_estimates(
+            reading.result(),
+            lambda: library.open(log, replace(chosen, blocks=False)),
+            choice,
+            output,
+            {"command": command_line(), "extras": extras, "force": force},
+        )
     except JacobianError as found:
         write_by_jacobian(log, found, choice, output, force=force, json=json)
         return
-    recording, robot = prepared_in_blocks(
-        read, choice, lambda: library.open(log, replace(chosen, blocks=False))
-    )
-    run = BlockAnalysis(analyse(recording, robot, choice), choice)
-    how: dict[str, Any] = {"command": command_line(), "extras": extras, "force": force}
-    if recording.long is None:
-        record = write_estimate_folder(output, run.made, **how)
-    else:
-        record = write_long_estimates(output, run.blocks(), lambda: run.made, **how)
     say_left_out(estimate_files(extras))
     if json:
         typer.echo(record)
     else:
-        show_estimates(run.made, output, estimate_files(extras))
+        show_estimates(made, output, estimate_files(extras))
     if show:
         open_made(output)
+
+
+def write_estimates(
+    recording: "Recording",
+    whole: "Callable[[], Recording]",
+    choice: "AnalysisChoice",
+    output: Path,
+    how: dict[str, Any],
+) -> "tuple[Analysis, str]":
+    """Analyse a log, in one piece or block by block, and write its estimates.
+
+    Args:
+        recording: The log, in blocks if it is long.
+        whole: Reads it in one piece.
+        choice: What is asked of it.
+        output: The folder.
+        how: What else the writers take.
+
+    Returns:
+        The analysis, and the record that was written.
+    """
+    from vftcli.outputs.log.estimates import write_estimate_folder, write_long_estimates
+    from vftcli.pipeline import analyse
+    from vftcli.streaming import BlockAnalysis, prepared_in_blocks
+
+    recording, robot = prepared_in_blocks(recording, choice, whole)
+    run = BlockAnalysis(analyse(recording, robot, choice), choice)
+    if recording.long is None:
+        return run.made, write_estimate_folder(output, run.made, **how)
+    record = write_long_estimates(output, run.blocks(), lambda: run.made, **how)
+    return run.made, record
 
 
 def show_estimates(made: "Analysis", output: Path, files: "Sequence[str]") -> None:

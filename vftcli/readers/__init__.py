@@ -24,7 +24,7 @@ from vftcli.readers import (
     tables,
 )
 from vftcli.readers.bags import formats as bags
-from vftcli.readers.cleaning import RestartError, cleaned
+from vftcli.readers.cleaning import RestartError, cleaned, without_unknown_rows
 from vftcli.readers.long_log import long_recording
 from vftcli.readers.opening import Digest
 from vftcli.readers.parts import refuse_arm
@@ -133,7 +133,8 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     def found(choice: ReadChoice = choice) -> RawLog:
         with np.errstate(all="ignore"):  # what a damaged file holds is judged when it is cleaned
             raw = reader.read(file, choice)
-            return replace(raw, remarks=(*file.remarks, *raw.remarks))
+            raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
+            return without_unknown_rows(raw) if choice.skips_unknown else raw
 
     try:
         raw = found()
@@ -163,6 +164,13 @@ def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
     return reader.episodes(file)
 
 
+def holds_episodes(path: str | Path, choice: ReadChoice) -> bool:
+    """Whether a file holds several episodes."""
+    file = open_log(Path(path))
+    reader = _reader(file, choice.format, choice.columns)
+    return reader.episodes is not None and len(reader.episodes(file)) > 1
+
+
 def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> Recording:
     """Read a log as `read` does; of a file that holds several recordings or arms, the first.
 
@@ -179,13 +187,15 @@ def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> 
         return replace(first, source=replace(first.source, remarks=remarks))
 
 
-def recognise(path: str | Path) -> Reader:
-    """Return the reader that a path's content calls for.
+def recognise(path: str | Path, choice: ReadChoice | None = None) -> Reader:
+    """Return the reader that a path's content calls for, or that is chosen.
 
     Raises:
         UnknownFormatError: If no format fits, or more than one.
+        LogError: If there is nothing at the path, or it cannot be opened.
     """
-    return _recognise(open_log(Path(path)))
+    choice = choice or ReadChoice()
+    return _reader(open_log(Path(path)), choice.format, choice.columns)
 
 
 def _reader(file: LogFile, name: str | None, columns: str | None) -> Reader:
@@ -229,6 +239,7 @@ __all__ = [
     "ReadChoice",
     "Reader",
     "episode_numbers",
+    "holds_episodes",
     "read",
     "read_chosen",
     "read_first_recording",

@@ -12,7 +12,7 @@ from typing import Self
 
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.derivation import is_fast, with_velocity
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
@@ -120,6 +120,8 @@ class RawLog:
         files: The files of a folder that it was read from; () for all.
         rest: What follows in the file, block by block, where this is the first of several; None
             where it is all.
+        rows: Which rows of the file these are, counted from 0; None for all. (T,)
+        unknown: Rows of the file that were left out because a value is no number.
     """
 
     stamps: Array
@@ -140,6 +142,8 @@ class RawLog:
     part: str = ""
     files: tuple[Path, ...] = ()
     rest: "Iterator[RawLog] | None" = None
+    rows: Indices | None = None
+    unknown: Indices | None = None
 
     def told_payload(self, constants: tuple[float, ...]) -> Self:
         """The log with the payload that its controller was told of last.
@@ -191,6 +195,8 @@ class ReadChoice:
         examining: Whether the log is only looked at, where a part and a word say more than a
             refusal.
         blocks: Whether a long log may come in blocks, where its format allows it.
+        skips_unknown: Whether rows with a value that is no number are left out and said, not
+            refused.
 
     Raises:
         ParameterError: If the effort, the derived signal or the arm is none of these.
@@ -207,6 +213,7 @@ class ReadChoice:
     arm: str | None = None
     examining: bool = False
     blocks: bool = False
+    skips_unknown: bool = False
 
     def __post_init__(self) -> None:
         if self.arm is not None:

@@ -13,6 +13,9 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 """True or false, sample by sample or joint by joint, named for what is true."""
 
+Indices = NDArray[np.int64]
+"""Numbers of rows or samples, counted from 0."""
+
 
 def frozen(value: ArrayLike) -> Array:
     """Return a read-only float64 array that nobody else can write to.

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
+from vftcli.signals.arrays import Array, Indices, check_clock, check_shape, frozen
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
@@ -80,6 +80,8 @@ class Source:
         remarks: Facts on what was dropped, turned or derived; cautions and warnings on what looks
             suspicious but was left as it is.
         part: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
+        row_samples: The sample that each of the rows is, or repeats; −1 for one that was dropped
+            otherwise. None where each row is the sample of its number. (rows,)
     """
 
     path: Path | None = None
@@ -94,6 +96,7 @@ class Source:
     derived: tuple[str, ...] = ()
     remarks: tuple[Remark, ...] = ()
     part: str = ""
+    row_samples: Indices | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if not self.label and self.path is not None:
@@ -193,9 +196,9 @@ class Recording:
     long: LongLog | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            if isinstance(value := getattr(self, one.name), np.ndarray):
-                object.__setattr__(self, one.name, frozen(value))
+        for each in fields(self):
+            if isinstance(value := getattr(self, each.name), np.ndarray):
+                object.__setattr__(self, each.name, frozen(value))
         if self.q.ndim != 2:
             raise ShapeError(f"q of the recording has shape {self.q.shape}; expected (T, n)")
         if len(self.t) == 0:
