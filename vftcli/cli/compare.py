@@ -56,6 +56,7 @@ def compare(
     """
     import polars as pl
 
+    from vftcli.batch.kinds import for_comparison
     from vftcli.cli.console import LeftOut, say_analysis
     from vftcli.evaluation import paired_significance
     from vftcli.evaluation.pooling import PoolMember, evaluate_pooled
@@ -71,7 +72,7 @@ def compare(
         "latex": tables.to_latex,
     }
     library = Library(logs)
-    choice = analysis.choice(library, reference).for_comparison()
+    choice = for_comparison(analysis.choice(library, reference))
     left_out, analyses = LeftOut(library, logs), []
     for made in analyse_logs(logs, choice, left_out.told):
         if not table.json:

@@ -53,6 +53,7 @@ def estimate(
         refuse_estimates(log)
     reading = Background(lambda: library.open(log, chosen))
 
+    from vftcli.batch.kinds import for_estimates
     from vftcli.cli.console import command_line
     from vftcli.cli.opening import open_made
     from vftcli.outputs.files import OutputFolder
@@ -60,7 +61,7 @@ def estimate(
     from vftcli.pipeline import analyse, prepared
 
     OutputFolder(output, force, estimate_files(extras)).check()
-    choice = analysis.choice(library).for_estimates()
+    choice = for_estimates(analysis.choice(library))
     made = analyse(*prepared(reading.result(), choice), choice)
     record = write_estimate_folder(output, made, command=command_line(), extras=extras, force=force)
     if json:
