@@ -76,6 +76,7 @@ def connected(
         EngineError: If it does not answer, is of other versions, or does not see the files.
     """
     import dask.config
+    import distributed  # noqa: F401 - its settings, which are changed here for a block
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # who dies is told in outcomes
     with dask.config.set(dict(CONFIG)):
