@@ -100,15 +100,6 @@ class AnalysisChoice:
         """Whether what touched the arm is listed: that needs the complete log."""
         return self.contacts and not self.observers.causal
 
-    def for_estimates(self) -> "AnalysisChoice":
-        """The same where estimates are written: the list comes with the wrench of `best`."""
-        return replace(self, contacts=self.contacts and BEST in self.observers.names)
-
-    def for_comparison(self) -> "AnalysisChoice":
-        """The same where errors are printed: the list is for the wrench, and to judge contacts."""
-        judged = self.reference is not None and self.reference.contacts
-        return replace(self, contacts=self.contacts and (self.wrench is not None or judged))
-
 
 Analyser = Callable[[Recording, Robot, AnalysisChoice, Models], "Analysis"]
 """What is done with each log of a command."""

@@ -7,7 +7,8 @@ import signal
 import pytest
 
 from vftcli.batch.choice import WorkersChoice
-from vftcli.batch.engine import Failure, Outcome, begin, failure_of, perform, run_tasks
+from vftcli.batch.engine import Failure, Outcome, begin, run_tasks
+from vftcli.batch.outcome import failure_of, perform
 
 HERE = WorkersChoice(workers=0)
 

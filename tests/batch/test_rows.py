@@ -33,7 +33,7 @@ def analysis() -> Analysis:
 
 def test_one_row_an_observer_and_joint_with_its_error(analysis: Analysis) -> None:
     rows = rows_of(analysis, "key")
-    assert dict(rows.schema) == dict(SCHEMA)
+    assert dict(rows.schema) == SCHEMA
     torques = rows.filter(rows["joint"].is_not_null())
     assert torques.select("observer", "joint").rows() == [
         (name, j) for name in ("fdo", "gmo") for j in range(1, 7)

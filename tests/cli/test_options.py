@@ -166,8 +166,8 @@ def test_summaries_are_those_of_the_commands() -> None:
 
 
 ROOT = Path(__file__).parent.parent.parent
-OF_OTHER_TOOLS = {"--binary", "--storage", "--help", "--all-extras"}
-"""Options in the documents that are those of pip, of ros2 bag, or of all programs."""
+OF_OTHER_TOOLS = {"--binary", "--storage", "--help", "--all-extras", "--nthreads"}
+"""Options in the documents that are those of pip, of ros2 bag, of Dask, or of all programs."""
 
 
 def test_documents_name_every_option_and_no_other() -> None:

@@ -43,7 +43,7 @@ def test_the_table_is_in_the_order_of_the_logs_and_equal_logs_share_rows(
     logs = pl.DataFrame(
         {"log": ["z", "b", "a"], "episode": [None, 1, None], "key": [OTHER, KEY, KEY]}, schema=LOGS
     )
-    table = folder.gather(logs, {})
+    (table,) = folder.gather(logs, {})
     assert list(table.select("log", "joint").iter_rows()) == [
         ("z", 7), ("b", 1), ("b", 2), ("a", 1), ("a", 2)
     ]  # fmt: skip
@@ -51,13 +51,14 @@ def test_the_table_is_in_the_order_of_the_logs_and_equal_logs_share_rows(
 
 def test_without_a_log_the_table_has_its_columns(folder: BatchFolder) -> None:
     schema = {"key": pl.String, "joint": pl.Int64}
-    table = folder.gather(pl.DataFrame(schema=LOGS), schema)
+    (table,) = folder.gather(pl.DataFrame(schema=LOGS), schema)
     assert table.columns == ["log", "episode", "key", "joint"]
 
 
 def test_the_seal_is_the_last_file_and_lists_the_others(folder: BatchFolder) -> None:
     table = rows(KEY, 1)
-    folder.put_gathered(table, table, "<html>", {"command": "x"})
+    folder.put_gathered(iter([table, rows(KEY, 2)]), table, lambda: "<html>", {"command": "x"})
+    assert pl.read_parquet(folder.path / "batch.parquet").equals(rows(KEY, 1, 2))
     record = json.loads((folder.path / "run.json").read_text())
     assert set(record["files"]) == {"batch.parquet", "failures.parquet", "index.html"}
 

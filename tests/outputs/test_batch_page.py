@@ -3,7 +3,7 @@
 import polars as pl
 
 from vftcli.batch.rows import SCHEMA
-from vftcli.outputs.page.batch_page import render_batch
+from vftcli.outputs.page.batch_page import batch_lines, render_batch
 
 LINE = {"robot": "ur5", "duration_s": 20.0, "joint": 1, "observer": "gmo", "load": False}
 FAILURES = {"log": pl.String, "stage": pl.String, "error": pl.String, "line": pl.String}
@@ -23,7 +23,7 @@ BAD = {"log": "b<i>.csv", "health": "bad", "reason": "effort: turned", "contacts
 def test_one_line_a_log_the_worst_first_and_what_failed() -> None:
     failures = pl.DataFrame([("c.csv", "reading", "LogError", "empty")], FAILURES, orient="row")
     rows = table(SOUND | FORCE, SOUND | FORCE | {"joint": 2, "rmse_Nm": 0.75}, BAD)
-    page = render_batch(rows, failures, {"a.csv": "logs/a 1/index.html"})
+    page = render_batch(list(batch_lines(rows, {"a.csv": "logs/a 1/index.html"})), failures)
     assert page.index("b&lt;i&gt;.csv") < page.index(">a.csv<")
     assert 'href="logs/a%201/index.html"' in page
     # The mean of both joints, and the force rounded.
@@ -36,5 +36,5 @@ def test_one_line_a_log_the_worst_first_and_what_failed() -> None:
 
 
 def test_a_batch_of_failures_alone_has_a_page() -> None:
-    page = render_batch(table(SOUND).clear(), pl.DataFrame(schema=FAILURES), {})
+    page = render_batch(list(batch_lines(table(SOUND).clear(), {})), pl.DataFrame(schema=FAILURES))
     assert "0 logs." in page

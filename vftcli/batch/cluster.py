@@ -3,6 +3,7 @@
 import hashlib
 import logging
 import os
+import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import count, islice
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vftcli.batch.choice import MEMORY, MOST_WORKERS, WorkersChoice
-from vftcli.batch.engine import (
+from vftcli.batch.outcome import (
     KILLED,
     EngineError,
     Failure,
@@ -50,6 +51,7 @@ CONFIG: Mapping[str, object] = {
     "distributed.worker.memory.spill": False,
     "distributed.comm.timeouts.connect": f"{ANSWER:g}s",
     "distributed.nanny.pre-spawn-environ": THREADS,
+    "distributed.worker.preload": [__name__],
 }
 
 PACKAGES = ("vftcli", "numpy", "scipy", "polars", "pin")
@@ -57,6 +59,11 @@ PACKAGES = ("vftcli", "numpy", "scipy", "polars", "pin")
 
 HEAD = 4096
 """Bytes of a file by which workers are asked whether they see the same. [B]"""
+
+
+def dask_setup(_worker: object) -> None:
+    """Leave Ctrl-C, which every process of a terminal gets, to the one that ends the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager
@@ -69,7 +76,7 @@ def connected(
         EngineError: If it does not answer, is of other versions, or does not see the files.
     """
     import dask.config
-    import distributed  # noqa: F401 - it adds its own settings, which must outlive the block
+    import distributed  # noqa: F401 - its settings, which are changed here for a block
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # who dies is told in outcomes
     with dask.config.set(dict(CONFIG)):

@@ -61,7 +61,8 @@ def rows_of(analysis: Analysis, key: str) -> pl.DataFrame:
     """The rows of one log; a single one without an observer where none ran."""
     sizes = pl.DataFrame(list(estimate_sizes(analysis)), schema=OF_ESTIMATE)
     if analysis.errors is not None:
-        errors = analysis.errors.drop("recording").rename({"samples": COMPARED})
+        others = pl.all().exclude("recording", "samples")
+        errors = analysis.errors.select(others, pl.col("samples").alias(COMPARED))
         missing = [name for name in (*JOINED, *OF_ERROR) if name not in errors.columns]
         kinds = {**OF_ESTIMATE, **OF_ERROR}
         errors = errors.with_columns(pl.lit(None, kinds[name]).alias(name) for name in missing)

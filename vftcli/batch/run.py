@@ -15,7 +15,8 @@ from vftcli.batch.rows import SCHEMA
 from vftcli.batch.shipping import Parcel, packed, work_on_parcel
 from vftcli.outputs.batch_folder import FAILED, BatchFolder
 from vftcli.outputs.log.run_record import versions
-from vftcli.outputs.page.batch_page import render_batch
+from vftcli.outputs.page.batch_page import batch_lines, render_batch
+from vftcli.outputs.page.index_page import IndexLine
 from vftcli.readers.collection import LogEntry
 from vftcli.readers.library import absolute, labelled
 
@@ -241,7 +242,6 @@ class _Run:
             },
             schema={"log": pl.String, "episode": pl.Int64, "key": pl.String},
         )
-        table = self.folder.gather(logs, SCHEMA)
         failures = pl.DataFrame(
             [
                 (self.labels[n], self.keys.get(n), *failure)
@@ -258,8 +258,19 @@ class _Run:
         )
         missing = set(range(len(self.plan.logs))) - set(finished) - self.failures.keys()
         count = self.count()._replace(done=len(finished) - self.before)
-        page = render_batch(table, failures, self.pages(finished))
-        self.folder.put_gathered(table, failures, page, self.record(count, len(missing)))
+        pages, lines = self.pages(finished), list[IndexLine]()
+
+        def noted() -> "Iterator[pl.DataFrame]":
+            for piece in self.folder.gather(logs, SCHEMA):
+                lines.extend(batch_lines(piece, pages))
+                yield piece
+
+        self.folder.put_gathered(
+            noted(),
+            failures,
+            lambda: render_batch(lines, failures),
+            self.record(count, len(missing)),
+        )
         return failures, count
 
     def pages(self, finished: Sequence[int]) -> dict[str, str]:

@@ -102,6 +102,7 @@ def batch(
 
     Example: vftcli batch fixtures/ur5_t*.csv --robot ur5 --do estimate -o out
     """
+    from vftcli.batch.kinds import for_comparison, for_estimates
     from vftcli.batch.log_work import LogJob
     from vftcli.batch.run import BatchPlan, run_batch
     from vftcli.cli.console import command_line, detail, say
@@ -115,9 +116,8 @@ def batch(
     choice = analysis.choice(Library(), reference)
     if do == "compare" and choice.reference is None:
         raise ParameterError("--do compare needs --reference: two-cycle, sensor, vendor, zero, …")
-    choice = {"estimate": choice.for_estimates, "compare": choice.for_comparison}.get(
-        do, lambda: choice
-    )()
+    narrowed = {"estimate": for_estimates, "compare": for_comparison}
+    choice = narrowed[do](choice) if do in narrowed else choice
     # These are of each worker.
     choice = replace(choice, library=Library(), examiner=Examiner(), progress=silent)
     extras = tuple(also.names())

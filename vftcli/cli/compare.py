@@ -56,6 +56,7 @@ def compare(
     """
     import polars as pl
 
+    from vftcli.batch.kinds import for_comparison
     from vftcli.cli.console import LeftOut, say_analysis
     from vftcli.cli.jacobian import JacobianLogs
     from vftcli.evaluation import paired_significance
@@ -72,7 +73,7 @@ def compare(
         "latex": tables.to_latex,
     }
     library = Library(logs)
-    choice = analysis.choice(library, reference).for_comparison()
+    choice = for_comparison(analysis.choice(library, reference))
     left_out, analyses = LeftOut(library, logs), []
     by_jacobian = JacobianLogs(left_out, choice)
     for made in analyse_logs(logs, choice, by_jacobian.told):

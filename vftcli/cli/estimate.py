@@ -60,6 +60,7 @@ def estimate(
         refuse_estimates(log)
     reading = Background(lambda: library.open(log, chosen))
 
+    from vftcli.batch.kinds import for_estimates
     from vftcli.cli.console import command_line, say_left_out
     from vftcli.cli.jacobian import write_by_jacobian
     from vftcli.cli.opening import open_made
@@ -68,7 +69,7 @@ def estimate(
     from vftcli.readers.table import JacobianError
 
     OutputFolder(output, force, estimate_files(extras)).check()
-    choice = analysis.choice(library).for_estimates()
+    choice = for_estimates(analysis.choice(library))
     try:
         made, record = write_estimates(
             reading.result(),

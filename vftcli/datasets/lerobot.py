@@ -12,9 +12,13 @@ from vftcli.datasets.statistics import KEYS, pooled
 from vftcli.readers.columnar import EPISODE, guarded
 from vftcli.readers.lerobot import data_file, episodes_told, info_of, text_of
 from vftcli.signals.errors import LogError
+from vftcli.signals.packages import needed
 
 PREFIX = "observation."
 """What the names of observations begin with."""
+
+DATASET = "a dataset of LeRobot"
+"""What needs pyarrow."""
 
 METADATA = b"huggingface"
 """Key of a Parquet schema's metadata under which the `datasets` library tells its features."""
@@ -44,10 +48,10 @@ class LeRobotDataset:
 
     def frames(self, file: DataFile, number: int) -> int:
         """How many frames an episode has."""
-        import pyarrow.parquet as pq
+        pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
 
         path = self.folder / file.place
-        with guarded(path):
+        with guarded(path, (pa.ArrowException,)):
             source = pq.ParquetFile(path)
             if EPISODE not in source.schema_arrow.names:
                 return int(source.metadata.num_rows)
@@ -60,10 +64,10 @@ class LeRobotDataset:
         Raises:
             LogError: If it has.
         """
-        import pyarrow.parquet as pq
+        pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
 
         path = self.folder / file.place
-        with guarded(path):
+        with guarded(path, (pa.ArrowException,)):
             there = {*pq.read_schema(path).names, *info_of(self.folder).get("features", {})}
         for column in columns:
             if PREFIX + column.name in there:
@@ -79,11 +83,10 @@ class LeRobotDataset:
         Raises:
             LogError: If an episode of the file has no forces, or another number of frames.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
 
         path = self.folder / file.place
-        with guarded(path):
+        with guarded(path, (pa.ArrowException,)):
             source = pq.ParquetFile(path)
             numbers = None
             if EPISODE in source.schema_arrow.names:
@@ -97,7 +100,7 @@ class LeRobotDataset:
         first = 0
         with pq.ParquetWriter(target, schema, compression=codec) as writer:
             for group in range(source.num_row_groups):
-                with guarded(path):
+                with guarded(path, (pa.ArrowException,)):
                     table = source.read_row_group(group)
                 rows = slice(first, first + table.num_rows)
                 first = rows.stop
@@ -155,10 +158,9 @@ class LeRobotDataset:
         copy: Path,
     ) -> None:
         """Write a table of episodes with the statistics of the columns, where it has those."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
 
-        with guarded(path):
+        with guarded(path, (pa.ArrowException,)):
             source = pq.ParquetFile(path)
             table = source.read()
         parts = [name.split("/") for name in table.column_names if name.startswith("stats/")]
@@ -212,14 +214,14 @@ def write_json(path: Path, value: Any) -> None:  # noqa: ANN401 - what JSON hold
 
 def kind_of(width: int) -> Any:  # noqa: ANN401 - a pyarrow type
     """How a column is stored: single numbers, or lists of one length."""
-    import pyarrow as pa
+    pa = needed("pyarrow", DATASET)
 
     return pa.float32() if width == 1 else pa.list_(pa.float32(), width)
 
 
 def as_column(values: Any) -> Any:  # noqa: ANN401 - float32 → pyarrow
     """Values (N, k) as they are stored."""
-    import pyarrow as pa
+    pa = needed("pyarrow", DATASET)
 
     flat = pa.array(np.ascontiguousarray(values).ravel())
     width = values.shape[1]

@@ -5,8 +5,8 @@ is complete. ``logs/<key[:2]>/<key>/`` holds what else was made of the log.
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +26,9 @@ TABLE, FAILURES, PAGE = "batch.parquet", "failures.parquet", "index.html"
 
 GATHERED = (TABLE, FAILURES, PAGE, SEAL)
 """Files that are made anew by every run."""
+
+PIECE = 500
+"""Logs whose rows are in memory at a time."""
 
 DONE, FAILED = ".parquet", ".failed.json"
 """Endings of what a log leaves in ``rows/``."""
@@ -150,8 +153,8 @@ class BatchFolder:
         """Take away why a log failed."""
         self.row_file(key, FAILED).unlink(missing_ok=True)
 
-    def gather(self, logs: "pl.DataFrame", schema: "Mapping[str, Any]") -> "pl.DataFrame":
-        """The rows of all logs in one table, in the order of the logs whatever ended first.
+    def gather(self, logs: "pl.DataFrame", schema: "Mapping[str, Any]") -> "Iterator[pl.DataFrame]":
+        """The rows of all logs, `PIECE` logs at a time, in the logs' order whatever ended first.
 
         Args:
             logs: ``log``, ``episode`` and ``key`` of every log that is done. Two logs of equal
@@ -160,24 +163,35 @@ class BatchFolder:
         """
         import polars as pl
 
-        files = [self.row_file(key) for key in logs["key"].unique(maintain_order=True)]
-        rows = pl.read_parquet(files) if files else pl.DataFrame(schema=schema)
-        return logs.join(rows, on="key", how="left", maintain_order="left_right")
+        for part in logs.iter_slices(PIECE) if logs.height else (logs,):
+            files = [self.row_file(key) for key in part["key"].unique(maintain_order=True)]
+            rows = pl.read_parquet(files) if files else pl.DataFrame(schema=schema)
+            yield part.join(rows, on="key", how="left", maintain_order="left_right")
 
     def put_gathered(
-        self, table: "pl.DataFrame", failures: "pl.DataFrame", page: str, record: Mapping[str, Any]
+        self,
+        tables: "Iterable[pl.DataFrame]",
+        failures: "pl.DataFrame",
+        page: Callable[[], str],
+        record: Mapping[str, Any],
     ) -> None:
         """Write the tables and the page, and at last their seal.
+
+        Args:
+            tables: Pieces of the one table, never all in memory.
+            failures: Why logs failed.
+            page: Makes the page, once every piece is written.
+            record: What else the seal holds.
 
         Raises:
             OutputError: If one cannot be written.
         """
         (self.path / SEAL).unlink(missing_ok=True)
-        for name, frame in ((TABLE, table), (FAILURES, failures)):
-            with atomic(self.path / name, force=True) as temporary, table_file(temporary) as file:
-                frame.write_parquet(file, compression="zstd", statistics=False)
+        for name, pieces in ((TABLE, tables), (FAILURES, (failures,))):
+            with atomic(self.path / name, force=True) as temporary:
+                put_pieces(temporary, pieces)
         with atomic(self.path / PAGE, force=True) as temporary:
-            put_text(temporary, page)
+            put_text(temporary, page())
         files = {name: digest(self.path / name) for name in (TABLE, FAILURES, PAGE)}
         with atomic(self.path / SEAL, force=True) as temporary:
             put_text(temporary, to_json({**record, "files": files}))
@@ -186,3 +200,19 @@ class BatchFolder:
         """Every file of a log's result, its rows last."""
         found = sorted(path for path in self.result(key).rglob("*") if path.is_file())
         return [*found, self.row_file(key)]
+
+
+def put_pieces(path: Path, pieces: "Iterable[pl.DataFrame]") -> None:
+    """Write one table of several pieces, a row group each; there is one at least."""
+    import polars as pl
+    from pyarrow.parquet import ParquetWriter
+
+    with ExitStack() as stack:
+        writer = None
+        for piece in pieces:
+            # What other programs read: text of the kind that Arrow has always had.
+            table = piece.to_arrow(compat_level=pl.CompatLevel.oldest())
+            if writer is None:
+                writer = ParquetWriter(path, table.schema, compression="zstd")
+                stack.enter_context(writer)
+            writer.write_table(table)

@@ -1,6 +1,6 @@
 """The page over a batch: one line a log, made from its table alone."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -12,15 +12,13 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-def render_batch(table: "pl.DataFrame", failures: "pl.DataFrame", pages: Mapping[str, str]) -> str:
+def render_batch(lines: Sequence[IndexLine], failures: "pl.DataFrame") -> str:
     """The page over a batch.
 
     Args:
-        table: Its rows, as ``batch.parquet`` holds them.
+        lines: One a log, as `batch_lines` makes them.
         failures: Logs that could not be done, with stage, error and line.
-        pages: Label of a log → its own page, relative to this one.
     """
-    lines = list(batch_lines(table, pages))
     robots = sorted({line.robot for line in lines})
     touched = sum(line.contacts not in {DASH, "0", "load"} for line in lines)
     told = sum(line.contacts != DASH for line in lines)
@@ -44,7 +42,12 @@ def render_batch(table: "pl.DataFrame", failures: "pl.DataFrame", pages: Mapping
 
 
 def batch_lines(table: "pl.DataFrame", pages: Mapping[str, str]) -> Iterator[IndexLine]:
-    """The line of every log."""
+    """The line of every log.
+
+    Args:
+        table: All rows of some logs, as ``batch.parquet`` holds them.
+        pages: Label of a log → its own page, relative to the batch's.
+    """
     import polars as pl
 
     if table.is_empty():
