@@ -44,10 +44,10 @@ def estimate(
     from vftcli.readers.estimates import refuse_estimates
     from vftcli.readers.library import Library
 
-    extras = also.names(csv=csv, rrd=rrd or show)
+    written = also.choice(csv=csv, rrd=rrd or show)
     # Of a large log only the columns that are looked at are read; outputs show the others too.
     causal = analysis.observers.causal or analysis.contacts.no_contacts
-    signals = EXAMINED if causal and not (analysis.wrench.asks or extras) else None
+    signals = EXAMINED if causal and not (analysis.wrench.asks or written.extras) else None
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
     if chosen.columns is None:
         refuse_estimates(log)
@@ -60,16 +60,18 @@ def estimate(
     from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
     from vftcli.pipeline import analyse, prepared
 
-    OutputFolder(output, force, estimate_files(extras)).check()
+    OutputFolder(output, force, estimate_files(written.extras)).check()
     choice = analysis.choice(library)
     # The list comes with the smoothed wrench of best, the observer that sees the complete log.
     choice = replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
     made = analyse(*prepared(reading.result(), choice), choice)
-    record = write_estimate_folder(output, made, command=command_line(), extras=extras, force=force)
+    record = write_estimate_folder(
+        output, made, command=command_line(), choice=written, force=force
+    )
     if json:
         typer.echo(record)
     else:
-        show_estimates(made, output, estimate_files(extras))
+        show_estimates(made, output, estimate_files(written.extras))
     if show:
         open_made(output)
 

@@ -55,8 +55,8 @@ def report(
     from vftcli.readers.library import Library
 
     library = Library(logs)
-    extras = also.names()
-    names = report_files([library.label(log) for log in logs], extras)
+    written = also.choice()
+    names = report_files([library.label(log) for log in logs], written.extras)
     OutputFolder(output, force, names).check()
     choice = analysis.choice(library, reference, on_screen=not json)
     if published is not None:
@@ -75,15 +75,15 @@ def report(
     choice.progress("writing")
     command, failed = command_line(), left_out.reasons
     if len(analyses) + len(failed) == 1:
-        record = write_report(output, analyses[0], command=command, force=force, extras=extras)
+        record = write_report(output, analyses[0], command=command, force=force, choice=written)
     else:
         record = write_reports(
-            output, analyses, command=command, force=force, extras=extras, failed=failed
+            output, analyses, command=command, force=force, choice=written, failed=failed
         )
     if json:
         typer.echo(record)
     else:
-        show_report(analyses, output, failed, extras, details=analysis.talk.details)
+        show_report(analyses, output, failed, written.extras, details=analysis.talk.details)
     if show:
         open_made(output)
     left_out.end(len(analyses))

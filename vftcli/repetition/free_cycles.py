@@ -47,22 +47,27 @@ class FreeCycles(NamedTuple):
         at = np.linspace(0, len(self.numbers) - 1, MOST_LAID).round().astype(int)
         return tuple(self.numbers[k] for k in at)
 
-    def remarks(self, whole: int) -> list[Remark]:
-        """Which of so many whole cycles they are, how they were found, and which are laid under."""
+    def remark(self, whole: int) -> Remark:
+        """Which of so many whole cycles they are, and how they were found."""
         code = "free-cycle" if len(self.numbers) == 1 else "free-cycles"
         named = [number + 1 for number in self.numbers]
         if self.residuals is None:
-            found = [fact(f"{code}-given", cycles=named, whole=whole)]
-        else:
-            residuals = [float(x) for x in self.residuals]
-            found = [fact(f"{code}-found", cycles=named, whole=whole, residuals=residuals)]
+            return fact(f"{code}-given", cycles=named, whole=whole)
+        residuals = [float(x) for x in self.residuals]
+        return fact(f"{code}-found", cycles=named, whole=whole, residuals=residuals)
+
+    def remarks(self, whole: int) -> list[Remark]:
+        """The same, and which of them are laid under the others where not all are."""
         count = len(self.numbers)
-        if count > MOST_LAID:
-            # The mean of k cycles with independent noise adds 1/k of one cycle's to the square.
-            wider = float(np.sqrt((1.0 + 1.0 / MOST_LAID) / (1.0 + 1.0 / count)) - 1.0)
-            drawn = [number + 1 for number in self.drawn]
-            found.append(fact("free-cycles-drawn", cycles=drawn, free=count, wider=wider))
-        return found
+        if count <= MOST_LAID:
+            return [self.remark(whole)]
+        # The mean of k cycles with independent noise adds 1/k of one cycle's to the square.
+        wider = float(np.sqrt((1.0 + 1.0 / MOST_LAID) / (1.0 + 1.0 / count)) - 1.0)
+        drawn = [number + 1 for number in self.drawn]
+        return [
+            self.remark(whole),
+            fact("free-cycles-drawn", cycles=drawn, free=count, wider=wider),
+        ]
 
 
 def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:

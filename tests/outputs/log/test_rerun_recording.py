@@ -123,7 +123,7 @@ def test_without_a_reference_there_are_no_residuals(
 
 
 def test_wrenches_have_their_own_tab(with_wrench: Analysis) -> None:
-    lines = line_groups(with_wrench)["Wrench"]
+    lines = list(line_groups(with_wrench)["Wrench"])
     assert [entry.path for entry in lines] == [f"/wrench/{a}" for a in (*AXES, "sigma_min")]
     np.testing.assert_array_equal(lines[4].values[:, 1], with_wrench.wrenches[1].known[:, 4])
 

@@ -1,7 +1,8 @@
 """What `vftcli estimate` writes: the estimates as flat columns, `run.json`, extras on demand."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.outputs.examination import overridden_lines
 from vftcli.outputs.files import OutputFolder, table_file
+from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.outputs.log.run_record import run_record, seal
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
@@ -164,16 +166,20 @@ def estimate_files(extras: Sequence[str]) -> tuple[str, ...]:
 
 
 def write_extras(
-    folder: OutputFolder, place: str, analysis: Analysis, extras: Sequence[str]
+    folder: OutputFolder, place: str, analysis: Analysis, choice: OutputChoice
 ) -> None:
     """Write what was asked for besides, below a place of a folder."""
     from vftcli.outputs.log.layouts import foxglove_layout, plotjuggler_layout
     from vftcli.outputs.log.mcap_output import write_mcap
     from vftcli.outputs.log.rerun_recording import write_rrd
 
+    writers: dict[str, Callable[[Path, Analysis], None]] = {
+        "csv": write_csv,
+        "mcap": write_mcap,
+        "rrd": partial(write_rrd, detail=choice.rrd_detail),
+    }
     texts = dict(zip(EXTRAS["layouts"], (foxglove_layout, plotjuggler_layout), strict=True))
-    writers = {"csv": write_csv, "mcap": write_mcap, "rrd": write_rrd}
-    for extra in extras:
+    for extra in choice.extras:
         for name in EXTRAS[extra]:
             if name in texts:
                 folder.write(f"{place}{name}", texts[name](analysis))
@@ -182,7 +188,11 @@ def write_extras(
 
 
 def write_estimate_folder(
-    path: Path, analysis: Analysis, command: str, extras: Sequence[str] = (), force: bool = False
+    path: Path,
+    analysis: Analysis,
+    command: str,
+    choice: OutputChoice = PLAIN,
+    force: bool = False,
 ) -> str:
     """Write `estimates.parquet`, `run.json` and the extras into a folder, all or nothing.
 
@@ -193,8 +203,8 @@ def write_estimate_folder(
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     record = run_record(analysis, command)
-    with OutputFolder(path, force, estimate_files(extras)) as folder:
+    with OutputFolder(path, force, estimate_files(choice.extras)) as folder:
         write_estimates(folder / "estimates.parquet", analysis)
         # After the record: it names the packages that are loaded, and these made no number.
-        write_extras(folder, "", analysis, extras)
+        write_extras(folder, "", analysis, choice)
         return seal(folder, SEAL, record)

@@ -11,6 +11,7 @@ from vftcli.analysis import Analysis
 from vftcli.outputs.contacts import contacts_csv, contacts_record
 from vftcli.outputs.files import OutputFolder, numbered
 from vftcli.outputs.log import tables
+from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.log.rerun_recording import write_rrd
 from vftcli.outputs.log.run_record import jsonable, run_record, seal, versions
@@ -64,7 +65,7 @@ def write_report(
     *,
     command: str,
     force: bool = False,
-    extras: Sequence[str] = (),
+    choice: OutputChoice = PLAIN,
 ) -> str:
     """Write the report of one log, all files or none.
 
@@ -74,9 +75,9 @@ def write_report(
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
-    names = report_files([analysis.recording.name], extras)
+    names = report_files([analysis.recording.name], choice.extras)
     with OutputFolder(path, force, names) as folder:
-        return fill(folder, "", analysis, command, extras)
+        return fill(folder, "", analysis, command, choice)
 
 
 def write_reports(
@@ -85,7 +86,7 @@ def write_reports(
     *,
     command: str,
     force: bool = False,
-    extras: Sequence[str] = (),
+    choice: OutputChoice = PLAIN,
     failed: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Write one sub-folder a log, and above them an index, all errors in one, and run.json.
@@ -95,7 +96,7 @@ def write_reports(
         analyses: The logs that could be analysed.
         command: The command line as the user typed it.
         force: Whether files that are there may be replaced.
-        extras: What else is written of each log, names of `estimates.extra_files`.
+        choice: What else is written of each log.
         failed: Why each of the other logs could not be, by its label.
 
     Returns:
@@ -108,9 +109,9 @@ def write_reports(
 
     labels = [a.recording.name for a in analyses]
     places = places_of(labels)
-    with OutputFolder(path, force, files_of_several(labels, extras)) as folder:
+    with OutputFolder(path, force, files_of_several(labels, choice.extras)) as folder:
         records = [
-            fill(folder, f"{place}/", analysis, command, extras)
+            fill(folder, f"{place}/", analysis, command, choice)
             for place, analysis in zip(places, analyses, strict=True)
         ]
         pages = list(zip(places, analyses, strict=True))
@@ -129,18 +130,19 @@ def write_reports(
 
 
 def fill(
-    folder: OutputFolder, place: str, analysis: Analysis, command: str, extras: Sequence[str] = ()
+    folder: OutputFolder, place: str, analysis: Analysis, command: str, choice: OutputChoice
 ) -> str:
     """Write one log's files; return the text of its `run.json`."""
     record = run_record(analysis, command)
     # The page shows the record that is written beside it, not one of its own.
     analysis = replace(analysis, run=record)
     folder.write(f"{place}index.html", render(analysis))
-    write_rrd(folder / f"{place}recording.rrd", analysis)
+    if choice.writes_recording:
+        write_rrd(folder / f"{place}recording.rrd", analysis, choice.rrd_detail)
     write_estimates(folder / f"{place}estimates.parquet", analysis)
     put_errors(folder, place, analysis.errors, [analysis])
     put_contacts(folder, place, [analysis])
-    write_extras(folder, place, analysis, extras)
+    write_extras(folder, place, analysis, choice)
     return seal(folder, f"{place}{SEAL}", record)
 
 
