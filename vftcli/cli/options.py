@@ -360,8 +360,10 @@ class AnalysisOptions(Bundle):
             VftError: If a word is not what its room takes.
         """
         from vftcli.cli.console import health_of, stages
+        from vftcli.cli.memory import give_back
         from vftcli.pipeline import AnalysisChoice
 
+        give_back()
         return AnalysisChoice(
             read=self.reading.choice(),
             robot=self.robot.choice(),

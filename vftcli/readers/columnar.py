@@ -106,10 +106,13 @@ class ColumnarTable(ABC):
             raise LogError(f"{self.path}: two columns have one name; rename one of them.")
         self._check_size(columns)
         with guarded(self.path):
-            table = self._decoded(sorted(columns))
-            if self._rows is not None:
-                table = table.take(self._rows)
-            return {c: self._numbers(table.column(names[c]), c, clock) for c in columns}
+            # One after the other: of a long log all of them have no room in two forms.
+            return {c: self._numbers(self._column(c), c, clock) for c in sorted(columns)}
+
+    def _column(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
+        """One column's rows, those that are kept."""
+        values = self._decoded([column]).column(0)
+        return values if self._rows is None else values.take(self._rows)
 
     def _check_size(self, columns: Sequence[int]) -> None:
         """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
@@ -158,7 +161,8 @@ class ColumnarTable(ABC):
             raise LogError(f"{self.path}: column {name} holds {kind}, not numbers.")
         whole = column == clock and pa.types.is_integer(values.type) and not values.null_count
         target = np.int64 if whole else np.float64
-        return np.asarray(values.to_numpy()).astype(target)
+        # Not copied where nothing is to be changed: what is picked of it is copied once more.
+        return np.asarray(values.to_numpy()).astype(target, copy=False)
 
     def _matrix(self, values: Any, column: int) -> Column:  # noqa: ANN401 - pyarrow
         """A column of lists of one length. (T, k)"""

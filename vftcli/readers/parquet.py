@@ -15,7 +15,7 @@ class ParquetTable(ColumnarTable):
         import pyarrow.parquet as pq
 
         source = file.direct or BytesIO(file.content)
-        self._file = pq.ParquetFile(source, memory_map=file.direct is not None)
+        self._file = pq.ParquetFile(source, memory_map=False, pre_buffer=False)
         return self._file.schema_arrow
 
     @property

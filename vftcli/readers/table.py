@@ -122,7 +122,15 @@ def picked(
     if picks.clock is not None:
         wanted |= {cell.column for cell in picks.clock.cells}
     loaded = table.load(sorted(wanted), clock.column if clock else None)
-    arrays = {pick.signal: _stacked(pick, loaded) for pick in signals}
+    kept = {*picks.constants, picks.origin}
+    if picks.clock is not None:
+        kept |= {cell.column for cell in picks.clock.cells}
+    arrays = {}
+    for k, pick in enumerate(signals):
+        arrays[pick.signal] = _stacked(pick, loaded)
+        # Of a long log the columns and what is picked of them have no room beside each other.
+        later = kept.union(*({cell.column for cell in p.cells} for p in signals[k + 1 :]))
+        loaded = {column: values for column, values in loaded.items() if column in later}
     stamps, tick, words = _stamps(table, picks, loaded, clock_name)
     if picks.origin is not None and len(stamps):
         more["origin"] = float(loaded[picks.origin][0]) * 1e-9 - float(stamps[0]) * tick

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,7 +25,14 @@ if TYPE_CHECKING:
     from vftcli.contacts.contact_list import ContactList
 
 
-def estimates_table(analysis: Analysis) -> "pl.DataFrame":
+ALL = slice(None)
+"""All rows of a table."""
+
+LONG, GROUP_ROWS = 1 << 17, 1 << 15
+"""Rows from which on a table is written as several groups, and rows of such a group."""
+
+
+def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
     """Time, motion, every observer's torque and the reference's, one flat column each.
 
     Columns: ``t`` [s]; ``q/1``… [rad]; ``dq/1``… [rad/s]; ``tau_ext/<observer>/1``… [N·m];
@@ -39,10 +46,10 @@ def estimates_table(analysis: Analysis) -> "pl.DataFrame":
     """
     import polars as pl
 
-    table = pl.DataFrame(dict(columns(analysis)))
+    table = pl.DataFrame(dict(columns(analysis, rows)))
     # Only columns that need it: to fill all of a long log takes longer than to write it.
     if analysis.contacts is not None:
-        table = table.with_columns(contact_column(analysis.t, analysis.contacts))
+        table = table.with_columns(contact_column(analysis.t[rows], analysis.contacts))
     unknown = [s.name for s in table if s.dtype == pl.Float64 and s.is_nan().any()]
     return table.with_columns(pl.col(unknown).fill_nan(None)) if unknown else table
 
@@ -57,24 +64,25 @@ def contact_column(t: Array, found: "ContactList") -> "pl.Series":
     return pl.Series("contact", number)
 
 
-def columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
-    """Name and values of every column, in order."""
+def columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
+    """Name and values of every column, in order, of some rows."""
     recording = analysis.recording
-    yield "t", recording.t
-    yield from per_joint("q", recording.q)
+    yield "t", recording.t[rows]
+    yield from per_joint("q", recording.q[rows])
     if recording.dq is not None:
-        yield from per_joint("dq", recording.dq)
+        yield from per_joint("dq", recording.dq[rows])
     for estimate in analysis.estimates:
-        yield from per_joint(f"tau_ext/{estimate.name}", estimate.tau)
+        yield from per_joint(f"tau_ext/{estimate.name}", estimate.tau[rows])
         if estimate.sd is not None:
-            yield from per_joint(f"sd/{estimate.name}", estimate.sd)
+            yield from per_joint(f"sd/{estimate.name}", estimate.sd[rows])
         if estimate.error_sd is not None:
-            yield from per_joint(f"band/{estimate.name}", estimate.error_sd)
+            yield from per_joint(f"band/{estimate.name}", estimate.error_sd[rows])
     if analysis.reference is not None:
-        yield from per_joint("tau_ext/reference", analysis.reference.tau)
+        yield from per_joint("tau_ext/reference", analysis.reference.tau[rows])
         if analysis.reference.sd is not None:
-            yield from per_joint("sd/reference", analysis.reference.sd)
-    yield from wrench_columns(analysis)
+            yield from per_joint("sd/reference", analysis.reference.sd[rows])
+    for name, values in wrench_columns(analysis):
+        yield name, values[rows]
 
 
 def per_joint(name: str, values: Array) -> Iterator[tuple[str, Array]]:
@@ -114,20 +122,46 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
     Raises:
         OutputError: If the disk is full.
     """
+    if len(analysis.t) > LONG:
+        write_groups(path, analysis)
+        return
     table = estimates_table(analysis)
-    # For who finds the table alone, without the record beside it.
-    doubts = overridden_lines(analysis.examinations)
-    metadata = {"vftcli": json.dumps({"overridden": doubts})} if doubts else None
-    schema = described_schema(table, frames_of(analysis))
     with table_file(path) as file:
         table.write_parquet(
             file,
             compression="zstd",
             compression_level=1,
             statistics=False,
-            metadata=metadata,
-            arrow_schema=schema,
+            metadata=doubts_of(analysis),
+            arrow_schema=described_schema(table, frames_of(analysis)),
         )
+
+
+def write_groups(path: Path, analysis: Analysis) -> None:
+    """Write the table of a long log as groups of rows: all of it has no room beside the log.
+
+    Raises:
+        OutputError: If the disk is full.
+    """
+    from pyarrow.parquet import ParquetWriter
+
+    schema = described_schema(estimates_table(analysis, slice(0, 1)), frames_of(analysis))
+    schema = schema.with_metadata(doubts_of(analysis))
+    # Measured numbers hardly repeat: a dictionary of them costs time and room.
+    how: Any = {"compression": "zstd", "compression_level": 1, "use_dictionary": False}
+    with (
+        table_file(path) as file,
+        ParquetWriter(file, schema, write_statistics=False, **how) as writer,
+    ):
+        for start in range(0, len(analysis.t), GROUP_ROWS):
+            table = estimates_table(analysis, slice(start, start + GROUP_ROWS))
+            writer.write_table(table.to_arrow().cast(schema))
+
+
+def doubts_of(analysis: Analysis) -> dict[str, str] | None:
+    """What is said beside the columns for who finds the table without the record beside it."""
+    doubts = overridden_lines(analysis.examinations)
+    return {"vftcli": json.dumps({"overridden": doubts})} if doubts else None
 
 
 def frames_of(analysis: Analysis) -> dict[str, StatedFrame]:
