@@ -51,7 +51,7 @@ def report(
     from vftcli.evaluation.print_table import check_published, compare_with
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.report import report_files, write_report, write_reports
-    from vftcli.pipeline import analyse_logs
+    from vftcli.pipeline import WRITING, analyse_logs
     from vftcli.readers.library import Library
 
     library = Library(logs)
@@ -72,7 +72,7 @@ def report(
             say_analysis(made)
     if not analyses:
         left_out.end(0)
-    choice.progress("writing")
+    choice.progress("writing", WRITING, 1.0)
     command, failed = command_line(), left_out.reasons
     if len(analyses) + len(failed) == 1:
         record = write_report(output, analyses[0], command=command, force=force, choice=written)

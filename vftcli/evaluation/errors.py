@@ -12,6 +12,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.lag import lags_of_each
+from vftcli.signals.progress import steps
 from vftcli.signals.series import median_step
 
 SCHEMA: dict[str, type[pl.DataType]] = {
@@ -134,7 +135,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
     lag = lags_of_each([e.tau for e in estimates], reference.tau, step)
     covered = [covered_samples(e, reference) for e in estimates]
     moving = reference.moving if reference.moving is not None else reference.known
-    for j in range(reference.joints if estimates else 0):
+    for j in steps(range(reference.joints if estimates else 0)):
         x, y = np.column_stack([e.tau[:, j] for e in estimates]), reference.tau[:, j]
         known = comparable(x, y)
         x, y = x[known], y[known]

@@ -16,6 +16,7 @@ from vftcli.outputs.log.run_record import run_record, seal
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
+from vftcli.signals.progress import steps
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.frames import FRAMES
 
@@ -153,7 +154,7 @@ def write_groups(path: Path, analysis: Analysis) -> None:
         table_file(path) as file,
         ParquetWriter(file, schema, write_statistics=False, **how) as writer,
     ):
-        for start in range(0, len(analysis.t), GROUP_ROWS):
+        for start in steps(range(0, len(analysis.t), GROUP_ROWS)):
             table = estimates_table(analysis, slice(start, start + GROUP_ROWS))
             writer.write_table(table.to_arrow().cast(schema))
 

@@ -19,6 +19,7 @@ from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds
 from vftcli.outputs.page.index_page import render_index
 from vftcli.outputs.page.page import render
 from vftcli.outputs.seals import SEAL
+from vftcli.signals.progress import steps
 
 if TYPE_CHECKING:
     import polars as pl
@@ -112,7 +113,7 @@ def write_reports(
     with OutputFolder(path, force, files_of_several(labels, choice.extras)) as folder:
         records = [
             fill(folder, f"{place}/", analysis, command, choice)
-            for place, analysis in zip(places, analyses, strict=True)
+            for place, analysis in steps(list(zip(places, analyses, strict=True)))
         ]
         pages = list(zip(places, analyses, strict=True))
         folder.write("index.html", render_index(pages, failed))
@@ -136,10 +137,15 @@ def fill(
     record = run_record(analysis, command)
     # The page shows the record that is written beside it, not one of its own.
     analysis = replace(analysis, run=record)
-    folder.write(f"{place}index.html", render(analysis))
+    writers: list[Callable[[], None]] = [
+        lambda: folder.write(f"{place}index.html", render(analysis)),
+        lambda: write_estimates(folder / f"{place}estimates.parquet", analysis),
+    ]
     if choice.writes_recording:
-        write_rrd(folder / f"{place}recording.rrd", analysis, choice.rrd_detail)
-    write_estimates(folder / f"{place}estimates.parquet", analysis)
+        path = folder / f"{place}recording.rrd"
+        writers.insert(1, lambda: write_rrd(path, analysis, choice.rrd_detail))
+    for write in steps(writers):
+        write()
     put_errors(folder, place, analysis.errors, [analysis])
     put_contacts(folder, place, [analysis])
     write_extras(folder, place, analysis, choice)

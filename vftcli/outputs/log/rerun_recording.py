@@ -36,6 +36,7 @@ from vftcli.outputs.rerun_file import ArmView, rerun_file
 from vftcli.robots.drive import drive_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS, ExternalTorque
+from vftcli.signals.progress import steps
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
@@ -93,7 +94,7 @@ def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
     """All plots; of a long log what `STRETCHES` show, every sample where contacts begin."""
     t, whole = analysis.t, whole_spans(analysis)
     tabs = []
-    for name, group in line_groups(analysis).items():
+    for name, group in steps(list(line_groups(analysis).items())):
         # One plot after the other: of a long log all of them have no room at once.
         shown = group if detail == FULL else (lines.thinned(t, STRETCHES, whole) for lines in group)
         tabs.append(Tab(name, t, list(shown)))
