@@ -8,7 +8,7 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.log import report
-from vftcli.outputs.log.choice import OutputChoice
+from vftcli.outputs.log.choice import NONE, OutputChoice
 from vftcli.outputs.log.estimates import extra_files, write_estimate_folder
 from vftcli.outputs.log.report import (
     ERROR_TABLES,
@@ -136,3 +136,13 @@ def test_estimate_writes_its_extras(analysis: Analysis, tmp_path: Path) -> None:
         "estimates.mcap",
         "recording.rrd",
     }
+
+
+def test_a_report_without_a_recording_takes_away_the_one_that_was_there(
+    without_reference: Analysis, tmp_path: Path
+) -> None:
+    write_report(tmp_path, without_reference, command="")
+    assert (tmp_path / "recording.rrd").exists()
+    none = OutputChoice(rrd_detail=NONE)
+    write_report(tmp_path, without_reference, command="", force=True, choice=none)
+    assert not (tmp_path / "recording.rrd").exists()

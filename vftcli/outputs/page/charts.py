@@ -118,7 +118,7 @@ def multiples(chart: Chart) -> str:
 def pictures_of(chart: Chart) -> str:
     """The small pictures of a chart alone."""
     families = chart.families or (0,) * len(chart.panels)
-    ends = {family: ends_of_family(chart, family) for family in set(families)}
+    ends = {family: ends_of_family(chart, families.index(family)) for family in set(families)}
     return "".join(picture(chart, j, ends[families[j]]) for j in range(len(chart.panels)))
 
 
@@ -160,15 +160,11 @@ def look_of(colour: str, dash: str, *, leads: bool = False) -> str:
     return f'stroke="{paint}" stroke-width="{1.9 if leads else 1.3}"{broken}'
 
 
-def ends_of_family(chart: Chart, family: int) -> Span:
-    """Ends of the vertical axis that all panels of a family have."""
-    families = chart.families or (family,) * len(chart.panels)
-    span = figures.ends_of(
-        values
-        for j, number in enumerate(families)
-        if number == family
-        for values in drawn_values(chart, j)
-    )
+def ends_of_family(chart: Chart, panel: int) -> Span:
+    """Ends of a panel's vertical axis: those of all panels of its family."""
+    families = chart.families or (0,) * len(chart.panels)
+    members = [j for j, family in enumerate(families) if family == families[panel]]
+    span = figures.ends_of(values for j in members for values in drawn_values(chart, j))
     return span if chart.lowest is None else Span(max(span.low, chart.lowest), span.high)
 
 
