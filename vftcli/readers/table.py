@@ -117,20 +117,16 @@ def picked(
     """
     signals = tuple(p for p in picks.signals if request.wants(p.signal))
     clock = picks.clock.cells[0] if picks.clock else None
-    wanted = {cell.column for pick in signals for cell in pick.cells} | set(picks.constants)
-    wanted |= set() if picks.origin is None else {picks.origin}
-    if picks.clock is not None:
-        wanted |= {cell.column for cell in picks.clock.cells}
-    loaded = table.load(sorted(wanted), clock.column if clock else None)
-    kept = {*picks.constants, picks.origin}
-    if picks.clock is not None:
-        kept |= {cell.column for cell in picks.clock.cells}
+    last = {cell.column: pick.signal for pick in signals for cell in pick.cells}
+    kept = {*picks.constants, *(() if picks.origin is None else (picks.origin,))}
+    # Of a table without a clock a column says how many rows there are.
+    kept |= {cell.column for cell in picks.clock.cells} if picks.clock else set(list(last)[:1])
+    loaded = table.load(sorted(kept.union(last)), clock.column if clock else None)
     arrays = {}
-    for k, pick in enumerate(signals):
+    for pick in signals:
         arrays[pick.signal] = _stacked(pick, loaded)
         # Of a long log the columns and what is picked of them have no room beside each other.
-        later = kept.union(*({cell.column for cell in p.cells} for p in signals[k + 1 :]))
-        loaded = {column: values for column, values in loaded.items() if column in later}
+        loaded = {c: x for c, x in loaded.items() if c in kept or last[c] != pick.signal}
     stamps, tick, words = _stamps(table, picks, loaded, clock_name)
     if picks.origin is not None and len(stamps):
         more["origin"] = float(loaded[picks.origin][0]) * 1e-9 - float(stamps[0]) * tick
@@ -143,10 +139,7 @@ def picked(
         clock=words,
         signals=arrays,
         remarks=(*remarks, *more.pop("remarks", ())),
-        constants=tuple(
-            float(column[-1]) if len(column) else float("nan")
-            for column in (loaded[c] for c in picks.constants)
-        ),
+        constants=tuple(float(loaded[c][-1]) if len(stamps) else np.nan for c in picks.constants),
         **more,
     )
 

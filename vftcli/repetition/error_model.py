@@ -119,12 +119,14 @@ def error_model(laid: LaidOver, *, corrected: bool, cutoff: float | None) -> Err
         signal += modelled
     noise = noise_of(t, signal, moving, step, cutoff)
     noise = np.maximum(noise, noise_when_quiet(t, signal, moving, step, cutoff))
-    motion_error = local_rms(low_pass(t, modelled, band(step, cutoff)[0]), step)
+    low = band(step, cutoff)[0]
+    motion_error = laid.once("motion", low, lambda: local_rms(low_pass(t, modelled, low), step))
     if corrected:
         motion_error = motion_error * np.maximum(LEAST_SHARE, laid.misfit)
     else:
         # The model's torque differentiates momenta: their noise is no difference of the motions.
-        own = slope_noise(t, laid.momentum[known], moving, step, band(step, cutoff)[0])
+        momentum = laid.momentum[known]
+        own = laid.once("slope", low, lambda: slope_noise(t, momentum, moving, step, low))
         motion_error = less_noise(motion_error, own)
     share = ANYWHERE * laid.stopped
     share[laid.standing.all(axis=1)] = AT_REST

@@ -1,7 +1,7 @@
 """A log with its free runs laid under it: what differs between them, whatever is made of that."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -26,10 +26,18 @@ class LaidOver:
     Attributes:
         motion: The log.
         pairings: Its free runs.
+        found: What else was found of them, by what it is and the cutoff that it was found for.
     """
 
     motion: DriveRun
     pairings: Sequence[Pairing]
+    found: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
+
+    def once(self, what: str, cutoff: float, find: Callable[[], Array]) -> Array:
+        """What was found before for a cutoff [Hz], or else is found now."""
+        if (what, cutoff) not in self.found:
+            self.found[what, cutoff] = find()
+        return self.found[what, cutoff]
 
     @cached_property
     def torque(self) -> Array:
