@@ -88,7 +88,7 @@ class BlockAnalysis:
             while waiting and all(ready):
                 analysis = self._block(waiting.popleft(), [queue.popleft() for queue in ready])
                 done += analysis.recording.samples
-                self.choice.progress(f"estimating {100 * done // samples} %")
+                self.choice.progress("estimating", done / samples, 1.0)
                 for wrench in analysis.wrenches[:1]:
                     masked.append(wrench.hidden)
                     if wrench.sigma_min is not None:

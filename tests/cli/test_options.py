@@ -48,6 +48,7 @@ BAD = {
     "--robot-arg": ("name", "--robot-arg 'name' is not NAME=VALUE"),
     "--payload": ("bucket", "no payload 'bucket'"),
     "--observer": ("kalman", "no observer 'kalman'; there is best, fdo, gmo"),
+    "--rrd-detail": ("many", "many is none of full, levels and none"),
     "--set": ("gmo.gain=much", "is not a number or a list"),
     "--gains": ("nowhere.toml", "nowhere.toml"),
     "--set-file": ("nowhere.toml", "nowhere.toml"),
@@ -153,7 +154,8 @@ def test_a_command_that_reads_a_log_reads_it_as_all_do(command: str) -> None:
 
 @pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
 def test_a_command_that_estimates_takes_all_that_can_be_asked(command: str) -> None:
-    whole = {*BAD, "--causal", "--wrench", "--as-printed", "--sensor-weight"} - {"--reference"}
+    whole = {*BAD, "--causal", "--wrench", "--as-printed", "--sensor-weight"}
+    whole -= {"--reference", "--rrd-detail"}
     assert set(parameters(command)) >= whole
 
 

@@ -86,7 +86,7 @@ def annotate(
     workers: WorkersChoice,
     command: str,
     tell: Callable[[str], None],
-    progress: Callable[[str], None],
+    progress: Callable[[str, float, float], None],
 ) -> dict[str, Any]:
     """Write a copy of a dataset with the forces of every frame.
 
@@ -138,9 +138,9 @@ def annotate(
         each = (tasks[k : k + TOGETHER] for k in range(0, len(tasks), TOGETHER))
         statistics: dict[int, Mapping[str, Statistics]] = {}
         for outcome in run(each, write, workers if len(tasks) > FEW else HERE):
-            progress(f"writing {value_of(outcome)['place']}")
+            progress(f"writing {value_of(outcome)['place']}", 0.8, 1.0)
             statistics |= outcome.value["statistics"]
-        progress("writing descriptions")
+        progress("writing descriptions", 0.9, 1.0)
         if path.is_dir():
             copy_others(path, folder, plan.places, link=how.link)
         dataset.finish(columns, dict(sorted(statistics.items())), folder)
@@ -226,7 +226,7 @@ def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work retu
 
 
 def gathered(
-    outcomes: Iterable[Outcome[Any]], how: CopyChoice, progress: Callable[[str], None]
+    outcomes: Iterable[Outcome[Any]], how: CopyChoice, progress: Callable[[str, float, float], None]
 ) -> Made:
     """All that is told of the episodes, in the order of their files.
 
@@ -242,7 +242,7 @@ def gathered(
                 refuse_missing(record)
         episodes += told["episodes"]
         robot, observer = robot or told["robot"], observer or told["observer"]
-        progress(f"{len(episodes)} episodes estimated")
+        progress(f"{len(episodes)} episodes estimated", 0.0, 0.8)
     episodes.sort(key=lambda record: (record["file"], record["episode"]))
     return Made(episodes, robot, observer)
 

@@ -8,6 +8,7 @@ from vftcli.analysis import Analysis
 from vftcli.batch.engine import begin
 from vftcli.doctor.examiner import Examiner
 from vftcli.outputs.batch_folder import BatchFolder
+from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.pipeline import Analyser, AnalysisChoice, analyse, list_touches, prepared
 from vftcli.readers.estimates import refuse_estimates
 from vftcli.readers.library import Library
@@ -24,7 +25,7 @@ class LogJob:
         do: A key of `WRITERS`.
         choice: What is asked of each log.
         anyway: Whether results are wanted even where a finding makes them meaningless.
-        extras: What else is written, names of `outputs.log.estimates.EXTRAS`.
+        written: What is written of each log besides what always is.
 
     Raises:
         ParameterError: If there is no such thing to do.
@@ -33,7 +34,7 @@ class LogJob:
     do: str
     choice: AnalysisChoice
     anyway: bool = False
-    extras: tuple[str, ...] = ()
+    written: OutputChoice = PLAIN
 
     def __post_init__(self) -> None:
         check_known(self.do, tuple(WRITERS), f"--do {self.do!r}")
@@ -112,15 +113,15 @@ def write_estimates(folder: Path, analysis: Analysis, task: LogTask) -> None:
     """What `vftcli estimate` writes."""
     from vftcli.outputs.log.estimates import write_estimate_folder
 
-    write_estimate_folder(folder, analysis, task.command, task.job.extras, force=True)
+    write_estimate_folder(folder, analysis, task.command, task.job.written, force=True)
 
 
 def write_page(folder: Path, analysis: Analysis, task: LogTask) -> None:
     """What `vftcli report` writes."""
     from vftcli.outputs.log.report import write_report
 
-    extras = task.job.extras
-    write_report(folder, analysis, command=task.command, force=True, extras=extras)
+    written = task.job.written
+    write_report(folder, analysis, command=task.command, force=True, choice=written)
 
 
 def write_contacts(folder: Path, analysis: Analysis, _task: LogTask) -> None:

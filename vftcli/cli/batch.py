@@ -108,10 +108,10 @@ def batch(
     from vftcli.cli.console import command_line, detail, say
     from vftcli.cli.progress import STAGES
     from vftcli.doctor.examiner import Examiner
-    from vftcli.pipeline import silent
     from vftcli.readers.collection import LogCollection
     from vftcli.readers.library import Library
     from vftcli.signals.errors import LogError, ParameterError
+    from vftcli.signals.progress import no_stage
 
     choice = analysis.choice(Library(), reference)
     if do == "compare" and choice.reference is None:
@@ -119,9 +119,8 @@ def batch(
     narrowed = {"estimate": for_estimates, "compare": for_comparison}
     choice = narrowed[do](choice) if do in narrowed else choice
     # These are of each worker.
-    choice = replace(choice, library=Library(), examiner=Examiner(), progress=silent)
-    extras = tuple(also.names())
-    job = LogJob(do=do, choice=choice, anyway=analysis.anyway.anyway, extras=extras)
+    choice = replace(choice, library=Library(), examiner=Examiner(), progress=no_stage)
+    job = LogJob(do=do, choice=choice, anyway=analysis.anyway.anyway, written=also.choice())
     engine = workers.choice()
     collection = LogCollection(choice.read, output)
     found = list(collection.find(logs))[: resume.limit]
@@ -178,7 +177,7 @@ def progress_line() -> "Callable[[BatchCount], None]":
         if rate and count.left:
             words += f", {rate:.2g} logs/s, {duration(count.left / rate)} left"
         if watched:
-            STAGES.begin(words)
+            STAGES.begin(words, (count.logs - count.left) / max(count.logs, 1))
         elif time.monotonic() - last > EVERY and count.left:
             last = time.monotonic()
             say(words)

@@ -224,8 +224,7 @@ def say_wrenches(sensed: "SensorReading") -> None:
             detail(f"note: {remark}")
 
 
-def stages() -> "Callable[[str], None]":
+def stages() -> "Callable[[str, float, float], None]":
     """Who shows on stderr what is being done, if somebody watches and it takes a while."""
-    from vftcli.pipeline import silent
-
-    return STAGES.begin if _level.get() > QUIET and sys.stderr.isatty() else silent
+    watched = _level.get() > QUIET and sys.stderr.isatty()
+    return STAGES.begin if watched else lambda *_: None

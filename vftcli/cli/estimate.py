@@ -47,15 +47,17 @@ def estimate(
     from vftcli.readers.library import Library
     from vftcli.signals.packages import check_installed
 
-    extras = also.names(csv=csv, rrd=rrd or show)
-    if "rrd" in extras:
+    written = also.choice(csv=csv, rrd=rrd or show)
+    if "rrd" in written.extras:
         check_installed("rerun", "recording.rrd (--rrd, --open)")
     # Of a large log only the columns that are looked at are read; outputs show the others too.
     causal = analysis.observers.causal or analysis.contacts.no_contacts
-    signals = EXAMINED if causal and not (analysis.wrench.asks or extras) else None
+    signals = EXAMINED if causal and not (analysis.wrench.asks or written.extras) else None
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
     # What needs no complete log comes in blocks, so that memory does not grow with it.
-    chosen = replace(chosen, blocks=causal and set(extras) <= {"csv"} and not chosen.interval)
+    chosen = replace(
+        chosen, blocks=causal and set(written.extras) <= {"csv"} and not chosen.interval
+    )
     if chosen.columns is None:
         refuse_estimates(log)
     reading = Background(lambda: library.open(log, chosen))
@@ -68,7 +70,7 @@ def estimate(
     from vftcli.outputs.log.estimates import estimate_files
     from vftcli.readers.table import JacobianError
 
-    OutputFolder(output, force, estimate_files(extras)).check()
+    OutputFolder(output, force, estimate_files(written.extras)).check()
     choice = for_estimates(analysis.choice(library))
     try:
         made, record = write_estimates(
@@ -76,16 +78,16 @@ def estimate(
             lambda: library.open(log, replace(chosen, blocks=False)),
             choice,
             output,
-            {"command": command_line(), "extras": extras, "force": force},
+            {"command": command_line(), "choice": written, "force": force},
         )
     except JacobianError as found:
         write_by_jacobian(log, found, choice, output, force=force, json=json)
         return
-    say_left_out(estimate_files(extras))
+    say_left_out(estimate_files(written.extras))
     if json:
         typer.echo(record)
     else:
-        show_estimates(made, output, estimate_files(extras))
+        show_estimates(made, output, estimate_files(written.extras))
     if show:
         open_made(output)
 

@@ -24,7 +24,7 @@ from vftcli.readers import (
     tables,
 )
 from vftcli.readers.bags import formats as bags
-from vftcli.readers.cleaning import RestartError, cleaned, without_unknown_rows
+from vftcli.readers.cleaning import RestartError, cleaned
 from vftcli.readers.long_log import long_recording
 from vftcli.readers.opening import Digest
 from vftcli.readers.parts import refuse_arm
@@ -36,6 +36,7 @@ from vftcli.readers.reader import (
     Reader,
     open_log,
 )
+from vftcli.readers.rows import without_unknown_rows
 from vftcli.readers.unrecognised import description, known_kind
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 from vftcli.signals.parsing import did_you_mean

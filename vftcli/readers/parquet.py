@@ -29,7 +29,7 @@ class PyarrowParquet(PyarrowTable):
         pq = needed("pyarrow.parquet", "a Parquet file")
         source = file.direct or BytesIO(file.content)
         self._direct = file.direct
-        self._file = pq.ParquetFile(source, memory_map=file.direct is not None)
+        self._file = pq.ParquetFile(source, memory_map=False, pre_buffer=False)
         about = self._file.metadata
         return self._held_of(self._file.schema_arrow, int(about.num_rows), about.metadata)
 

@@ -36,11 +36,10 @@ def picked(
     """
     signals = tuple(p for p in picks.signals if request.wants(p.signal))
     clock = picks.clock.cells[0] if picks.clock else None
-    wanted = {cell.column for pick in signals for cell in pick.cells} | set(picks.constants)
-    wanted |= set() if picks.origin is None else {picks.origin}
-    if picks.clock is not None:
-        wanted |= {cell.column for cell in picks.clock.cells}
-    asked = sorted(wanted), clock.column if clock else None
+    last = {cell.column: pick.signal for pick in signals for cell in pick.cells}
+    kept = {*picks.constants, *(() if picks.origin is None else (picks.origin,))}
+    kept |= {cell.column for cell in picks.clock.cells} if picks.clock else set()
+    asked = sorted(kept.union(last)), clock.column if clock else None
     blocks = None
     if request.blocks and isinstance(table, LongTable) and table.rows > WHOLE_ROWS:
         blocks = table.blocks(*asked)
@@ -51,13 +50,18 @@ def picked(
     remarks = (*table.remarks, *(pick.remark for pick in signals if pick.remark))
     wrench = next((pick for pick in signals if pick.signal == "wrench"), None)
     more.setdefault("wrench_frame", wrench.frame if wrench else None)
+    constants, arrays = _last(loaded, picks), {}
+    for pick in signals:
+        arrays[pick.signal] = _stacked(pick, loaded)
+        # Of a long log the columns and what is picked of them have no room beside each other.
+        loaded = {c: x for c, x in loaded.items() if last.get(c) != pick.signal}
     first = RawLog(
         stamps=stamps,
         tick=tick,
         clock=words,
-        signals={pick.signal: _stacked(pick, loaded) for pick in signals},
+        signals=arrays,
         remarks=(*remarks, *more.pop("remarks", ())),
-        constants=_last(loaded, picks),
+        constants=constants,
         **more,
     )
     return first if blocks is None else replace(first, rest=_rest(first, table, picks, blocks))

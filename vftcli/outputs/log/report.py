@@ -11,6 +11,7 @@ from vftcli.analysis import Analysis
 from vftcli.outputs.contacts import contacts_csv, contacts_record
 from vftcli.outputs.files import OutputFolder, numbered
 from vftcli.outputs.log import tables
+from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.log.rerun_recording import write_rrd
 from vftcli.outputs.log.run_record import jsonable, run_record, seal, versions
@@ -19,6 +20,7 @@ from vftcli.outputs.page.index_page import render_index
 from vftcli.outputs.page.page import render
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.packages import installed
+from vftcli.signals.progress import steps
 
 if TYPE_CHECKING:
     import polars as pl
@@ -65,7 +67,7 @@ def write_report(
     *,
     command: str,
     force: bool = False,
-    extras: Sequence[str] = (),
+    choice: OutputChoice = PLAIN,
 ) -> str:
     """Write the report of one log, all files or none.
 
@@ -75,9 +77,9 @@ def write_report(
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
-    names = report_files([analysis.recording.name], extras)
+    names = report_files([analysis.recording.name], choice.extras)
     with OutputFolder(path, force, names) as folder:
-        return fill(folder, "", analysis, command, extras)
+        return fill(folder, "", analysis, command, choice)
 
 
 def write_reports(
@@ -86,7 +88,7 @@ def write_reports(
     *,
     command: str,
     force: bool = False,
-    extras: Sequence[str] = (),
+    choice: OutputChoice = PLAIN,
     failed: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Write one sub-folder a log, and above them an index, all errors in one, and run.json.
@@ -96,7 +98,7 @@ def write_reports(
         analyses: The logs that could be analysed.
         command: The command line as the user typed it.
         force: Whether files that are there may be replaced.
-        extras: What else is written of each log, names of `estimates.extra_files`.
+        choice: What else is written of each log.
         failed: Why each of the other logs could not be, by its label.
 
     Returns:
@@ -109,10 +111,10 @@ def write_reports(
 
     labels = [a.recording.name for a in analyses]
     places = places_of(labels)
-    with OutputFolder(path, force, files_of_several(labels, extras)) as folder:
+    with OutputFolder(path, force, files_of_several(labels, choice.extras)) as folder:
         records = [
-            fill(folder, f"{place}/", analysis, command, extras)
-            for place, analysis in zip(places, analyses, strict=True)
+            fill(folder, f"{place}/", analysis, command, choice)
+            for place, analysis in steps(list(zip(places, analyses, strict=True)))
         ]
         pages = list(zip(places, analyses, strict=True))
         folder.write("index.html", render_index(pages, failed))
@@ -130,19 +132,24 @@ def write_reports(
 
 
 def fill(
-    folder: OutputFolder, place: str, analysis: Analysis, command: str, extras: Sequence[str] = ()
+    folder: OutputFolder, place: str, analysis: Analysis, command: str, choice: OutputChoice
 ) -> str:
     """Write one log's files; return the text of its `run.json`."""
     record = run_record(analysis, command)
     # The page shows the record that is written beside it, not one of its own.
     analysis = replace(analysis, run=record)
-    folder.write(f"{place}index.html", render(analysis))
-    if installed("rerun"):  # else `left_out` says how to get it
-        write_rrd(folder / f"{place}recording.rrd", analysis)
-    write_estimates(folder / f"{place}estimates.parquet", analysis)
+    writers: list[Callable[[], None]] = [
+        lambda: folder.write(f"{place}index.html", render(analysis)),
+        lambda: write_estimates(folder / f"{place}estimates.parquet", analysis),
+    ]
+    if choice.writes_recording and installed("rerun"):  # else `left_out` says how to get it
+        path = folder / f"{place}recording.rrd"
+        writers.insert(1, lambda: write_rrd(path, analysis, choice.rrd_detail))
+    for write in steps(writers):
+        write()
     put_errors(folder, place, analysis.errors, [analysis])
     put_contacts(folder, place, [analysis])
-    write_extras(folder, place, analysis, extras)
+    write_extras(folder, place, analysis, choice)
     return seal(folder, f"{place}{SEAL}", record)
 
 
