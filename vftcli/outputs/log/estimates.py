@@ -169,7 +169,7 @@ def write_groups(
                 writer = pq.ParquetWriter(file, schema, write_statistics=False, **how)
                 files.enter_context(writer)
                 if csv is not None:
-                    text = files.enter_context(table_file(csv))
+                    text = files.enter_context(csv.open("wb"))
                     table.clear().write_csv(text)
             writer.write_table(table.to_arrow().cast(schema))
             if csv is not None:
