@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.evaluation import evaluate, rmse
     from vftcli.evaluation.reference_choice import ReferenceChoice
-    from vftcli.notebook import contacts
+    from vftcli.notebook import contacts, report, thresholds
     from vftcli.observers import (
         FilteredDynamicsObserver,
         KalmanObserver,
@@ -85,7 +85,9 @@ HOMES = {
     "link_poses": "robots.kinematics",
     "load_robot": "robots",
     "read": "readers",
+    "report": "notebook",
     "rmse": "evaluation",
+    "thresholds": "notebook",
     "two_cycle_difference": "repetition.two_cycle",
 }
 """Public name → the module it lives in."""
@@ -132,6 +134,8 @@ __all__ = [
     "link_poses",
     "load_robot",
     "read",
+    "report",
     "rmse",
+    "thresholds",
     "two_cycle_difference",
 ]

@@ -17,10 +17,11 @@ from vftcli.signals.arrays import (
 )
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.recording import Recording
+from vftcli.signals.shown import Shown
 
 
-@dataclass(frozen=True, kw_only=True)
-class DynamicsTerms:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class DynamicsTerms(Shown):
     r"""Momentum form of the equations of motion: :math:`\dot p = \mu + \tau_{ext}` (33).
 
     Attributes:

@@ -1,17 +1,21 @@
 """Recording: one log, in SI units, on one strictly increasing clock."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
+from vftcli.signals.arrays import Array, check_clock, check_series, check_shape, seal
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
-from vftcli.signals.wrench import WrenchFrame
+from vftcli.signals.shown import Shown, frame_of, per_joint
+from vftcli.signals.wrench import WrenchFrame, per_axis
+
+if TYPE_CHECKING:
+    import polars as pl
 
 MEANINGS = {
     "q": "joint positions",
@@ -32,6 +36,9 @@ MEANINGS = {
 JOINT_SIGNALS = tuple(name for name in MEANINGS if name != "wrench")
 """Those of them that hold one column a joint."""
 
+
+COLUMN_NAMES = {"torque": "tau"}
+"""Signals whose columns in tables are called otherwise than the field of a Recording."""
 
 EFFORTS = ("current", "torque", "torque_without_gravity")
 """Those that say what the drives do; a log has one of them or several."""
@@ -59,8 +66,8 @@ class Awaited:
         instance.__dict__[self._key] = value
 
 
-@dataclass(frozen=True, kw_only=True)
-class Source:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Source(Shown):
     """Where a recording came from and what was done to it on the way in.
 
     Attributes:
@@ -98,6 +105,9 @@ class Source:
         if not self.label and self.path is not None:
             object.__setattr__(self, "label", self.path.name)
 
+    def _headline(self) -> str:
+        return f"{self.path or 'in memory'}, {self.format}"
+
     @property
     def repairs(self) -> tuple[str, ...]:
         """What was dropped, turned or derived, in words."""
@@ -109,8 +119,8 @@ class Source:
         return tuple(str(remark) for remark in self.remarks if remark.level != "fact")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Recording:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Recording(Shown):
     """Measurements of an n-joint robot at T instants. A signal the log lacks is None, never zeros.
 
     Attributes:
@@ -157,12 +167,9 @@ class Recording:
     source: Source = Source()
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if isinstance(value := getattr(self, field.name), np.ndarray):
-                object.__setattr__(self, field.name, frozen(value))
-        if self.q.ndim != 2:
-            raise ShapeError(f"q of the recording has shape {self.q.shape}; expected (T, n)")
-        if len(self.t) == 0:
+        seal(self, "t", *MEANINGS)
+        check_series(self.q, None, "q", "the recording")
+        if np.size(self.t) == 0:
             raise ClockError(f"{self.name}: no samples")
         check_clock(self.t, self.name)
         shape = (len(self.t), self.joints)
@@ -171,6 +178,32 @@ class Recording:
                 check_shape(signal, shape, name, self.name)
         if self.wrench is not None:
             check_shape(self.wrench, (len(self.t), 6), "wrench", self.name)
+        if self.joint_names and len(self.joint_names) != self.joints:
+            told = f"{len(self.joint_names)} joint names for {self.joints} joints"
+            raise ShapeError(f"{self.name}: {told}; expected one a joint, or none")
+        if self.payload_com is not None:
+            check_shape(np.asarray(self.payload_com), (3,), "payload_com", self.name)
+
+    def _headline(self) -> str:
+        there = f"{self.samples} samples of {self.joints} joints over {self.duration:.4g} s"
+        return f"{self.name}: {there}; {', '.join(self.signals)}"
+
+    def _rows(self) -> Iterator[Sequence[object]]:
+        yield "signal", "what it is", "columns", "least", "most"
+        for name in self.signals:
+            values = getattr(self, name)
+            least, most = float(values.min()), float(values.max())
+            yield name, MEANINGS[name], values.shape[1], least, most
+
+    def columns(self) -> Iterator[tuple[str, Array]]:
+        """Name and values of every signal's columns, as ``q/1``, in a fixed order."""
+        for name in self.signals:
+            split = per_axis if name == "wrench" else per_joint
+            yield from split(COLUMN_NAMES.get(name, name), getattr(self, name))
+
+    def to_polars(self) -> "pl.DataFrame":
+        """Time ``t`` and every signal, one column a joint or axis, as `vftcli convert` writes."""
+        return frame_of([("t", self.t), *self.columns()])
 
     @property
     def joints(self) -> int:
