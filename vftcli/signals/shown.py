@@ -79,7 +79,9 @@ def value_text(value: object) -> str:
         few = value.ndim == 1 and len(value) <= FEW
         return f"[{joined(value)}]" if few else f"array {value.shape}"
     if isinstance(value, (tuple, list, Mapping)):
-        return f"{len(value)} × {type(next(iter(value))).__name__}"
+        first, count = next(iter(value)), len(value)
+        few = count <= FEW and isinstance(first, (str, int, float))
+        return " ".join(map(cell, value)) if few else f"{count} × {type(first).__name__}"
     plain = isinstance(value, (str, int, float, Path))
     return cell(value) if plain else type(value).__name__
 

@@ -153,14 +153,14 @@ class Wrench(Shown):
 
     def _headline(self) -> str:
         most = self.size[np.isfinite(self.size)].max(initial=0.0)
-        return f"of {self.name}, {self.frame} axes: {len(self.t)} samples, |F| up to {most:.3g} N"
+        return f"of {self.name}, frame {self.frame}: {len(self.t)} samples, |F| up to {most:.3g} N"
 
     def _rows(self) -> Iterator[Sequence[object]]:
-        yield "axis", "unit", "least", "most", "median sd"
+        yield "axis", "unit", "least", "most", "largest sd"
         told = np.isfinite(self.known).all(axis=1)
         for k, axis in enumerate(AXES):
             values = self.values[told, k]
-            sd = None if self.sd is None or not told.any() else float(np.median(self.sd[told, k]))
+            sd = None if self.sd is None or not told.any() else float(self.sd[told, k].max())
             ends = (float(values.min()), float(values.max())) if told.any() else (None, None)
             yield axis, unit_of(axis), *ends, sd
 
