@@ -39,11 +39,10 @@ def folder(tmp_path: Path) -> Iterator[Path]:
     os.chdir(before)
 
 
-WITH_COMMANDS = [path for path in DOCUMENTS if commands(path)]
-WITH_PYTHON = [path for path in DOCUMENTS if blocks(path, "python")]
+TO_RUN = [path for path in DOCUMENTS if commands(path) or blocks(path, "python")]
 
 
-@pytest.mark.parametrize("path", WITH_COMMANDS, ids=lambda p: p.name)
+@pytest.mark.parametrize("path", TO_RUN, ids=lambda p: p.name)
 @pytest.mark.usefixtures("folder")
 def test_every_command_and_snippet_of_a_document_runs(path: Path) -> None:
     for command in commands(path):
