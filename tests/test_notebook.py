@@ -77,7 +77,7 @@ def test_everything_in_hand_is_one_line_and_a_table(analysis: vft.Analysis) -> N
         *(analysis.estimates[0], analysis.remarks, analysis.remarks[0], analysis.motion),
         *(analysis.motion.log, analysis.motion.log.terms, analysis.virtual_sensor),
         *(analysis.refinement, analysis.examinations[0], analysis.tunings["gmo"]),
-        vft.MomentumObserver(),
+        *(*analysis.observers, vft.KalmanObserver()),
     ]
     for thing in things:
         assert len(repr(thing)) <= 162, type(thing)

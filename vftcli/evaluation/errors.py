@@ -8,7 +8,7 @@ import polars as pl
 
 from vftcli.evaluation.intervals import Resampled, interval, resample
 from vftcli.evaluation.significance import p_value
-from vftcli.signals.arrays import Array, Mask, numbers
+from vftcli.signals.arrays import Array, Mask, number_array
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.lag import lags
@@ -53,8 +53,8 @@ def rmse(estimate: Array, reference: Array) -> Array:
     Raises:
         ShapeError: If the two have different shapes, or are no arrays of numbers.
     """
-    estimate = numbers(estimate, "the estimate", "the error")
-    reference = numbers(reference, "the reference", "the error")
+    estimate = number_array(estimate, "the estimate", "the error")
+    reference = number_array(reference, "the reference", "the error")
     if estimate.shape != reference.shape:
         raise ShapeError(f"estimate {estimate.shape} against reference {reference.shape}")
     error = estimate - reference

@@ -13,7 +13,7 @@ from vftcli.observers.first_order import (
 )
 from vftcli.observers.observer import Complex, Tuning, check_terms
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, handed_over, numbers
+from vftcli.signals.arrays import Array, handed_over, number_array
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.shown import Shown
@@ -47,7 +47,7 @@ class FilteredDynamicsObserver(Shown):
     as_printed: bool = False
 
     def __post_init__(self) -> None:
-        if np.size(numbers(self.omega, "omega", self.name)) != 1:
+        if np.size(number_array(self.omega, "omega", self.name)) != 1:
             raise ShapeError(f"fdo.omega is {self.omega!r}; expected one number for all joints")
         if not (np.isfinite(self.omega) and self.omega > 0):
             raise ParameterError(f"fdo.omega is {self.omega:g} rad/s; it must be positive")

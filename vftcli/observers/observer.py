@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, frozen, numbers, seal
+from vftcli.signals.arrays import Array, frozen, number_array, seal
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_kind
@@ -80,7 +80,7 @@ def numbers_of(value: ArrayLike, name: str, observer: str) -> Array:
     Raises:
         ShapeError: If it is something else.
     """
-    found = numbers(value, name, observer)
+    found = number_array(value, name, observer)
     if found.ndim > 1:
         told = f"{name} of {observer} has shape {found.shape}"
         raise ShapeError(f"{told}; expected one number, or one a joint: (n,)")

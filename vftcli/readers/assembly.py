@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from vftcli.readers.cleaning import cleaned
 from vftcli.readers.reader import RawLog
-from vftcli.signals.arrays import numbers
+from vftcli.signals.arrays import number_array
 from vftcli.signals.errors import MissingSignalError, ShapeError
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
 
@@ -33,10 +33,12 @@ def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Rec
         raise MissingSignalError(
             "a recording needs joint positions: give q=… of shape (T, n) [rad]"
         )
-    arrays = {key: np.array(numbers(value, key, name)) for key, value in signals.items()}
+    arrays = {key: np.array(number_array(value, key, name)) for key, value in signals.items()}
     for key, value in arrays.items():
         if value.ndim != 2 or len(value) != np.size(t):
             told = f"{key} of {name} has shape {value.shape}"
             raise ShapeError(f"{told}; expected ({np.size(t)}, n), a row for each stamp of t")
-    raw = RawLog(stamps=np.array(numbers(t, "t", name)), tick=1.0, clock="as given", signals=arrays)
+    raw = RawLog(
+        stamps=np.array(number_array(t, "t", name)), tick=1.0, clock="as given", signals=arrays
+    )
     return cleaned(raw, Path(name), "arrays")

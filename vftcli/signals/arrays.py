@@ -47,7 +47,7 @@ def handed_over(value: Array) -> Array:
     return value
 
 
-def numbers(value: ArrayLike, name: str, owner: str) -> Array:
+def number_array(value: ArrayLike, name: str, owner: str) -> Array:
     """Return `frozen` of what a user gives for an array.
 
     Raises:
@@ -70,7 +70,7 @@ def seal(owner: object, *names: str) -> None:
     for name in names:
         if (value := getattr(owner, name)) is not None:
             # The one way past a frozen dataclass, for its own __post_init__ only.
-            object.__setattr__(owner, name, numbers(value, name, type(owner).__name__))
+            object.__setattr__(owner, name, number_array(value, name, type(owner).__name__))
 
 
 def frozen_mask(value: ArrayLike) -> Mask:
