@@ -1,5 +1,7 @@
 """The documents are run: every command and snippet in them works on the repository's fixtures."""
 
+import ast
+import json
 import os
 import re
 import shlex
@@ -37,11 +39,10 @@ def folder(tmp_path: Path) -> Iterator[Path]:
     os.chdir(before)
 
 
-WITH_COMMANDS = [path for path in DOCUMENTS if commands(path)]
-WITH_PYTHON = [path for path in DOCUMENTS if blocks(path, "python")]
+TO_RUN = [path for path in DOCUMENTS if commands(path) or blocks(path, "python")]
 
 
-@pytest.mark.parametrize("path", WITH_COMMANDS, ids=lambda p: p.name)
+@pytest.mark.parametrize("path", TO_RUN, ids=lambda p: p.name)
 @pytest.mark.usefixtures("folder")
 def test_every_command_and_snippet_of_a_document_runs(path: Path) -> None:
     for command in commands(path):
@@ -52,6 +53,25 @@ def test_every_command_and_snippet_of_a_document_runs(path: Path) -> None:
         assert result.exit_code == 0, f"{command}\n{result.output}\n{result.exception!r}"
     for snippet in blocks(path, "python"):
         exec(compile(snippet, path.name, "exec"), {})
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_notebook_runs_and_shows_every_result() -> None:
+    notebook = json.loads((ROOT / "docs" / "notebook.ipynb").read_text("utf-8"))
+    names: dict[str, object] = {}
+    shown = 0
+    for cell in notebook["cells"]:
+        if cell["cell_type"] != "code":
+            continue
+        assert not cell["outputs"], "the notebook is kept without what it printed"
+        body = ast.parse("".join(cell["source"])).body
+        last = body.pop() if isinstance(body[-1], ast.Expr) else None
+        exec(compile(ast.Module(body, []), "notebook.ipynb", "exec"), names)
+        if last is not None:
+            value = eval(compile(ast.Expression(last.value), "notebook.ipynb", "eval"), names)
+            assert "<table" in value._repr_html_(), ast.unparse(last)
+            shown += 1
+    assert shown >= 10
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda p: p.name)

@@ -1,15 +1,27 @@
 """What a notebook asks of a log, without a command line."""
 
+import json
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import vftcli as vft
+from vftcli.contacts.contact_list import ContactList
 from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 
-TAPS = Path(__file__).parents[1] / "fixtures" / "ur5_taps_ur_rtde.csv"
+ROOT = Path(__file__).parents[1]
+TAPS = ROOT / "fixtures" / "ur5_taps_ur_rtde.csv"
+CIRCLE = ROOT / "fixtures" / "ur5_circle.csv"
+T, Q = np.linspace(0.0, 1.0, 11), np.zeros((11, 6))
+
+
+@pytest.fixture(scope="module")
+def analysis() -> vft.Analysis:
+    return vft.report(CIRCLE, "ur5", observers=["best", "gmo"], reference="two-cycle")
 
 
 def test_contacts_are_those_of_the_pipeline() -> None:
@@ -19,11 +31,141 @@ def test_contacts_are_those_of_the_pipeline() -> None:
     (made,) = analyse_logs([TAPS], choice, work=list_touches)
     assert (expected := made.contacts) is not None
     found = vft.contacts(TAPS, robot="ur5", free_part="0.3:4")
-    rows = [(contact.start, contact.stop, contact.peak_force) for contact in found.contacts]
+    rows = [(contact.start, contact.stop, contact.peak_force) for contact in found]
     assert rows == [(c.start, c.stop, c.peak_force) for c in expected.contacts]
-    assert len(rows) == 2
+    assert len(rows) == len(found) == 2
+    frame = found.to_polars()
+    assert frame["peak_force_N"].to_list() == [peak for _, _, peak in rows]
 
 
-def test_a_file_that_is_not_there_is_one_line() -> None:
-    with pytest.raises(vft.VftError):
-        vft.contacts("no_such_log.csv", robot="ur5")
+def test_a_log_and_a_robot_may_be_files_or_objects() -> None:
+    recording, robot = vft.read(TAPS), vft.load_robot("ur5")
+    named = vft.contacts(TAPS, "ur5", free_part="0.3:4", interval="0:6").to_polars()
+    held = vft.contacts(recording, robot, free_part="0.3:4", interval="0:6").to_polars()
+    assert named.equals(held)
+
+
+def test_a_list_without_contacts_is_a_list_nevertheless(analysis: vft.Analysis) -> None:
+    from dataclasses import replace
+
+    assert analysis.contacts is not None
+    empty: ContactList = replace(analysis.contacts, contacts=())
+    assert empty
+    assert len(empty) == 0
+    assert list(empty) == []
+    assert empty.to_polars().columns[:2] == ["number", "start_s"]
+    assert "0 contacts" in repr(empty)
+
+
+def test_a_report_answers_everything(analysis: vft.Analysis) -> None:
+    assert analysis.contacts is not None
+    assert analysis.wrench is not None
+    assert analysis.errors is not None
+    assert len(analysis.contacts) == 12  # the pushes of the fixture's truth
+    assert analysis.wrench.name == "best"
+    assert set(analysis.errors["observer"]) == {"best", "gmo"}
+    codes = analysis.remarks.to_polars()["code"].to_list()  # type: ignore[attr-defined]
+    assert {"free-cycle-found", "floor-propagated", "wrench-smoothed"} <= set(codes)
+    assert len(codes) == len(analysis.remarks)
+
+
+def test_everything_in_hand_is_one_line_and_a_table(analysis: vft.Analysis) -> None:
+    assert analysis.contacts is not None
+    things = [
+        *(analysis, analysis.recording, analysis.robot, analysis.robot.chain, analysis.reference),
+        *(analysis.contacts, analysis.contacts[0], analysis.contacts.model, analysis.wrench),
+        *(analysis.estimates[0], analysis.remarks, analysis.remarks[0], analysis.motion),
+        *(analysis.motion.log, analysis.motion.log.terms, analysis.virtual_sensor),
+        *(analysis.refinement, analysis.examinations[0], analysis.tunings["gmo"]),
+        *(*analysis.observers, vft.KalmanObserver()),
+    ]
+    for thing in things:
+        assert len(repr(thing)) <= 162, type(thing)
+        assert "\n" not in repr(thing), type(thing)
+        table = thing._repr_html_()  # type: ignore[union-attr]
+        assert table.startswith("<table>"), type(thing)
+        assert len(table) < 6000, type(thing)
+
+
+def test_a_report_is_written_where_it_is_asked_for(tmp_path: Path) -> None:
+    asked = {"robot": "ur5", "observers": "gmo", "interval": "0:6", "free_part": "0:4"}
+    vft.report(CIRCLE, output=tmp_path / "out", **asked)  # type: ignore[arg-type]
+    record = json.loads((tmp_path / "out" / "run.json").read_text("utf-8"))
+    assert record["command"].startswith("vftcli.report(")
+    assert (tmp_path / "out" / "index.html").exists()
+    with pytest.raises(vft.VftError, match="--force"):
+        vft.report(CIRCLE, output=tmp_path / "out", **asked)  # type: ignore[arg-type]
+
+
+def test_thresholds_are_those_of_the_command(tmp_path: Path) -> None:
+    from typer.testing import CliRunner
+
+    from vftcli.cli import app
+
+    free = tmp_path / "free.parquet"
+    told = ["simulate", "ur5-circle", "--set", "contacts=[]", "--set", "trajectory.cycles=9"]
+    assert CliRunner().invoke(app, [*told, "-o", str(free)]).exit_code == 0
+    ran = CliRunner().invoke(app, ["thresholds", str(free), "--robot", "ur5", "--json"])
+    record = json.loads(ran.stdout)
+    found = vft.thresholds(free, "ur5")
+    rows = [row["threshold_Nm"] for row in record["joints"]]
+    assert found.to_polars().filter(unit="N·m")["threshold"].to_list()[:6] == rows
+    assert [remark.code for remark in found.remarks] == [r["code"] for r in record["remarks"]]
+    assert len(repr(found)) <= 162
+    assert found._repr_html_().count("<tr>") == 1 + 6 + 6 + 1  # head, joints, axes, |F|
+
+
+MISTAKES: dict[str, tuple[str, Callable[[], object]]] = {
+    "gain": (r"\(2,\).*\(6,\)", lambda: vft.MomentumObserver(gain=[5, 3]).estimate(TERMS)),
+    "gain 2d": (r"\(n,\)", lambda: vft.MomentumObserver(gain=[[5, 3]])),
+    "gain text": ("array of numbers", lambda: vft.MomentumObserver(gain="fast")),
+    "kalman": (r"\(6,\)", lambda: vft.KalmanObserver(r_diag=[1, 2]).estimate(TERMS)),
+    "covariance": (
+        r"\(3, 6\)",
+        lambda: vft.KalmanObserver(initial_covariance=np.zeros((2, 2))).estimate(TERMS),
+    ),
+    "omega": ("one number", lambda: vft.FilteredDynamicsObserver(omega=[1, 2])),
+    "no terms": ("dynamics_terms", lambda: vft.MomentumObserver().estimate(RECORDING)),
+    "q one joint": (r"\(T, n\)", lambda: vft.Recording(t=T, q=Q[:, 0])),
+    "q text": ("array of numbers", lambda: vft.Recording(t=T, q="q")),
+    "q none": (r"\(T, n\)", lambda: vft.Recording(t=T, q=None)),
+    "ragged": ("array of numbers", lambda: vft.Recording(t=T, q=[[1, 2], [3]])),
+    "t scalar": ("one-dimensional", lambda: vft.Recording(t=1.0, q=Q)),
+    "dq": (r"\(11, 6\)", lambda: vft.Recording(t=T, q=Q, dq=Q[:, :5])),
+    "names": ("one a joint", lambda: vft.Recording(t=T, q=Q, joint_names=("a",))),
+    "payload": (r"\(3,\)", lambda: vft.Recording(t=T, q=Q, payload_com=(1.0,))),
+    "p": (r"\(T, n\)", lambda: vft.DynamicsTerms(t=T, p=Q[:, 0], mu=Q)),
+    "tau": (r"\(T, n\)", lambda: vft.ExternalTorque(name="x", t=T, tau=Q[:, 0])),
+    "rows of arrays": (r"\(11, n\)", lambda: vft.assemble(T, q=Q[:5])),
+    "no joints of arrays": (r"\(11, n\)", lambda: vft.assemble(T, q=T)),
+    "robot by name": ("load_robot", lambda: vft.dynamics_terms(RECORDING, "ur5")),
+    "log by name": ("read", lambda: vft.dynamics_terms("log.csv", vft.load_robot("ur5"))),
+    "analyse": ("load_robot", lambda: vft.analyse(RECORDING, "ur5", vft.AnalysisChoice())),
+    "robot's number": ("profile's name", lambda: vft.load_robot(5)),
+    "pose": (r"\(T, 6\)", lambda: vft.flange_jacobian(vft.load_robot("ur5").chain, Q[0])),
+    "no chain": ("robot.chain", lambda: vft.link_poses(vft.load_robot("ur5"), Q)),
+    "errors": ("list of ExternalTorque", lambda: vft.evaluate("log", TORQUE, TORQUE)),
+    "errors' log": ("recording.name", lambda: vft.evaluate(RECORDING, [TORQUE], TORQUE)),
+    "rmse": ("array of numbers", lambda: vft.rmse(TORQUE, TORQUE)),
+    "path": ("name of a file", lambda: vft.read(None)),
+    "columns": ("no column", lambda: vft.read(CIRCLE, columns="q=foo*")),
+    "columns of an object": ("read already", lambda: vft.contacts(RECORDING, columns="q=a*")),
+    "interval": ("interval='0:4'", lambda: vft.contacts(CIRCLE, "ur5", interval=(0, 4))),
+    "free": ("texts or paths", lambda: vft.report(CIRCLE, "ur5", free=3)),
+    "report's robot": ("a Robot", lambda: vft.report(CIRCLE, 5)),
+    "report's log": ("a Recording", lambda: vft.report(5)),
+    "no free log": ("no log is given", lambda: vft.thresholds([], "ur5")),
+    "no file": ("no such file", lambda: vft.contacts("no_such_log.csv", robot="ur5")),
+}  # fmt: skip
+
+RECORDING = vft.Recording(t=T, q=Q, dq=Q, torque=Q)
+TERMS = vft.DynamicsTerms(t=T, p=Q, mu=Q)
+TORQUE = vft.ExternalTorque(name="gmo", t=T, tau=Q)
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_line_that_says_what_was_expected(mistake: str) -> None:
+    expected, make = MISTAKES[mistake]
+    with pytest.raises(vft.VftError, match=expected) as caught:
+        make()
+    assert "\n" not in str(caught.value)

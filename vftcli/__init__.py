@@ -4,14 +4,17 @@ For notebooks, everything one needs is here; it is imported when it is first use
 
     import vftcli as vft
 
-    recording = vft.read("fixtures/ur5_circle.csv")
-    robot = vft.load_robot("ur5")
-    terms = vft.dynamics_terms(recording, robot)
-    estimate = vft.MomentumObserver(gain=10.0).estimate(terms)
-    estimate.tau  # (T, n) [N·m], torque on the robot
+    analysis = vft.report("fixtures/ur5_circle.csv", "ur5", reference="two-cycle")
+    analysis.contacts.to_polars()  # what touched the arm
+    analysis.wrench.to_polars()  # force and moment on the robot
+    analysis.errors, analysis.remarks
 
-Everything that ``vftcli estimate`` and ``vftcli compare`` do with a log is one call, and a choice a
-room says how::
+One observer alone::
+
+    terms = vft.dynamics_terms(vft.read("fixtures/ur5_circle.csv"), vft.load_robot("ur5"))
+    vft.MomentumObserver(gain=10.0).estimate(terms).tau  # (T, n) [N·m], torque on the robot
+
+What a command's further options say is a choice of each room::
 
     choice = vft.AnalysisChoice(
         robot=vft.RobotChoice(name="ur5"),
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.evaluation import evaluate, rmse
     from vftcli.evaluation.reference_choice import ReferenceChoice
-    from vftcli.notebook import contacts
+    from vftcli.notebook import contacts, report, thresholds
     from vftcli.observers import (
         FilteredDynamicsObserver,
         KalmanObserver,
@@ -85,7 +88,9 @@ HOMES = {
     "link_poses": "robots.kinematics",
     "load_robot": "robots",
     "read": "readers",
+    "report": "notebook",
     "rmse": "evaluation",
+    "thresholds": "notebook",
     "two_cycle_difference": "repetition.two_cycle",
 }
 """Public name → the module it lives in."""
@@ -132,6 +137,8 @@ __all__ = [
     "link_poses",
     "load_robot",
     "read",
+    "report",
     "rmse",
+    "thresholds",
     "two_cycle_difference",
 ]

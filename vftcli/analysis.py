@@ -1,6 +1,6 @@
 """Analysis: everything one run over one log made, ready to be shown."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,8 @@ from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import Remark, Remarks
+from vftcli.signals.shown import Shown, joined
 
 if TYPE_CHECKING:
     import polars as pl
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
     from vftcli.virtual_sensor.smoother.observer_wrench import SmootherInput
 
 
-@dataclass(frozen=True, kw_only=True)
-class Analysis:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Analysis(Shown):
     """One log, one robot, its observers' estimates, and how they compare with the reference.
 
     Attributes:
@@ -46,7 +47,7 @@ class Analysis:
         contact_scores: How each observer tells contacts, or empty where it was not asked.
         published: A printed table beside these errors, or None where none was asked for.
         examinations: What is wrong with the log, then with its free runs.
-        remarks: What the reader of the numbers should know.
+        remarks: What the reader of the numbers should know, as `Remarks`.
         run: The command, versions and conventions, as `run.json` holds them.
     """
 
@@ -64,6 +65,37 @@ class Analysis:
     examinations: "tuple[Examination, ...]" = ()
     remarks: tuple[Remark, ...] = ()
     run: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "remarks", Remarks(self.remarks))
+
+    def _headline(self) -> str:
+        names = ", ".join(estimate.name for estimate in self.estimates) or "no observer"
+        told = "no list of contacts"
+        if self.contacts is not None:
+            told = f"{len(self.contacts)} contact{'s' * (len(self.contacts) != 1)}"
+        return f"of {self.recording.name} on {self.robot.name}: {names}; {told}"
+
+    def _rows(self) -> Iterator[Sequence[object]]:
+        yield "what", "of it"
+        yield "recording", self.recording._headline()
+        yield "robot", self.robot._headline()
+        if self.contacts is not None:
+            yield "contacts", self.contacts._headline()
+        yield from (("wrench", wrench._headline()) for wrench in self.wrenches)
+        for estimate in self.estimates:
+            yield "estimate", estimate._headline()
+        if self.reference is not None:
+            yield "reference", self.reference.name
+        if self.errors is not None:
+            for name, error in self.errors.group_by("observer", maintain_order=True):
+                yield f"error of {name[0]}", f"rmse {joined(error['rmse_Nm'])} N·m"
+        yield "remarks", Remarks(self.remarks)._headline()
+
+    @property
+    def wrench(self) -> "Wrench | None":
+        """The wrench of the first observer that has one: of `best`, where contacts are listed."""
+        return next(iter(self.wrenches), None)
 
     @property
     def recording(self) -> Recording:

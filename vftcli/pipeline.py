@@ -196,9 +196,9 @@ def check_logged(recording: Recording, why: str) -> None:
         )
 
 
-def analyse_log(path: Path, choice: AnalysisChoice) -> "Analysis":
+def analyse_log(path: str | Path, choice: AnalysisChoice) -> "Analysis":
     """Read a log, choose its robot, and analyse it."""
-    return next(analyse_logs([path], choice))
+    return next(analyse_logs([Path(path)], choice))
 
 
 def analyse(

@@ -8,7 +8,8 @@ from vftcli.contacts.compared_signals import ComparedSignals
 from vftcli.contacts.thresholds import SignalThreshold, Thresholds
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.recording import Recording, Source
+from vftcli.signals.recording import Recording
+from vftcli.signals.source import Source
 from vftcli.signals.wrench import Wrench
 
 T = np.arange(0.0, 20.0, 0.01)

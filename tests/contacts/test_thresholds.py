@@ -15,7 +15,8 @@ from vftcli.contacts.thresholds import (
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.recording import Recording, Source
+from vftcli.signals.recording import Recording
+from vftcli.signals.source import Source
 
 RATE = 10.0
 """Samples a second. [Hz]"""

@@ -20,8 +20,9 @@ from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.recording import Recording, Source
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution, fact
+from vftcli.signals.source import Source
 from vftcli.virtual_sensor.choice import WrenchChoice
 
 HOSTILE = '<script>alert("x")</script>&_%.csv'

@@ -9,12 +9,14 @@ from hypothesis import strategies as st
 
 from vftcli.signals.arrays import (
     check_clock,
+    check_series,
     check_shape,
     frozen,
     frozen_mask,
     handed_over,
     is_uniform,
     median,
+    number_array,
     seal,
 )
 from vftcli.signals.errors import ClockError, ShapeError
@@ -100,3 +102,22 @@ def test_even_clocks_are_told_from_jittering_ones() -> None:
     t[50] += 1e-4
     assert not is_uniform(t)
     assert is_uniform(t, tolerance=0.05)
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [("q", "the text 'q'"), ([[1, 2], [3]], "rows of unequal length"), (object(), "no number")],
+)
+def test_what_is_no_array_of_numbers_is_refused(value: object, told: str) -> None:
+    assert number_array([[1, 2]], "q", "x").tolist() == [[1.0, 2.0]]
+    with pytest.raises(ShapeError, match=f"^q of x is {told}.*; expected an array of numbers$"):
+        number_array(value, "q", "x")  # type: ignore[arg-type]
+
+
+def test_a_series_has_a_column_a_joint() -> None:
+    check_series(np.zeros((3, 6)), None, "q", "x")
+    check_series([[0.0] * 6], 6, "q", "x")
+    with pytest.raises(ShapeError, match=r"^q of x has shape \(3, 6\); expected \(T, 7\)$"):
+        check_series(np.zeros((3, 6)), 7, "q", "x")
+    with pytest.raises(ShapeError, match=r"expected \(T, n\)$"):
+        check_series(np.zeros(3), None, "q", "x")

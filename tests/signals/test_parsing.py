@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, check_known, did_you_mean, interval, numbers
+from vftcli.signals.parsing import (
+    assignment,
+    check_kind,
+    check_known,
+    did_you_mean,
+    interval,
+    numbers,
+)
 
 
 @pytest.mark.parametrize(
@@ -47,3 +54,11 @@ def test_an_unknown_word_is_refused_with_what_there_is() -> None:
     check_known("fe", {"fe": 1, "zoh": 2}, "unheard")
     with pytest.raises(ParameterError, match=r"^discretisation 'rk4'; there is fe, zoh$"):
         check_known("rk4", {"fe": 1, "zoh": 2}, "discretisation 'rk4'")
+
+
+def test_a_thing_of_another_kind_is_refused_with_what_gives_one() -> None:
+    check_kind(True, int, "the count", "len(x)")  # a subclass is of the kind
+    with pytest.raises(ParameterError, match=r"^the count is 'a'; expected int: len\(x\) is one$"):
+        check_kind("a", int, "the count", "len(x)")
+    with pytest.raises(ParameterError, match=r"^the count is ndarray; expected int"):
+        check_kind(np.zeros(3), int, "the count", "len(x)")

@@ -11,11 +11,9 @@ from vftcli.cli.log_options import ReadOptions, RobotOptions
 
 if TYPE_CHECKING:
     from vftcli.evaluation.reference_choice import ReferenceChoice
-    from vftcli.pipeline import AnalysisChoice
-    from vftcli.repetition.free_run import ModelledRun, Models
+    from vftcli.repetition.free_run import ModelledRun
     from vftcli.signals.external_torque import ExternalTorque
     from vftcli.signals.recording import Recording
-    from vftcli.signals.remarks import Remark
     from vftcli.signals.wrench import Wrench
 
 
@@ -57,9 +55,10 @@ def contact_thresholds(
     from vftcli.contacts.caught import check_contacts
     from vftcli.contacts.compared_signals import check_alike, compared_signals
     from vftcli.contacts.thresholds import find_thresholds, left_out
+    from vftcli.notebook import modelled, touched
     from vftcli.outputs.examination import health_record
     from vftcli.outputs.thresholds import thresholds_record, thresholds_text
-    from vftcli.pipeline import AnalysisChoice
+    from vftcli.pipeline import AnalysisChoice, prepared
     from vftcli.readers.library import Library
     from vftcli.repetition.free_run import Models
     from vftcli.signals.errors import ParameterError
@@ -75,13 +74,15 @@ def contact_thresholds(
         examiner=health_of(library, anyway=anyway.anyway),
     )
     models = Models()
-    free = [modelled(log, choice, models) for log in library.open_logs(logs, choice.read)]
+    opened = library.open_logs(logs, choice.read)
+    free = [modelled(*prepared(log, choice), choice, models) for log in opened]
     signals = [compared_signals(run) for run in free]
     thresholds = find_thresholds(signals, rate)
     counted = left_out(signals, rate)
     checked = None
     if check is not None:
-        pushed = modelled(library.open(check, choice.read.whole), choice, models)
+        touching = library.open(check, choice.read.whole)
+        pushed = modelled(*prepared(touching, choice), choice, models)
         check_alike((signals[0], compared := compared_signals(pushed)))
         truth = truth_of(pushed, asked or settled_reference(pushed.recording))
         checked = check_contacts(compared, thresholds, *truth)
@@ -97,36 +98,6 @@ def contact_thresholds(
     for remark in (*remarks, *(checked.remarks if checked else ())):
         say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
     typer.echo(thresholds_text(thresholds, counted, checked), nl=False)
-
-
-def modelled(recording: "Recording", choice: "AnalysisChoice", models: "Models") -> "ModelledRun":
-    """A log with its robot, examined.
-
-    Raises:
-        ExaminationError: If a finding makes every result meaningless.
-    """
-    from vftcli.pipeline import prepared
-
-    run = models.of(*prepared(recording, choice))
-    choice.examiner.examine(run.recording, run.robot)
-    return run
-
-
-def touched(run: "ModelledRun") -> tuple["Remark", ...]:
-    """A remark where a log that is to be free shows contact."""
-    from vftcli.contacts.tail import SETTLING
-    from vftcli.evaluation.touches import touches
-    from vftcli.signals.recording import EFFORTS
-    from vftcli.signals.remarks import Where, caution
-
-    known = touches(run) if set(EFFORTS) & set(run.recording.signals) else ()
-    found = [touch for touch in known if touch.stop > run.recording.t[0] + SETTLING]
-    if not found:
-        return ()
-    worst = max(found, key=lambda touch: touch.torque)
-    where = Where(run.recording.name, (worst.joint + 1,), (worst.start, worst.stop))
-    sizes = {"torque_Nm": worst.torque, "quiet_Nm": worst.quiet}
-    return (caution("free-log-touched", where, count=len(found), **sizes),)
 
 
 def truth_of(

@@ -1,12 +1,19 @@
 """Contact and ContactList: the answer to what touched the arm."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
 
 from vftcli.contacts.places import ArmPart
 from vftcli.contacts.windows import ContactPrior
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.remarks import Remark
+from vftcli.signals.shown import UNKNOWN, Shown, joined, value_text
+
+if TYPE_CHECKING:
+    import polars as pl
 
 Trust = Literal["good", "fair", "weak"]
 """How far a row may be believed."""
@@ -17,6 +24,10 @@ SURE_NATS, TIGHT, WIDE = 50.0, 0.25, 0.4
 
 BLIND = 500.0
 """Where only forces larger than this are told along an axis, the pose is blind to it. [N]"""
+
+
+FIRST_COLUMNS = ("number", "start_s", "stop_s", "peak_s", "peak_force_N")
+"""Columns that a table of contacts has even where it has no row."""
 
 
 class ForceCourse(NamedTuple):
@@ -33,8 +44,8 @@ class ForceCourse(NamedTuple):
     band: Array
 
 
-@dataclass(frozen=True, kw_only=True)
-class Contact:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Contact(Shown):
     """One contact: force and moment ON the robot, base axes, the moment about the flange point.
 
     Bands and standard deviations are calibrated: they hold what the model errs by, too.
@@ -94,6 +105,71 @@ class Contact:
         seal(self, "wrench", "wrench_sd", "mean_force", "impulse")
         seal(self, "joint_torque", "joint_torque_sd")
 
+    def _headline(self) -> str:
+        kind = "load" if self.is_load else "contact"
+        when = f"{self.start:.2f} to {self.stop:.2f} s"
+        return f"{self.number}, a {kind}: {when}, {self._size}, {self.where} ({self.trust})"
+
+    def _rows(self) -> Iterator[Sequence[object]]:
+        yield "field", "value"
+        for key, value in self.record().items():
+            told = value if isinstance(value, (str, float, int)) else value_text(value)
+            yield key, UNKNOWN if told == "" else told
+
+    @property
+    def _size(self) -> str:
+        """|F| at the peak with its 95 % band; the joints' torques where no force is told."""
+        if self.peak_force is None:
+            return f"{joined(self.joint_torque)} N·m"
+        return f"{self.peak_force:.0f} ± {self.peak_band:.0f} N"
+
+    def record(self) -> dict[str, Any]:
+        """The contact for machines, units in the names."""
+        wrench, sd = self.wrench, self.wrench_sd
+        return {
+            "number": self.number,
+            "kind": "load" if self.is_load else "contact",
+            "start_s": self.start,
+            "stop_s": self.stop,
+            "peak_s": self.peak,
+            "peak_force_N": self.peak_force,
+            "peak_force_band_N": self.peak_band,
+            "force_N": None if wrench is None else wrench[:3],
+            "force_sd_N": None if sd is None else sd[:3],
+            "moment_Nm": None if wrench is None else wrench[3:],
+            "moment_sd_Nm": None if sd is None else sd[3:],
+            "mean_force_N": self.mean_force,
+            "impulse_Ns": self.impulse,
+            "where": self.where,
+            "where_lead_nats": self.lead,
+            "places": [link or "flange" for link in self.places],
+            "anywhere_N": None if self.anywhere is None else list(self.anywhere),
+            "trust": self.trust,
+            "evidence_nats": self.evidence,
+            "joint_torque_Nm": self.joint_torque,
+            "joint_torque_sd_Nm": self.joint_torque_sd,
+            "at_rest": self.at_rest,
+            "remarks": list(self.remarks),
+            "vendor_force_N": self.vendor_force,
+            "sensor_force_N": self.sensor_force,
+        }
+
+    def row(self) -> dict[str, Any]:
+        """The record in one row: ``force_N`` becomes ``force_N_x`` …, joints are numbered."""
+        row: dict[str, Any] = {}
+        for key, value in self.record().items():
+            if isinstance(value, np.ndarray):
+                axes = "xyz" if len(value) == 3 else range(1, len(value) + 1)
+                row |= {f"{key}_{axis}": float(v) for axis, v in zip(axes, value, strict=True)}
+            elif key == "anywhere_N":
+                low, high = value or (None, None)
+                row |= {"anywhere_least_N": low, "anywhere_most_N": high}
+            elif isinstance(value, list):
+                row[key] = " ".join(str(item) for item in value)
+            else:
+                row[key] = value
+        return row
+
     def numbered(self, number: int) -> "Contact":
         """The same with another number."""
         return replace(self, number=number)
@@ -126,8 +202,8 @@ class Contact:
         return "good" if share <= TIGHT else "fair"
 
 
-@dataclass(frozen=True, kw_only=True)
-class ContactModel:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ContactModel(Shown):
     """What the list rests on.
 
     Attributes:
@@ -148,9 +224,9 @@ class ContactModel:
         seal(self, "noise_sd", "error_sd", "error_time")
 
 
-@dataclass(frozen=True, kw_only=True)
-class ContactList:
-    """What touched the arm along a log.
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ContactList(Shown):
+    """What touched the arm along a log: a sequence of `Contact`.
 
     Attributes:
         recording: The log's label.
@@ -179,6 +255,39 @@ class ContactList:
     stops: tuple[float, ...]
     model: ContactModel
     remarks: tuple[Remark, ...] = ()
+
+    def __getitem__(self, place: int) -> Contact:
+        """The contact at a place of the list, from 0; it ends the loop over them all."""
+        return self.contacts[place]
+
+    def __len__(self) -> int:
+        """How many contacts there are."""
+        return len(self.contacts)
+
+    def __bool__(self) -> bool:
+        """True: a log that nothing touched has a list too, unlike one that tells no contacts."""
+        return True
+
+    def _headline(self) -> str:
+        count, hardest = len(self), self.hardest
+        told = f"{count} contact{'s' * (count != 1)} in {self.duration:.4g} s"
+        if hardest is None:
+            return f"of {self.recording}: {told}"
+        return f"of {self.recording}: {told}, the hardest {hardest._size} at {hardest.peak:.2f} s"
+
+    def _rows(self) -> Iterator[Sequence[object]]:
+        yield "#", "from – to [s]", "|F| at its peak", "force x y z [N]", "where", "trust"
+        for c in self.contacts:
+            force = UNKNOWN if c.wrench is None else " ".join(f"{f:.0f}" for f in c.wrench[:3])
+            yield c.number, f"{c.start:.2f} – {c.stop:.2f}", c._size, force, c.where, c.trust
+
+    def to_polars(self) -> "pl.DataFrame":
+        """One row a contact, the columns those of ``contacts.csv``, units in their names."""
+        import polars as pl
+
+        if not self.contacts:
+            return pl.DataFrame(schema=dict.fromkeys(FIRST_COLUMNS, pl.Float64))
+        return pl.DataFrame([c.row() for c in self.contacts], infer_schema_length=None)
 
     @property
     def tells_untouched(self) -> bool:

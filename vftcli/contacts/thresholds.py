@@ -1,8 +1,8 @@
 """Thresholds from motion that nobody touched, at a stated rate of false alarms."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,11 @@ from vftcli.contacts.tail import BLOCK, ENOUGH, SETTLING, Tail, block_maxima, ev
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.shown import Shown, joined
+from vftcli.signals.wrench import AXES, unit_of
+
+if TYPE_CHECKING:
+    import polars as pl
 
 DUE = 3.0
 """A log that holds this many false alarms, at their rate, shows it; a shorter one extrapolates."""
@@ -51,8 +56,8 @@ class SignalThreshold(NamedTuple):
     tail: Tail | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Thresholds:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Thresholds(Shown):
     """Thresholds of an arm.
 
     Attributes:
@@ -72,6 +77,32 @@ class Thresholds:
     of_vendor: bool
     logged_wrench: bool
     remarks: tuple[Remark, ...] = ()
+
+    def _headline(self) -> str:
+        values = joined(one.value for one in self.joints)
+        return f"passed {self.rate:g} × an hour: {values} N·m on J1…"
+
+    @property
+    def named(self) -> tuple[tuple[str, str, SignalThreshold], ...]:
+        """Name, unit and threshold of every joint and axis, and of the force's size."""
+        return (
+            *((f"J{j}", "N·m", one) for j, one in enumerate(self.joints, start=1)),
+            *((name, unit_of(name), one) for name, one in zip(AXES, self.axes, strict=False)),
+            *(("|F|", "N", one) for one in self.force),
+        )
+
+    def _rows(self) -> Iterator[Sequence[object]]:
+        yield "signal", "threshold", "unit", "95 %", "needed by"
+        for name, unit, one in self.named:
+            yield name, one.value, unit, joined(one.interval), one.log
+
+    def to_polars(self) -> "pl.DataFrame":
+        """One row a signal: its threshold with its interval, unit, rate and log."""
+        import polars as pl
+
+        names = ("signal", "threshold", "low", "high", "unit", "rate_per_h", "log")
+        rows = [(n, x.value, *x.interval, unit, x.rate, x.log) for n, unit, x in self.named]
+        return pl.DataFrame(rows, names, orient="row")
 
     def level(self, name: str, signals: ComparedSignals) -> Array:
         """A set's signals in multiples of their thresholds, no column without thresholds. (T, k)

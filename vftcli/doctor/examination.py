@@ -13,6 +13,7 @@ from vftcli.doctor.velocity import velocity_fit
 from vftcli.robots import Robot
 from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark
+from vftcli.signals.shown import Shown
 
 NO_FIT = frozenset({"other-robot", "no-robot-fits", "no-robot-fits-any", "no-robot-fits-at-rest"})
 """Findings that an arm's model is another's: what identification is for."""
@@ -37,8 +38,8 @@ ASSUMPTIONS = frozenset({"no-temperature", "temperature-gaps"})
 """Findings that every command says: nothing is wrong, and results stand on what is assumed."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Examination:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Examination(Shown):
     """What the doctor found.
 
     Attributes:

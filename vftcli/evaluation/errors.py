@@ -8,10 +8,11 @@ import polars as pl
 
 from vftcli.evaluation.intervals import Resampled, interval, resample
 from vftcli.evaluation.significance import p_value
-from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.errors import ShapeError
+from vftcli.signals.arrays import Array, Mask, number_array
+from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.lag import lags_of_each
+from vftcli.signals.parsing import check_kind
 from vftcli.signals.progress import steps
 from vftcli.signals.series import median_step
 
@@ -51,8 +52,10 @@ def rmse(estimate: Array, reference: Array) -> Array:
     """Root-mean-square error per joint over the samples where both are finite. (n,)
 
     Raises:
-        ShapeError: If the two have different shapes.
+        ShapeError: If the two have different shapes, or are no arrays of numbers.
     """
+    estimate = number_array(estimate, "the estimate", "the error")
+    reference = number_array(reference, "the reference", "the error")
     if estimate.shape != reference.shape:
         raise ShapeError(f"estimate {estimate.shape} against reference {reference.shape}")
     error = estimate - reference
@@ -115,8 +118,15 @@ def evaluate(
 
     Raises:
         ShapeError: If an estimate and the reference have different shapes.
+        ParameterError: If one of them is something else.
     """
-    return table(recording, reference.name, scored(tuple(estimates), reference))
+    check_kind(recording, str, "the recording", "recording.name")
+    if not isinstance(estimates, Iterable):
+        raise ParameterError("the estimates are one thing; expected a list of ExternalTorque")
+    estimates = tuple(estimates)
+    for torque in (*estimates, reference):
+        check_kind(torque, ExternalTorque, "a torque", "observer.estimate(terms)")
+    return table(recording, reference.name, scored(estimates, reference))
 
 
 def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> Iterator[Scored]:

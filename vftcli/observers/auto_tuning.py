@@ -23,6 +23,7 @@ from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, frozen
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, warning
+from vftcli.signals.shown import Shown
 
 SLOWEST = 1.0
 """Smallest natural frequency that is tried. [rad/s]"""
@@ -142,8 +143,8 @@ def noise_level(omega_n: Array, spectra: Spectra) -> Array:
     return np.asarray(np.maximum(scale, np.finfo(float).tiny))
 
 
-@dataclass(frozen=True, kw_only=True)
-class AutoTuned:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class AutoTuned(Shown):
     """An observer under its own name whose gains came from the log, or fell back to hand-set ones.
 
     Attributes:

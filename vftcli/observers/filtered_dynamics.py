@@ -11,15 +11,16 @@ from vftcli.observers.first_order import (
     first_order_tuning,
     run_first_order,
 )
-from vftcli.observers.observer import Complex, Tuning
+from vftcli.observers.observer import Complex, Tuning, check_terms
 from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
-from vftcli.signals.arrays import Array, handed_over
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.arrays import Array, handed_over, number_array
+from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.shown import Shown
 
 
-@dataclass(frozen=True, kw_only=True)
-class FilteredDynamicsObserver:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class FilteredDynamicsObserver(Shown):
     r"""Low-pass filtered :math:`\dot p - \mu`, written so that nothing is differentiated.
 
     τ̂ = F₁{−μ} + F₂{p} + ωp with F₁ = ω/(s+ω) and F₂ = −ω²/(s+ω), discretised by the bilinear
@@ -51,6 +52,8 @@ class FilteredDynamicsObserver:
     as_printed: bool = False
 
     def __post_init__(self) -> None:
+        if np.size(number_array(self.omega, "omega", self.name)) != 1:
+            raise ShapeError(f"fdo.omega is {self.omega!r}; expected one number for all joints")
         if not (np.isfinite(self.omega) and self.omega > 0):
             raise ParameterError(f"fdo.omega is {self.omega:g} rad/s; it must be positive")
 
@@ -65,6 +68,7 @@ class FilteredDynamicsObserver:
         self, terms: DynamicsTerms, state: FirstOrderState | None = None
     ) -> tuple[ExternalTorque, FirstOrderState]:
         """Run over a block of a log from where the block before ended; None where it begins."""
+        check_terms(terms)
         rate = np.full(terms.joints, self.omega)
         driven = afresh = None
         if self.as_printed:

@@ -13,14 +13,15 @@ from vftcli.observers.kalman_model import (
     Discrete,
     discretise,
 )
-from vftcli.observers.observer import Complex, Tuning, per_joint
+from vftcli.observers.observer import Complex, Tuning, check_terms, numbers_of, per_joint
 from vftcli.observers.steady_filter import steady_filter
 from vftcli.observers.uneven_kalman import Fold, filter_blocks, last_covariance, settle, spans
 from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array, empty_series, frozen, handed_over
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_known
+from vftcli.signals.shown import Shown
 
 
 class KalmanState(NamedTuple):
@@ -35,8 +36,8 @@ class KalmanState(NamedTuple):
     posterior: Covariance
 
 
-@dataclass(frozen=True, kw_only=True)
-class KalmanObserver:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class KalmanObserver(Shown):
     r"""Kalman filter on x = [p; τ_ext] with ṗ = μ + τ_ext + w_p, τ̇_ext = A_τ τ_ext + w_τ.
 
     With diagonal R, Q_p and Q_τ it is n two-state filters whose gains do not depend on the data.
@@ -75,7 +76,7 @@ class KalmanObserver:
         check_known(scheme, DISCRETISATIONS, f"discretisation {scheme!r}")
         check_known(convention, NOISE_CONVENTIONS, f"kfo.noise_convention is {convention!r}")
         for name in ("r_diag", "q_p_diag", "q_tau_diag", "decay"):
-            value = frozen(np.atleast_1d(np.asarray(getattr(self, name), dtype=np.float64)))
+            value = numbers_of(getattr(self, name), name, self.name)
             # The paper gives A_τ = −a, its tables a: either sign means the same decay.
             value = frozen(np.abs(value)) if name == "decay" else value
             object.__setattr__(self, name, value)
@@ -114,6 +115,7 @@ class KalmanObserver:
         self, terms: DynamicsTerms, state: KalmanState | None = None
     ) -> tuple[ExternalTorque, KalmanState]:
         """Run over a block of a log from where the block before ended; None where it begins."""
+        check_terms(terms)
         n, clock = terms.joints, terms.clock
         settled = self.steady(clock.step, n)
         d = self.unexplained(terms)
@@ -163,8 +165,11 @@ class KalmanObserver:
         """Covariance before the first update: the user's, or the stationary one. (n,)"""
         if self.initial_covariance is None:
             return settled.prior
-        given = np.asarray(self.initial_covariance, dtype=np.float64).reshape(3, -1)
-        return Covariance(*np.broadcast_to(given, (3, len(settled.prior.p11))))
+        given, joints = np.asarray(self.initial_covariance, np.float64), len(settled.prior.p11)
+        if given.shape not in {(3,), (3, 1), (3, joints)}:
+            told = f"initial_covariance of {self.name} has shape {given.shape}"
+            raise ShapeError(f"{told}; expected (3, {joints}): P₁₁, P₁₂, P₂₂ of each joint")
+        return Covariance(*np.broadcast_to(given.reshape(3, -1), (3, joints)))
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """ω_n = (Q_τ/R)^¼, ζ = ½√(2 + Q_p/√(Q_τR)) of the effective densities, and the exact delay.

@@ -11,18 +11,19 @@ from vftcli.observers.first_order import (
     first_order_tuning,
     run_first_order,
 )
-from vftcli.observers.observer import Complex, Tuning, per_joint
+from vftcli.observers.observer import Complex, Tuning, check_terms, numbers_of, per_joint
 from vftcli.observers.recursion import recursion
 from vftcli.observers.steady_filter import steady_filter
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, frozen, handed_over
+from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, warning
+from vftcli.signals.shown import Shown
 
 
-@dataclass(frozen=True, kw_only=True)
-class MomentumObserver:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class MomentumObserver(Shown):
     r"""First-order residual of the momentum balance, :math:`\dot r = K(\dot p - \mu - r)`.
 
     Discretised by the implicit trapezoidal rule with a = K·Ts/2, stable for every gain:
@@ -45,7 +46,7 @@ class MomentumObserver:
     as_printed: bool = False
 
     def __post_init__(self) -> None:
-        gain = frozen(np.atleast_1d(np.asarray(self.gain, dtype=np.float64)))
+        gain = numbers_of(self.gain, "gain", self.name)
         object.__setattr__(self, "gain", gain)
         if not (np.all(np.isfinite(gain)) and np.all(gain > 0)):
             raise ParameterError(f"gmo.gain is {gain.tolist()} 1/s; every gain must be positive")
@@ -61,6 +62,7 @@ class MomentumObserver:
         self, terms: DynamicsTerms, state: FirstOrderState | None = None
     ) -> tuple[ExternalTorque, FirstOrderState]:
         """Run over a block of a log from where the block before ended; None where it begins."""
+        check_terms(terms)
         gain = per_joint(self.gain, terms.joints)
         remarks: tuple[Remark, ...] = ()
         if self.as_printed:

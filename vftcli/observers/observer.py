@@ -4,17 +4,20 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, seal
+from vftcli.signals.arrays import Array, frozen, number_array, seal
+from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.parsing import check_kind
+from vftcli.signals.shown import Shown
 
 Complex = NDArray[np.complex128]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Tuning:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Tuning(Shown):
     """What an observer's parameters mean, joint by joint.
 
     Attributes:
@@ -59,5 +62,31 @@ class Observer(Protocol):
 
 
 def per_joint(value: Array | float, joints: int) -> Array:
-    """One number a joint from one number or one a joint. (n,)"""
-    return np.array(np.broadcast_to(np.asarray(value, dtype=np.float64), (joints,)))
+    """One number a joint from one number or one a joint. (n,)
+
+    Raises:
+        ShapeError: If it is neither.
+    """
+    found = np.asarray(value, dtype=np.float64)
+    if found.size != 1 and found.shape != (joints,):
+        told = f"an observer's parameter has shape {found.shape}"
+        raise ShapeError(f"{told}; expected one number, or one a joint: ({joints},)")
+    return np.array(np.broadcast_to(found.ravel(), (joints,)))
+
+
+def numbers_of(value: ArrayLike, name: str, observer: str) -> Array:
+    """A parameter as a list of numbers, one or one a joint. (1,) or (n,)
+
+    Raises:
+        ShapeError: If it is something else.
+    """
+    found = number_array(value, name, observer)
+    if found.ndim > 1:
+        told = f"{name} of {observer} has shape {found.shape}"
+        raise ShapeError(f"{told}; expected one number, or one a joint: (n,)")
+    return frozen(np.atleast_1d(found))
+
+
+def check_terms(terms: DynamicsTerms) -> None:
+    """Raise a ParameterError unless what an observer runs over are dynamics terms."""
+    check_kind(terms, DynamicsTerms, "terms", "dynamics_terms(recording, robot)")

@@ -35,13 +35,14 @@ from vftcli.observers.uneven_kalman import gain_sequence
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series, handed_over
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.shown import Shown
 
 SETTLED = 1e-16
 """Share of the smoother's settled information that may be missing where it counts as settled."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class KalmanSmoother:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class KalmanSmoother(Shown):
     """Fixed-interval smoother on a disturbance Kalman filter, with the filter's own parameters.
 
     Exact at uneven clocks; memory grows with the log, time too.

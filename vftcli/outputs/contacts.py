@@ -1,11 +1,11 @@
 """The list of contacts as JSON, CSV, a table and a sentence."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.contacts.contact_list import FIRST_COLUMNS, Contact, ContactList
 from vftcli.outputs.grid import Column, Grid, csv_rows
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import sentence
@@ -50,70 +50,20 @@ def contacts_record(found: ContactList) -> dict[str, Any]:
             "block_s": model.block,
         },
         "remarks": list(found.remarks),
-        "contacts": [contact_record(contact) for contact in found.contacts],
-    }
-
-
-def contact_record(contact: Contact) -> dict[str, Any]:
-    """One contact for machines."""
-    wrench, sd = contact.wrench, contact.wrench_sd
-    return {
-        "number": contact.number,
-        "kind": "load" if contact.is_load else "contact",
-        "start_s": contact.start,
-        "stop_s": contact.stop,
-        "peak_s": contact.peak,
-        "peak_force_N": contact.peak_force,
-        "peak_force_band_N": contact.peak_band,
-        "force_N": None if wrench is None else wrench[:3],
-        "force_sd_N": None if sd is None else sd[:3],
-        "moment_Nm": None if wrench is None else wrench[3:],
-        "moment_sd_Nm": None if sd is None else sd[3:],
-        "mean_force_N": contact.mean_force,
-        "impulse_Ns": contact.impulse,
-        "where": contact.where,
-        "where_lead_nats": contact.lead,
-        "places": [link or "flange" for link in contact.places],
-        "anywhere_N": None if contact.anywhere is None else list(contact.anywhere),
-        "trust": contact.trust,
-        "evidence_nats": contact.evidence,
-        "joint_torque_Nm": contact.joint_torque,
-        "joint_torque_sd_Nm": contact.joint_torque_sd,
-        "at_rest": contact.at_rest,
-        "remarks": list(contact.remarks),
-        "vendor_force_N": contact.vendor_force,
-        "sensor_force_N": contact.sensor_force,
+        "contacts": [contact.record() for contact in found.contacts],
     }
 
 
 def contacts_csv(lists: Sequence[ContactList]) -> str:
     """One row a contact of every log, vectors taken apart."""
     rows = [
-        {"recording": found.recording} | flat(contact_record(contact))
+        {"recording": found.recording} | contact.row()
         for found in lists
         for contact in found.contacts
     ]
     keys = list(dict.fromkeys(key for row in rows for key in row))
-    if not rows:
-        keys = ["recording", "number", "start_s", "stop_s", "peak_s", "peak_force_N"]
+    keys = keys or ["recording", *FIRST_COLUMNS]
     return csv_rows([{key: row.get(key) for key in keys} for row in rows], keys)
-
-
-def flat(record: Mapping[str, Any]) -> dict[str, Any]:
-    """A contact's record in one row: ``force_N`` becomes ``force_N_x`` …, joints are numbered."""
-    row: dict[str, Any] = {}
-    for key, value in record.items():
-        if isinstance(value, np.ndarray):
-            axes = "xyz" if len(value) == 3 else range(1, len(value) + 1)
-            row |= {f"{key}_{axis}": float(v) for axis, v in zip(axes, value, strict=True)}
-        elif key == "anywhere_N":
-            low, high = value or (None, None)
-            row |= {"anywhere_least_N": low, "anywhere_most_N": high}
-        elif isinstance(value, list):
-            row[key] = " ".join(str(item) for item in value)
-        else:
-            row[key] = value
-    return row
 
 
 def hardest_rows(contacts: Sequence[Contact], most: int = MOST_ROWS) -> list[Contact]:

@@ -29,12 +29,6 @@ def thresholds_text(
 
 def thresholds_grid(thresholds: Thresholds) -> Grid:
     """Every threshold with its interval, and the tail it comes from."""
-    joints = [f"J{j}" for j in range(1, len(thresholds.joints) + 1)]
-    named = [
-        *((name, "N·m", one) for name, one in zip(joints, thresholds.joints, strict=True)),
-        *((n, unit_of(n), one) for n, one in zip(AXES, thresholds.axes, strict=False)),
-        *(("|F|", "N", one) for one in thresholds.force),
-    ]
     return Grid(
         title=f"passed untouched by any joint, or any axis, {thresholds.rate:g} × an hour",
         columns=(
@@ -48,7 +42,7 @@ def thresholds_grid(thresholds: Thresholds) -> Grid:
             Column("log", unit="h"),
             Column("needed by", words=True),
         ),
-        rows=tuple((name, one.value, unit, *tail_entries(one)) for name, unit, one in named),
+        rows=tuple((n, one.value, unit, *tail_entries(one)) for n, unit, one in thresholds.named),
     )
 
 

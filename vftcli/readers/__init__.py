@@ -115,6 +115,8 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     Raises:
         VftError: As `read` does; also if all episodes are chosen, for this returns one.
     """
+    if not isinstance(path, str | Path):
+        raise ParameterError(f"the log is {path!r}; expected the name of a file or folder")
     path = Path(path)
     if choice.all_episodes:
         raise ParameterError(

@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike
 
 from vftcli.readers.cleaning import cleaned
 from vftcli.readers.reader import RawLog
-from vftcli.signals.errors import MissingSignalError
+from vftcli.signals.arrays import number_array
+from vftcli.signals.errors import MissingSignalError, ShapeError
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
 
 
@@ -20,6 +21,7 @@ def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Rec
         signals: Fields of `Recording` by name, at least ``q``: (T, n) in SI units.
 
     Raises:
+        ShapeError: If a signal is no array of numbers with a row for each stamp.
         MissingSignalError: If there is no ``q``, or a name is not a signal of a Recording.
         LogError: If a signal holds NaN or infinity.
         ClockError: If the clock runs backwards.
@@ -31,6 +33,12 @@ def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Rec
         raise MissingSignalError(
             "a recording needs joint positions: give q=… of shape (T, n) [rad]"
         )
-    arrays = {key: np.array(value, dtype=np.float64) for key, value in signals.items()}
-    raw = RawLog(stamps=np.array(t, dtype=np.float64), tick=1.0, clock="as given", signals=arrays)
+    arrays = {key: np.array(number_array(value, key, name)) for key, value in signals.items()}
+    for key, value in arrays.items():
+        if value.ndim != 2 or len(value) != np.size(t):
+            told = f"{key} of {name} has shape {value.shape}"
+            raise ShapeError(f"{told}; expected ({np.size(t)}, n), a row for each stamp of t")
+    raw = RawLog(
+        stamps=np.array(number_array(t, "t", name)), tick=1.0, clock="as given", signals=arrays
+    )
     return cleaned(raw, Path(name), "arrays")

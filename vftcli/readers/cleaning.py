@@ -11,9 +11,10 @@ from vftcli.readers.reader import RawLog
 from vftcli.readers.rows import kept, row_samples
 from vftcli.signals.arrays import Array, handed_over, median
 from vftcli.signals.errors import ClockError, LogError
-from vftcli.signals.recording import Recording, Source
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import gaps_of, median_step
+from vftcli.signals.source import Source
 
 GARBAGE_ROWS = 100
 """Rows at the start of a log among which a misaligned packet may have left garbage."""

@@ -15,10 +15,11 @@ from vftcli.refinement.consistency import Consistency, consistency
 from vftcli.refinement.paper_gap import expected_gap
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, fact
+from vftcli.signals.shown import Shown
 
 
-@dataclass(frozen=True, kw_only=True)
-class Refinement:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Refinement(Shown):
     """What the complete log makes of its estimates.
 
     Attributes:

@@ -12,6 +12,7 @@ from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.identity import refuse_repeated_runs
 from vftcli.signals.remarks import Remark, Where, fact
+from vftcli.signals.shown import Shown
 
 # A plain estimate asks for no free motion: what finds it is loaded when it is asked for.
 if TYPE_CHECKING:
@@ -58,8 +59,8 @@ class FreePart(NamedTuple):
         return tuple(pairing for piece in self.pieces for pairing in piece.pairings)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FreeMotion:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class FreeMotion(Shown):
     """The free motion of one log. What is asked of it is found or made once, when first asked for.
 
     Attributes:

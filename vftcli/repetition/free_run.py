@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vftcli.robots.drive import check_joints
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
+from vftcli.signals.shown import Shown
 
 # A plain estimate has no free run: what lays one under a log is loaded when it is asked for.
 if TYPE_CHECKING:
@@ -18,8 +20,8 @@ if TYPE_CHECKING:
     from vftcli.repetition.pairing import Pairing
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ModelledRun:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ModelledRun(Shown):
     """A recording and what the robot's model says of it, evaluated once, when first asked for.
 
     Attributes:
@@ -58,7 +60,12 @@ class Models:
         self._runs: list[ModelledRun] = []
 
     def of(self, recording: Recording, robot: Robot, *, literal: bool = False) -> ModelledRun:
-        """The recording with this robot's model, the one that is there if there is one."""
+        """The recording with this robot's model, the one that is there if there is one.
+
+        Raises:
+            VftError: If they are of different joints, or something else.
+        """
+        check_joints(recording, robot)
         for run in self._runs:
             if run.recording is recording and run.robot is robot and run.literal == literal:
                 return run

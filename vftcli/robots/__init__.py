@@ -58,6 +58,8 @@ def load_robot(robot: str | Path, *, tip: str = "", arguments: Sequence[str] = (
     Raises:
         RobotError: If there is no such profile or file, or it is not a valid description.
     """
+    if not isinstance(robot, str | Path):
+        raise RobotError(f"the robot is {robot!r}; expected a profile's name, as 'ur5', or a file")
     path = PROFILES.get(plain_name(str(robot)), Path(robot))
     ending = path.suffix.lower()
     if ending == ".toml":

@@ -14,10 +14,11 @@ import numpy as np
 from vftcli.signals.arrays import Array, check_shape, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
+from vftcli.signals.shown import Shown
 
 
-@dataclass(frozen=True, kw_only=True)
-class Payload:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Payload(Shown):
     """A rigid load on the flange.
 
     Attributes:
@@ -38,8 +39,8 @@ class Payload:
             raise RobotError(f"the payload is unphysical: {why}")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Chain:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Chain(Shown):
     """Geometry and inertia of an n-joint revolute serial arm at rest on its base.
 
     Attributes:

@@ -7,6 +7,7 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.transmission import joint_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, RobotError
+from vftcli.signals.parsing import check_kind
 from vftcli.signals.recording import EFFORTS, Recording
 
 CONSTANT_SD, SENSOR_SD = 0.03, 0.01
@@ -15,7 +16,13 @@ the constants of a UR10e's maker. [1]"""
 
 
 def check_joints(recording: Recording, robot: Robot) -> None:
-    """Raise a RobotError unless the log and the robot have the same number of joints."""
+    """Raise a RobotError unless the log and the robot have the same number of joints.
+
+    Raises:
+        ParameterError: If either is something else, as the name of one.
+    """
+    check_kind(recording, Recording, "the recording", "vftcli.read(LOG)")
+    check_kind(robot, Robot, "the robot", "vftcli.load_robot('ur5')")
     if recording.joints != robot.joints:
         raise RobotError(
             f"{recording.name}: the log has {recording.joints} joints but robot {robot.name!r} has "

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.robots.chain import Chain
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, check_series
+from vftcli.signals.parsing import check_kind
 
 
 class LinkPoses(NamedTuple):
@@ -26,8 +27,13 @@ def link_poses(chain: Chain, q: Array) -> LinkPoses:
     Args:
         chain: The arm.
         q: Joint positions. (T, n) [rad]
+
+    Raises:
+        ShapeError: If q is not one column a joint of the arm.
     """
-    samples, n = q.shape
+    check_kind(chain, Chain, "the chain", "robot.chain")
+    check_series(q, chain.joints, "q", "the poses")
+    samples, n = np.shape(q)
     rotation, translation = np.empty((samples, n + 1, 3, 3)), np.empty((samples, n + 1, 3))
     R: Array = np.broadcast_to(np.eye(3), (samples, 3, 3))
     o: Array = np.zeros((samples, 3))

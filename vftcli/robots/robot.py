@@ -1,6 +1,6 @@
 """Robot: everything known about one arm, whatever file it came from."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +11,7 @@ from vftcli.signals.arrays import Array, check_shape, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import Pose
 from vftcli.signals.remarks import Remark
+from vftcli.signals.shown import Shown
 
 REFERENCE = 35.0
 """Joint temperature that friction is taken for where nobody says one: a warm arm's. [°C]"""
@@ -18,8 +19,8 @@ REFERENCE = 35.0
 TORQUE_SOURCES = ("current", "link_torque", "joint_torque")
 
 
-@dataclass(frozen=True, kw_only=True)
-class JointFriction:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class JointFriction(Shown):
     """Friction of one joint: a model's name and its parameters (the keys of the robot file).
 
     Attributes:
@@ -63,8 +64,8 @@ class JointFriction:
         return table
 
 
-@dataclass(frozen=True, kw_only=True)
-class Limits:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Limits(Shown):
     """Joint limits; NaN where the description gives none.
 
     Attributes:
@@ -85,8 +86,8 @@ class Limits:
         seal(self, *vars(self))
 
 
-@dataclass(frozen=True, kw_only=True)
-class SensorNoise:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SensorNoise(Shown):
     """Standard deviations of the joint measurements; NaN where unknown.
 
     Attributes:
@@ -105,8 +106,8 @@ class SensorNoise:
         seal(self, *vars(self))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Robot:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Robot(Shown):
     """One arm: chain, drives, friction, limits and the gains its observers start from.
 
     Attributes:
@@ -179,6 +180,20 @@ class Robot:
                 f"{self.name}: torque_source {self.torque_source!r} is unknown; "
                 f"there is {', '.join(TORQUE_SOURCES)}"
             )
+
+    def _headline(self) -> str:
+        friction = ", ".join(dict.fromkeys(joint.model for joint in self.friction)) or "none"
+        load = "" if self.payload is None else f", payload {self.payload.mass:g} kg"
+        effort = self.torque_source.replace("_", " ")
+        return f"{self.name}: {self.joints} joints, logs {effort}, friction {friction}{load}"
+
+    def _rows(self) -> Iterator[Sequence[object]]:
+        yield "joint", "link mass [kg]", "K [N·m/A]", "friction", "speed limit [rad/s]"
+        for j, name in enumerate(self.chain.names):
+            constant = None if self.torque_constant is None else float(self.torque_constant[j])
+            model = self.friction[j].model if self.friction else "none"
+            mass, speed = float(self.chain.mass[j]), float(self.limits.qd_max[j])
+            yield f"J{j + 1} {name}", mass, constant, model, speed
 
     @property
     def joints(self) -> int:

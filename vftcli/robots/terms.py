@@ -23,6 +23,7 @@ from vftcli.signals.arrays import (
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import Clock, clock_of
+from vftcli.signals.shown import Shown
 
 
 class Instant(NamedTuple):
@@ -39,8 +40,8 @@ class Instant(NamedTuple):
     mu: Array
 
 
-@dataclass(frozen=True, kw_only=True)
-class DynamicsTerms:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class DynamicsTerms(Shown):
     r"""Momentum form of the equations of motion: :math:`\dot p = \mu + \tau_{ext}` (33).
 
     Attributes:

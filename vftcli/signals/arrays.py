@@ -50,12 +50,30 @@ def handed_over(value: Array) -> Array:
     return value
 
 
+def number_array(value: ArrayLike, name: str, owner: str) -> Array:
+    """Return `frozen` of what a user gives for an array.
+
+    Raises:
+        ShapeError: If it is no array of numbers, as a word, or rows of unequal length.
+    """
+    try:
+        return frozen(value)
+    except (TypeError, ValueError):
+        kind = "rows of unequal length, or no numbers" if np.iterable(value) else "no number"
+        kind = f"the text {value!r}" if isinstance(value, str) else kind
+        raise ShapeError(f"{name} of {owner} is {kind}; expected an array of numbers") from None
+
+
 def seal(owner: object, *names: str) -> None:
-    """Make the named arrays of a frozen dataclass read-only float64 ones; None stays None."""
+    """Make the named arrays of a frozen dataclass read-only float64 ones; None stays None.
+
+    Raises:
+        ShapeError: If one of them is no array of numbers.
+    """
     for name in names:
         if (value := getattr(owner, name)) is not None:
             # The one way past a frozen dataclass, for its own __post_init__ only.
-            object.__setattr__(owner, name, frozen(value))
+            object.__setattr__(owner, name, number_array(value, name, type(owner).__name__))
 
 
 def frozen_mask(value: ArrayLike) -> Mask:
@@ -80,8 +98,8 @@ def check_clock(t: Array, what: str) -> None:
     Raises:
         ClockError: If the clock stands still, runs backwards or holds a non-finite value.
     """
-    if t.ndim != 1:
-        raise ShapeError(f"the clock of {what} has shape {t.shape}; it must be one-dimensional")
+    if np.ndim(t) != 1:
+        raise ShapeError(f"the clock of {what} has shape {np.shape(t)}; it must be one-dimensional")
     if not np.all(np.isfinite(t)):
         k = int(np.argmin(np.isfinite(t)))
         raise ClockError(f"the clock of {what} is not finite at sample {k}")
@@ -96,8 +114,23 @@ def check_clock(t: Array, what: str) -> None:
 
 def check_shape(value: NDArray[Any], shape: tuple[int, ...], name: str, owner: str) -> None:
     """Raise a ShapeError unless `value` has `shape`."""
-    if value.shape != shape:
-        raise ShapeError(f"{name} of {owner} has shape {value.shape}; expected {shape}")
+    if np.shape(value) != shape:
+        raise ShapeError(f"{name} of {owner} has shape {np.shape(value)}; expected {shape}")
+
+
+def check_series(value: ArrayLike, joints: int | None, name: str, owner: str) -> None:
+    """Raise a ShapeError unless `value` is (T, n).
+
+    Args:
+        value: One column a joint.
+        joints: n, None for any number.
+        name: What it is called.
+        owner: Whose it is.
+    """
+    shape = np.shape(value)
+    if len(shape) != 2 or joints not in {None, shape[1]}:
+        wanted = "n" if joints is None else joints
+        raise ShapeError(f"{name} of {owner} has shape {shape}; expected (T, {wanted})")
 
 
 def median(values: Array) -> float:

@@ -75,6 +75,20 @@ def assignment(text: str, option: str, form: str) -> tuple[str, str]:
     return key.strip(), value.strip()
 
 
+def check_kind(value: object, kind: type, name: str, how: str) -> None:
+    """Raise a ParameterError unless what a caller gives is of a kind.
+
+    Args:
+        value: It.
+        kind: What is expected.
+        name: What it is called.
+        how: What gives one.
+    """
+    if not isinstance(value, kind):
+        told = shown(value) if isinstance(value, str) else type(value).__name__
+        raise ParameterError(f"{name} is {told}; expected {kind.__name__}: {how} is one")
+
+
 def shown(value: object) -> str:
     """A value of a file as a complaint quotes it, cut where it is long."""
     text = repr(value)

@@ -1,18 +1,22 @@
 """Recording: one log, in SI units, on one strictly increasing clock."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Indices, check_clock, check_shape, frozen
+from vftcli.signals.arrays import Array, check_clock, check_series, check_shape, seal
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import fact
 from vftcli.signals.series import median_step
+from vftcli.signals.shown import Shown, frame_of, per_joint
+from vftcli.signals.source import IN_MEMORY, Source
 from vftcli.signals.timing import Timing
-from vftcli.signals.wrench import WrenchFrame
+from vftcli.signals.wrench import WrenchFrame, per_axis
+
+if TYPE_CHECKING:
+    import polars as pl
 
 MEANINGS = {
     "q": "joint positions",
@@ -34,83 +38,11 @@ JOINT_SIGNALS = tuple(name for name in MEANINGS if name != "wrench")
 """Those of them that hold one column a joint."""
 
 
+COLUMN_NAMES = {"torque": "tau"}
+"""Signals whose columns in tables are called otherwise than the field of a Recording."""
+
 EFFORTS = ("current", "torque", "torque_without_gravity")
 """Those that say what the drives do; a log has one of them or several."""
-
-
-class Awaited:
-    """A field that may be given as a function; it is called when the field is first read.
-
-    A digest is computed beside everything else, and nobody waits for it before it is written down.
-    """
-
-    def __set_name__(self, _owner: type, name: str) -> None:
-        self._key = f"_{name}"
-
-    def __get__(self, instance: object, _owner: type) -> str:
-        if instance is None:
-            return ""  # the field's default
-        value: str | Callable[[], str] = instance.__dict__[self._key]
-        if not isinstance(value, str):
-            value = value()
-            instance.__dict__[self._key] = value
-        return value
-
-    def __set__(self, instance: object, value: str | Callable[[], str]) -> None:
-        instance.__dict__[self._key] = value
-
-
-@dataclass(frozen=True, kw_only=True)
-class Source:
-    """Where a recording came from and what was done to it on the way in.
-
-    Attributes:
-        path: The file or bag directory, or None for a recording made in memory.
-        format: The reader's name.
-        label: What the log is called in tables, unique within a command; the file's name where
-            that is unique.
-        sha256: Hex digest of the file's bytes (of all files of a directory, in name order), by
-            which a run is known again; reading it waits until it is computed.
-        clock: Which clock the stamps are from, in words.
-        t0: The log's own stamp of the first sample. [s]
-        t0_ns: The same stamp in whole nanoseconds where the log counts them. [ns]
-        rows: Samples the file held before any were dropped.
-        duplicates: Rows dropped because their stamp repeated the one before.
-        derived: Signals that were made of others here and stand in no log.
-        remarks: Facts on what was dropped, turned or derived; cautions and warnings on what looks
-            suspicious but was left as it is.
-        part: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
-        row_samples: The sample that each of the rows is, or repeats; −1 for one that was dropped
-            otherwise. None where each row is the sample of its number. (rows,)
-    """
-
-    path: Path | None = None
-    label: str = ""
-    format: str = "memory"
-    sha256: Awaited = Awaited()
-    clock: str = "as given"
-    t0: float = 0.0
-    t0_ns: int | None = None
-    rows: int = 0
-    duplicates: int = 0
-    derived: tuple[str, ...] = ()
-    remarks: tuple[Remark, ...] = ()
-    part: str = ""
-    row_samples: Indices | None = field(default=None, compare=False, repr=False)
-
-    def __post_init__(self) -> None:
-        if not self.label and self.path is not None:
-            object.__setattr__(self, "label", self.path.name)
-
-    @property
-    def repairs(self) -> tuple[str, ...]:
-        """What was dropped, turned or derived, in words."""
-        return tuple(str(remark) for remark in self.remarks if remark.level == "fact")
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What looks suspicious, in words."""
-        return tuple(str(remark) for remark in self.remarks if remark.level != "fact")
 
 
 Change = Callable[["Recording"], "Recording"]
@@ -145,8 +77,8 @@ class LongLog:
         return replace(self, changes=(*self.changes, make))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Recording:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Recording(Shown):
     """Measurements of an n-joint robot at T instants. A signal the log lacks is None, never zeros.
 
     Attributes:
@@ -192,16 +124,13 @@ class Recording:
     robot_hint: str | None = None
     payload_mass: float | None = None
     payload_com: tuple[float, ...] | None = None
-    source: Source = Source()
+    source: Source = IN_MEMORY
     long: LongLog | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            if isinstance(value := getattr(self, each.name), np.ndarray):
-                object.__setattr__(self, each.name, frozen(value))
-        if self.q.ndim != 2:
-            raise ShapeError(f"q of the recording has shape {self.q.shape}; expected (T, n)")
-        if len(self.t) == 0:
+        seal(self, "t", *MEANINGS)
+        check_series(self.q, None, "q", "the recording")
+        if np.size(self.t) == 0:
             raise ClockError(f"{self.name}: no samples")
         check_clock(self.t, self.name)
         shape = (len(self.t), self.joints)
@@ -210,6 +139,32 @@ class Recording:
                 check_shape(signal, shape, name, self.name)
         if self.wrench is not None:
             check_shape(self.wrench, (len(self.t), 6), "wrench", self.name)
+        if self.joint_names and len(self.joint_names) != self.joints:
+            told = f"{len(self.joint_names)} joint names for {self.joints} joints"
+            raise ShapeError(f"{self.name}: {told}; expected one a joint, or none")
+        if self.payload_com is not None:
+            check_shape(np.asarray(self.payload_com), (3,), "payload_com", self.name)
+
+    def _headline(self) -> str:
+        there = f"{self.samples} samples of {self.joints} joints over {self.duration:.4g} s"
+        return f"{self.name}: {there}; {', '.join(self.signals)}"
+
+    def _rows(self) -> Iterator[Sequence[object]]:
+        yield "signal", "what it is", "columns", "least", "most"
+        for name in self.signals:
+            values = getattr(self, name)
+            least, most = float(values.min()), float(values.max())
+            yield name, MEANINGS[name], values.shape[1], least, most
+
+    def columns(self) -> Iterator[tuple[str, Array]]:
+        """Name and values of every signal's columns, as ``q/1``, in a fixed order."""
+        for name in self.signals:
+            split = per_axis if name == "wrench" else per_joint
+            yield from split(COLUMN_NAMES.get(name, name), getattr(self, name))
+
+    def to_polars(self) -> "pl.DataFrame":
+        """Time ``t`` and every signal, one column a joint or axis, as `vftcli convert` writes."""
+        return frame_of([("t", self.t), *self.columns()])
 
     @property
     def joints(self) -> int:

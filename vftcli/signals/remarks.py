@@ -13,12 +13,17 @@ the catalogue, `words/*.toml` beside this file, one table a code::
 
 import string
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+
+from vftcli.signals.shown import Shown
+
+if TYPE_CHECKING:
+    import polars as pl
 
 Level = Literal["fact", "caution", "warning"]
 """A fact informs, a caution limits what can be said, a warning can make results wrong."""
@@ -41,8 +46,8 @@ class Where(NamedTuple):
     span: tuple[float, float] | None = None
 
 
-@dataclass(frozen=True)
-class Remark:
+@dataclass(frozen=True, repr=False)
+class Remark(Shown):
     """What a reader of the numbers should know.
 
     Attributes:
@@ -63,6 +68,40 @@ class Remark:
     def __str__(self) -> str:
         """The remark on one line."""
         return sentence(self)
+
+    def _headline(self) -> str:
+        return f"{self.level} {self.code}: {self.message}"
+
+    @property
+    def message(self) -> str:
+        """Its sentence, "" where the catalogue does not have it."""
+        try:
+            return sentence(self)
+        except LookupError:
+            return ""
+
+
+class Remarks(Shown, tuple[Remark, ...]):
+    """Remarks in order: a tuple that a notebook shows as a table."""
+
+    def _headline(self) -> str:
+        counts = {level: sum(r.level == level for r in self) for level in get_args(Level)}
+        told = [f"{n} {level}{'s' * (n != 1)}" for level, n in counts.items() if n]
+        return ", ".join(told) or "none"
+
+    def _rows(self) -> Iterator[Sequence[object]]:
+        yield "level", "code", "message"
+        yield from ((remark.level, remark.code, remark.message) for remark in self)
+
+    def to_polars(self) -> "pl.DataFrame":
+        """One row a remark: its level, code and message, and what it is about."""
+        import polars as pl
+
+        names = ("level", "code", "message", "about")
+        rows = [(r.level, r.code, r.message, r.where.about or None) for r in self]
+        joints = [list(remark.where.joints) for remark in self]
+        table = pl.DataFrame(rows, dict.fromkeys(names, pl.String), orient="row")
+        return table.with_columns(pl.Series("joints", joints, pl.List(pl.Int64)))
 
 
 def fact(code: str, where: Where = Where(), **values: object) -> Remark:  # noqa: B008 - immutable

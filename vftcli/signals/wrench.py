@@ -1,14 +1,19 @@
 """Wrench: force and moment ON the robot along a log; WrenchFrame: what a log states of its own."""
 
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from vftcli.signals.arrays import Array, Mask, check_clock, check_shape, frozen_mask, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark
+from vftcli.signals.shown import Shown, frame_of
+
+if TYPE_CHECKING:
+    import polars as pl
 
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 """Names of the six components, force first, as in column names and tables."""
@@ -99,8 +104,14 @@ def unit_of(axis: str | int) -> str:
     return "N" if number < 3 else "N·m"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Wrench:
+def per_axis(name: str, values: Array) -> Iterator[tuple[str, Array]]:
+    """One contiguous column an axis, fx to mz."""
+    for axis, column in zip(AXES, np.ascontiguousarray(values.T), strict=True):
+        yield f"{name}/{axis}", column
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Wrench(Shown):
     """Force and moment that the environment exerts on the robot.
 
     Attributes:
@@ -139,6 +150,29 @@ class Wrench:
             if (value := getattr(self, name)) is not None:
                 check_shape(value, shape, name, self.name)
         check_shape(mask, (samples,), "mask", self.name)
+
+    def _headline(self) -> str:
+        most = self.size[np.isfinite(self.size)].max(initial=0.0)
+        return f"of {self.name}, frame {self.frame}: {len(self.t)} samples, |F| up to {most:.3g} N"
+
+    def _rows(self) -> Iterator[Sequence[object]]:
+        yield "axis", "unit", "least", "most", "largest sd"
+        told = np.isfinite(self.known).all(axis=1)
+        for k, axis in enumerate(AXES):
+            values = self.values[told, k]
+            sd = None if self.sd is None or not told.any() else float(self.sd[told, k].max())
+            ends = (float(values.min()), float(values.max())) if told.any() else (None, None)
+            yield axis, unit_of(axis), *ends, sd
+
+    def columns(self) -> Iterator[tuple[str, Array]]:
+        """Name and values of every axis, as ``wrench/best/fx``, and of its standard deviation."""
+        yield from per_axis(f"wrench/{self.name}", self.known)
+        if self.known_sd is not None:
+            yield from per_axis(f"wrench_sd/{self.name}", self.known_sd)
+
+    def to_polars(self) -> "pl.DataFrame":
+        """Time ``t`` and every axis, named as in ``estimates.parquet``; unknown is null."""
+        return frame_of([("t", self.t), *self.columns()])
 
     @property
     def hidden(self) -> Mask:

@@ -8,8 +8,9 @@ import numpy as np
 from vftcli.robots import Robot, load_robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.recording import Recording, Source
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import fact
+from vftcli.signals.source import Source
 from vftcli.signals.wrench import WrenchFrame
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.force_sensor import read_force_sensor

@@ -8,6 +8,7 @@ import numpy as np
 from vftcli.signals.arrays import Mask
 from vftcli.signals.lag import time_offset
 from vftcli.signals.remarks import Remark, Where, fact
+from vftcli.signals.shown import Shown
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.null_space import NullSpaceVerdict
@@ -18,8 +19,8 @@ from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 from vftcli.virtual_sensor.zero import Drift, without_drift, zero_drift
 
 
-@dataclass(frozen=True, kw_only=True)
-class SensorReading:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SensorReading(Shown):
     """Everything the virtual sensor says of one log.
 
     Attributes:

@@ -11,6 +11,7 @@ from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.shown import Shown
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import Mounting, check_frame, frame_pose, from_base
 from vftcli.virtual_sensor.solvers import (
@@ -28,8 +29,8 @@ CHUNK = 4096
 """Samples that are solved at once: about 10 MB of 6×6 matrices."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class VirtualSensor:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class VirtualSensor(Shown):
     """How joint torques become a wrench.
 
     Attributes:

@@ -7,7 +7,8 @@ from vftcli.identification import Task, identify
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.regressor import chain_parameters, torque_regressor
-from vftcli.signals.recording import Recording, Source
+from vftcli.signals.recording import Recording
+from vftcli.signals.source import Source
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,8 @@ from vftcli.outputs.log.mcap_output import frame_id, ros_name, stamps_of, write_
 from vftcli.outputs.log.run_record import jsonable
 from vftcli.robots.drive import drive_torque
 from vftcli.robots.kinematics import link_poses
-from vftcli.signals.recording import Recording, Source
+from vftcli.signals.recording import Recording
+from vftcli.signals.source import Source
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from vftcli.outputs.files import atomic, check_file, table_file
-from vftcli.outputs.log.estimates import per_axis, per_joint
 from vftcli.outputs.log.mcap_output import (
     OutputTopic,
     joint_topic,
@@ -17,10 +16,7 @@ from vftcli.outputs.log.mcap_output import (
 from vftcli.readers.bags.ros_messages import Value, in_parts
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import OutputError
-from vftcli.signals.recording import JOINT_SIGNALS, Recording
-
-COLUMN_NAMES = {"torque": "tau"}
-"""Signals whose columns are called otherwise than the field of a Recording."""
+from vftcli.signals.recording import COLUMN_NAMES, JOINT_SIGNALS, Recording
 
 
 def convert(recording: Recording, path: Path, *, force: bool = False) -> None:
@@ -55,11 +51,7 @@ def columns_of(recording: Recording) -> Iterator[tuple[str, Any]]:
     yield "t", recording.t
     # Whole numbers: a float of today's date in seconds is exact to 240 ns only.
     yield "t_src_ns", source_stamps(recording)
-    for name in JOINT_SIGNALS:
-        if (value := getattr(recording, name)) is not None:
-            yield from per_joint(COLUMN_NAMES.get(name, name), value)
-    if recording.wrench is not None:
-        yield from per_axis("wrench", recording.wrench)
+    yield from recording.columns()
 
 
 def write_parquet(recording: Recording, path: Path) -> None:

@@ -19,7 +19,8 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.packages import installed, needed
 from vftcli.signals.progress import steps
-from vftcli.signals.wrench import AXES
+from vftcli.signals.shown import frame_of, per_joint
+from vftcli.signals.wrench import per_axis
 from vftcli.virtual_sensor.frames import FRAMES
 
 if TYPE_CHECKING:
@@ -47,24 +48,15 @@ def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
     the masked samples stands apart in ``wrench_masked/<observer>/fx``….
     What is not known is null.
     """
-    import polars as pl
-
-    table = pl.DataFrame(dict(columns(analysis, rows)))
-    # Only columns that need it: to fill all of a long log takes longer than to write it.
-    if analysis.contacts is not None:
-        table = table.with_columns(contact_column(analysis.t[rows], analysis.contacts))
-    unknown = [s.name for s in table if s.dtype == pl.Float64 and s.is_nan().any()]
-    return table.with_columns(pl.col(unknown).fill_nan(None)) if unknown else table
+    return frame_of(columns(analysis, rows))
 
 
-def contact_column(t: Array, found: "ContactList") -> "pl.Series":
-    """The number of the contact that each sample lies in, null outside of all. (T,)"""
-    import polars as pl
-
+def contact_column(t: Array, found: "ContactList") -> Array:
+    """The number of the contact that each sample lies in, NaN outside of all. (T,)"""
     number = np.full(len(t), np.nan)
     for contact in found.contacts:
         number[(t >= contact.start) & (t <= contact.stop)] = contact.number
-    return pl.Series("contact", number)
+    return number
 
 
 def columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
@@ -75,23 +67,15 @@ def columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
     if recording.dq is not None:
         yield from per_joint("dq", recording.dq[rows])
     for estimate in analysis.estimates:
-        yield from per_joint(f"tau_ext/{estimate.name}", estimate.tau[rows])
-        if estimate.sd is not None:
-            yield from per_joint(f"sd/{estimate.name}", estimate.sd[rows])
-        if estimate.error_sd is not None:
-            yield from per_joint(f"band/{estimate.name}", estimate.error_sd[rows])
+        yield from estimate.columns(rows)
     if analysis.reference is not None:
         yield from per_joint("tau_ext/reference", analysis.reference.tau[rows])
         if analysis.reference.sd is not None:
             yield from per_joint("sd/reference", analysis.reference.sd[rows])
     for name, values in wrench_columns(analysis):
         yield name, values[rows]
-
-
-def per_joint(name: str, values: Array) -> Iterator[tuple[str, Array]]:
-    """One contiguous column a joint, named from 1."""
-    for j, column in enumerate(np.ascontiguousarray(values.T), start=1):
-        yield f"{name}/{j}", column
+    if analysis.contacts is not None:
+        yield "contact", contact_column(analysis.t[rows], analysis.contacts)
 
 
 def wrench_columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
@@ -99,9 +83,7 @@ def wrench_columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
     sensed = analysis.virtual_sensor
     bounded = sensed is not None and sensed.sensor.solver != "pinv"
     for wrench in analysis.wrenches:
-        yield from per_axis(f"wrench/{wrench.name}", wrench.known)
-        if wrench.known_sd is not None:
-            yield from per_axis(f"wrench_sd/{wrench.name}", wrench.known_sd)
+        yield from wrench.columns()
         # By plain least squares nothing can be said there; a bounded solver says something finite.
         if bounded and wrench.hidden.any():
             said = np.where(wrench.hidden[:, None], wrench.values, np.nan)
@@ -111,12 +93,6 @@ def wrench_columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
     sigma = next((w.sigma_min for w in analysis.wrenches if w.sigma_min is not None), None)
     if sigma is not None:
         yield "sigma_min", sigma
-
-
-def per_axis(name: str, values: Array) -> Iterator[tuple[str, Array]]:
-    """One contiguous column an axis, fx to mz."""
-    for axis, column in zip(AXES, np.ascontiguousarray(values.T), strict=True):
-        yield f"{name}/{axis}", column
 
 
 def write_estimates(path: Path, analysis: Analysis) -> None:

@@ -6,12 +6,13 @@ from typing import Any
 
 from vftcli.evaluation.logged_jacobian import JacobianJudgement
 from vftcli.outputs.files import OutputFolder, table_file
-from vftcli.outputs.log.estimates import per_axis, per_joint
 from vftcli.outputs.log.report import ERROR_TABLES
 from vftcli.outputs.log.run_record import CONVENTIONS, seal, versions
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
+from vftcli.signals.shown import per_joint
+from vftcli.signals.wrench import per_axis
 
 FRAME = StatedFrame("axes and point of the log's own Jacobian, as force on the robot")
 

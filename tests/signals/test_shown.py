@@ -1,0 +1,116 @@
+"""What a notebook shows: one line, a small table, a frame; never an array of thousands."""
+
+from dataclasses import dataclass, replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, Remarks, caution, fact
+from vftcli.signals.shown import LONGEST, Shown, frame_of
+from vftcli.signals.source import Source
+from vftcli.signals.wrench import AXES, Wrench
+
+T = np.linspace(0.0, 1.0, 501)
+Q = np.outer(T, np.arange(1.0, 7.0))
+
+
+@dataclass(frozen=True, repr=False)
+class Thing(Shown):
+    name: str = "a\nb <i>"
+    few: np.ndarray | None = None
+    many: np.ndarray | None = None
+    words: tuple[str, ...] = ()
+
+
+class Balance(HTMLParser):
+    """The tags of a page that are open."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:  # noqa: ARG002
+        self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def things() -> list[Shown]:
+    recording = Recording(t=T, q=Q, wrench=Q, source=Source(path=Path("log.csv")))
+    torque = ExternalTorque(name="gmo", t=T, tau=np.where(Q > 5.5, np.nan, Q), error_sd=0.0 * Q + 1)
+    wrench = Wrench(name="best", t=T, values=Q, sd=Q, frame="base", masked=T > 0.5)
+    return [Thing(few=T[:3], many=Q, words=("x", "y")), recording, recording.source, torque,
+            wrench, Remarks([fact("as-printed")]), fact("as-printed")]  # fmt: skip
+
+
+@pytest.mark.parametrize("thing", things(), ids=lambda thing: type(thing).__name__)
+def test_a_thing_is_one_short_line_and_a_whole_table(thing: Shown) -> None:
+    line = repr(thing)
+    assert line.startswith(f"<{type(thing).__name__}")
+    assert len(line) <= LONGEST + 2  # its angle brackets
+    assert "\n" not in line
+    assert not Balance(thing._repr_html_()).open
+
+
+def test_fields_are_numbers_or_shapes_and_their_letters_are_escaped() -> None:
+    thing = Thing(few=np.array([1.5, np.nan]), many=Q)
+    assert repr(thing) == "<Thing name a\\nb <i>, few [1.5 –], many array (501, 6)>"
+    assert "<i>" not in thing._repr_html_()
+
+
+def test_a_long_line_is_cut() -> None:
+    line = repr(Thing(name="x" * 1000))
+    assert len(line) == LONGEST + 2
+    assert line.endswith("…>")
+
+
+def test_frames_have_the_columns_of_the_files_and_null_for_what_is_not_known() -> None:
+    _, recording, _, torque, wrench, *_ = things()
+    assert isinstance(recording, Recording)
+    assert isinstance(torque, ExternalTorque)
+    assert isinstance(wrench, Wrench)
+    wanted = ["t", *(f"q/{j}" for j in range(1, 7)), *(f"wrench/{axis}" for axis in AXES)]
+    assert recording.to_polars().columns == wanted
+    assert recording.to_polars()["q/3"].to_list() == Q[:, 2].tolist()
+    frame = torque.to_polars()
+    assert frame.columns[1] == "tau_ext/gmo/1"
+    assert frame.columns[-1] == "band/gmo/6"
+    assert frame["tau_ext/gmo/6"].null_count() == np.count_nonzero(Q[:, 5] > 5.5)
+    assert wrench.to_polars()["wrench/best/fx"].null_count() == np.count_nonzero(T > 0.5)
+
+
+def test_a_joint_that_is_never_known_is_shown_without_a_warning() -> None:
+    tau = Q.copy()
+    tau[:, 0] = np.nan
+    shown = ExternalTorque(name="gmo", t=T, tau=tau)
+    assert "rms 0 " in repr(shown)
+    assert "<td>0%</td>" in shown._repr_html_()
+
+
+def test_remarks_are_a_tuple_with_a_frame() -> None:
+    first, second = fact("as-printed"), replace(caution("as-printed"), level="warning")
+    remarks = Remarks([first, second])
+    assert (*remarks, first) == (first, second, first)
+    assert repr(remarks) == "<Remarks 1 fact, 1 warning>"
+    assert repr(Remarks()) == "<Remarks none>"
+    frame = remarks.to_polars()
+    assert frame["level"].to_list() == ["fact", "warning"]
+    assert frame["message"][0] == str(first)
+    assert Remarks().to_polars().columns == frame.columns
+
+
+def test_a_remark_without_words_is_shown_too() -> None:
+    assert repr(Remark("no-such-code")) == "<Remark fact no-such-code:>"
+
+
+def test_a_frame_keeps_whole_numbers() -> None:
+    frame = frame_of([("k", np.arange(3)), ("x", np.array([1.0, np.nan, 2.0]))])
+    assert frame["k"].dtype == pl.Int64
+    assert frame["x"].to_list() == [1.0, None, 2.0]

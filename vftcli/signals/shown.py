@@ -1,0 +1,107 @@
+"""Shown: what a notebook shows of a thing, one line and a small table instead of its arrays."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vftcli.signals.arrays import Array
+from vftcli.signals.letters import printable
+
+if TYPE_CHECKING:
+    import polars as pl
+
+LONGEST = 160
+"""Letters of a line at most."""
+
+FEW = 7
+"""An array of so many numbers, one a joint of most arms, is shown; of a larger one its shape."""
+
+UNKNOWN = "–"
+"""What stands for a number that is not known."""
+
+
+class Shown:
+    """A thing whose `repr` is one line, and which a notebook shows as a small table.
+
+    A dataclass that is one is made with ``repr=False``. It says what it is by `_headline`, and what
+    is in it by `_rows`; else both are made of its fields.
+    """
+
+    def _headline(self) -> str:
+        """What it is, behind the name of its class."""
+        return ", ".join(f"{name} {text}" for name, text in field_texts(self))
+
+    def _rows(self) -> Iterable[Sequence[object]]:
+        """The rows of its table, the headings first."""
+        return [("field", "value"), *field_texts(self)]
+
+    def __repr__(self) -> str:
+        """What it is, on one line."""
+        line = printable(f"{type(self).__name__} {self._headline()}".rstrip())
+        return f"<{line if len(line) <= LONGEST else line[: LONGEST - 1] + '…'}>"
+
+    def _repr_html_(self) -> str:
+        """What it is as the caption of a small table, for notebooks."""
+        head, *rows = [[escape(printable(cell(x))) for x in row] for row in self._rows()]
+        heads = "".join(f"<th>{text}</th>" for text in head)
+        lines = "".join(f"<tr>{''.join(f'<td>{text}</td>' for text in row)}</tr>" for row in rows)
+        caption = escape(repr(self)[1:-1])
+        return (
+            f"<table><caption>{caption}</caption><thead><tr>{heads}</tr></thead>"
+            f"<tbody>{lines}</tbody></table>"
+        )
+
+
+def cell(value: object) -> str:
+    """A value as a table shows it: a dash for what is not known, four digits of a number."""
+    if value is None or (isinstance(value, float) and np.isnan(value)):
+        return UNKNOWN
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def field_texts(owner: object) -> list[tuple[str, str]]:
+    """Name and text of every field of a dataclass that says something."""
+    if not is_dataclass(owner):
+        return []
+    shown = [(f.name, getattr(owner, f.name)) for f in fields(owner) if f.repr]
+    return [(name, text) for name, value in shown if (text := value_text(value))]
+
+
+def value_text(value: object) -> str:
+    """A value in a few letters, "" for none."""
+    if value is None or (isinstance(value, (str, tuple, list, Mapping)) and not value):
+        return ""
+    if isinstance(value, np.ndarray):
+        few = value.ndim == 1 and len(value) <= FEW
+        return f"[{joined(value)}]" if few else f"array {value.shape}"
+    if isinstance(value, (tuple, list, Mapping)):
+        first, count = next(iter(value)), len(value)
+        few = count <= FEW and isinstance(first, (str, int, float))
+        return " ".join(map(cell, value)) if few else f"{count} × {type(first).__name__}"
+    plain = isinstance(value, (str, int, float, Path))
+    return cell(value) if plain else type(value).__name__
+
+
+def joined(values: Iterable[float]) -> str:
+    """Numbers with blanks between."""
+    return " ".join(cell(float(value)) for value in values)
+
+
+def per_joint(name: str, values: Array) -> Iterator[tuple[str, Array]]:
+    """One contiguous column a joint, named from 1."""
+    for j, column in enumerate(np.ascontiguousarray(values.T), start=1):
+        yield f"{name}/{j}", column
+
+
+def frame_of(columns: Iterable[tuple[str, Any]]) -> "pl.DataFrame":
+    """A polars frame of named columns; what is not known is null."""
+    import polars as pl
+
+    table = pl.DataFrame(dict(columns))
+    # Only columns that need it: to fill all of a long log takes longer than to write it.
+    unknown = [s.name for s in table if s.dtype == pl.Float64 and s.is_nan().any()]
+    return table.with_columns(pl.col(unknown).fill_nan(None)) if unknown else table
