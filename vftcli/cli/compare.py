@@ -1,13 +1,17 @@
 """`vftcli compare`: errors of the observers against a reference."""
 
 from dataclasses import replace
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, flag, taken_apart
+from vftcli.cli.bundles import Bundle, flag, option, taken_apart
 from vftcli.cli.help import COMPARE, OUTPUT
+
+if TYPE_CHECKING:
+    from vftcli.outputs.files import OutputFolder
 
 MORE = "Intervals, lags and significance: --details"
 """What the tables on the terminal leave out."""
@@ -36,12 +40,40 @@ class TableOptions(Bundle):
         return asked[0] if asked else "terminal"
 
 
+class DrawnErrors(opt.FigureOptions):
+    """The figure of the errors, and where it goes."""
+
+    output: Path | None = option("-o/--output", "DIR", "Folder for --figures.")
+    force: opt.Force = False
+
+    def folder(self) -> "OutputFolder | None":
+        """Where the figure goes, None where none is asked for.
+
+        Raises:
+            typer.BadParameter: If only one of --figures and -o is given.
+            VftError: If the folder cannot be written.
+        """
+        from vftcli.outputs.figures.log import ERROR_FIGURES
+        from vftcli.outputs.figures.paper import figure_files
+        from vftcli.outputs.files import OutputFolder
+
+        form = self.form()
+        if (form is None) != (self.output is None):
+            raise typer.BadParameter("--figures and -o DIR need each other: tables go to stdout")
+        if self.output is None:
+            return None
+        folder = OutputFolder(self.output, self.force, figure_files(form, ERROR_FIGURES))
+        folder.check()
+        return folder
+
+
 @taken_apart
 def compare(
     logs: opt.Logs,
     reference: opt.RequiredReferenceOptions,
     analysis: opt.AnalysisOptions,
     table: TableOptions,
+    drawn: DrawnErrors,
     significance: Annotated[
         bool,
         typer.Option(
@@ -57,9 +89,11 @@ def compare(
     """
     import polars as pl
 
-    from vftcli.cli.console import LeftOut, say_analysis
+    from vftcli.cli.console import LeftOut, say, say_analysis
     from vftcli.evaluation import paired_significance
     from vftcli.evaluation.pooling import PoolMember, evaluate_pooled
+    from vftcli.outputs.figures.log import error_figures
+    from vftcli.outputs.figures.paper import write_figures
     from vftcli.outputs.log import tables
     from vftcli.outputs.log.wrench_tables import paper_bounds
     from vftcli.pipeline import analyse_logs
@@ -71,7 +105,7 @@ def compare(
         "markdown": tables.to_markdown,
         "latex": tables.to_latex,
     }
-    library = Library(logs)
+    library, figures = Library(logs), drawn.folder()
     choice = analysis.choice(library, reference)
     # The list is for the wrench and for judging contacts; a table of torques needs none.
     listed = choice.contacts and (analysis.wrench.asks or reference.contacts)
@@ -99,6 +133,10 @@ def compare(
         if a.reference is not None
     ]
     together = pl.concat([*errors, evaluate_pooled(members)], how="diagonal")
+    if figures is not None:
+        with figures as folder:
+            write_figures(folder, error_figures(together), str(drawn.figures))
+        say(f"wrote {folder.path}: figures/errors-*.{drawn.figures}")
     rows, bounds = tables.marked(together, analyses), paper_bounds(analyses)
     if table.form == "terminal":
         text = tables.to_terminal(rows, bounds, every=analysis.talk.details)

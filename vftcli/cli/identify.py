@@ -101,6 +101,7 @@ def identify_robot(
     asked: TaskOptions,
     validation: ValidationOptions,
     free: WithoutLoad,
+    drawn: opt.FigureOptions,
     anyway: opt.AnywayOptions,
     talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     json: opt.Json = False,
@@ -117,12 +118,13 @@ def identify_robot(
     from vftcli.cli.opening import open_made
     from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.identification.files import beside, write_identification
+    from vftcli.outputs.identification.files import beside, files_beside, write_identification
     from vftcli.outputs.identification.tables import tables_text
     from vftcli.readers.library import Library
 
     task = asked.task(output.stem, friction=robot.friction != "none")
-    OutputFolder(output.parent, force, [file.name for file in beside(output).values()]).check()
+    form = drawn.form()
+    OutputFolder(output.parent, force, files_beside(output, form)).check()
     choice, chosen = reading.choice(), robot.choice()
     # An episode is one of LOG's; the others are logs of their own.
     held_out_choice = reading.changed(interval=validation.interval, episode=None).choice()
@@ -144,7 +146,7 @@ def identify_robot(
         say_recording(recording)
         examiner.examine(recording, profile)
     found = identify(train, profile, task, held_out, unloaded[0] if unloaded else None)
-    record = write_identification(output, found, examiner.examinations, command_line(), force)
+    record = write_identification(output, found, examiner.examinations, command_line(), force, form)
     say_robots(examiner.robots)
     for remark in found.remarks:
         detail(f"note: {remark}")

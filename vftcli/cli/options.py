@@ -269,6 +269,28 @@ class ExtraOptions(Bundle):
         return [name for name, wanted in asked.items() if wanted]
 
 
+class FigureOptions(Bundle):
+    """Figures for a paper."""
+
+    GROUP = headings.WRITE
+
+    figures: str | None = option(
+        "--figures", "pdf|svg|png", "Also figures for a paper, one and two columns wide."
+    )
+
+    def form(self) -> str | None:
+        """What they are written as, None where none are asked for.
+
+        Raises:
+            VftError: If it is not one of the forms, or matplotlib is not installed.
+        """
+        if self.figures is None:
+            return None
+        from vftcli.outputs.figures.paper import checked_form
+
+        return checked_form(self.figures)
+
+
 class NamedReferenceOptions(Bundle):
     """What is taken for true where nothing else is asked of it."""
 

@@ -26,6 +26,7 @@ def report(
     reference: opt.ReferenceOptions,
     analysis: opt.AnalysisOptions,
     also: opt.ExtraOptions,
+    drawn: opt.FigureOptions,
     published: Annotated[
         str | None,
         typer.Option(
@@ -55,8 +56,8 @@ def report(
     from vftcli.readers.library import Library
 
     library = Library(logs)
-    extras = also.names()
-    names = report_files([library.label(log) for log in logs], extras)
+    extras, form = also.names(), drawn.form()
+    names = report_files([library.label(log) for log in logs], extras, form)
     OutputFolder(output, force, names).check()
     choice = analysis.choice(library, reference, on_screen=not json)
     if published is not None:
@@ -75,10 +76,12 @@ def report(
     choice.progress("writing")
     command, failed = command_line(), left_out.reasons
     if len(analyses) + len(failed) == 1:
-        record = write_report(output, analyses[0], command=command, force=force, extras=extras)
+        record = write_report(
+            output, analyses[0], command=command, force=force, extras=extras, form=form
+        )
     else:
         record = write_reports(
-            output, analyses, command=command, force=force, extras=extras, failed=failed
+            output, analyses, command=command, force=force, extras=extras, form=form, failed=failed
         )
     if json:
         typer.echo(record)

@@ -24,6 +24,7 @@ def tune_gains(
     robot: RobotOptions,
     free: opt.FreeOptions,
     bias: opt.BiasOptions,
+    drawn: opt.FigureOptions,
     anyway: opt.AnywayOptions,
     talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     goal: Annotated[
@@ -54,7 +55,8 @@ def tune_gains(
     from vftcli.cli.console import command_line, detail, health_of, say, say_json, say_recording
     from vftcli.observers.choice import LOG_GAINS, ObserverChoice
     from vftcli.outputs.examination import health_record, overridden_lines
-    from vftcli.outputs.files import check_file, write_text
+    from vftcli.outputs.figures.tuned import write_tuned
+    from vftcli.outputs.files import check_file
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
     from vftcli.outputs.log.run_record import jsonable
@@ -66,6 +68,7 @@ def tune_gains(
     from vftcli.signals.errors import ParameterError
 
     wanted = parse_goal(goal, threshold)
+    form = drawn.form()
     check_file(output, force)
     library = Library([log])
     choice = AnalysisChoice(
@@ -90,9 +93,10 @@ def tune_gains(
     heading = [*doubts, command_line(), f"goal: {goal}", f"robot: {arm.name}", *notes]
     comments = "".join(f"# {line}\n" for line in heading)
     gains = {"observers": {line.section: dict(line.gains) for line in tuned}}
-    write_text(output, comments + "".join(lines_of(gains)), force)
+    text = comments + "".join(lines_of(gains))
+    write_tuned(output, text, found.spectra, tuned, force=force, form=form)
     if json:
-        rows = [jsonable({**line._asdict()}) for line in tuned]
+        rows = [jsonable(line.record) for line in tuned]
         health = jsonable(health_record(examinations))
         say_json({"goal": goal, "examination": health, "notes": notes, "observers": rows})
         return

@@ -49,5 +49,9 @@ class IdentificationError(VftError):
     """A log does not determine what shall be identified from it, or contradicts the robot."""
 
 
+class PackageError(VftError):
+    """What is asked for needs a package that is not installed."""
+
+
 class ExaminationError(VftError):
     """What the examination of a log found makes every result meaningless."""

@@ -9,7 +9,7 @@ from vftcli.admittance.closed_loop import ClosedLoop
 from vftcli.admittance.latency import latencies
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.grid import Column, Grid, csv_rows, terminal
+from vftcli.outputs.grid import Column, Grid, csv_rows, latex, terminal
 from vftcli.signals.arrays import Array
 
 
@@ -186,3 +186,11 @@ def stability_grid(replay: Replay) -> Grid:
         rows=tuple(rows),
         swatches=True,
     )
+
+
+def latex_text(replay: Replay) -> str:
+    """The parameters (Tables III and IV of the paper) and the comparison as LaTeX tables."""
+    grids = [parameter_grid(replay)]
+    if replay.rows:
+        grids.append(comparison_grid(replay.rows))
+    return "\n".join(latex(grid) for grid in grids)

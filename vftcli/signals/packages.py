@@ -1,0 +1,70 @@
+"""Packages that vftcli works without: whoever needs one asks for it here, and is told what lacks.
+
+They are ordinary dependencies all the same, or extras. Estimation, errors, contacts and pages need
+none of them; docs/outputs.md tells what each is for.
+"""
+
+import sys
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+from vftcli.signals.errors import PackageError, VftError
+
+PACKAGES = {
+    "pinocchio": ("pin", "pip install pin"),
+    "rerun": ("rerun-sdk", "pip install rerun-sdk"),
+    "pyarrow": ("pyarrow", "pip install pyarrow"),
+    "h5py": ("h5py", "pip install 'vftcli[hdf5]'"),
+    "xacro": ("xacro", "pip install 'vftcli[xacro]'"),
+    "xacrodoc": ("xacrodoc", "pip install 'vftcli[xacro]'"),
+    "matplotlib": ("matplotlib", "pip install 'vftcli[figures]'"),
+}
+"""Module → the package that holds it, and how to install it."""
+
+if sys.platform == "win32":
+    PACKAGES["pinocchio"] = ("pin", "conda install -c conda-forge pinocchio")  # no wheel there
+
+
+def installed(module: str) -> bool:
+    """Whether a package of this module is there; it is not loaded."""
+    return find_spec(module) is not None
+
+
+def remedy(module: str) -> str:
+    """How to install the package of a module."""
+    return PACKAGES[module][1]
+
+
+def check_installed(module: str, what: str) -> None:
+    """See whether the package that something needs is there; it is not loaded.
+
+    Raises:
+        PackageError: If it is not.
+    """
+    if not installed(module):
+        needed(module, what)
+
+
+def needed(
+    module: str, what: str, otherwise: str = "", error: type[VftError] = PackageError
+) -> Any:  # noqa: ANN401 - a module
+    """The module that something needs.
+
+    Args:
+        module: Name of the module, also one inside a package.
+        what: What needs it, as the first words of the message.
+        otherwise: What else one can do, as its last words.
+        error: The class of what is raised.
+
+    Raises:
+        VftError: If it is not installed, or cannot be loaded.
+    """
+    try:
+        return import_module(module)
+    except ImportError as failure:
+        root = module.partition(".")[0]
+        package, install = PACKAGES[root]
+        absent = isinstance(failure, ModuleNotFoundError) and failure.name == root
+        why = "is not installed here" if absent else f"cannot be loaded ({failure})"
+        raise error(f"{what} needs {package}, which {why}: {install}{otherwise}") from None
