@@ -29,7 +29,7 @@ READING = {
 
 OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
        ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
-       ("init", "--output"),
+       ("init", "--output"), ("compare", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, what is written where, and --csv, which
 the contract makes a file of `estimate` and a table of the others."""
@@ -66,6 +66,7 @@ BAD = {
     "--torque-sd": ("some", "--torque-sd"),
     "--derive": ("tau", "--derive 'tau'"),
     "--reference": ("magic", "no reference 'magic'"),
+    "--figures": ("gif", "--figures 'gif' is not pdf, svg or png"),
     "--config": ("nowhere.toml", "--config nowhere.toml: no such file"),
 }
 """Shared option → a value it does not take, and what the one line on it says."""
@@ -152,7 +153,8 @@ def test_a_command_that_reads_a_log_reads_it_as_all_do(command: str) -> None:
 
 @pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
 def test_a_command_that_estimates_takes_all_that_can_be_asked(command: str) -> None:
-    whole = {*BAD, "--causal", "--wrench", "--as-printed", "--sensor-weight"} - {"--reference"}
+    whole = {*BAD, "--causal", "--wrench", "--as-printed", "--sensor-weight"}
+    whole -= {"--reference", "--figures"}  # what it is compared with, and how it is shown
     assert set(parameters(command)) >= whole
 
 

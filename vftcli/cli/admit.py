@@ -117,14 +117,19 @@ class ForceOptions(Bundle):
     )
 
 
+class LatexOption(Bundle):
+    """The tables for a paper."""
+
+    GROUP = OUTPUT
+
+    latex: bool = flag("--latex", "Print a LaTeX table (booktabs).", seldom=True)
+
+
 class ShownOptions(opt.FigureOptions):
     """What is shown and drawn of the comparison."""
 
     json: opt.Json = False
-    latex: Annotated[
-        bool,
-        typer.Option("--latex", help="Print LaTeX tables (booktabs).", rich_help_panel=OUTPUT),
-    ] = False
+    table: LatexOption
 
 
 @taken_apart
@@ -166,7 +171,7 @@ def admit(
         OutputFolder(output, force, files_of_replay(form)).check()
     elif show_made or form:
         raise typer.BadParameter("--open and --figures are of what -o DIR writes; give -o too")
-    if shown.json and shown.latex:
+    if shown.json and shown.table.latex:
         raise typer.BadParameter("choose one of --json and --latex")
     recording, run = None, None
     examinations: tuple[Examination, ...] = ()
@@ -188,7 +193,7 @@ def admit(
             examinations=examinations,
             form=form,
         )
-        if not (shown.json or shown.latex):
+        if not (shown.json or shown.table.latex):
             say(f"wrote {output}: vftcli open {output}")
         if show_made:
             open_made(output)
@@ -369,7 +374,7 @@ def show(result: "Replay", run: "ClosedLoop | None", shown: ShownOptions) -> Non
     if shown.json:
         typer.echo(json_rows(result.rows).rstrip("\n"))
         return
-    if shown.latex:
+    if shown.table.latex:
         typer.echo(latex_text(result).rstrip("\n"))
         return
     say(f"{result.robot.title or result.robot.name}: {result.source}")

@@ -101,11 +101,9 @@ def identify_robot(
     asked: TaskOptions,
     validation: ValidationOptions,
     free: WithoutLoad,
-    drawn: opt.FigureOptions,
+    made: opt.MadeOptions,
     anyway: opt.AnywayOptions,
     talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
-    json: opt.Json = False,
-    force: opt.Force = False,
     show: opt.Open = False,
 ) -> None:
     """Make a robot file from logs: friction, inertias, payload.
@@ -123,8 +121,8 @@ def identify_robot(
     from vftcli.readers.library import Library
 
     task = asked.task(output.stem, friction=robot.friction != "none")
-    form = drawn.form()
-    OutputFolder(output.parent, force, files_beside(output, form)).check()
+    form = made.form()
+    OutputFolder(output.parent, made.force, files_beside(output, form)).check()
     choice, chosen = reading.choice(), robot.choice()
     # An episode is one of LOG's; the others are logs of their own.
     held_out_choice = reading.changed(interval=validation.interval, episode=None).choice()
@@ -146,11 +144,13 @@ def identify_robot(
         say_recording(recording)
         examiner.examine(recording, profile)
     found = identify(train, profile, task, held_out, unloaded[0] if unloaded else None)
-    record = write_identification(output, found, examiner.examinations, command_line(), force, form)
+    record = write_identification(
+        output, found, examiner.examinations, command_line(), made.force, form
+    )
     say_robots(examiner.robots)
     for remark in found.remarks:
         detail(f"note: {remark}")
     say(f"wrote {', '.join(str(file) for file in beside(output).values())}")
-    typer.echo(record.rstrip("\n") if json else tables_text(found))
+    typer.echo(record.rstrip("\n") if made.json else tables_text(found))
     if show:
         open_made(output.with_suffix(".html"))

@@ -291,6 +291,13 @@ class FigureOptions(Bundle):
         return checked_form(self.figures)
 
 
+class MadeOptions(FigureOptions):
+    """What is made: figures too, JSON in place of words, over what is there."""
+
+    json: Json = False
+    force: Force = False
+
+
 class NamedReferenceOptions(Bundle):
     """What is taken for true where nothing else is asked of it."""
 

@@ -24,7 +24,7 @@ def tune_gains(
     robot: RobotOptions,
     free: opt.FreeOptions,
     bias: opt.BiasOptions,
-    drawn: opt.FigureOptions,
+    made: opt.MadeOptions,
     anyway: opt.AnywayOptions,
     talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     goal: Annotated[
@@ -43,8 +43,6 @@ def tune_gains(
             help="Torque that raises an alarm [N·m], one or one a joint.",
         ),
     ] = None,
-    json: opt.Json = False,
-    force: opt.Force = False,
 ) -> None:
     """Find gains on a log for a stated goal, for --gains.
 
@@ -64,12 +62,11 @@ def tune_gains(
     from vftcli.readers.library import Library
     from vftcli.refinement.tuning import bounds_reached, parse_goal, tune_all
     from vftcli.repetition.free_run import Models
-    from vftcli.robots.writing import lines_of
     from vftcli.signals.errors import ParameterError
 
     wanted = parse_goal(goal, threshold)
-    form = drawn.form()
-    check_file(output, force)
+    form = made.form()
+    check_file(output, made.force)
     library = Library([log])
     choice = AnalysisChoice(
         read=reading.choice(),
@@ -91,11 +88,8 @@ def tune_gains(
     notes = [str(remark) for remark in (*found.remarks, *reached)]
     doubts = overridden_lines(examinations)
     heading = [*doubts, command_line(), f"goal: {goal}", f"robot: {arm.name}", *notes]
-    comments = "".join(f"# {line}\n" for line in heading)
-    gains = {"observers": {line.section: dict(line.gains) for line in tuned}}
-    text = comments + "".join(lines_of(gains))
-    write_tuned(output, text, found.spectra, tuned, force=force, form=form)
-    if json:
+    write_tuned(output, heading, found.spectra, tuned, force=made.force, form=form)
+    if made.json:
         rows = [jsonable(line.record) for line in tuned]
         health = jsonable(health_record(examinations))
         say_json({"goal": goal, "examination": health, "notes": notes, "observers": rows})

@@ -164,7 +164,11 @@ def tune_all(spectra: Spectra, goal: TuningGoal) -> tuple[Tuned, ...]:
 
 def tuning_curves(spectra: Spectra) -> dict[str, Curve]:
     """Observer → its expected error over its rate; one curve for both first-order observers."""
-    kinds = {"fdo, gmo": momentum, "kfo-zoh": kalman_filter, "kfo-rts": kalman_smoother}
+    kinds: dict[str, Kind] = {
+        "fdo, gmo": momentum,
+        "kfo-zoh": kalman_filter,
+        "kfo-rts": kalman_smoother,
+    }
     return {name: error_curve(kind, spectra) for name, kind in kinds.items()}
 
 

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from vftcli.outputs.figures.lines import MARKS, NARROW
+from vftcli.outputs.figures.lines import MARKS, NARROW, plain
 from vftcli.outputs.figures.paper import add_legend, legend_room, sheet, shortened
+from vftcli.outputs.log.rmse_tables import DAGGER
 from vftcli.signals.arrays import Array
 
 if TYPE_CHECKING:
@@ -77,9 +78,10 @@ def dot_figure(
     for axes, plot in zip(grid, plots, strict=False):
         draw_dots(axes, plot, looks)
         axes.set_ylabel(label)
-        axes.set_xlabel("Joint")
+        doubtful = any(DAGGER in joint for joint in plot.joints)
+        axes.set_xlabel(f"Joint{f' ({DAGGER} rests: reference not to be trusted)' * doubtful}")
         if len(plots) > 1:
-            axes.set_title(shortened(plot.title), fontsize=7.0, pad=2.0)
+            axes.set_title(shortened(plot.title), fontsize=7.0, pad=3.5)
     for axes in grid[len(plots) :]:
         axes.set_axis_off()
     add_legend(figure, handles, legend_columns)
@@ -123,7 +125,7 @@ def draw_dots(axes: "Axes", plot: DotPlot, looks: Mapping[str, dict[str, Any]]) 
     if shown.size and shown.min() > 0.0 and shown.max() > RANGE * shown.min():
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.yaxis.set_major_formatter(FuncFormatter(plain))
         axes.yaxis.set_minor_formatter(NullFormatter())
     else:
         axes.set_ylim(bottom=0.0)

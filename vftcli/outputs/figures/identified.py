@@ -28,7 +28,9 @@ def identification_figures(found: Identification) -> dict[str, Drawing]:
         )
     if not found.residuals.is_empty():
         # The last number of a row of the table is the mean.
-        rows = [DotRow(name, np.array(values[:-1])) for name, *values in residual_grid(found).rows]
+        rows = [
+            DotRow(str(name), np.array(values[:-1])) for name, *values in residual_grid(found).rows
+        ]
         joints = [f"J{j}" for j in range(1, found.robot.joints + 1)]
         plot = DotPlot(found.robot.name, joints, rows, np.full(len(joints), np.nan))
         paints = {row.name: SPARE[k % len(SPARE)] for k, row in enumerate(rows)}

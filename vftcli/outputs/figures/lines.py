@@ -24,12 +24,15 @@ wide. [in]"""
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 """Marks in turn: what they stand for is told by their shape where colours are not printed."""
 
-APART = 0.06
+APART = 0.05
 """Numbers of contacts stand no closer than this share of the axis; between them some are left
 out."""
 
 AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}
 """Unit of a horizontal axis → what it is called."""
+
+PAPER_DASHES = {"4 2": "9 3 2 3 2 3"}
+"""Dashes of the page → those on paper, where they are too much like others."""
 
 PAINTS = {INK: "black", REFERENCE: "0.65"}
 """Colours of the page that follow its theme → theirs on white paper."""
@@ -104,7 +107,7 @@ def line_figure(
 
 def draw_plot(axes: "Axes", plot: Plot) -> None:
     """One panel with its contacts, bands and lines."""
-    from matplotlib.ticker import MaxNLocator
+    from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
     chart, j = plot.chart, plot.panel
     for start, stop in chart.spans:
@@ -117,9 +120,16 @@ def draw_plot(axes: "Axes", plot: Plot) -> None:
             draw_line(axes, chart, series, j)
     if chart.log:
         axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(FuncFormatter(plain))
+        axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlim(float(chart.x[0]), float(chart.x[-1]))
     axes.set_ylim(*ends_of_family(chart, j))
     axes.yaxis.set_major_locator(MaxNLocator(4))
+
+
+def plain(value: float, _place: int) -> str:
+    """A number along a logarithmic axis, without a power where one can do without."""
+    return f"{value:g}"
 
 
 def draw_over(axes: "Axes", plot: Plot, *, named: bool) -> None:
@@ -166,7 +176,8 @@ def paint(series: ChartLine) -> str:
 
 def look(series: ChartLine) -> dict[str, Any]:
     """How a line looks: in grey too it is told by its dashes or its width."""
-    dashes = tuple(float(part) for part in series.dash.split())
+    dash = PAPER_DASHES.get(series.dash, series.dash)
+    dashes = tuple(float(part) for part in dash.split())
     broad = series.colour == REFERENCE
     return {
         "color": paint(series),

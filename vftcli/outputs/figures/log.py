@@ -16,13 +16,18 @@ from vftcli.outputs.figures.paper import Drawing
 from vftcli.outputs.log.rmse_tables import block, logs_of
 from vftcli.outputs.page.charts import INK, Chart, ChartLine, lines_of_names
 from vftcli.outputs.page.refinement_part import spectra_chart, tuning_chart
-from vftcli.outputs.page.torque_part import LOWEST, QUIETEST, response_charts, torque_chart
+from vftcli.outputs.page.torque_part import (
+    LOWEST,
+    QUIETEST,
+    legend_name,
+    response_charts,
+    torque_chart,
+)
 from vftcli.outputs.page.wrench_part import wrench_chart
 from vftcli.outputs.palette import colours_of_names
 
 if TYPE_CHECKING:
     import polars as pl
-
     from matplotlib.figure import Figure
 
     from vftcli.observers.auto_tuning import Curve
@@ -84,17 +89,37 @@ def wrench_drawing(analysis: Analysis, names: Sequence[str] = ()) -> Drawing | N
     chart = drawn_lines(analysis, chart, names)
     return Drawing(
         f"{analysis.recording.name}: force and moment on the robot, {chart.title}",
-        partial(line_figure, plots=plots_of(chart), numbers=contact_numbers(analysis)),
+        partial(wrench_figure, chart, contact_numbers(analysis)),
     )
+
+
+def wrench_figure(chart: Chart, numbers: Mapping[int, float], width: float) -> "Figure":
+    """Forces above moments, or in one column's width beside them."""
+    order = range(6) if width > NARROW else (0, 3, 1, 4, 2, 5)
+    return line_figure(width, plots_of(chart, only=order), numbers=numbers)
 
 
 def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str]) -> Chart:
     """The chart with the lines of these observers and the reference; a band only of one alone."""
     estimated = [line.name for line in analysis.estimates]
     wanted = names or ([BEST] if BEST in estimated else estimated)
+    # Of a file only that it is one: its path has no room.
+    plain = (
+        {}
+        if analysis.reference is None
+        else {
+            legend_name(
+                analysis, "reference"
+            ): f"reference ({analysis.reference.name.split(':')[0]})"
+        }
+    )
     own = [line.name for line in chart.series if line.name in wanted]
     series = tuple(
-        line._replace(shown=True, half=line.half if len(own) == 1 else None)
+        line._replace(
+            name=plain.get(line.name, line.name),
+            shown=True,
+            half=line.half if len(own) == 1 else None,
+        )
         for line in chart.series
         if line.name in own or line.name not in estimated
     )
@@ -140,7 +165,8 @@ def error_plot(rows: "pl.DataFrame") -> DotPlot:
 
     found = block(rows)
     low, high = (
-        block(rows.with_columns(rmse_Nm=pl.col(end))).rmse for end in ("rmse_low_Nm", "rmse_high_Nm")
+        block(rows.with_columns(rmse_Nm=pl.col(end))).rmse
+        for end in ("rmse_low_Nm", "rmse_high_Nm")
     )
     dots = zip(found.observers, found.rmse, low, high, strict=True)
     title = f"{found.recording}, {found.reference}"

@@ -173,8 +173,9 @@ def legend_room(width: float, labels: Sequence[str]) -> tuple[int, float]:
     if not labels:
         return 1, 0.0
     widest = SAMPLE + LETTER * max(map(len, labels))
-    columns = max(min(int(width / widest), len(labels)), 1)
-    return columns, LINE * -(-len(labels) // columns) + 0.05
+    rows = -(-len(labels) // max(int(width / widest), 1))
+    # As many columns as rows of about one length need.
+    return -(-len(labels) // rows), LINE * rows + 0.05
 
 
 def add_legend(figure: "Figure", handles: "Mapping[str, Artist]", columns: int) -> None:

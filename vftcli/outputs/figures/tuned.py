@@ -8,6 +8,7 @@ from vftcli.outputs.figures.log import spectra_drawing, tuning_drawing
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.files import OutputFolder, write_text
 from vftcli.refinement.tuning import Tuned, tuning_curves
+from vftcli.robots.writing import lines_of
 
 TUNED_FIGURES = ("spectra", "tuning")
 """Their names."""
@@ -25,7 +26,7 @@ def tuned_figures(spectra: Spectra, tuned: Sequence[Tuned]) -> dict[str, Drawing
 
 def write_tuned(
     path: Path,
-    text: str,
+    heading: Sequence[str],
     spectra: Spectra,
     tuned: Sequence[Tuned],
     *,
@@ -36,7 +37,7 @@ def write_tuned(
 
     Args:
         path: The gains file.
-        text: What it holds.
+        heading: What stands above the gains as comments.
         spectra: What the gains were chosen on.
         tuned: What was chosen.
         force: Whether files that are there may be replaced.
@@ -45,6 +46,9 @@ def write_tuned(
     Raises:
         OutputError: If a file cannot be written, or exists and `force` is not set.
     """
+    comments = "".join(f"# {line}\n" for line in heading)
+    gains = {"observers": {line.section: dict(line.gains) for line in tuned}}
+    text = comments + "".join(lines_of(gains))
     if form is None:
         write_text(path, text, force)
         return

@@ -152,7 +152,7 @@ def rmse_grid(table: Block) -> Grid:
         rows=tuple(rows),
         summaries=int(table.has_floor),
         marked=True,
-        notes=(f"{LATEX_DAGGER}: {RESTS}",) if table.untrusted else (),
+        notes=tuple(marks_in_words([table]).splitlines()),
         swatches=True,
     )
 
