@@ -42,7 +42,7 @@ LATEX_LETTERS = {
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
     "–": "--",
-    "†": r"\dag{}",
+    "†": r"$\dagger$",
     "−": "$-$",
     "α": r"$\alpha$",
     "ξ": r"$\xi$",
