@@ -35,6 +35,7 @@ ORDER = (
     "pipeline",
     "proposal",
     "notebook",
+    "yardsticks",
     "benchmark",
     "cli",
 )

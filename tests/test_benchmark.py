@@ -1,4 +1,4 @@
-"""The benchmark: its yardsticks compute what the observers do, else no ratio says anything."""
+"""The benchmark: what it measures, and the keys that scripts read."""
 
 from pathlib import Path
 
@@ -10,58 +10,15 @@ from vftcli.benchmark import (
     Timings,
     benchmark,
     circle,
-    dense_kalman_loop,
     examination_costs,
-    first_order_loops,
-    held_matrices,
-    taylor_exponential,
+    jittering,
+    simd,
     wide_table,
 )
-from vftcli.observers import KalmanObserver, MomentumObserver
 from vftcli.robots import load_robot
-from vftcli.robots.terms import dynamics_terms
 
 UR5 = load_robot("ur5")
 LOG = circle(UR5, 400)
-TERMS = dynamics_terms(LOG, UR5)
-STEP = LOG.median_step
-
-
-def test_the_first_order_loop_is_the_momentum_observer() -> None:
-    fdo, gmo = first_order_loops(TERMS.p, TERMS.mu, STEP, rate=10.0)
-    expected = MomentumObserver(gain=10.0).estimate(TERMS).tau[-1]
-    # The same recursion in another order of sums; torques are some tens of N·m.
-    np.testing.assert_allclose(gmo, expected, atol=1e-9)
-    np.testing.assert_allclose(fdo, expected, atol=1e-9)  # with K = ω they are one filter
-
-
-@pytest.mark.parametrize("rebuild", [False, True])
-def test_the_dense_loop_is_the_steady_kalman_observer(rebuild: bool) -> None:
-    kalman = KalmanObserver(discretisation="zoh", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
-    found = dense_kalman_loop(TERMS.p, TERMS.mu, STEP, kalman, rebuild=rebuild)
-    expected = kalman.estimate(TERMS).tau[-1]
-    # Started at the steady covariance the two agree to the Riccati equation's accuracy.
-    np.testing.assert_allclose(found[6:], expected, rtol=1e-6, atol=1e-6)
-
-
-def test_the_series_is_the_exponential() -> None:
-    from scipy.linalg import expm
-
-    A = 0.05 * np.random.default_rng(0).normal(size=(4, 4))
-    # The first term left out is ‖A‖⁶/6! with ‖A‖ of about 0.2.
-    np.testing.assert_allclose(taylor_exponential(A), expm(A), atol=1e-6)
-
-
-def test_the_held_matrices_are_those_of_an_integrator_pair() -> None:
-    h, q_p, q_tau = 0.008, np.array([0.01]), np.array([5000.0])
-    A, B, Q = held_matrices(h, q_p, q_tau)
-    np.testing.assert_allclose(A, [[1, h], [0, 1]], atol=1e-15)
-    np.testing.assert_allclose(B, [[h], [0]], atol=1e-15)
-    exact = [
-        [q_p[0] * h + q_tau[0] * h**3 / 3, q_tau[0] * h**2 / 2],
-        [q_tau[0] * h**2 / 2, q_tau[0] * h],
-    ]
-    np.testing.assert_allclose(Q, exact, rtol=1e-12)
 
 
 def test_a_shortened_run_counts_in_full() -> None:
@@ -76,8 +33,17 @@ def test_the_keys_that_scripts_read() -> None:
     assert [row["name"] for row in found["observers"]] == ["fdo", "gmo", "kfo-fe", "kfo-zoh"]
     assert {"total_s", "per_sample_us"} <= set(found["observers"][0])
     ratios = {"core_over_rnea_loop", "analytic_script_over_core", "literal_script_over_core"}
+    ratios |= {"core_over_rnea_loop_jittering", "core_over_rnea_loop_cold"}
     assert ratios <= set(found["ratios"])
+    assert found["complete_log"][-1]["name"] == "wrench smoother"
+    assert found["simd"] == simd()
     assert all(value > 0 for value in found["ratios"].values())
+
+
+def test_the_jittering_clock_strays_by_a_twentieth() -> None:
+    steps = np.diff(jittering(LOG).t) * 125.0
+    assert 0.95 <= steps.min() < 0.97
+    assert 1.03 < steps.max() <= 1.05
 
 
 def test_the_examination_is_measured_on_a_log_that_reads_back(tmp_path: Path) -> None:

@@ -23,11 +23,12 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Part, Spectra, spectra_of
 from vftcli.readers import read
 from vftcli.robots import Robot, load_robot
-from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.literal import literal_momentum_terms
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.virtual_sensor.smoother.noise import FreeTerms
+from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
+from vftcli.yardsticks import analytic_script, literal_script, rnea_loop
 
 SAMPLES = 30_060
 """Samples of the paper's Table II."""
@@ -41,8 +42,14 @@ FREE_SECONDS = 8.0
 TUNED = ("kfo-auto", "rts-auto")
 """Observers that are timed with their tuning."""
 
+SMOOTHER = "wrench smoother"
+"""Name of the smoother of the whole log's wrench."""
+
 LOOKING_BACK = (BEST, "kfo-rts", *TUNED)
 """Observers that need a complete log."""
+
+JITTER = 0.05
+"""How far the steps of the jittering clock stray, of their mean. [1]"""
 
 PAPER_TABLE_2 = {"fdo": 10.869, "gmo": 10.541, "kfo-fe": 17.578, "kfo-zoh": 58.363}
 """The paper's total times over 30 060 samples on its laptop. [s]"""
@@ -96,6 +103,18 @@ def circle(robot: Robot, samples: int, rate: float = 125.0) -> Recording:
     return Recording(t=t, q=q, dq=dq, current=current, torque=current)
 
 
+def jittering(motion: Recording) -> Recording:
+    """The same motion on a clock that jitters by 5 %, seed 1."""
+    strayed = np.random.default_rng(1).uniform(-JITTER, JITTER, motion.samples) * motion.median_step
+    return replace(motion, t=motion.t + 0.5 * strayed)
+
+
+def simd() -> str:
+    """The widest instructions that NumPy found on this machine, as it names them."""
+    found = np.show_config(mode="dicts") or {}
+    return str((found.get("SIMD Extensions", {}).get("found") or ["baseline"])[-1])
+
+
 def driven(motion: Recording, robot: Robot) -> tuple[Recording, Array]:
     """The same motion with the efforts that drive it: what the doctor calls sound.
 
@@ -118,136 +137,28 @@ def driven(motion: Recording, robot: Robot) -> tuple[Recording, Array]:
     )
 
 
-def rnea_loop(model: Any, q: Array, dq: Array) -> None:  # noqa: ANN401
-    """The yardstick: one bare `pin.rnea` call a sample, one term, nothing else."""
-    import pinocchio as pin
-
-    data, zero = model.createData(), np.zeros(model.nv)
-    for k in range(len(q)):
-        pin.rnea(model, data, q[k], dq[k], zero)
-
-
-def analytic_script(model: Any, recording: Recording, kalman: KalmanObserver) -> None:  # noqa: ANN401
-    """What one would write at first: Pinocchio a sample, and a dense Kalman filter."""
-    import pinocchio as pin
-
-    q, dq, tau = recording.q, recording.require("dq"), recording.require("torque")
-    data, step = model.createData(), recording.median_step
-    p, mu = np.empty_like(q), np.empty_like(q)
-    for k in range(len(q)):
-        M = pin.crba(model, data, q[k])
-        C = pin.computeCoriolisMatrix(model, data, q[k], dq[k])
-        p[k] = M @ dq[k]
-        mu[k] = tau[k] + C.T @ dq[k] - pin.computeGeneralizedGravity(model, data, q[k])
-    first_order_loops(p, mu, step)
-    dense_kalman_loop(p, mu, step, kalman)
-    dense_kalman_loop(p, mu, step, kalman)
-
-
-def literal_script(model: Any, recording: Recording, kalman: KalmanObserver) -> None:  # noqa: ANN401
-    """The paper's own way, (7)–(16) and (19)–(44) sample by sample.
-
-    n + 3 RNEA calls a sample, FDO, GMO, the Kalman filter by forward Euler, and the one by
-    zero-order hold with its matrices made anew at every sample from fifth-order Taylor series, as
-    Sec. II-D describes.
-    """
-    terms = literal_momentum_terms(model, recording.q, recording.require("dq"))
-    mu = recording.require("torque") + terms.coriolis_transpose_dq - terms.gravity
-    first_order_loops(terms.p, mu, recording.median_step)
-    dense_kalman_loop(terms.p, mu, recording.median_step, kalman)
-    dense_kalman_loop(terms.p, mu, recording.median_step, kalman, rebuild=True)
-
-
-def first_order_loops(p: Array, mu: Array, step: float, rate: float = 10.0) -> tuple[Array, Array]:
-    """FDO and GMO, one sample after another."""
-    a = 0.5 * rate * step
-    y1, y2, r = np.zeros(p.shape[1]), -rate * p[0], np.zeros(p.shape[1])
-    for k in range(1, len(p)):
-        y1 = (1 - a) / (1 + a) * y1 - a / (1 + a) * (mu[k] + mu[k - 1])
-        y2 = (1 - a) / (1 + a) * y2 - rate * a / (1 + a) * (p[k] + p[k - 1])
-        r = ((1 - a) * r + rate * (p[k] - p[k - 1]) - a * (mu[k] + mu[k - 1])) / (1 + a)
-    return y1 + y2 + rate * p[-1], r
-
-
-def taylor_exponential(A: Array, order: int = 5) -> Array:
-    """exp(A) by its Taylor series, as the paper approximates it."""
-    term = total = np.eye(len(A))
-    for k in range(1, order + 1):
-        term = term @ A / k
-        total = total + term
-    return total
-
-
-def held_matrices(step: float, q_p: Array, q_tau: Array) -> tuple[Array, Array, Array]:
-    """A, B (43) and Q (44, corrected) of the zero-order hold, by Taylor series."""
-    n = len(q_p)
-    eye, zero = np.eye(n), np.zeros((n, n))
-    A_c = np.block([[zero, eye], [zero, zero]])
-    B_c = np.vstack([eye, zero])
-    both = taylor_exponential(np.block([[A_c, B_c], [np.zeros((n, 3 * n))]]) * step)
-    Q_c = np.diag(np.concatenate([q_p, q_tau]))
-    M = taylor_exponential(np.block([[A_c, Q_c], [np.zeros_like(A_c), -A_c.T]]) * step)
-    Q = M[: 2 * n, 2 * n :] @ M[: 2 * n, : 2 * n].T
-    return both[: 2 * n, : 2 * n], both[: 2 * n, 2 * n :], Q
-
-
-def dense_kalman_loop(
-    p: Array,
-    mu: Array,
-    step: float,
-    kalman: KalmanObserver,
-    *,
-    rebuild: bool = False,
-) -> Array:
-    """The 2n-state textbook Kalman filter with its covariance, one sample after another.
-
-    With `rebuild` its matrices are made anew at every sample.
-    """
-    n = p.shape[1]
-    model, prior = kalman.model(step, n), kalman.steady(step, n).prior
-    densities = kalman.densities(n)
-    eye, zero = np.eye(n), np.zeros((n, n))
-    A = np.block([[eye, np.diag(model.a12)], [zero, np.diag(model.a22)]])
-    B, C = np.vstack([step * eye, zero]), np.hstack([eye, zero])
-    Q = np.block(
-        [[np.diag(model.q11), np.diag(model.q12)], [np.diag(model.q12), np.diag(model.q22)]]
-    )
-    R = np.diag(model.r)
-    P = np.block(
-        [[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]]
-    )
-    x, identity = np.concatenate([p[0], np.zeros(n)]), np.eye(2 * n)
-    for k in range(len(p)):
-        if rebuild:
-            A, B, Q = held_matrices(step, densities.q_p, densities.q_tau)
-        if k:
-            x = A @ x + B @ (0.5 * (mu[k] + mu[k - 1]))
-            P = A @ P @ A.T + Q
-        L = P @ C.T @ np.linalg.inv(C @ P @ C.T + R)
-        x = x + L @ (p[k] - C @ x)
-        I_LC = identity - L @ C
-        P = I_LC @ P @ I_LC.T + L @ R @ L.T
-    return x
-
-
 def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) -> dict[str, Any]:
     """Measure the observers and the ratios of the project's bars.
 
     Returns:
         ``observers``: rows (name, total_s, per_sample_us, paper_s), dynamics included in none;
-        ``dynamics``: the batched terms; ``ratios``: core_over_rnea_loop, analytic_script_over_core,
+        ``dynamics``: the batched terms; ``core``: these and all four observers, on the even clock,
+        on one that jitters, and when first called; ``ratios``: core_over_rnea_loop,
+        core_over_rnea_loop_jittering, core_over_rnea_loop_cold, analytic_script_over_core,
         literal_script_over_core, complete_over_core, best_over_observers; and what was run.
         ``complete_log`` holds the spectra and the observers that need a complete log: the tuned
         ones with their tuning, ``best`` without, its smoothing pass alone. best_over_observers is
-        that pass over the paper's four together, dynamics in neither.
+        that pass over the paper's four together, dynamics in neither; ``wrench smoother`` is the
+        wrench of the whole log, its noise and prior included.
     """
     robot = load_robot(robot_name)
     recording = circle(robot, samples)
     timings = Timings()
     with one_core():
         run_rounds(timings, robot, recording, rounds)
-    core = timings.median("core")
+    core, rnea = timings.median("core"), timings.median("rnea loop")
     return {
+        "simd": simd(),
         "robot": robot.name,
         "samples": samples,
         "rounds": rounds,
@@ -256,11 +167,19 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
             for name in PAPER
         ],
         "complete_log": [
-            {"name": name, **timings.row(name, samples)} for name in ("spectra", *LOOKING_BACK)
+            {"name": name, **timings.row(name, samples)}
+            for name in ("spectra", *LOOKING_BACK, SMOOTHER)
+            if name in timings.seconds
         ],
         "dynamics": timings.row("dynamics", samples),
+        "core": [
+            {"name": name, **timings.row(name, samples)}
+            for name in ("core", "jittering core", "cold core")
+        ],
         "ratios": {
-            "core_over_rnea_loop": core / timings.median("rnea loop"),
+            "core_over_rnea_loop": core / rnea,
+            "core_over_rnea_loop_jittering": timings.median("jittering core") / rnea,
+            "core_over_rnea_loop_cold": timings.median("cold core") / rnea,
             "analytic_script_over_core": timings.median("analytic script") / core,
             "literal_script_over_core": timings.median("literal script") / core,
             "complete_over_core": timings.median("complete") / core,
@@ -269,18 +188,23 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
     }
 
 
+def estimate_tuned(name: str, terms: DynamicsTerms, found: Spectra) -> None:
+    """Tune an observer to spectra and run it."""
+    tune_to_spectra(name, found).estimate(terms)
+
+
 def run_rounds(timings: Timings, robot: Robot, recording: Recording, rounds: int) -> None:
     """Run everything once unmeasured, then interleaved for `rounds` rounds."""
     built, _ = ObserverChoice(names=(*PAPER, "kfo-rts")).build(robot, recording.median_step)
     observers, smoother = dict(zip(PAPER, built[:-1], strict=True)), built[-1]
-    q, dq = np.array(recording.q), np.array(recording.require("dq"))
+    q, dq, uneven = recording.q, recording.require("dq"), jittering(recording)
     few = min(SCRIPT_SAMPLES, recording.samples)
     short = recording.between(0.0, float(recording.t[few - 1]))
     scale, model = recording.samples / few, robot.model
     kalman = KalmanObserver(discretisation="zoh", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
 
-    def core() -> DynamicsTerms:
-        terms = dynamics_terms(recording, robot)
+    def core(log: Recording = recording) -> DynamicsTerms:
+        terms = dynamics_terms(log, robot)
         for observer in observers.values():
             observer.estimate(terms)
         return terms
@@ -290,36 +214,39 @@ def run_rounds(timings: Timings, robot: Robot, recording: Recording, rounds: int
     def spectra(terms: DynamicsTerms) -> Spectra:
         return spectra_of(Part(terms, ~free), [Part(terms, free)])
 
-    def auto(name: str, terms: DynamicsTerms, found: Spectra) -> None:
-        tune_to_spectra(name, found).estimate(terms)
-
     def complete() -> None:
         terms = core()
         smoother.estimate(terms)
         found = spectra(terms)
         for name in TUNED:
-            auto(name, terms, found)
+            estimate_tuned(name, terms, found)
 
+    timings.measure("cold core", core)
     terms = core()
     found = spectra(terms)
-    best = tune_to_spectra(BEST, found)
+    part = [FreeTerms(terms, q, free)]
+    work: dict[str, Callable[[], object]] = {
+        "core": core,
+        "jittering core": partial(core, uneven),
+        "complete": complete,
+        "spectra": partial(spectra, terms),
+        "kfo-rts": partial(smoother.estimate, terms),
+        BEST: partial(tune_to_spectra(BEST, found).estimate, terms),
+        **({SMOOTHER: partial(smooth_wrench, terms, q, robot, part)} if q.shape[1] >= 6 else {}),
+        **{name: partial(estimate_tuned, name, terms, found) for name in TUNED},
+        "rnea loop": partial(rnea_loop, model, np.array(q), np.array(dq)),
+        "dynamics": partial(dynamics_terms, recording, robot),
+        **{name: partial(observer.estimate, terms) for name, observer in observers.items()},
+    }
+    scripts = {"analytic script": analytic_script, "literal script": literal_script}
+    work["jittering core"]()
     complete()
-    momentum_terms(robot.loaded_chain, q, dq)
     for _ in range(rounds):
         core()  # unmeasured: the scripts before it have given the memory back
-        timings.measure("core", core)
-        timings.measure("complete", complete)
-        timings.measure("spectra", lambda: spectra(terms))
-        timings.measure("kfo-rts", lambda: smoother.estimate(terms))
-        timings.measure(BEST, lambda: best.estimate(terms))
-        for name in TUNED:
-            timings.measure(name, partial(auto, name, terms, found))
-        timings.measure("rnea loop", lambda: rnea_loop(model, q, dq))
-        timings.measure("dynamics", lambda: dynamics_terms(recording, robot))
-        for name, observer in observers.items():
-            timings.measure(name, partial(observer.estimate, terms))
-        timings.measure("analytic script", lambda: analytic_script(model, short, kalman), scale)
-        timings.measure("literal script", lambda: literal_script(model, short, kalman), scale)
+        for name, call in work.items():
+            timings.measure(name, call)
+        for name, script in scripts.items():
+            timings.measure(name, partial(script, model, short, kalman), scale)
 
 
 def wide_table(robot: Robot, samples: int = SAMPLES, columns: int = 200) -> dict[str, Array]:

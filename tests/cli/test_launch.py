@@ -34,26 +34,6 @@ def test_long_output_arrives_whole_through_a_pipe() -> None:
     assert done.stdout.rstrip().endswith("]")
 
 
-def test_without_pinocchio_what_needs_it_says_so_and_the_rest_works(tmp_path: Path) -> None:
-    script = "import sys; sys.modules['pinocchio'] = None; " + PROGRAM
-    for words, code in (
-        (("simulate", "ur5-circle", "--set", "duration=0.1", "-o", tmp_path / "log.csv"), 1),
-        (("compare", FIXTURE, "--robot", "ur5", "--reference", TRUTH), 0),
-    ):
-        done = subprocess.run(
-            [sys.executable, "-c", script, *map(str, words)],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == code, done.stderr
-        if code:
-            assert done.stderr.splitlines()[-1] == (
-                "error: vftcli simulate needs pin, which is not installed here: pip install pin"
-            )
-    assert not any(tmp_path.iterdir())
-
-
 def test_functions_registered_for_the_exit_are_called() -> None:
     script = "import atexit; atexit.register(lambda: print('called at exit')); " + PROGRAM
     done = subprocess.run(

@@ -42,6 +42,8 @@ def test_an_effort_is_told_from_what_it_may_be() -> None:
     bare = torque - gravity(UR10E, log)
     assert cause(replace(log, current=-current)) == ("effort-sign", ())
     assert cause(replace(log, current=torque)) == ("current-as-torque", ())
+    assert cause(replace(log, current=-torque)) == ("current-as-turned-torque", ())
+    assert cause(replace(plain, torque=-current)) == ("torque-as-turned-current", ())
     assert cause(replace(log, current=1e3 * current)) == ("milliamperes", ())
     assert cause(replace(log, current=bare)) == ("torque-without-gravity", ())
     assert cause(replace(log, current=bare / constant)) == ("current-without-gravity", ())

@@ -13,7 +13,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from array_mutants import archive_mutant, parquet_mutant, record_mutant
-from container_mutants import arrow_mutant, hdf5_mutant, json_mutant, matlab_mutant
+from container_mutants import (
+    arrow_mutant,
+    dataset_mutant,
+    hdf5_mutant,
+    json_mutant,
+    matlab_mutant,
+)
 from message_mutants import bag_mutant, folder_mutant, mcap_mutant
 from option_mutants import option_words
 from robot_mutants import toml_mutant, urdf_mutant
@@ -45,6 +51,7 @@ MUTATORS: dict[str, Callable[[Seed, Rng, Path], Mutant]] = {
     "mcap": mcap_mutant,
     "bag": bag_mutant,
     "folder": folder_mutant,
+    "dataset": dataset_mutant,
     "robot": toml_mutant,
     "gains": toml_mutant,
     "scenario": toml_mutant,
@@ -54,7 +61,7 @@ MUTATORS: dict[str, Callable[[Seed, Rng, Path], Mutant]] = {
 WEIGHTS = {
     "table": 15, "lines": 5, "parquet": 8, "npz": 6, "npy": 2, "pickle": 5, "records": 4,
     "mcap": 10, "bag": 6, "folder": 6, "arrow": 5, "json": 3, "mat": 4, "hdf5": 6,
-    "robot": 5, "urdf": 3, "mjcf": 1, "gains": 1, "scenario": 1, "options": 4,
+    "dataset": 5, "robot": 5, "urdf": 3, "mjcf": 1, "gains": 1, "scenario": 1, "options": 4,
 }  # fmt: skip
 """Family → inputs of a hundred."""
 
@@ -117,6 +124,10 @@ def attempt(
         else:
             options = ["--columns", seed.columns] if seed.columns else []
             robot = ["--robot", "ur5" if seed.joints == 6 else "panda"]
+            if family == "dataset" and rng.random() < 0.5:
+                options += ["--episode", pick(rng, ("0", "1", "2", "9", "all", "-1", "x"))]
+            if seed.name == "jacobian":
+                command, robot = pick(rng, ("estimate", "compare")), ["--wrench"]
             words = [command, str(place), *options, *(robot if command in ANALYSES else [])]
     words += {
         "inspect": ["--json"],

@@ -1,12 +1,14 @@
-"""Mutations of containers: Arrow, JSON documents, MATLAB files and HDF5."""
+"""Mutations of containers: Arrow, JSON documents, MATLAB files, HDF5, and folders of them."""
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from array_mutants import Arrays, arrays_changed, changed_inside, table_changed
+from array_mutants import Arrays, arrays_changed, changed_inside, parquet_mutant, table_changed
 from bytes_mutants import mutate_bytes
+from text_mutants import lines_mutant
 from tokens import Mutant, Rng, Seed, pick
 
 
@@ -109,3 +111,25 @@ def odd_object(file: Any, name: str, rng: Rng) -> str:
     else:
         file.create_dataset(name, data=np.array([file.ref] * 3, dtype=h5py.ref_dtype))
     return f" odd{kind}"
+
+
+IN_DATASET = {
+    ".parquet": parquet_mutant, ".json": json_mutant, ".jsonl": lines_mutant, ".h5": hdf5_mutant,
+}  # fmt: skip
+"""Ending of a file in a data set → what changes it."""
+
+
+def dataset_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
+    """A data set with one of its files changed, gone, or called like another."""
+    shutil.copytree(seed.path, path)
+    files = sorted(file for file in path.rglob("*") if file.is_file())
+    file, kind = pick(rng, files), rng.random()
+    if kind < 0.1:
+        file.unlink()
+        return Mutant(f"without {file.name}", path=path)
+    if kind < 0.2:
+        file.replace(pick(rng, files))
+        return Mutant(f"moved {file.name}", path=path)
+    sound = seed.path / file.relative_to(path)
+    how = IN_DATASET[file.suffix](seed._replace(path=sound), rng, file).how
+    return Mutant(f"{file.name}: {how}", path=path)

@@ -14,6 +14,7 @@ from tokens import Seed
 sys.path.insert(0, str(Path(__file__).parents[1] / "readers"))
 import seed_containers
 import seed_logs
+from test_lerobot import dataset
 
 MOST = 60
 """Rows or messages of a seed: an input should cost some tens of milliseconds."""
@@ -24,8 +25,8 @@ FAMILIES = {
     "ur-binary": "records", "npy": "npy", "npz": "npz", "pickle": "pickle", "parquet": "parquet",
     "arrow": "arrow", "arrow-stream": "arrow", "json": "json", "json-skills": "json",
     "json-lines": "lines", "mat": "mat", "mat-struct": "mat", "hdf5": "hdf5", "aloha": "hdf5",
-    "robomimic": "hdf5", "rosbag1": "bag", "rosbag1-lz4": "bag", "db3": "folder",
-    "mcap": "mcap", "mcap-json": "mcap",
+    "robomimic": "hdf5", "mat-73": "hdf5", "rosbag1": "bag",
+    "rosbag1-lz4": "bag", "db3": "folder", "mcap": "mcap", "mcap-json": "mcap",
 }  # fmt: skip
 """Seed of the reader tests → the mutator that knows its structure."""
 
@@ -103,9 +104,35 @@ def seeds_in_code(folder: Path) -> Iterator[Seed]:
         path = folder / name
         made = make(path)
         yield Seed(name, family, made, columns)
+    for version in (2, 3):
+        yield Seed(
+            f"lerobot-{version}", "dataset", dataset(folder / f"set{version}", version=version)
+        )
+    if find_spec("h5py") is not None:
+        seed_containers.droid(folder / "droid" / "a")
+        seed_containers.droid(folder / "droid" / "b")
+        yield Seed("droid", "dataset", folder / "droid")
+    yield Seed("jacobian", "table", jacobian_table(folder / "jacobian.csv"))
     for storage in ("sqlite3", "mcap"):
         path = seed_logs.rosbag2(folder / f"rosbag2-{storage}", storage=storage)
         yield Seed(f"rosbag2-{storage}", "folder", path)
+
+
+def jacobian_table(path: Path) -> Path:
+    """Torques beside a Jacobian and a sensor's wrench, without positions."""
+    import numpy as np
+
+    rng = np.random.default_rng(17)
+    J = rng.standard_normal((MOST, 6, 7))
+    J[:, 3:] /= np.linalg.norm(J[:, 3:], axis=1)[:, None]
+    wrench = rng.standard_normal((MOST, 6))
+    parts = [np.arange(MOST) / 80, np.einsum("tij,ti->tj", J, wrench), J.reshape(MOST, 42), wrench]
+    names = ["timestamp", *(f"tau_ext_{j}" for j in range(7))]
+    names += [f"jacobian_{r}_{c}" for r in range(6) for c in range(7)]
+    names += ["fx", "fy", "fz", "mx", "my", "mz"]
+    table = np.column_stack(parts)
+    np.savetxt(path, table, "%.9g", delimiter=",", header=",".join(names), comments="")
+    return path
 
 
 def robot_seeds(folder: Path) -> Iterator[Seed]:

@@ -16,6 +16,7 @@ from vftcli.robots.friction import friction_torque
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.robots.terms import dynamics_terms
 from vftcli.robots.transmission import at_motors, joint_torque, motor_torque
+from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
 
 UR5 = load_robot("ur5")
@@ -83,6 +84,20 @@ def test_what_the_file_says_is_kept(made):
 def test_without_friction_nothing_tells_a_coupling(made):
     given = training(made(1.0), rubs=False)
     assert with_couplings(given) == (given, [])
+
+
+def test_targets_of_coupled_joints_are_refused(made):
+    """Nobody knows whose they are: taken for the joints', motor 6 would show in joint 6 alone."""
+    T = np.eye(6)
+    T[5, 4] = 1.0
+    log = made(1.0)
+    asked = log.current * UR5.torque_constant
+    log = replace(log, target_current=log.current, target_torque=asked)
+    robot = with_transmission(UR5, T)
+    with pytest.raises(IdentificationError, match=r"driven through each other .*--method friction"):
+        identify([log], robot, Task(method="targets"))
+    found = identify([log], robot, Task(method="friction")).robot.chain.transmission
+    np.testing.assert_array_equal(found, T)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from vftcli.observers import MomentumObserver
 from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.remarks import Remark
 
 
 @pytest.fixture
@@ -41,3 +43,29 @@ def random_walk(
     t = np.concatenate([[0.0], np.cumsum(steps)])
     p = 2.0 + np.cumsum(rng.normal(0, 0.1, (samples, joints)), axis=0)
     return DynamicsTerms(t=t, p=p, mu=rng.normal(0, 5, (samples, joints)))
+
+
+@pytest.fixture
+def in_blocks() -> Callable[..., tuple[np.ndarray, tuple[Remark, ...]]]:
+    """Runs an observer over a log block by block."""
+    return run_in_blocks
+
+
+def run_in_blocks(
+    observer: MomentumObserver, log: DynamicsTerms, size: int
+) -> tuple[np.ndarray, tuple[Remark, ...]]:
+    """τ̂ over a log cut into blocks of `size` samples, and the remarks of the last block."""
+    state, before, tau = None, None, []
+    for first in range(0, log.samples, size):
+        span = slice(first, first + size)
+        block = DynamicsTerms(
+            t=log.t[span],
+            p=log.p[span],
+            mu=log.mu[span],
+            log_clock=log.clock,
+            before=before,
+        )
+        estimate, state = observer.run(block, state)
+        before = block.last
+        tau.append(estimate.tau)
+    return np.concatenate(tau), estimate.remarks

@@ -1,15 +1,17 @@
 """Kalman observers against a dense textbook filter, SciPy's Riccati and matrix exponential."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_are
 
 from vftcli.observers import KalmanObserver
-from vftcli.observers.kalman_gains import Covariance, gain_sequence
+from vftcli.observers.kalman_gains import Covariance
 from vftcli.observers.kalman_model import NOISE_CONVENTIONS, Densities, zero_order_hold
-from vftcli.observers.recursion import steps_of
+from vftcli.observers.recursion import PIECE
+from vftcli.observers.uneven_kalman import gain_sequence
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
 
@@ -34,17 +36,17 @@ def paper(scheme: str, convention: str = "density", **more: object) -> KalmanObs
 
 def dense(observer: KalmanObserver, log: DynamicsTerms) -> tuple[np.ndarray, np.ndarray]:
     """The 2n-state textbook filter with full matrices; returns τ̂ and its standard deviation."""
-    n, steps = log.joints, steps_of(log.t)
+    n, clock = log.joints, log.clock
     eye, zero = np.eye(n), np.zeros((n, n))
     C, whole = np.hstack([eye, zero]), np.eye(2 * n)
-    prior = observer.steady(steps.median, n).prior
+    prior = observer.steady(clock.step, n).prior
     P = np.block(
         [[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]]
     )
     x = np.concatenate([log.p[0], np.zeros(n)])
     tau, sd = np.empty_like(log.p), np.empty_like(log.p)
     for k in range(log.samples):
-        step = steps.median if steps.uniform else steps.dt[k]
+        step = clock.step if clock.uniform else log.dt[k, 0]
         m = observer.model(step, n)
         if k:
             A = np.block([[eye, np.diag(m.a12)], [zero, np.diag(m.a22)]])
@@ -148,11 +150,11 @@ def test_a_users_initial_covariance_is_followed_exactly(scheme: str, wandering: 
     """Blocks run side by side give the plain loop's covariances, transient and all."""
     start = np.array([[50.0] * 6, [3.0] * 6, [4e4] * 6])
     observer, log = paper(scheme, initial_covariance=start), wandering(samples=800, jitter=0.3)
-    steps = steps_of(log.t)
+    dt = log.dt[:, 0]
     P = start.copy()
     expected = []
     for k in range(log.samples):
-        m = observer.model(steps.dt[k], 6)
+        m = observer.model(dt[k], 6)
         p11, p12, p22 = P
         if k:
             p11, p12, p22 = (
@@ -270,3 +272,23 @@ def test_half_the_power_passes_at_the_bandwidth(scheme: str) -> None:
     s, omega = 2j * np.pi * tuning.bandwidth, tuning.omega_n
     response = omega**2 / (s**2 + 2.0 * tuning.zeta * omega * s + omega**2)
     np.testing.assert_allclose(np.abs(response) ** 2, 0.5, rtol=1e-12)  # rounding
+
+
+@pytest.mark.parametrize(
+    "more",
+    [{}, {"as_printed": True}, {"initial_covariance": np.array([4.0, 0.0, 100.0])}],
+    ids=["plain", "as printed", "P0"],
+)
+@pytest.mark.parametrize("jitter", [0.0, 0.2])
+def test_blocks_of_a_log_give_the_whole_log_s_estimate(
+    jitter: float, more: dict[str, object], wandering: TermsOf, in_blocks: Callable[..., Any]
+) -> None:
+    observer, log = paper("zoh", **more), wandering(PIECE + 900, jitter)
+    whole = observer.estimate(log).tau
+    np.testing.assert_array_equal(in_blocks(observer, log, PIECE)[0], whole)
+    for size in (37, 5000):
+        short = slice(0, 400 if size == 37 else None)
+        part = DynamicsTerms(t=log.t[short], p=log.p[short], mu=log.mu[short], log_clock=log.clock)
+        # the same sums in another order; some 100 N·m
+        found = in_blocks(observer, part, size)[0]
+        np.testing.assert_allclose(found, whole[short], rtol=0, atol=1e-11)

@@ -65,6 +65,9 @@ def test_a_bare_robot_gets_ten_per_second_and_is_told() -> None:
     np.testing.assert_array_equal(gmo.gain, [10.0] * 6)
     assert [remark.code for remark in remarks] == ["gain-from-default"]
     assert "10" in str(remarks[0])
+    # From 2/Ts on a first-order observer alternates; at 4 Hz that is 8 1/s.
+    (gmo,), _ = build_observers(["gmo"], setup("", step=0.25))
+    np.testing.assert_array_equal(gmo.gain, [8.0] * 6)
 
 
 MALFORMED = {

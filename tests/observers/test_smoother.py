@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from vftcli.observers import KalmanObserver
-from vftcli.observers.recursion import steps_of
 from vftcli.observers.smoother import KalmanSmoother
 from vftcli.robots.terms import DynamicsTerms
 
@@ -23,17 +22,17 @@ def smoother(scheme: str = "fe", convention: str = "density", **more: object) ->
 
 def dense_rts(smooth: KalmanSmoother, log: DynamicsTerms) -> tuple[np.ndarray, np.ndarray]:
     """Forward filter and backward smoother with full 2n-state matrices, as in any textbook."""
-    f, n, steps = smooth.filter, log.joints, steps_of(log.t)
+    f, n, clock = smooth.filter, log.joints, log.clock
     eye, zero = np.eye(n), np.zeros((n, n))
     C, whole = np.hstack([eye, zero]), np.eye(2 * n)
-    prior = f.steady(steps.median, n).prior
+    prior = f.steady(clock.step, n).prior
     P = np.block(
         [[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]]
     )
     x = np.concatenate([log.p[0], np.zeros(n)])
     filtered, predicted = [], []
     for k in range(log.samples):
-        step = steps.median if steps.uniform else steps.dt[k]
+        step = clock.step if clock.uniform else log.dt[k, 0]
         m = f.model(step, n)
         A = np.block([[eye, np.diag(m.a12)], [zero, np.diag(m.a22)]])
         if k:

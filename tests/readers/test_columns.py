@@ -153,6 +153,7 @@ def test_a_headerless_table_that_is_described_wrongly(
         ("t=t,q=pos_{i}", r"no column 'pos_\{i\}'"),
         ("t=t,q=q_0|q_1,dq=dq_0", "dq has 1 columns, q has 2"),
         ("t=t,q=q_0[0:2]", "not of lists"),
+        ("t=t,q=q_0|q_1|q_1", "a column of q twice"),
     ],
 )
 def test_a_headed_table_that_is_described_wrongly(tmp_path: Path, columns: str, told: str) -> None:

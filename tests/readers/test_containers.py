@@ -1,7 +1,7 @@
 """Arrow, JSON, MATLAB and HDF5 files: what is read of each, and what is refused by name."""
 
-import builtins
 import json
+import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -280,15 +280,9 @@ class TestHdf5:
     def test_without_h5py_the_file_is_named_with_the_remedy(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        path, importing = seeds.aloha(tmp_path / "x"), builtins.__import__
-
-        def without(name: str, *rest: object) -> object:
-            if name == "h5py":
-                raise ImportError(name)
-            return importing(name, *rest)
-
-        monkeypatch.setattr(builtins, "__import__", without)
-        with pytest.raises(LogError, match=r"an HDF5 file, .*pip install 'vftcli\[hdf5\]'"):
+        path = seeds.aloha(tmp_path / "x")
+        monkeypatch.setitem(sys.modules, "h5py", None)
+        with pytest.raises(LogError, match=r"an HDF5 file needs h5py, .*'vftcli\[hdf5\]'"):
             read(path)
 
 

@@ -1,6 +1,7 @@
 """Hostile containers: what claims or unpacks to gigabytes, leads elsewhere, or has no end."""
 
 import struct
+import zlib
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -74,6 +75,38 @@ def leads_out(path: Path) -> Path:
         layout[:] = h5py.VirtualSource(other.name, "q", shape=motion()["q"].shape)
         file.create_virtual_dataset("joint_pos", layout)
     return path
+
+
+def one_chunk(path: Path, rows: int, packed: bytes, deflated: int = 1) -> Path:
+    """Positions in one chunk of some rows, with a content that need not fit."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["t"], file["dq"] = motion()["t"], motion()["dq"]
+        settings = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        settings.set_chunk((rows, 6))
+        for _ in range(deflated):
+            settings.set_filter(h5py.h5z.FILTER_DEFLATE, 0, (1,))
+        space = h5py.h5s.create_simple(motion()["q"].shape, (h5py.h5s.UNLIMITED, 6))
+        q = h5py.h5d.create(file.id, b"q", h5py.h5t.NATIVE_DOUBLE, space, settings)
+        q.write_direct_chunk((0, 0), packed)
+    return path
+
+
+def large_chunk(path: Path) -> Path:
+    """Some rows in a chunk of ten million, which is unpacked whole."""
+    return one_chunk(path, 10_000_000, zlib.compress(b""))
+
+
+def lying_chunk(path: Path) -> Path:
+    """A chunk of the rows that are there, whose content inflates to 480 MB."""
+    return one_chunk(path, ROWS, zlib.compress(bytes(480_000_000)))
+
+
+def deflated_twice(path: Path) -> Path:
+    """Some kilobytes that inflate to half a megabyte, and these to 480 MB."""
+    packed = zlib.compress(zlib.compress(bytes(480_000_000)))
+    return one_chunk(path, ROWS, packed, deflated=2)
 
 
 def matlab_bomb(path: Path) -> Path:
@@ -152,6 +185,9 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "claim": (claim, "unpack to more than 128 MiB"),
     "claims_of_many": (claims_of_many, "unpack to more than 128 MiB"),
     "claim_of_matlab": (claim_of_matlab, "unpack to more than 128 MiB"),
+    "large_chunk": (large_chunk, "its chunks unpack to 457 MiB each"),
+    "lying_chunk": (lying_chunk, "a chunk unpacks to more than"),
+    "deflated_twice": (deflated_twice, "packed by HDF5's filters [1, 1]"),
     "leads_out": (leads_out, "no joint positions (q) among t"),
     "matlab_bomb": (matlab_bomb, "unpacks to more than 128 MiB"),
     "matlab_struct_bomb": (matlab_struct_bomb, "unpacks to more than 128 MiB"),
@@ -170,7 +206,10 @@ READ: dict[str, tuple[Callable[[Path], Path], int]] = {
 }
 """What is made, and the samples that are read all the same."""
 
-OF_HDF5 = {"claim", "claims_of_many", "claim_of_matlab", "circle", "leads_out"}
+OF_HDF5 = {
+    "claim", "claims_of_many", "claim_of_matlab", "large_chunk", "lying_chunk",
+    "deflated_twice", "circle", "leads_out",
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -213,10 +213,11 @@ def test_columns_say_more_of_one_signal(tmp_path: Path) -> None:
     [
         ("info.json", "{", "not a readable description"),
         ("episodes.jsonl", '{"episode_index": 0}\n', "a line that tells no episode"),
+        ("episodes.jsonl", "\xe5", "not text in UTF-8"),
     ],
 )
 def test_a_damaged_description_is_refused(name: str, text: str, words: str, tmp_path: Path) -> None:
     path = dataset(tmp_path, version=2)
-    (path / "meta" / name).write_text(text)
+    (path / "meta" / name).write_text(text, encoding="latin-1")
     with pytest.raises(LogError, match=words):
         read(path)

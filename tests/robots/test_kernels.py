@@ -1,6 +1,7 @@
 """The batched kernels against Pinocchio, which shares no code with them."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,8 @@ import pinocchio as pin
 import pytest
 
 from vftcli.robots import PROFILES, Payload, Robot, kernels, load_robot
-from vftcli.robots.kernels import momentum_terms
+from vftcli.robots.chain import Chain
+from vftcli.robots.kernels import felt_bodies, momentum_chunks, momentum_terms
 from vftcli.robots.literal import literal_momentum_terms
 
 TILTED = np.array([3.1, -4.2, -8.3])  # a base on a wall bracket, |g| = 9.81 to 1 %
@@ -16,6 +18,8 @@ LOAD = Payload(mass=2.0, com=np.array([0.02, 0.03, 0.08]), inertia=np.diag([0.01
 
 # Both sides round at 1e-16 of terms up to a few hundred N·m, over some hundred operations.
 ROUNDING = 1e-10
+
+PER_JOINT = ("names", "rotation", "translation", "mass", "com", "inertia", "rotor_inertia")
 
 
 def tilted(robot: Robot, gravity: Sequence[float] | np.ndarray) -> Robot:
@@ -91,7 +95,7 @@ def test_chunks_leave_no_seam(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernels, "CHUNK", 77)
     parts = momentum_terms(robot.loaded_chain, q, dq)
     for one, other in zip(whole, parts, strict=True):
-        np.testing.assert_allclose(other, one, atol=1e-13, rtol=0)  # BLAS blocks sums differently
+        np.testing.assert_array_equal(other, one)
 
 
 def test_arm_at_rest_without_gravity_has_no_torque() -> None:
@@ -113,3 +117,76 @@ def test_rotor_inertia_counts_in_the_momentum() -> None:
     with_rotor = momentum_terms(robot.chain, q, dq).p
     without = momentum_terms(bare, q, dq).p
     np.testing.assert_allclose(with_rotor - without, dq * robot.chain.rotor_inertia, atol=1e-13)
+
+
+def dense(robot: Robot, seed: int) -> Chain:
+    """The arm with every frame turned and shifted at random: no angle or offset is special."""
+    rng = np.random.default_rng(seed)
+    n = robot.joints
+    R = np.array([np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(n)])
+    R *= np.sign(np.linalg.det(R))[:, None, None]
+    r = rng.normal(0.0, 0.3, (n, 3))
+    return replace(robot.chain, rotation=R, translation=r, gravity=TILTED)
+
+
+@pytest.mark.parametrize("joints", [1, 6, 7])
+def test_general_rotations_agree_with_pinocchio(joints: int) -> None:
+    chain = dense(load_robot("panda" if joints == 7 else "ur5"), seed=9)
+    if joints == 1:
+        cut = {k: v[:1] for k, v in vars(chain).items() if k in PER_JOINT}
+        chain = replace(chain, **cut)
+    rng = np.random.default_rng(10)
+    q, dq = rng.normal(0.0, 3.0, (2, 50, joints))
+    terms = momentum_terms(chain, q, dq)
+    model = chain.to_pinocchio()
+    data = model.createData()
+    for k in range(len(q)):
+        M = pin.crba(model, data, q[k])
+        C = pin.computeCoriolisMatrix(model, data, q[k], dq[k])
+        g = pin.computeGeneralizedGravity(model, data, q[k])
+        np.testing.assert_allclose(terms.p[k], M @ dq[k], atol=ROUNDING, rtol=0)
+        np.testing.assert_allclose(
+            terms.coriolis_transpose_dq[k], C.T @ dq[k], atol=ROUNDING, rtol=0
+        )
+        np.testing.assert_allclose(terms.gravity[k], g, atol=ROUNDING, rtol=0)
+
+
+def test_bodies_hand_on_what_their_joint_cannot_feel() -> None:
+    """No mass, no first moment along the axis and no J_yy is left, so that little is computed."""
+    bodies = felt_bodies(load_robot("ur5").with_payload(LOAD).loaded_chain)
+    assert not bodies.mass.any()
+    assert not bodies.moment[:, 2].any()
+    assert not bodies.inertia[:, 1, 1].any()
+
+
+@pytest.mark.parametrize("samples", [0, 1, 2])
+def test_short_logs(samples: int) -> None:
+    robot = load_robot("ur5")
+    q, dq = states(robot, seed=11, samples=3)
+    whole, part = (
+        momentum_terms(robot.chain, x, y) for x, y in ((q, dq), (q[:samples], dq[:samples]))
+    )
+    for one, other in zip(whole, part, strict=True):
+        np.testing.assert_array_equal(other, one[:samples])
+
+
+def test_bias_is_coriolis_less_gravity_and_programs_of_several_arms_do_not_mix() -> None:
+    q, dq = states(load_robot("ur5"), seed=12)
+    arms = [load_robot(name).chain for name in ("ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e")]
+    expected = [momentum_terms(chain, q, dq) for chain in arms]
+    for chain, terms in zip(arms, expected, strict=True):
+        ((_, velocity, (p, bias)),) = momentum_chunks(chain, q, dq, ("p", "bias"))
+        np.testing.assert_array_equal(velocity, dq)
+        np.testing.assert_array_equal(p, terms.p)
+        # one sum in another order, of torques of 10²
+        np.testing.assert_allclose(bias, terms.coriolis_transpose_dq - terms.gravity, atol=1e-12)
+
+
+def test_threads_do_not_share_what_they_work_in() -> None:
+    robot = load_robot("ur5")
+    logs = [states(robot, seed=20 + k, samples=4000) for k in range(4)]
+    alone = [momentum_terms(robot.chain, *log).p for log in logs]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda log: momentum_terms(robot.chain, *log).p, logs * 5))
+    for one, other in zip(alone * 5, together, strict=True):
+        np.testing.assert_array_equal(other, one)

@@ -114,6 +114,8 @@ def test_without_pinocchio_an_mjcf_is_refused_and_a_urdf_is_read(
     from made_urdfs import fingered
 
     monkeypatch.setitem(sys.modules, "pinocchio", None)
-    with pytest.raises(RobotError, match="read by Pinocchio, which is not installed: pip install"):
+    with pytest.raises(
+        RobotError, match="an MJCF needs pin, which is not installed here: pip install pin"
+    ):
         load_robot(written(tmp_path, mjcf(), "arm.xml"))
     assert load_robot(written(tmp_path, fingered())).joints == 7

@@ -1,14 +1,17 @@
 """DynamicsTerms: μ as (33) defines it, and what is said when a signal is missing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from vftcli.robots import load_robot
 from vftcli.robots.drive import drive_torque
-from vftcli.robots.terms import dynamics_terms
+from vftcli.robots.terms import DynamicsTerms, RunningTerms, dynamics_terms
 from vftcli.signals.errors import MissingSignalError, RobotError
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import clock_of
 
 
 def motion(joints: int, samples: int = 400, rate: float = 500.0) -> tuple[np.ndarray, ...]:
@@ -90,3 +93,33 @@ def test_current_for_a_robot_without_drive_constants_is_refused() -> None:
     recording = Recording(t=t, q=q, dq=dq, current=q)
     with pytest.raises(MissingSignalError, match="no torque_constant"):
         dynamics_terms(recording, load_robot("panda"))
+
+
+@pytest.mark.parametrize("size", [1, 150, 399])
+def test_blocks_of_a_log_have_the_whole_log_s_terms(size: int) -> None:
+    """To the last bit, friction that remembers the motion included."""
+    robot = load_robot("ur5")
+    slips = {**robot.friction[0].parameters, "presliding": 2.0, "presliding_length": 0.05}
+    friction = (replace(robot.friction[0], parameters=slips), *robot.friction[1:])
+    robot = replace(robot, friction=friction)
+    t, q, dq, _ = motion(6)
+    t = t + 1e-4 * np.random.default_rng(1).uniform(-1, 1, len(t))
+    log = Recording(t=t, q=q, dq=dq, current=np.cos(q))
+    whole = dynamics_terms(log, robot)
+    running = RunningTerms(robot, clock_of(t))
+    for first in range(0, len(t), size):
+        span = slice(first, first + size)
+        block = running.next(Recording(t=t[span], q=q[span], dq=dq[span], current=np.cos(q[span])))
+        for name in ("p", "mu", "d", "dt"):
+            np.testing.assert_array_equal(getattr(block, name), getattr(whole, name)[span])
+
+
+def test_the_unexplained_change_of_momentum_is_the_trapezoid() -> None:
+    rng = np.random.default_rng(2)
+    t = np.cumsum(rng.uniform(0.5, 1.5, 50))
+    p, mu = rng.normal(size=(50, 3)), rng.normal(size=(50, 3))
+    terms = DynamicsTerms(t=t, p=p, mu=mu)
+    expected = np.diff(p, axis=0) - 0.5 * np.diff(t)[:, None] * (mu[1:] + mu[:-1])
+    np.testing.assert_allclose(terms.d[1:], expected, atol=1e-14)  # rounding of a few
+    np.testing.assert_array_equal(terms.d[0], 0.0)
+    np.testing.assert_array_equal(replace(terms, mu=0 * mu).d[1:], np.diff(p, axis=0))

@@ -8,7 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vftcli.signals.errors import ClockError
-from vftcli.signals.series import bridge_unknown, gaps_of, median_step, resample_columns, runs_of
+from vftcli.signals.series import (
+    bridge_unknown,
+    clock_of,
+    gaps_of,
+    median_step,
+    resample_columns,
+    runs_of,
+)
 
 
 @given(st.lists(st.booleans(), max_size=60))
@@ -33,6 +40,13 @@ def test_runs_reach_the_first_and_the_last_sample() -> None:
 def test_the_step_is_the_median_one(steps: list[float]) -> None:
     t = np.concatenate([[0.0], np.cumsum(steps)])
     assert median_step(t) == np.median(np.diff(t))
+
+
+def test_a_clock_is_even_or_not_and_has_a_step() -> None:
+    even = np.arange(100) * 0.004
+    assert clock_of(even) == (True, pytest.approx(0.004, rel=1e-15))
+    assert clock_of(np.delete(even, 50)) == (False, pytest.approx(0.004, rel=1e-12))
+    assert clock_of(even[:1]) == (True, 1.0)
 
 
 def test_one_sample_has_no_step() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.packages import needed
 from vftcli.signals.pose import exp_matrix
 
 ITERATIONS = 12
@@ -30,7 +31,7 @@ class FlangeSolver:
     """
 
     def __init__(self, robot: Robot) -> None:
-        import pinocchio as pin
+        pin = needed("pinocchio", "an admittance replay")
         from scipy.linalg.lapack import dposv
 
         if robot.joints < 6:

@@ -20,9 +20,6 @@ from vftcli.cli.help import GroupedCommand, JourneyGroup
 from vftcli.signals.errors import VftError
 from vftcli.signals.letters import printable
 
-PACKAGES = {"pinocchio": "pin"}
-"""Module of a dependency that some platforms lack → the package that holds it."""
-
 
 def make_app(load: Collection[str] = tuple(COMMANDS)) -> typer.Typer:
     """Make the command line; a command that is not to be loaded has its summary only."""
@@ -87,13 +84,6 @@ def main() -> None:
         make_app(asked_for())(prog_name="vftcli")
     except VftError as error:
         fail(str(error))
-    except ModuleNotFoundError as error:
-        if (package := PACKAGES.get(error.name or "")) is None:
-            raise
-        fail(
-            f"vftcli {' '.join(sorted(asked_for()))} needs {package}, which is not installed here: "
-            f"pip install {package}"
-        )
     except MemoryError:
         fail("out of memory; use --interval to take a part of the log")
     except OSError as error:

@@ -155,13 +155,15 @@ def admit(
     Example: vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9
     """
     from vftcli.admittance.choice import ControlChoice, split_settings
-    from vftcli.cli.console import command_line, say
+    from vftcli.cli.console import command_line, say, say_left_out
     from vftcli.cli.opening import open_made
     from vftcli.outputs.admittance.files import files_of_replay, write_admittance
     from vftcli.outputs.files import OutputFolder
+    from vftcli.signals.packages import check_installed
 
     if sum((log is not None, bool(release.release), loop.closed_loop is not None)) != 1:
         raise typer.BadParameter("give one of LOG, --release AXIS=VALUE, --closed-loop SCENARIO")
+    check_installed("pinocchio", "vftcli admit")
     own, others = split_settings(analysis.observers.assignments or ())
     control = ControlChoice.parsed(assignments=own, **controllers.words())
     observers = analysis.observers.changed(assignments=others)
@@ -195,6 +197,7 @@ def admit(
         )
         if not (shown.json or shown.table.latex):
             say(f"wrote {output}: vftcli open {output}")
+        say_left_out(files_of_replay(form))
         if show_made:
             open_made(output)
 

@@ -19,6 +19,7 @@ class BenchOptions(Bundle):
     examination: bool = flag(
         "--examination", "Measure the examination too, on a minute and on a log of 118 MB."
     )
+    latex: bool = flag("--latex", "Print a LaTeX table (booktabs).")
     memory: bool = flag("--memory", "Measure memory too, on a million samples of a Panda.")
 
 
@@ -30,9 +31,11 @@ def bench(measured: BenchOptions, json: opt.Json = False) -> None:
     """
     from vftcli.benchmark import benchmark, memory_per_sample
     from vftcli.cli.console import say_json
-    from vftcli.outputs.grid import terminal
+    from vftcli.outputs.grid import latex, terminal
     from vftcli.outputs.listings import bench_grid
+    from vftcli.signals.packages import check_installed
 
+    check_installed("pinocchio", "vftcli bench")
     result = benchmark(measured.robot, measured.samples, measured.rounds)
     if measured.examination:
         result["examination"] = examined(measured)
@@ -42,11 +45,20 @@ def bench(measured: BenchOptions, json: opt.Json = False) -> None:
     if json:
         say_json(result)
         return
-    typer.echo(f"{result['robot']}, {measured.samples} samples, median of {measured.rounds} rounds")
+    if measured.latex:
+        typer.echo(latex(bench_grid(result)), nl=False)
+        return
+    typer.echo(
+        f"{result['robot']}, {measured.samples} samples, median of {measured.rounds} rounds, "
+        f"NumPy with {result['simd']}"
+    )
     typer.echo(terminal(bench_grid(result)))
     ratios = result["ratios"]
     typer.echo(
-        f"all observers with dynamics / one bare pin.rnea loop: {ratios['core_over_rnea_loop']:.2f}"
+        f"all observers with dynamics / one bare pin.rnea loop: "
+        f"{ratios['core_over_rnea_loop']:.2f}; on a clock that jitters "
+        f"{ratios['core_over_rnea_loop_jittering']:.2f}; when first called "
+        f"{ratios['core_over_rnea_loop_cold']:.2f}"
     )
     typer.echo(f"per-sample Pinocchio script / this: {ratios['analytic_script_over_core']:.0f}")
     typer.echo(f"the paper's literal method / this: {ratios['literal_script_over_core']:.0f}")

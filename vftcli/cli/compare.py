@@ -11,6 +11,8 @@ from vftcli.cli.bundles import Bundle, flag, option, taken_apart
 from vftcli.cli.help import COMPARE, OUTPUT
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from vftcli.outputs.files import OutputFolder
 
 MORE = "Intervals, lags and significance: --details"
@@ -51,20 +53,31 @@ class DrawnErrors(opt.FigureOptions):
 
         Raises:
             typer.BadParameter: If only one of --figures and -o is given.
-            VftError: If the folder cannot be written.
+            VftError: If figures cannot be drawn, or the folder cannot be written.
         """
-        from vftcli.outputs.figures.log import ERROR_FIGURES
-        from vftcli.outputs.figures.paper import figure_files
-        from vftcli.outputs.files import OutputFolder
-
         form = self.form()
         if (form is None) != (self.output is None):
             raise typer.BadParameter("--figures and -o DIR need each other: tables go to stdout")
         if self.output is None:
             return None
+        from vftcli.outputs.figures.log import ERROR_FIGURES
+        from vftcli.outputs.figures.paper import figure_files
+        from vftcli.outputs.files import OutputFolder
+
         folder = OutputFolder(self.output, self.force, figure_files(form, ERROR_FIGURES))
         folder.check()
         return folder
+
+    def write(self, errors: "pl.DataFrame") -> None:
+        """Draw the errors, if that is asked for, and say where."""
+        if (figures := self.folder()) is not None:
+            from vftcli.cli.console import say
+            from vftcli.outputs.figures.log import error_figures
+            from vftcli.outputs.figures.paper import write_figures
+
+            with figures as folder:
+                write_figures(folder, error_figures(errors), str(self.figures))
+            say(f"wrote {self.output}: figures/errors-single.{self.figures}, errors-double")
 
 
 @taken_apart
@@ -89,33 +102,29 @@ def compare(
     """
     import polars as pl
 
-    from vftcli.cli.console import LeftOut, say, say_analysis
+    from vftcli.cli.console import LeftOut, say_analysis
+    from vftcli.cli.jacobian import JacobianLogs
     from vftcli.evaluation import paired_significance
     from vftcli.evaluation.pooling import PoolMember, evaluate_pooled
-    from vftcli.outputs.figures.log import error_figures
-    from vftcli.outputs.figures.paper import write_figures
     from vftcli.outputs.log import tables
     from vftcli.outputs.log.wrench_tables import paper_bounds
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
 
-    show = {
-        "json": tables.to_json,
-        "csv": tables.to_csv,
-        "markdown": tables.to_markdown,
-        "latex": tables.to_latex,
-    }
-    library, figures = Library(logs), drawn.folder()
+    if drawn.folder() is not None and significance:
+        raise typer.BadParameter("--figures draws the errors; leave --significance away")
+    library = Library(logs)
     choice = analysis.choice(library, reference)
     # The list is for the wrench and for judging contacts; a table of torques needs none.
     listed = choice.contacts and (analysis.wrench.asks or reference.contacts)
     choice = replace(choice, contacts=listed)
     left_out, analyses = LeftOut(library, logs), []
-    for made in analyse_logs(logs, choice, left_out.told):
+    by_jacobian = JacobianLogs(left_out, choice)
+    for made in analyse_logs(logs, choice, by_jacobian.told):
         if not table.json:
             say_analysis(made)
         analyses.append(made)
-    if not analyses:
+    if not (analyses or by_jacobian.judged):
         left_out.end(0)
     if significance:
         pairs = [
@@ -123,24 +132,24 @@ def compare(
             for a in analyses
             if a.reference is not None
         ]
+        if not pairs:
+            raise typer.BadParameter("--significance compares observers, and none ran")
         typer.echo(tables.pairs_text(pl.concat(pairs), as_json=table.json))
         left_out.end(len(analyses))
         return
     errors = [a.errors for a in analyses if a.errors is not None]
+    errors += [made.errors for made in by_jacobian.judged if made.errors is not None]
     members = [
         PoolMember(a.robot.name, a.estimates, a.reference)
         for a in analyses
         if a.reference is not None
     ]
     together = pl.concat([*errors, evaluate_pooled(members)], how="diagonal")
-    if figures is not None:
-        with figures as folder:
-            write_figures(folder, error_figures(together), str(drawn.figures))
-        say(f"wrote {folder.path}: figures/errors-*.{drawn.figures}")
+    drawn.write(together)
     rows, bounds = tables.marked(together, analyses), paper_bounds(analyses)
     if table.form == "terminal":
         text = tables.to_terminal(rows, bounds, every=analysis.talk.details)
         typer.echo(text if analysis.talk.details else f"{text}{MORE}")
     else:
-        typer.echo(show[table.form](rows, bounds))
-    left_out.end(len(analyses))
+        typer.echo(tables.FORMS[table.form](rows, bounds))
+    left_out.end(len(errors))

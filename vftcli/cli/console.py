@@ -5,7 +5,7 @@ import os
 import shlex
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -19,8 +19,6 @@ from vftcli.signals.errors import VftError
 from vftcli.signals.letters import printable, printable_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from vftcli.analysis import Analysis
     from vftcli.doctor import Examination, Examiner
     from vftcli.outputs.canvas import Canvas
@@ -65,6 +63,14 @@ def say(text: str) -> None:
     if _level.get() > QUIET:
         STAGES.clear()
         typer.echo(printable_lines(text), err=True)
+
+
+def say_left_out(names: Iterable[Path | str]) -> None:
+    """Say which of the files that a command writes lack something for want of a package."""
+    from vftcli.outputs.files import left_out
+
+    for line in left_out(Path(name).name for name in names):
+        say(line)
 
 
 def detail(text: str) -> None:

@@ -34,7 +34,7 @@ def convert_log(
 
     Example: vftcli convert fixtures/ur5_circle.csv -o ur5_circle.mcap
     """
-    from vftcli.cli.console import say, say_json
+    from vftcli.cli.console import say, say_json, say_left_out
     from vftcli.doctor import examine
     from vftcli.outputs.examination import health_line
     from vftcli.outputs.log.conversion import check_conversion, convert
@@ -49,6 +49,7 @@ def convert_log(
     convert(recording, output, force=force)
     # A table may be made of any log, also of one that no estimate should be made of.
     say(health_line(examine(recording)))
+    say_left_out([output])
     if json:
         summary = {
             "output": str(output),

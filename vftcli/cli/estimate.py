@@ -43,8 +43,11 @@ def estimate(
     from vftcli.doctor.examiner import EXAMINED
     from vftcli.readers.estimates import refuse_estimates
     from vftcli.readers.library import Library
+    from vftcli.signals.packages import check_installed
 
     extras = also.names(csv=csv, rrd=rrd or show)
+    if "rrd" in extras:
+        check_installed("rerun", "recording.rrd (--rrd, --open)")
     # Of a large log only the columns that are looked at are read; outputs show the others too.
     causal = analysis.observers.causal or analysis.contacts.no_contacts
     signals = EXAMINED if causal and not (analysis.wrench.asks or extras) else None
@@ -53,19 +56,27 @@ def estimate(
         refuse_estimates(log)
     reading = Background(lambda: library.open(log, chosen))
 
-    from vftcli.cli.console import command_line
+    from vftcli.cli.console import command_line, say_left_out
+    from vftcli.cli.jacobian import write_by_jacobian
     from vftcli.cli.opening import open_made
     from vftcli.observers.table import BEST
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
     from vftcli.pipeline import analyse, prepared
+    from vftcli.readers.table import JacobianError
 
     OutputFolder(output, force, estimate_files(extras)).check()
     choice = analysis.choice(library)
     # The list comes with the smoothed wrench of best, the observer that sees the complete log.
     choice = replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
-    made = analyse(*prepared(reading.result(), choice), choice)
+    try:
+        recording = reading.result()
+    except JacobianError as found:
+        write_by_jacobian(log, found, choice, output, force=force, json=json)
+        return
+    made = analyse(*prepared(recording, choice), choice)
     record = write_estimate_folder(output, made, command=command_line(), extras=extras, force=force)
+    say_left_out(estimate_files(extras))
     if json:
         typer.echo(record)
     else:

@@ -112,7 +112,15 @@ def identify_robot(
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
-    from vftcli.cli.console import command_line, detail, health_of, say, say_recording, say_robots
+    from vftcli.cli.console import (
+        command_line,
+        detail,
+        health_of,
+        say,
+        say_left_out,
+        say_recording,
+        say_robots,
+    )
     from vftcli.cli.opening import open_made
     from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
@@ -150,7 +158,9 @@ def identify_robot(
     say_robots(examiner.robots)
     for remark in found.remarks:
         detail(f"note: {remark}")
-    say(f"wrote {', '.join(str(file) for file in beside(output).values())}")
+    files = list(beside(output).values())
+    say(f"wrote {', '.join(str(file) for file in files if file.exists())}")
+    say_left_out(files)
     typer.echo(record.rstrip("\n") if made.json else tables_text(found))
     if show:
         open_made(output.with_suffix(".html"))

@@ -40,6 +40,7 @@ def open_made(path: Path) -> None:
     """
     from vftcli.cli.console import say
     from vftcli.signals.errors import OutputError
+    from vftcli.signals.packages import check_installed
 
     page, recording = found_at(path, PAGE), found_at(path, RECORDING)
     if page is not None:
@@ -48,6 +49,7 @@ def open_made(path: Path) -> None:
         if recording is not None:
             say(f"the recording: vftcli open {recording}")
     elif recording is not None:
+        check_installed("rerun", f"the viewer of {recording}")
         words = [sys.executable, "-m", "rerun", str(recording)]
         quiet = subprocess.DEVNULL
         # It goes on when the command has ended.

@@ -14,9 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from vftcli.analysis import Analysis
-
-if TYPE_CHECKING:
-    from vftcli.analysis import Analysis
+    from vftcli.cli.console import LeftOut
+    from vftcli.pipeline import AnalysisChoice
 
 
 @taken_apart
@@ -47,13 +46,14 @@ def report(
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
     """
-    from vftcli.cli.console import LeftOut, command_line, say_analysis
+    from vftcli.cli.console import LeftOut, command_line, say_left_out
+    from vftcli.cli.jacobian import write_by_jacobian
     from vftcli.cli.opening import open_made
-    from vftcli.evaluation.print_table import check_published, compare_with
+    from vftcli.evaluation.print_table import check_published
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.report import report_files, write_report, write_reports
-    from vftcli.pipeline import analyse_logs
+    from vftcli.outputs.log.report import FILES, report_files, write_report, write_reports
     from vftcli.readers.library import Library
+    from vftcli.readers.table import JacobianError
 
     library = Library(logs)
     extras, form = also.names(), drawn.form()
@@ -63,14 +63,12 @@ def report(
     if published is not None:
         check_published(published, reference.reference)
         choice = replace(choice, observers=choice.observers.beside_print())
-    left_out, analyses = LeftOut(library, logs), []
-    for made in analyse_logs(logs, choice, left_out.told):
-        beside = None
-        if published is not None and made.errors is not None:
-            beside = compare_with(published, made.errors, made.observers, made.tunings)
-        analyses.append(replace(made, published=beside))
-        if not json:
-            say_analysis(made)
+    left_out = LeftOut(library, logs)
+    try:
+        analyses = analysed(logs, choice, left_out, published, json=json)
+    except JacobianError as found:  # of one log; among several it is left out
+        write_by_jacobian(logs[0], found, choice, output, force=force, json=json)
+        return
     if not analyses:
         left_out.end(0)
     choice.progress("writing")
@@ -83,6 +81,7 @@ def report(
         record = write_reports(
             output, analyses, command=command, force=force, extras=extras, form=form, failed=failed
         )
+    say_left_out(FILES)
     if json:
         typer.echo(record)
     else:
@@ -90,6 +89,30 @@ def report(
     if show:
         open_made(output)
     left_out.end(len(analyses))
+
+
+def analysed(
+    logs: "Sequence[Path]",
+    choice: "AnalysisChoice",
+    left_out: "LeftOut",
+    published: str | None,
+    *,
+    json: bool,
+) -> "list[Analysis]":
+    """The logs that can be analysed, a printed table beside their errors where one is asked for."""
+    from vftcli.cli.console import say_analysis
+    from vftcli.evaluation.print_table import compare_with
+    from vftcli.pipeline import analyse_logs
+
+    analyses = []
+    for made in analyse_logs(logs, choice, left_out.told):
+        beside = None
+        if published is not None and made.errors is not None:
+            beside = compare_with(published, made.errors, made.observers, made.tunings)
+        analyses.append(replace(made, published=beside))
+        if not json:
+            say_analysis(made)
+    return analyses
 
 
 def show_report(

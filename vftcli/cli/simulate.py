@@ -61,8 +61,9 @@ def simulate_log(
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """
-    from vftcli.cli.console import command_line, say, say_json
+    from vftcli.cli.console import command_line, say, say_json, say_left_out
     from vftcli.outputs.simulation import free_path, log_folder, save
+    from vftcli.signals.packages import check_installed
     from vftcli.simulation import load_scenario
     from vftcli.simulation.experiment import simulate_pair
     from vftcli.simulation.load import listing
@@ -71,6 +72,7 @@ def simulate_log(
         for name, title in listing():
             typer.echo(f"{name:<16} {title}")
         return
+    check_installed("pinocchio", "vftcli simulate")
     setup = load_scenario(scenario, experiment.settings or ())
     for words in setup.adapted or ():
         say(f"note: {words}")
@@ -79,6 +81,7 @@ def simulate_log(
     runs = simulate_pair(setup, experiment.seed, progress_bar())
     places = dict(zip(paths, runs, strict=True))
     files = [str(f) for f in save(places, experiment.log_format, force, command_line())]
+    say_left_out(files)
     if json:
         about = {"scenario": setup.name, "seed": runs[0].seed, "files": files}
         about |= {"samples": len(runs[0].measured.rows), "robot": setup.robot}

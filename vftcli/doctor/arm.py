@@ -161,6 +161,13 @@ def explained(
             ranked="; ".join(str(found) for found in robots),
         )
         return
+    if (other := diagnosis.unclear) is not None:
+        yield warning(
+            "effort-unclear",
+            other=other.code,
+            misfit_percent=100 * diagnosis.case.misfit,
+            other_percent=100 * other.case.misfit,
+        )
     yield from declared_payload(recording, robot)
     yield from load_remarks(recording, robot, healed)
     yield from vendor_sign(recording, healed)

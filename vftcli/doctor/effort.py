@@ -79,6 +79,7 @@ def readings(
         yield reading("current-as-torque", mean.copy(), as_torque)
         yield reading("milliamperes", driven / 1e3, as_current / 1e3)
         yield reading("effort-sign", -driven, as_current)
+        yield reading("current-as-turned-torque", -mean, as_torque)
         yield reading("torque-without-gravity", mean + gravity, as_torque)
         yield reading("current-without-gravity", driven + gravity, as_current)
         return
@@ -92,4 +93,5 @@ def readings(
     else:
         yield reading("torque-with-gravity", mean.copy(), as_torque)
     if constant is not None:
-        yield reading("torque-as-current", driven, as_current)
+        yield reading("torque-as-current", driven.copy(), as_current)
+        yield reading("torque-as-turned-current", -driven, as_current)

@@ -21,12 +21,16 @@ REFUSING = NO_FIT | {
     "effort-sign", "effort-sign-by-work", "joint-sign", "effort-order", "joint-order",
     "torque-without-gravity", "torque-with-gravity", "current-without-gravity",
     "current-as-torque", "torque-as-current", "milliamperes",
+    "current-as-turned-torque", "torque-as-turned-current",
     "upside-down", "tilted-base", "time-unit", "velocity-unit",
 }  # fmt: skip
 """Findings that make every result meaningless. A load or a contact is never one of them."""
 
 
-READINGS = frozenset({"current-as-torque", "torque-as-current", "milliamperes", "effort-sign"})
+READINGS = frozenset({
+    "current-as-torque", "current-as-turned-torque", "torque-without-gravity",
+    "torque-as-current", "torque-as-turned-current", "milliamperes", "effort-sign",
+})  # fmt: skip
 """Findings that an effort is something else, by which its size is explained."""
 
 ASSUMPTIONS = frozenset({"no-temperature", "temperature-gaps"})

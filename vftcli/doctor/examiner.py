@@ -37,7 +37,9 @@ class Correction(NamedTuple):
 
 CORRECTIONS = {
     "current-as-torque": Correction("torque"),
+    "current-as-turned-torque": Correction("torque", -1.0),
     "torque-as-current": Correction("current"),
+    "torque-as-turned-current": Correction("current", -1.0),
     "torque-without-gravity": Correction("torque_without_gravity"),
     "torque-with-gravity": Correction("torque"),
     "milliamperes": Correction("current", 1e-3),

@@ -6,13 +6,13 @@ from typing import ClassVar
 import numpy as np
 
 from vftcli.observers.first_order import (
-    Piece,
+    FirstOrderState,
     first_order_response,
     first_order_tuning,
     run_first_order,
 )
 from vftcli.observers.observer import Complex, Tuning
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
@@ -28,10 +28,15 @@ class FilteredDynamicsObserver:
         Y₁ᵗ = k₁Y₁ᵗ⁻¹ − k₂(μᵗ + μᵗ⁻¹),  Y₂ᵗ = k₁Y₂ᵗ⁻¹ + k₃(pᵗ + pᵗ⁻¹),  τ̂ = Y₁ + Y₂ + ωp
 
     k₁ = (1−a)/(1+a), k₂ = a/(1+a), k₃ = −ωa/(1+a), from Y₁⁰ = 0 and Y₂⁰ = −ωp⁰, so that τ̂⁰ = 0.
+    Y₁ and Y₂ obey one recursion; with k₃ + ω = ω/(1+a) and k₃ − k₁ω = −ω/(1+a) they are together
+
+        τ̂ᵗ = k₁τ̂ᵗ⁻¹ + ω/(1+a) dᵗ,  dᵗ = pᵗ − pᵗ⁻¹ − ½Ts(μᵗ + μᵗ⁻¹)
+
+    which is what runs: the momentum observer with K = ω, for every sample time.
 
     Two errata of the paper are corrected by default: the printed k₃ has 1 + 2a in its denominator,
-    which leaks a share of the momentum into the estimate, and the printed filter starts from
-    Y₂⁰ = 0, which forgets −ωe^{−ωt}p₀ of (26).
+    which adds a²/(1+2a)·(pᵗ + pᵗ⁻¹) to dᵗ, a share of the momentum that leaks into the estimate;
+    and the printed filter starts from Y₂⁰ = 0, τ̂⁰ = ωp⁰, which forgets −ωe^{−ωt}p₀ of (26).
 
     Attributes:
         omega: Cutoff ω, the same for all joints. [rad/s]
@@ -54,26 +59,24 @@ class FilteredDynamicsObserver:
 
         Past a gap with a > 1 the filter starts afresh, and the estimate's remarks say so.
         """
+        return self.run(terms)[0]
+
+    def run(
+        self, terms: DynamicsTerms, state: FirstOrderState | None = None
+    ) -> tuple[ExternalTorque, FirstOrderState]:
+        """Run over a block of a log from where the block before ended; None where it begins."""
         rate = np.full(terms.joints, self.omega)
-        tau, remarks = run_first_order(terms, rate, self._coefficients, self._start)
-        tau += self.omega * terms.p
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=remarks)
-
-    def _coefficients(self, piece: Piece) -> tuple[Array, Array]:
-        """(29): Y₁ and Y₂ obey the same recursion, so it is their sum that is run."""
-        a, p, mu = piece.a, piece.p, piece.mu
-        k1, k2 = (1.0 - a) / (1.0 + a), a / (1.0 + a)
-        k3 = -self.omega * a / (1.0 + (2.0 if self.as_printed else 1.0) * a)
-        x = p[1:] + p[:-1]
-        x *= k3
-        both = mu[1:] + mu[:-1]
-        both *= k2
-        x -= both
-        return k1, x
-
-    def _start(self, p: Array) -> Array:
-        """Y₁ + Y₂ = −ωp, so that τ̂ = 0; zero as printed."""
-        return np.zeros_like(p) if self.as_printed else -self.omega * p
+        driven = afresh = None
+        if self.as_printed:
+            a, afresh = 0.5 * self.omega * terms.dt, self.omega * terms.p
+            driven = terms.d + a**2 / (1.0 + 2.0 * a) * (terms.p + one_sample_earlier(terms, "p"))
+            if state is None:
+                driven[0] = (1.0 + a[0]) * terms.p[0]  # which alone makes τ̂⁰ = ωp⁰
+        tau, state = run_first_order(terms, rate, state, driven, afresh)
+        estimate = ExternalTorque(
+            name=self.name, t=terms.t, tau=handed_over(tau), remarks=state.remarks
+        )
+        return estimate, state
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """What ω means at a sample time. [s]"""

@@ -1,89 +1,110 @@
 """What the two first-order observers share: sample times, restarts, and what a gain means."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.observers.observer import Complex, Tuning
-from vftcli.observers.recursion import PIECE, Steps, recursion, steps_of
+from vftcli.observers.recursion import PIECE
 from vftcli.observers.steady_filter import steady_filter
+from vftcli.observers.uneven_kalman import Fold, sum_varying
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, Mask, empty_series
+from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.remarks import Remark, caution
 
+GAP = 3.0
+"""A step of more than this many nominal ones is a gap."""
 
-@dataclass(frozen=True)
-class Piece:
-    """A stretch of a log with the sample before it, as a first-order observer works on it.
+
+class FirstOrderState(NamedTuple):
+    """Where a first-order observer stands after a block of a log.
 
     Attributes:
-        p: Momentum, the sample before first. (N+1, n) [kg·m²/s]
-        mu: μ, the sample before first. (N+1, n) [N·m]
-        a: rate·Ts/2, constant (1, n) on a uniform clock, else one a sample. (N, n)
+        states: Its states, the estimate first. (m, n) [N·m]
+        gaps: Number of gaps that it started afresh after.
+        longest: The longest of them. [s]
     """
 
-    p: Array
-    mu: Array
-    a: Array
+    states: Array
+    gaps: int = 0
+    longest: float = 0.0
 
-
-Coefficients = Callable[[Piece], tuple[Array, Array]]
-"""A piece → how much of the state stays (1 or N, n), and what is added to it (N, n)."""
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """That it started afresh, if it did."""
+        if self.gaps == 0:
+            return ()
+        code = "restarted-after-gap" if self.gaps == 1 else "restarted-after-gaps"
+        return (caution(code, gaps=self.gaps, longest_s=self.longest),)
 
 
 def run_first_order(
-    terms: DynamicsTerms, rate: Array, coefficients: Coefficients, start: Callable[[Array], Array]
-) -> tuple[Array, tuple[Remark, ...]]:
-    """Run y_t = decay_t y_{t−1} + x_t over a log, a piece at a time. (T, n), and remarks
+    terms: DynamicsTerms,
+    rate: Array,
+    state: FirstOrderState | None,
+    driven: Array | None = None,
+    afresh: Array | None = None,
+) -> tuple[Array, FirstOrderState]:
+    """Run τ̂ᵗ = (1−a)/(1+a) τ̂ᵗ⁻¹ + rate/(1+a) dᵗ with a = rate·Ts/2 over a block of a log. (T, n)
 
     Past a gap so long that a > 1 the state would change its sign: there the filter starts afresh,
-    and a remark says so. Gains that give a > 1 at the nominal sample time are the user's own choice
-    and restart nothing.
+    and a remark says so. A gap is a step of more than `GAP` nominal ones: on a slow clock that
+    jitters, a passes 1 in many a step that misses nothing. Gains that give a > 1 at the nominal
+    sample time are the user's own choice and restart nothing.
 
     Args:
-        terms: p and μ.
+        terms: The block.
         rate: ω or K. (n,) [1/s]
-        coefficients: The observer's formula.
-        start: Momentum where the filter starts (…, n) → the state it starts from.
+        state: Where the block before ended, None where the log begins, from τ̂ = 0.
+        driven: Its input, `DynamicsTerms.d` if not given. (T, n) [N·m·s]
+        afresh: The estimate where it starts afresh, 0 if not given. (T, n) [N·m]
     """
-    steps = steps_of(terms.t)
-    y = empty_series(terms.samples, terms.joints)
-    y[0] = start(terms.p[0])
-    gaps = 0
-    for first in range(1, terms.samples, PIECE):
-        span, with_before = slice(first, first + PIECE), slice(first - 1, first + PIECE)
-        dt = np.array([steps.median]) if steps.uniform else steps.dt[span]
-        piece = Piece(terms.p[with_before], terms.mu[with_before], 0.5 * dt[:, None] * rate)
-        decay, x = coefficients(piece)
-        afresh = restarts(piece.a, rate, steps)
-        if afresh is not None:
-            gaps += int(np.count_nonzero(afresh.any(axis=1)))
-            decay = np.where(afresh, 0.0, decay)
-            x = np.where(afresh, start(piece.p[1:]), x)
-        y[span] = scalar_recursion(decay, x, y[first - 1])
-    if gaps == 0:
-        return y, ()
-    code = "restarted-after-gap" if gaps == 1 else "restarted-after-gaps"
-    return y, (caution(code, gaps=gaps, longest_s=float(np.max(steps.dt))),)
-
-
-def restarts(a: Array, rate: Array, steps: Steps) -> Mask | None:
-    """Where a gap makes the filter start afresh (N, n), or None where nothing does."""
-    if steps.uniform:
-        return None
-    where: Mask = (a > 1.0) & (0.5 * steps.median * rate <= 1.0)
-    return where if where.any() else None
+    n, uniform = terms.joints, terms.clock.uniform
+    before, gaps, longest = state or FirstOrderState(np.zeros((1, n)))
+    d = terms.d if driven is None else driven
+    if uniform:
+        decay, gain = coefficients(terms.dt, rate)
+        tau, before = steady_filter(decay[None], gain, d, before, wanted=np.ones((1, n)))
+        return tau, FirstOrderState(before, gaps, longest)
+    tau = empty_series(*d.shape)
+    nominal = terms.clock.step * rate
+    for first in range(0, terms.samples, PIECE):
+        span = slice(first, first + PIECE)
+        dt = terms.dt[span]
+        decay, gain = coefficients(dt, rate)
+        x = gain * d[span]
+        where = (dt * rate > 2.0) & (dt > GAP * terms.clock.step) & (nominal <= 2.0)
+        if where.any():
+            decay[where], x[where] = 0.0, 0.0 if afresh is None else afresh[span][where]
+            rows = where.any(axis=1)
+            gaps, longest = gaps + int(np.sum(rows)), max(longest, float(np.max(dt[rows])))
+        tau[span] = scalar_recursion(decay, x, before[0])
+        before = tau[span][-1:]
+    return tau, FirstOrderState(before, gaps, longest)
 
 
 def scalar_recursion(decay: Array, x: Array, before: Array) -> Array:
-    """Run y_t = decay_t y_{t−1} + x_t from `before`, for each joint. (N, n)"""
-    n = x.shape[1]
-    start = before[None]
-    if len(decay) == 1:
-        one = np.ones((1, n))
-        return steady_filter(decay.reshape(1, 1, n), one, x, start, wanted=one)
-    return recursion(decay.reshape(-1, 1, 1, n), x[:, None, :], start)[:, 0]
+    """Run y_t = decay_t y_{t−1} + x_t from `before` (n,), blocks of samples side by side. (N, n)"""
+    fold = Fold.of(len(x))
+    decay, y = fold.fold(decay), fold.fold(x)
+    reach = decay[0].copy()
+    for i in range(1, len(y)):
+        y[i] += decay[i] * y[i - 1]
+        reach *= decay[i]
+    ends = y[-1].copy()
+    ends[0] += reach[0] * before
+    sum_varying(ends[None], reach[None, None])
+    entering = np.concatenate([before[None], ends[:-1]])
+    for i in range(len(y)):
+        entering = decay[i] * entering
+        y[i] += entering
+    return fold.unfold(y)
+
+
+def coefficients(dt: Array, rate: Array) -> tuple[Array, Array]:
+    """How much of the estimate stays, and the gain on d, for sample times (N, 1). (N, n) each"""
+    a = 0.5 * dt * rate
+    return (1.0 - a) / (1.0 + a), rate / (1.0 + a)
 
 
 def first_order_tuning(rate: Array, step: float, parameter_count: int) -> Tuning:

@@ -1,10 +1,11 @@
 """Disturbance Kalman filters, KFO (36)–(44): forward Euler and zero-order hold."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.observers.kalman_gains import Covariance, Gains, Steady, gain_pieces, steady
+from vftcli.observers.kalman_gains import Covariance, Gains, Steady, steady, update
 from vftcli.observers.kalman_model import (
     DISCRETISATIONS,
     NOISE_CONVENTIONS,
@@ -13,13 +14,25 @@ from vftcli.observers.kalman_model import (
     discretise,
 )
 from vftcli.observers.observer import Complex, Tuning, per_joint
-from vftcli.observers.recursion import Steps, recursion, steps_of
 from vftcli.observers.steady_filter import steady_filter
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.observers.uneven_kalman import Fold, filter_blocks, last_covariance, settle, spans
+from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array, empty_series, frozen, handed_over
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_known
+
+
+class KalmanState(NamedTuple):
+    """Where a Kalman observer stands after a block of a log.
+
+    Attributes:
+        error: e = p − p̂ [kg·m²/s] and τ̂ [N·m]. (2, n)
+        posterior: Their covariance. (n,) each
+    """
+
+    error: Array
+    posterior: Covariance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,38 +108,56 @@ class KalmanObserver:
 
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """Run over a whole log; `sd` is √P₂₂, the filter's own account of its error."""
-        n, steps = terms.joints, steps_of(terms.t)
-        settled = self.steady(steps.median, n)
-        if steps.uniform and self.initial_covariance is None:
-            model = self.model(steps.median, n)
-            change = momentum_change(terms, steps, trapezoid=not self.as_printed)
+        return self.run(terms)[0]
+
+    def run(
+        self, terms: DynamicsTerms, state: KalmanState | None = None
+    ) -> tuple[ExternalTorque, KalmanState]:
+        """Run over a block of a log from where the block before ended; None where it begins."""
+        n, clock = terms.joints, terms.clock
+        settled = self.steady(clock.step, n)
+        d = self.unexplained(terms)
+        if clock.uniform and self.initial_covariance is None:
+            model = self.model(clock.step, n)
             F, g = error_filter(settled.gains, model.a12, model.a22)
-            tau = steady_filter(F, g, change, np.zeros((2, n)), wanted=second_entry(n))
+            start = np.zeros((2, n)) if state is None else state.error
+            tau, end = steady_filter(F, g, d, start, wanted=second_entry(n))
             row = handed_over(np.sqrt(settled.gains.posterior.p22))
             sd = np.broadcast_to(row, tau.shape)
+            state = KalmanState(end, settled.gains.posterior)
         else:
-            tau, sd = self._step_by_step(terms, steps, settled)
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=handed_over(sd))
+            tau, sd, state = self._step_by_step(terms, d, settled, state)
+        estimate = ExternalTorque(
+            name=self.name, t=terms.t, tau=handed_over(tau), sd=handed_over(sd)
+        )
+        return estimate, state
 
     def _step_by_step(
-        self, terms: DynamicsTerms, steps: Steps, settled: Steady
-    ) -> tuple[Array, Array]:
+        self, terms: DynamicsTerms, d: Array, settled: Steady, state: KalmanState | None
+    ) -> tuple[Array, Array, KalmanState]:
         """τ̂ and √P₂₂ with gains that follow each step's own sample time. (T, n) each"""
-        samples, n = terms.p.shape
-        dt = np.full(samples, steps.median) if steps.uniform else steps.dt
-        tau, sd, state = empty_series(samples, n), empty_series(samples, n), np.zeros((2, n))
-        for span, model, gains in gain_pieces(
-            lambda span: self.model(dt[span, None], n),
-            samples,
-            self.first_prior(settled),
-            settled.gains.posterior,
-        ):
-            F, g = error_filter(gains, model.a12, model.a22)
-            d = momentum_change(terms, steps, trapezoid=not self.as_printed, span=span)
-            states = recursion(F, g * d[:, None, :], state)
-            state = states[-1]
-            tau[span], sd[span] = states[:, 1], np.sqrt(gains.posterior.p22)
-        return tau, sd
+        samples, n = d.shape
+        tau, sd = empty_series(samples, n), empty_series(samples, n)
+        dt, begins = np.broadcast_to(terms.dt, (samples, 1)), state is None
+        if state is None:
+            first = update(self.first_prior(settled), self.model(dt[:1], n).r[0]).posterior
+            state = KalmanState(np.zeros((2, n)), first)
+            tau[0], sd[0] = 0.0, np.sqrt(first.p22)
+        error, entering = state
+        for span in spans(samples, begins=begins):
+            fold = Fold.of(span.stop - span.start)
+            model = self.model(fold.fold(dt[span]), n)
+            gains = settle(model, entering, settled.gains.posterior)
+            entering = last_covariance(gains, fold)
+            answer, error = filter_blocks(model, gains, fold.fold(d[span]), error, fold)
+            tau[span], sd[span] = fold.unfold(answer), fold.unfold(np.sqrt(gains.posterior.p22))
+        return tau, sd, KalmanState(error, entering)
+
+    def unexplained(self, terms: DynamicsTerms) -> Array:
+        """The filter's input pᵗ − pᵗ⁻¹ − Ts·u: `DynamicsTerms.d`, or with u = μᵗ (40). (T, n)"""
+        if not self.as_printed:
+            return terms.d
+        return terms.d + 0.5 * terms.dt * (one_sample_earlier(terms, "mu") - terms.mu)
 
     def first_prior(self, settled: Steady) -> Covariance:
         """Covariance before the first update: the user's, or the stationary one. (n,)"""
@@ -180,34 +211,6 @@ def transition(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array, Arra
     return rest, rest * a12, -gains.l2, a22 - gains.l2 * a12
 
 
-def momentum_change(
-    terms: DynamicsTerms, steps: Steps, *, trapezoid: bool = True, span: slice = slice(None)
-) -> Array:
-    """Return d = pᵗ − pᵗ⁻¹ − Ts·u, the change of momentum that the model leaves unexplained. (N, n)
-
-    u is ½(μᵗ + μᵗ⁻¹), or μᵗ alone without `trapezoid` (40); the first sample of a log has none.
-
-    Args:
-        terms: p and μ of the whole log.
-        steps: Its sample times.
-        trapezoid: Whether u is the mean of two samples.
-        span: The samples wanted.
-    """
-    first, stop, _ = span.indices(terms.samples)
-    begin = max(first, 1)
-    now, before = slice(begin, stop), slice(begin - 1, stop - 1)
-    p, mu = terms.p, terms.mu
-    d = empty_series(stop - first, terms.joints)
-    d[: begin - first] = 0.0
-    rest = d[begin - first :]
-    step = steps.median if steps.uniform else steps.dt[now, None]
-    explained = mu[now] + mu[before] if trapezoid else mu[now].copy()
-    explained *= 0.5 * step if trapezoid else step
-    np.subtract(p[now], p[before], out=rest)
-    rest -= explained
-    return d
-
-
 def second_entry(joints: int) -> Array:
     """Weights that pick the external torque out of a two-state filter. (2, n)"""
     return np.repeat([[0.0], [1.0]], joints, axis=1)
@@ -216,7 +219,7 @@ def second_entry(joints: int) -> Array:
 def error_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
     """Transition (…, 2, 2, n) and input (…, 2, n) of the filter on its error e = p − p̂.
 
-    Subtracting p from x̂ᵗ = (I−LC)(A x̂ᵗ⁻¹ + B u) + L pᵗ leaves one input, d:
+    Subtracting p from x̂ᵗ = (I−LC)(A x̂ᵗ⁻¹ + B u) + L pᵗ leaves one input, `DynamicsTerms.d`:
 
         eᵗ = (1−L₁)(eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹),  τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂(eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹)
 

@@ -1,18 +1,11 @@
-"""Gains and covariances of n independent two-state Kalman filters: steady, or step by step."""
+"""Gains and covariances of n independent two-state Kalman filters, and what they settle to."""
 
-from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.observers.kalman_model import Discrete
 from vftcli.signals.arrays import Array
-
-PIECE = 1 << 14
-"""Samples handled at a time: the covariances of a piece are a dozen arrays of its size."""
-
-SETTLED = 4e-16
-"""Relative change of a block's first covariance below which another pass would change nothing."""
 
 
 class Covariance(NamedTuple):
@@ -74,17 +67,6 @@ def solved_prior(model: Discrete) -> Covariance:
     return Covariance(*np.array(entries).T)
 
 
-def predict(posterior: Covariance, model: Discrete) -> Covariance:
-    """Covariance before the next measurement, P⁻ = A P Aᵀ + Q."""
-    p11, p12, p22 = posterior
-    moved = p12 + model.a12 * p22
-    return Covariance(
-        p11 + model.a12 * (p12 + moved) + model.q11,
-        model.a22 * moved + model.q12,
-        model.a22**2 * p22 + model.q22,
-    )
-
-
 def update(prior: Covariance, r: Array) -> Gains:
     """Gains for a measured momentum, and the covariance after it in Joseph's form."""
     p11, p12, p22 = prior
@@ -99,108 +81,3 @@ def update(prior: Covariance, r: Array) -> Gains:
         p22 - 2.0 * l2 * p12 + l2**2 * p11 + l2**2 * r,
     )
     return Gains(l1, l2, posterior)
-
-
-def gain_pieces(
-    model_of: Callable[[slice], Discrete], samples: int, prior: Covariance, guess: Covariance
-) -> Iterator[tuple[slice, Discrete, Gains]]:
-    """Run the covariance recursion over a log's own sample times, a piece of the log at a time.
-
-    The recursion is nonlinear but forgets where it started, so blocks of a piece are run side by
-    side from a guess, and again from where the block before ended, until no block's start changes:
-    the result is then that of the plain loop. A filter that forgets slowly only takes more passes.
-
-    Args:
-        model_of: The models of a span of samples, entries (N, n); that of sample 0 only has its
-            measurement noise used.
-        samples: Number of samples T.
-        prior: Covariance before the first sample's update. (n,)
-        guess: Where the blocks start before they know better, the stationary posterior. (n,)
-
-    Yields:
-        A span of samples, its models, and its gains and posterior covariances. (N, n) each
-    """
-    first = slice(0, 1)
-    model = model_of(first)
-    gains = update(Covariance(*(p[None] for p in prior)), model.r)
-    yield first, model, gains
-    for begin in range(1, samples, PIECE):
-        span = slice(begin, min(begin + PIECE, samples))
-        model = model_of(span)
-        entering = Covariance(*(p[-1] for p in gains.posterior))
-        gains = settle(model, entering, guess)
-        yield span, model, gains
-
-
-def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
-    """The gains of `gain_pieces` for a whole log at once. (T, n) each
-
-    Args:
-        model: The models of all samples. (T, n) each
-        prior: Covariance before the first sample's update. (n,)
-        guess: Where blocks of a piece start before they know better. (n,)
-    """
-    shape = np.broadcast_shapes(model.r.shape, prior.p11.shape)
-    whole = empty_gains(shape)
-    pieces = gain_pieces(
-        lambda span: Discrete(*(entry[span] for entry in model)), shape[0], prior, guess
-    )
-    for span, _, gains in pieces:
-        write(whole, span, gains)
-    return whole
-
-
-def empty_gains(shape: tuple[int, ...]) -> Gains:
-    """Uninitialised gains and covariances, as `write` fills them."""
-    return Gains(np.empty(shape), np.empty(shape), Covariance(*(np.empty(shape) for _ in range(3))))
-
-
-def write(out: Gains, span: slice, part: Gains) -> None:
-    """Copy gains and covariances into their place."""
-    out.l1[span], out.l2[span] = part.l1, part.l2
-    for whole, piece in zip(out.posterior, part.posterior, strict=True):
-        whole[span] = piece
-
-
-def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
-    """Gains of one piece of a log, its blocks repeated until their starts agree. (N, n) each"""
-    samples, n = model.a12.shape
-    length = max(1, int(np.ceil(np.sqrt(samples))))
-    blocks = -(-samples // length)
-    padded = Discrete(*(in_blocks(entry, blocks, length) for entry in model))
-    starts = Covariance(*(np.tile(g, (blocks, 1)) for g in guess))
-    for start, value in zip(starts, entering, strict=True):
-        start[0] = value
-    # After k passes the first k blocks are exact, so this ends, mostly long before.
-    for _ in range(blocks):
-        gains = run_blocks(padded, starts, length)
-        change = 0.0
-        for start, end in zip(starts, gains.posterior, strict=True):
-            new = end[-1, :-1]
-            scale = np.maximum(np.abs(new), np.finfo(float).tiny)
-            change = max(change, float(np.max(np.abs(new - start[1:]) / scale, initial=0.0)))
-            start[1:] = new
-        if change <= SETTLED:
-            break
-    flat = [
-        a.transpose(1, 0, 2).reshape(blocks * length, n)[:samples]
-        for a in (gains.l1, gains.l2, *gains.posterior)
-    ]
-    return Gains(flat[0], flat[1], Covariance(*flat[2:]))
-
-
-def in_blocks(entry: Array, blocks: int, length: int) -> Array:
-    """Arrange samples as position in block × block × joint, repeating the last to fill up."""
-    short = blocks * length - len(entry)
-    padded = np.concatenate([entry, np.repeat(entry[-1:], short, axis=0)]) if short else entry
-    return np.ascontiguousarray(padded.reshape(blocks, length, -1).transpose(1, 0, 2))
-
-
-def run_blocks(model: Discrete, starts: Covariance, length: int) -> Gains:
-    """One pass: the covariance recursion of all blocks side by side. (length, blocks, n) each"""
-    gains, state = empty_gains(model.a12.shape), starts
-    for i in range(length):
-        step = update(predict(state, Discrete(*(entry[i] for entry in model))), model.r[i])
-        write(gains, slice(i, i + 1), step)
-        state = step.posterior
-    return gains

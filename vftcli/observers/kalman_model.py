@@ -74,6 +74,12 @@ def zero_order_hold(step: Array, d: Densities) -> Discrete:
         Q̂₂₂ = Q_τ (1 − e^{−2aTs})/(2a) [Q_τ Ts]
     """
     shape = np.broadcast_shapes(np.shape(step), d.r.shape)
+    if not d.decay.any():
+        q22 = step * d.q_tau
+        q12 = 0.5 * step * q22
+        q11 = step * (d.q_p + q12 / 1.5)
+        held = np.broadcast_to(step, shape)
+        return Discrete(held, held, np.ones(shape), q11, q12, q22, np.broadcast_to(d.r, shape))
     step, a = np.broadcast_to(step, shape), np.broadcast_to(d.decay, shape)
     x = a * step
     some = np.where(x > 0.0, a, 1.0)

@@ -6,13 +6,14 @@ from typing import ClassVar
 import numpy as np
 
 from vftcli.observers.first_order import (
-    Piece,
+    FirstOrderState,
     first_order_response,
     first_order_tuning,
     run_first_order,
 )
 from vftcli.observers.observer import Complex, Tuning, per_joint
-from vftcli.observers.recursion import recursion, steps_of
+from vftcli.observers.recursion import recursion
+from vftcli.observers.steady_filter import steady_filter
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, frozen, handed_over
 from vftcli.signals.errors import ParameterError
@@ -26,7 +27,7 @@ class MomentumObserver:
 
     Discretised by the implicit trapezoidal rule with a = K·Ts/2, stable for every gain:
 
-        rᵗ = [(1−a)rᵗ⁻¹ + K(pᵗ − pᵗ⁻¹) − a(μᵗ + μᵗ⁻¹)]/(1+a),  r⁰ = 0
+        rᵗ = [(1−a)rᵗ⁻¹ + K(pᵗ − pᵗ⁻¹) − a(μᵗ + μᵗ⁻¹)]/(1+a) = [(1−a)rᵗ⁻¹ + K dᵗ]/(1+a),  r⁰ = 0
 
     (35) as printed feeds back r^{i−1} + r^{i−2}, which oscillates above K·Ts = 0.343 and is
     unstable from 2 on; that form runs with `as_printed`.
@@ -54,41 +55,25 @@ class MomentumObserver:
 
         Past a gap with a > 1 the filter starts afresh, and the estimate's remarks say so.
         """
+        return self.run(terms)[0]
+
+    def run(
+        self, terms: DynamicsTerms, state: FirstOrderState | None = None
+    ) -> tuple[ExternalTorque, FirstOrderState]:
+        """Run over a block of a log from where the block before ended; None where it begins."""
         gain = per_joint(self.gain, terms.joints)
-        if self.as_printed:
-            return self._as_printed(terms, gain)
-
-        def coefficients(piece: Piece) -> tuple[Array, Array]:
-            a, p, mu = piece.a, piece.p, piece.mu
-            x = p[1:] - p[:-1]
-            x *= gain / (1.0 + a)
-            both = mu[1:] + mu[:-1]
-            both *= a / (1.0 + a)
-            x -= both
-            return (1.0 - a) / (1.0 + a), x
-
-        tau, remarks = run_first_order(terms, gain, coefficients, np.zeros_like)
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=remarks)
-
-    def _as_printed(self, terms: DynamicsTerms, gain: Array) -> ExternalTorque:
-        """rᵗ = rᵗ⁻¹ + K(pᵗ−pᵗ⁻¹) − a(μᵗ+μᵗ⁻¹+rᵗ⁻¹+rᵗ⁻²), r⁻¹ = r⁰ = 0: two states a joint."""
-        n, p, mu, steps = terms.joints, terms.p, terms.mu, steps_of(terms.t)
-        dt = np.array([steps.median]) if steps.uniform else steps.dt
-        a = 0.5 * dt[:, None] * gain
-        x = np.zeros((terms.samples, 2, n))
-        x[1:, 0] = gain * (p[1:] - p[:-1]) - a[-terms.samples + 1 :] * (mu[1:] + mu[:-1])
-        F = np.zeros((len(a), 2, 2, n))
-        F[:, 0, 0], F[:, 0, 1], F[:, 1, 0] = 1.0 - a, -a, 1.0
-        # As printed it may well diverge: that is the result, and is shown as unknown.
-        with np.errstate(over="ignore", invalid="ignore"):
-            tau = recursion(F[0] if len(a) == 1 else F, x, np.zeros((2, n)))[:, 0]
-        unstable = np.flatnonzero(np.median(a, axis=0) >= 1.0)
         remarks: tuple[Remark, ...] = ()
-        if len(unstable):
-            joints = tuple(int(j) + 1 for j in unstable)
-            remarks = (warning("unstable-as-printed", Where(joints=joints)),)
-        tau = np.where(np.isfinite(tau), tau, np.nan)
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=remarks)
+        if self.as_printed:
+            tau, state = run_as_printed(terms, gain, state)
+            unstable = np.flatnonzero(0.5 * terms.clock.step * gain >= 1.0)
+            if len(unstable):
+                joints = tuple(int(j) + 1 for j in unstable)
+                remarks = (warning("unstable-as-printed", Where(joints=joints)),)
+        else:
+            tau, state = run_first_order(terms, gain, state)
+            remarks = state.remarks
+        estimate = ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), remarks=remarks)
+        return estimate, state
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """What K means at a sample time. [s]"""
@@ -97,3 +82,22 @@ class MomentumObserver:
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Complex gain at `frequency` [Hz]. (F, n)"""
         return first_order_response(per_joint(self.gain, joints), frequency, step)
+
+
+def run_as_printed(
+    terms: DynamicsTerms, gain: Array, state: FirstOrderState | None
+) -> tuple[Array, FirstOrderState]:
+    """rᵗ = rᵗ⁻¹ + K dᵗ − a(rᵗ⁻¹ + rᵗ⁻²), r⁻¹ = r⁰ = 0: two states a joint. (T, n)"""
+    n, a = terms.joints, 0.5 * terms.dt * gain
+    start = np.zeros((2, n)) if state is None else state.states
+    F = np.zeros((len(a), 2, 2, n))
+    F[:, 0, 0], F[:, 0, 1], F[:, 1, 0] = 1.0 - a, -a, 1.0
+    g = np.stack([gain, np.zeros(n)])
+    # As printed it may well diverge: that is the result, and is shown as unknown.
+    with np.errstate(over="ignore", invalid="ignore"):
+        if terms.clock.uniform:
+            tau, end = steady_filter(F[0], g, terms.d, start, wanted=np.eye(2)[0][:, None] + 0 * g)
+        else:
+            states = recursion(F, g * terms.d[:, None], start)
+            tau, end = states[:, 0], states[-1]
+    return np.where(np.isfinite(tau), tau, np.nan), FirstOrderState(end)

@@ -7,11 +7,9 @@ back. That is the same sum in another order, so it agrees with a sample-by-sampl
 for constant and changing F alike.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from vftcli.signals.arrays import Array, is_uniform, median
+from vftcli.signals.arrays import Array
 
 BLOCK = 32
 """Samples in a block: the Python loop has this length, once a level."""
@@ -19,8 +17,9 @@ BLOCK = 32
 FEW = 48
 """Below this many samples a plain loop is as quick."""
 
-PIECE = 1 << 16
-"""Samples handled at a time, so that memory does not grow with the log."""
+PIECE = 1 << 14
+"""Samples handled at a time, so that memory does not grow with the log; blocks of a log that begin
+at multiples of it give the numbers of the whole log to the last bit."""
 
 
 def recursion(F: Array, x: Array, start: Array) -> Array:
@@ -104,30 +103,3 @@ def transition_product(F: Array, G: Array) -> Array:
     for column in range(len(G)):
         add_product(F, G[:, column], out[:, column], room)
     return out
-
-
-@dataclass(frozen=True)
-class Steps:
-    """Sample times of a log and where a first-order filter has to start afresh.
-
-    Attributes:
-        dt: Time since the sample before; the first is the median. (T,) [s]
-        uniform: Whether all are equal, so that constant coefficients are exact.
-        median: The nominal sample time. [s]
-    """
-
-    dt: Array
-    uniform: bool
-    median: float
-
-
-def steps_of(t: Array) -> Steps:
-    """Sample times of a clock. A single sample has a nominal step of 1 s, which nothing uses."""
-    if len(t) < 2:
-        return Steps(np.ones(len(t)), True, 1.0)
-    dt = np.diff(t)
-    usual = median(dt)
-    if uniform := is_uniform(t):
-        # The mean step of an even clock has more digits than any single difference of stamps.
-        usual = float((t[-1] - t[0]) / (len(t) - 1))
-    return Steps(np.concatenate([[usual], dt]), uniform, usual)

@@ -23,15 +23,15 @@ import numpy as np
 from vftcli.observers.kalman import (
     KalmanObserver,
     error_filter,
-    momentum_change,
     second_entry,
     transition,
 )
-from vftcli.observers.kalman_gains import Covariance, Gains, gain_sequence
+from vftcli.observers.kalman_gains import Covariance, Gains
 from vftcli.observers.kalman_model import Discrete
 from vftcli.observers.observer import Complex, Tuning
-from vftcli.observers.recursion import Steps, recursion, steps_of
+from vftcli.observers.recursion import recursion
 from vftcli.observers.steady_filter import steady_filter
+from vftcli.observers.uneven_kalman import gain_sequence
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series, handed_over
 from vftcli.signals.external_torque import ExternalTorque
@@ -56,22 +56,20 @@ class KalmanSmoother:
 
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """Smooth a whole log; `sd` is the smoother's own √P₂₂."""
-        steps = steps_of(terms.t)
-        if steps.uniform and self.filter.initial_covariance is None:
-            tau, sd = self._steady(terms, steps)
+        if terms.clock.uniform and self.filter.initial_covariance is None:
+            tau, sd = self._steady(terms)
         else:
-            tau, sd = self._step_by_step(terms, steps)
+            tau, sd = self._step_by_step(terms)
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=handed_over(sd))
 
-    def _steady(self, terms: DynamicsTerms, steps: Steps) -> tuple[Array, Array]:
+    def _steady(self, terms: DynamicsTerms) -> tuple[Array, Array]:
         """Smooth with constant gains. (T, n) each"""
-        n = terms.joints
-        settled, model = self.filter.steady(steps.median, n), self.filter.model(steps.median, n)
-        gains = settled.gains
-        change = momentum_change(terms, steps, trapezoid=not self.filter.as_printed)
+        n, step = terms.joints, terms.clock.step
+        settled, model = self.filter.steady(step, n), self.filter.model(step, n)
+        gains, d = settled.gains, self.filter.unexplained(terms)
         F, g = error_filter(gains, model.a12, model.a22)
         start = np.zeros((2, n))
-        tau = steady_filter(F, g, change, start, wanted=second_entry(n))
+        tau, _ = steady_filter(F, g, d, start, wanted=second_entry(n))
         innovation = innovations(tau, gains.l2, model.a22)
         S = settled.prior.p11 + model.r
         backward, b = backward_filter(gains, model.a12, model.a22)
@@ -79,7 +77,7 @@ class KalmanSmoother:
         driven = np.zeros_like(innovation)
         driven[1:] = innovation[:0:-1] / S
         weights = np.stack([gains.posterior.p12, gains.posterior.p22])
-        tau -= steady_filter(backward, b, driven, start, wanted=weights)[::-1]
+        tau -= steady_filter(backward, b, driven, start, wanted=weights)[0][::-1]
         return tau, self._steady_deviation(gains, model, S, terms.samples)
 
     def _steady_deviation(self, gains: Gains, model: Discrete, S: Array, samples: int) -> Array:
@@ -93,18 +91,17 @@ class KalmanSmoother:
         sd[samples - len(variances) :] = np.sqrt(variances[::-1])
         return sd
 
-    def _step_by_step(self, terms: DynamicsTerms, steps: Steps) -> tuple[Array, Array]:
+    def _step_by_step(self, terms: DynamicsTerms) -> tuple[Array, Array]:
         """Smooth with gains that follow each step's own sample time. (T, n) each"""
         samples, n = terms.p.shape
-        dt = np.full(samples, steps.median) if steps.uniform else steps.dt
-        settled = self.filter.steady(steps.median, n)
-        model = self.filter.model(dt[:, None], n)
+        settled = self.filter.steady(terms.clock.step, n)
+        model = self.filter.model(np.broadcast_to(terms.dt, (samples, 1)), n)
         gains = gain_sequence(model, self.filter.first_prior(settled), settled.gains.posterior)
         # L₁ = P⁻₁₁/S and R = S − P⁻₁₁, so S = R/(1 − L₁).
         S = model.r / (1.0 - gains.l1)
         F, g = error_filter(gains, model.a12, model.a22)
-        change = momentum_change(terms, steps, trapezoid=not self.filter.as_printed)
-        states = recursion(F, g * change[:, None, :], np.zeros((2, n)))
+        d = self.filter.unexplained(terms)
+        states = recursion(F, g * d[:, None], np.zeros((2, n)))
         tau = states[:, 1].copy()
         innovation = innovations(tau, gains.l2, model.a22)
         backward, b = backward_filter(gains, model.a12, model.a22)

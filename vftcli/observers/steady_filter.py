@@ -3,21 +3,43 @@
 s_t = F s_{t−1} + g d_t, with a scalar input d and a small state for each joint of which one
 combination is wanted. Within a block of samples that is a triangular Toeplitz matrix of its impulse
 response times the block's inputs, plus what the state at the block's start still contributes; BLAS
-does that for all blocks at once. The states at the blocks' ends obey the same kind of recursion,
-once a block. It is the plain loop's sum in another order, to rounding.
+does that for all blocks at once. The states x_b at the blocks' starts obey the same kind of
+recursion with R = F^BLOCK, summed by doubling: x_b ← x_b + R x_{b−1}, then x_b + R² x_{b−2}, …
+until the filter has forgotten. It is the plain loop's sum in another order, to rounding.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.observers.recursion import PIECE, recursion
+from vftcli.observers.recursion import PIECE
 from vftcli.signals.arrays import Array, empty_series
 
 BLOCK = 32
-"""Samples in a block: the work grows with it, the number of blocks shrinks."""
+"""Samples in a block, a power of two: the work grows with it, the number of blocks shrinks."""
+
+FORGOTTEN = 1e-20
+"""What is left of a state that counts as nothing: far below the last digit of anything."""
 
 
-def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> Array:
-    """Run s_t = F s_{t−1} + g d_t and return one combination of the state, wanted·s_t. (T, n)
+class BlockFilter(NamedTuple):
+    """What a filter of n joints makes of one block.
+
+    Attributes:
+        toeplitz: Block's inputs → what is wanted at each of its samples. (n, BLOCK, BLOCK)
+        ends: Block's inputs → the state at its end. (n, BLOCK, m)
+        carry: State before the block → what is wanted at each of its samples. (n, m, BLOCK)
+        powers: Fᵏ for k = 0 … BLOCK. (n, BLOCK + 1, m, m)
+    """
+
+    toeplitz: Array
+    ends: Array
+    carry: Array
+    powers: Array
+
+
+def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> tuple[Array, Array]:
+    """Run s_t = F s_{t−1} + g d_t.
 
     Args:
         F: Transition. (m, m, n)
@@ -25,66 +47,66 @@ def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> 
         d: Input. (T, n)
         start: State before the first sample. (m, n)
         wanted: Weights of the state's entries. (m, n)
+
+    Returns:
+        One combination of the state, wanted·s_t (T, n), and the state after the last sample (m, n).
     """
-    samples, n = d.shape
-    out = empty_series(samples, n)
-    kernels = [Kernel(F[:, :, j], g[:, j], wanted[:, j]) for j in range(n)]
-    state = start
-    for first in range(0, samples, PIECE):
-        span = slice(first, min(first + PIECE, samples))
-        state = piece(F, kernels, d[span], state, out[span])
-    return out
+    blocks, state = blocks_of(F.transpose(2, 0, 1), g.T, wanted.T), start.T
+    out = empty_series(*d.shape)
+    columns = np.ascontiguousarray(d.T)
+    for first in range(0, len(d), PIECE):
+        span = slice(first, first + PIECE)
+        state = filter_piece(blocks, columns[:, span], state, out.T[:, span])
+    return out, state.T
 
 
-class Kernel:
-    """One joint's block: impulse response, its effect on the block's end, and the state's decay.
-
-    Attributes:
-        inputs: Block's inputs → what is wanted, then the state at its end. (BLOCK, BLOCK + m)
-        carry: State at the block's start → what is wanted. (m, BLOCK)
-        reach: State at the block's start → at its end. (m, m)
-    """
-
-    def __init__(self, F: Array, g: Array, wanted: Array) -> None:
-        m = len(g)
-        powers = np.empty((BLOCK + 1, m, m))
-        powers[0] = np.eye(m)
-        for i in range(BLOCK):
-            powers[i + 1] = F @ powers[i]
-        response = powers[:BLOCK] @ g
-        lag = np.arange(BLOCK)[None, :] - np.arange(BLOCK)[:, None]
-        toeplitz = np.where(lag >= 0, (response @ wanted)[np.maximum(lag, 0)], 0.0)
-        self.inputs = np.ascontiguousarray(np.hstack([toeplitz, response[::-1]]))
-        self.carry = np.ascontiguousarray((wanted @ powers[1:]).T)
-        self.reach = powers[BLOCK]
+def blocks_of(F: Array, g: Array, wanted: Array) -> BlockFilter:
+    """Prepare a filter, joints first: F (n, m, m), g and wanted (n, m)."""
+    n, m = g.shape
+    powers = np.empty((n, BLOCK + 1, m, m))
+    powers[:, 0], powers[:, 1] = np.eye(m), F
+    k = 1
+    while k < BLOCK:
+        powers[:, k + 1 : 2 * k + 1] = powers[:, 1 : k + 1] @ powers[:, k : k + 1]
+        k *= 2
+    response = (powers[:, :BLOCK] @ g[:, None, :, None])[..., 0]
+    impulse = np.zeros((n, 2 * BLOCK - 1))
+    impulse[:, BLOCK - 1 :] = (response @ wanted[..., None])[..., 0]
+    at = np.arange(BLOCK)
+    return BlockFilter(
+        toeplitz=impulse[:, BLOCK - 1 + at[None, :] - at[:, None]],
+        ends=np.ascontiguousarray(response[:, ::-1]),
+        carry=(wanted[:, None, None] @ powers[:, 1:])[:, :, 0].transpose(0, 2, 1).copy(),
+        powers=powers,
+    )
 
 
-def piece(F: Array, kernels: list[Kernel], d: Array, state: Array, out: Array) -> Array:
-    """Filter one piece into `out` and return the state at its end. (m, n)"""
-    samples = len(d)
-    whole = samples // BLOCK
-    covered = whole * BLOCK
-    if whole:
-        made = [
-            d[:covered, j].reshape(whole, BLOCK) @ kernel.inputs for j, kernel in enumerate(kernels)
-        ]
-        reach = np.stack([kernel.reach for kernel in kernels], axis=-1)
-        ends = recursion(reach, np.stack([x[:, BLOCK:] for x in made], axis=-1), state)
-        entering = np.concatenate([state[None], ends[:-1]])
-        for j, kernel in enumerate(kernels):
-            answer = np.ascontiguousarray(entering[:, :, j]) @ kernel.carry
-            answer += made[j][:, :BLOCK]
-            out[:covered, j] = answer.ravel()
-        state = ends[-1]
-    return state if covered == samples else tail(F, kernels, d[covered:], state, out[covered:])
+def filter_piece(blocks: BlockFilter, d: Array, state: Array, out: Array) -> Array:
+    """Filter d (n, N) into `out` (n, N); the state before it → the state after it. (n, m)"""
+    n, samples = d.shape
+    count = samples // BLOCK
+    covered = count * BLOCK
+    inputs = d[:, :covered].reshape(n, count, BLOCK)
+    x = np.empty((n, count + 1, state.shape[1]))
+    x[:, 0] = state
+    np.matmul(inputs, blocks.ends, out=x[:, 1:])
+    sum_by_doubling(x, blocks.powers[:, BLOCK])
+    for j in range(n):
+        answer = out[j, :covered].reshape(count, BLOCK)
+        np.matmul(inputs[j], blocks.toeplitz[j], out=answer)
+        answer += x[j, :-1] @ blocks.carry[j]
+    # The few samples left fill no block: the same matrices, cut off.
+    rest, left, state = d[:, None, covered:], samples - covered, x[:, -1]
+    tail = rest @ blocks.toeplitz[:, :left, :left] + state[:, None] @ blocks.carry[:, :, :left]
+    out[:, covered:] = tail[:, 0]
+    forced = (rest @ blocks.ends[:, BLOCK - left :])[:, 0]
+    return forced + (blocks.powers[:, left] @ state[..., None])[..., 0]
 
 
-def tail(F: Array, kernels: list[Kernel], d: Array, state: Array, out: Array) -> Array:
-    """Filter the few samples that fill no block, and return the state at their end. (m, n)"""
-    left, m = len(d), len(state)
-    for j, kernel in enumerate(kernels):
-        out[:, j] = d[:, j] @ kernel.inputs[:left, :left] + state[:, j] @ kernel.carry[:, :left]
-    forced = np.stack([d[:, j] @ k.inputs[BLOCK - left :, -m:] for j, k in enumerate(kernels)], -1)
-    for _ in range(left):
-        state = np.einsum("abj,bj->aj", F, state)
-    return forced + state
+def sum_by_doubling(x: Array, R: Array) -> None:
+    """Run x_b ← x_b + R x_{b−1} over all blocks in place: x (n, B, m), R (n, m, m)."""
+    reach, apart = R.transpose(0, 2, 1), 1
+    while apart < x.shape[1] and np.max(np.abs(reach)) > FORGOTTEN:
+        x[:, apart:] += x[:, :-apart] @ reach
+        reach = reach @ reach
+        apart *= 2

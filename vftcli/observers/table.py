@@ -128,16 +128,18 @@ def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tu
     """A first-order observer's gain (n,) [1/s], and where it was not given its remark's code.
 
     It is then the inverse of the Kalman filter's delay, so that the observers lag alike;
-    `FALLBACK_RATE` where no gains are given at all.
+    `FALLBACK_RATE` where no gains are given at all; and on a slow clock at most 2/Ts, which takes
+    each sample's raw disturbance as it is: from there on the observer would overshoot.
     """
     given = parameters_given(name, name, setup.gains, setup.settings)
     if parameter in given:
         return joint_values(given[parameter], setup.joints, f"{name}.{parameter}"), ()
+    rate, origin = per_joint(FALLBACK_RATE, setup.joints), "gain-from-default"
     if "kfo" in setup.gains or "kfo" in setup.settings:
         kalman, _ = build_kfo("fe")(setup)
-        delay = kalman.tuning(setup.step, setup.joints).delay
-        return 1.0 / delay, ("gain-from-kalman-delay",)
-    return per_joint(FALLBACK_RATE, setup.joints), ("gain-from-default",)
+        rate = 1.0 / kalman.tuning(setup.step, setup.joints).delay
+        origin = "gain-from-kalman-delay"
+    return np.minimum(rate, 2.0 / setup.step), (origin,)
 
 
 def build_kfo(scheme: str, section: str | None = None) -> Callable[[Setup], Built]:

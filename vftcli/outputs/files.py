@@ -17,6 +17,7 @@ from vftcli.outputs.partial import PARTIAL, check_writable, held, partial_folder
 from vftcli.outputs.seals import SEAL, digests, is_seal, sealed_files
 from vftcli.signals.errors import OutputError
 from vftcli.signals.letters import whole
+from vftcli.signals.packages import installed, remedy
 
 _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
 
@@ -319,6 +320,17 @@ def check_letters(path: Path) -> None:
     """Raise an OutputError for a name with bytes that are no letters: libraries refuse it."""
     if whole(str(path)) != str(path):
         raise OutputError(f"{path} is no name in UTF-8; give another -o")
+
+
+def left_out(names: Iterable[str]) -> list[str]:
+    """What of these files is not written for want of a package, a line each."""
+    lines = []
+    for name in dict.fromkeys(names):
+        if name.endswith(".rrd") and not installed("rerun"):
+            lines.append(f"{name} not written: {remedy('rerun')}")
+        elif name.endswith(".parquet") and not installed("pyarrow"):
+            lines.append(f"{name} without units beside its columns: {remedy('pyarrow')}")
+    return lines
 
 
 def numbered(names: Iterable[str]) -> list[str]:

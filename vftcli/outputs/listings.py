@@ -112,10 +112,10 @@ def robot_text(robot: "Robot") -> str:
 
 def bench_grid(result: Mapping[str, Any]) -> Grid:
     """How long dynamics and observers took, with the paper's times on its laptop beside them."""
-    rows = [{"name": "dynamics", **result["dynamics"]}, *result["observers"]]
+    rows = [{"name": "dynamics", **result["dynamics"]}, *result["observers"], *result["core"]]
     return Grid(
         columns=(
-            Column("", words=True, width=10),
+            Column("", words=True, width=15),
             Column("total", unit="ms", form=".2f"),
             Column("per sample", unit="µs", form=".3f"),
             Column("paper, its laptop", unit="s", form=".3f"),

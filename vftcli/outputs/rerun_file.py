@@ -21,6 +21,7 @@ from vftcli.outputs.palette import rgb
 from vftcli.outputs.plots import Lines, LogLine, Tab
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import OutputError
+from vftcli.signals.packages import check_installed
 
 CONTACTS = "/contacts"
 """Below it stand the contacts: `/contacts/1` is that of number 1."""
@@ -86,7 +87,9 @@ def rerun_file(
 
     Raises:
         OutputError: If the file is not whole in the end.
+        PackageError: If Rerun is not installed.
     """
+    check_installed("rerun", path.name)
     import rerun as rr
 
     # The same data make the same recording: no random id, and no time at which it was made.
@@ -279,7 +282,8 @@ def send_log(stream: Stream, log: Sequence[LogLine]) -> None:
         rows = rr.TextLog.columns(
             text=[drawable(line.text) for line in own],
             level=[line.level for line in own],
-            color=[rgb(line.colour) for line in own],
+            # Packed as 0xRRGGBBAA: Rerun 0.30 takes three numbers for three colours.
+            color=np.array([int(f"{line.colour[1:]}ff", 16) for line in own], dtype=np.uint32),
         )
         stream.send_columns(path, [rr.TimeColumn("t", duration=[line.t for line in own])], rows)
 

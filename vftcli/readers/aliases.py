@@ -53,6 +53,7 @@ WRENCHES = (
     "fx fy fz tx ty tz",
     "wrench/fx wrench/fy wrench/fz wrench/mx wrench/my wrench/mz",
     "wrench/fx wrench/fy wrench/fz wrench/tx wrench/ty wrench/tz",
+    " ".join(f"ft_wrench_{what}_{axis}" for what in ("force", "torque") for axis in "xyz"),
 )
 """Names of the six columns of a wrench."""
 
@@ -115,7 +116,7 @@ def picks_by_alias(table: Table, stated: Sequence[Item] = ()) -> tuple[Picks, tu
     joints = next((len(p.cells) for p in signals if p.signal == "q"), 0)
     # A group of another width is about something else: a gripper, a base.
     also = {"q", "wrench", *(pick.signal for pick in told.values())}
-    signals = [p for p in signals if len(p.cells) == joints or p.signal in also]
+    signals = [p for p in signals if len(p.cells) == (joints or len(p.cells)) or p.signal in also]
     names_there = table.names or ()
     origin = names_there.index(OWN_STAMPS) if names_there.count(OWN_STAMPS) == 1 else None
     origin = None if origin in table.lists else origin

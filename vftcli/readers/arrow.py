@@ -4,10 +4,12 @@ import struct
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from vftcli.readers.columnar import ColumnarTable, episodes_of, read_columns
+from vftcli.readers.columnar import HeldColumns, episodes_of, read_columns
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.readers.pyarrow_table import PyarrowTable
 from vftcli.readers.reader import LogFile, Reader
 from vftcli.signals.errors import LogError
+from vftcli.signals.packages import needed
 
 FILE_MAGIC, STREAM_MAGIC = b"ARROW1\0\0", b"\xff\xff\xff\xff"
 
@@ -21,27 +23,26 @@ MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 
 """Places of fields in Arrow's Message, RecordBatch and DictionaryBatch (format/Message.fbs)."""
 
 
-class ArrowTable(ColumnarTable):
+class ArrowTable(PyarrowTable):
     """An Arrow file or stream; a file is a stream behind its magic, its index is not needed."""
 
-    def _opened(self, file: LogFile) -> Any:  # noqa: ANN401 - pyarrow
-        import pyarrow as pa
+    def __init__(self, file: LogFile) -> None:
+        needed("pyarrow", f"{file.path}: an Arrow file", error=LogError)
+        super().__init__(file)
 
+    def _opened(self, file: LogFile) -> HeldColumns:
+        pa = needed("pyarrow", "an Arrow file")
         content = pa.py_buffer(file.content)
         self._content = content.slice(len(FILE_MAGIC) if file.head.startswith(FILE_MAGIC) else 0)
         batches = tuple(claims(self._content))
-        self._rows_claimed = sum(rows for rows, _ in batches)
         limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * self._size)
         if sum(size for _, size in batches) > limit:
             raise LogError(
                 f"{file.path}: unpacks to more than {limit >> 20} MiB, more than a log of this "
                 "size can hold. It is damaged or made to fill memory."
             )
-        return pa.ipc.open_stream(self._content).schema
-
-    @property
-    def _row_count(self) -> int:
-        return self._rows_claimed
+        schema = pa.ipc.open_stream(self._content).schema
+        return self._held_of(schema, sum(rows for rows, _ in batches), schema.metadata)
 
     def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
         for batch in self._stream([column]):
@@ -57,7 +58,7 @@ class ArrowTable(ColumnarTable):
 
     def _stream(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
         """The batches, of some columns."""
-        import pyarrow as pa
+        pa = needed("pyarrow", "an Arrow file")
 
         options = pa.ipc.IpcReadOptions(use_threads=False, included_fields=list(columns))
         return pa.ipc.open_stream(self._content, options=options)
@@ -69,7 +70,7 @@ def claims(content: Any) -> Iterator[tuple[int, int]]:  # noqa: ANN401 - pyarrow
     Raises:
         ValueError: If a batch contradicts itself.
     """
-    import pyarrow as pa
+    pa = needed("pyarrow", "an Arrow file")
 
     reader = pa.ipc.MessageReader.open_stream(content)
     while True:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,24 @@ from vftcli.signals.wrench import WrenchFrame
 EPISODE = "episode_index"
 
 
+class HeldColumns(NamedTuple):
+    """What a table says that it holds.
+
+    Attributes:
+        names: Of its columns.
+        lists: Whether each is a column of lists.
+        rows: Their number.
+        told: What `vftcli convert` wrote beside the columns, as JSON; "{}" for nothing.
+    """
+
+    names: tuple[str, ...]
+    lists: tuple[bool, ...]
+    rows: int
+    told: bytes | str
+
+
 class ColumnarTable(ABC):
     """A file of columns; only those asked for are decoded, and nothing is ever mended.
-
-    pyarrow decodes it: on a damaged page polars would end the whole process.
 
     Attributes:
         path: The file.
@@ -35,48 +49,58 @@ class ColumnarTable(ABC):
 
     remarks: tuple[Remark, ...] = ()
 
-    def __init__(self, file: LogFile, rows: Any = None) -> None:  # noqa: ANN401 - numbers of rows
-        self.path = file.path
-        self._rows = rows
+    def __init__(self, file: LogFile) -> None:
+        self.path: Path = file.path
+        self._rows: Any = None
         self._size = len(file.content)
-        with guarded(self.path):
-            self._schema = self._opened(file)
-            if self._row_count == 0:
+        with self._guarded():
+            held = self._opened(file)
+            if held.rows == 0:
                 raise LogError(f"{file.path}: the table has no rows; nothing was recorded into it.")
-        self.names: tuple[str, ...] | None = tuple(self._schema.names)
+        self.names: tuple[str, ...] | None = held.names
+        self._held = held
 
     @abstractmethod
-    def _opened(self, file: LogFile) -> Any:  # noqa: ANN401 - pyarrow
-        """Open the file; its schema."""
-
-    @property
-    @abstractmethod
-    def _row_count(self) -> int:
-        """Rows that the file claims to have."""
+    def _opened(self, file: LogFile) -> HeldColumns:
+        """Open the file; what it says it holds."""
 
     @abstractmethod
-    def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
+    def _errors(self) -> tuple[type[BaseException], ...]:
+        """What the decoder raises on a damaged file, beside Python's own errors."""
+
+    @abstractmethod
+    def _first_list(self, column: int) -> Any:  # noqa: ANN401 - a list
         """The value in the first row of a column of lists, None for none."""
 
     @abstractmethod
-    def _decoded(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
-        """Some columns of all rows, as a table."""
+    def _numbers(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
+        """Decode columns, of the rows that are kept; whole stamps stay whole.
 
-    @property
-    def _metadata(self) -> Mapping[bytes, bytes]:
-        """What was written beside the columns."""
-        return self._schema.metadata or {}
+        Raises:
+            LogError: If one holds no numbers or its lists differ in length.
+        """
+
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
+        """Turn the errors of a decoder into a LogError that names the file."""
+        usual = (OSError, ValueError, KeyError, MemoryError, OverflowError)
+        try:
+            yield
+        except BaseException as error:
+            if not isinstance(error, (*usual, *self._errors())):
+                raise
+            reason = str(error).split("\n")[0][:120]
+            raise LogError(f"{self.path}: a damaged Parquet or Arrow file ({reason})") from None
 
     @property
     def width(self) -> int:
         """Number of columns."""
-        return len(self._schema)
+        return len(self._held.names)
 
     def told(self) -> dict[str, Any]:
         """What vftcli convert wrote beside the columns; nothing for files of other programs."""
-        text = self._metadata.get(b"vftcli", b"{}")
         try:
-            told = json.loads(text)
+            told = json.loads(self._held.told)
         except (ValueError, RecursionError):
             return {}
         good = isinstance(told, dict) and isinstance(told.get("joint_names", []), list)
@@ -85,12 +109,11 @@ class ColumnarTable(ABC):
     @cached_property
     def lists(self) -> Mapping[int, int]:
         """Columns of lists and their length in the first row."""
-        kinds = list(enumerate(self._schema.types))
-        return {k: self._first_length(k) for k, kind in kinds if is_list(kind)}
+        return {k: self._first_length(k) for k, is_list in enumerate(self._held.lists) if is_list}
 
     def _first_length(self, column: int) -> int:
         """Length of the list in the first row of a column, 0 for an empty one."""
-        with guarded(self.path):
+        with self._guarded():
             value = self._first_list(column)
         return len(value) if value is not None else 0
 
@@ -100,16 +123,13 @@ class ColumnarTable(ABC):
         Raises:
             LogError: If a column holds no numbers or its lists differ in length.
         """
-        names = self._schema.names
-        # pyarrow would hand over both under one name.
+        names = self._held.names
+        # Decoders hand over both under one name.
         if any(names.count(names[c]) > 1 for c in columns):
             raise LogError(f"{self.path}: two columns have one name; rename one of them.")
         self._check_size(columns)
-        with guarded(self.path):
-            table = self._decoded(sorted(columns))
-            if self._rows is not None:
-                table = table.take(self._rows)
-            return {c: self._numbers(table.column(names[c]), c, clock) for c in columns}
+        with self._guarded():
+            return self._numbers(sorted(columns), clock)
 
     def _check_size(self, columns: Sequence[int]) -> None:
         """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
@@ -122,7 +142,7 @@ class ColumnarTable(ABC):
         """
         limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * self._size)
         width = sum(self.lists.get(column, 1) for column in columns)
-        if 8 * width * self._row_count > limit:
+        if 8 * width * self._held.rows > limit:
             raise LogError(
                 f"{self.path}: its columns unpack to more than {limit >> 20} MiB, more than a log "
                 "of this size can hold. It is damaged or made to fill memory."
@@ -141,68 +161,6 @@ class ColumnarTable(ABC):
     def keep(self, rows: Any) -> None:  # noqa: ANN401 - numbers of rows
         """Keep some rows only, all for None."""
         self._rows = rows
-
-    def _numbers(self, values: Any, column: int, clock: int | None) -> Column:  # noqa: ANN401
-        """A column as numbers; whole stamps stay whole, times become nanoseconds."""
-        import pyarrow as pa
-
-        if column in self.lists:
-            return self._matrix(values, column)
-        kind, name = values.type, self._schema.names[column]
-        if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-            unit = pa.timestamp("ns") if pa.types.is_timestamp(kind) else pa.duration("ns")
-            values = values.cast(unit).cast(pa.int64())
-        elif pa.types.is_boolean(kind):
-            values = values.cast(pa.uint8())
-        elif not is_number(kind):
-            raise LogError(f"{self.path}: column {name} holds {kind}, not numbers.")
-        whole = column == clock and pa.types.is_integer(values.type) and not values.null_count
-        target = np.int64 if whole else np.float64
-        return np.asarray(values.to_numpy()).astype(target)
-
-    def _matrix(self, values: Any, column: int) -> Column:  # noqa: ANN401 - pyarrow
-        """A column of lists of one length. (T, k)"""
-        length, name = self.lists[column], self._schema.names[column]
-        values = values.combine_chunks()
-        if hasattr(values, "chunks"):  # pyarrow keeps an empty or split column as chunks
-            values = values.chunk(0) if values.num_chunks else values
-        flat = values.flatten()
-        even = np.all(np.asarray(values.value_lengths()) == length) if len(values) else True
-        if values.null_count or not even or len(flat) != length * len(values):
-            raise LogError(f"{self.path}: the lists of {name} are not all {length} long.")
-        if not is_number(flat.type):
-            raise LogError(f"{self.path}: the lists of {name} hold {flat.type}.")
-        numbers = np.asarray(flat.to_numpy(zero_copy_only=False)).astype(np.float64)
-        return numbers.reshape(len(values), length)
-
-
-def is_list(kind: Any) -> bool:  # noqa: ANN401 - a pyarrow type
-    """Whether a column holds lists."""
-    import pyarrow as pa
-
-    tests = (pa.types.is_list, pa.types.is_large_list, pa.types.is_fixed_size_list)
-    return any(test(kind) for test in tests)
-
-
-def is_number(kind: Any) -> bool:  # noqa: ANN401 - a pyarrow type
-    """Whether a column holds numbers."""
-    import pyarrow as pa
-
-    return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
-
-
-@contextmanager
-def guarded(path: Path) -> Iterator[None]:
-    """Turn the errors of pyarrow's decoders into a LogError that names the file."""
-    import pyarrow as pa
-
-    try:
-        yield
-    except (
-        pa.ArrowException, OSError, ValueError, KeyError, MemoryError, OverflowError,
-    ) as error:  # fmt: skip
-        reason = str(error).split("\n")[0][:120]
-        raise LogError(f"{path}: a damaged Parquet or Arrow file ({reason})") from None
 
 
 def read_columns(table: ColumnarTable, request: ReadChoice) -> RawLog:

@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from vftcli.readers.hdf5_chunks import check_chunks
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
 from vftcli.readers.reader import LogFile
 from vftcli.readers.table import Column, listed
 from vftcli.signals.errors import LogError
+from vftcli.signals.packages import needed
 from vftcli.signals.remarks import Remark
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -34,12 +36,7 @@ def opened(file: LogFile) -> Iterator[Any]:
     Raises:
         LogError: If h5py is not installed, or the file is damaged.
     """
-    try:
-        import h5py
-    except ImportError:
-        raise LogError(
-            f"{file.path}: an HDF5 file, which h5py reads: pip install 'vftcli[hdf5]'."
-        ) from None
+    h5py = needed("h5py", f"{file.path}: an HDF5 file", error=LogError)
     try:
         with h5py.File(file.direct or BytesIO(file.content), "r") as content:
             yield content
@@ -106,7 +103,8 @@ class Hdf5Table:
         """Check that datasets may be read: a kilobyte may claim any size, and costs nothing.
 
         Raises:
-            LogError: If they claim more numbers than what is stored of them can hold.
+            LogError: If they claim more numbers than what is stored of them can hold, or a chunk
+                unpacks to more.
         """
         names, datasets = list(self._datasets), list(self._datasets.values())
         stored = sum(datasets[c].id.get_storage_size() for c in columns)
@@ -116,6 +114,8 @@ class Hdf5Table:
                 f"{self.path}: {listed([names[c] for c in columns])} unpack to more than "
                 f"{limit >> 20} MiB, more than the {stored} bytes that are stored of them can hold."
             )
+        for c in columns:
+            check_chunks(f"{self.path}: {names[c]}", datasets[c], limit)
 
     def _numbers(self, dataset: Any, is_clock: bool) -> Column:  # noqa: ANN401 - h5py
         """One dataset. (T,) or (T, k)"""
@@ -142,7 +142,7 @@ def datasets_of(path: Path, content: Any) -> Iterator[tuple[str, Any]]:  # noqa:
     Raises:
         LogError: If there are too many objects to be a log.
     """
-    import h5py
+    h5py = needed("h5py", "an HDF5 file")
 
     seen: set[int] = set()
     waiting = [("", content["/"], 0)]

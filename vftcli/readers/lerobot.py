@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.readers.aliases import ALIASES
-from vftcli.readers.columnar import EPISODE, episodes_of
+from vftcli.readers.columnar import EPISODE, ColumnarTable, episodes_of
 from vftcli.readers.columns import SIGNALS, parse_columns
 from vftcli.readers.joints import kinematic_order
-from vftcli.readers.parquet import ParquetTable
+from vftcli.readers.parquet import parquet_table
 from vftcli.readers.parts import arm_of, episode_of, refuse_arm
 from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, Reader, open_log
 from vftcli.readers.table import listed
@@ -125,7 +125,7 @@ def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
 
 
 def columns_of(
-    path: Path, table: ParquetTable, features: Mapping[str, Any], request: ReadChoice
+    path: Path, table: ColumnarTable, features: Mapping[str, Any], request: ReadChoice
 ) -> tuple[str, tuple[str, ...], str, tuple[Any, ...]]:
     """Which columns hold which signals of which arm, by the names of features and their elements.
 
@@ -164,7 +164,7 @@ def columns_of(
     return ",".join(["t=timestamp", *items]), names, side, remarks
 
 
-def wrenches_left(table: ParquetTable, features: Mapping[str, Any]) -> tuple[Remark, ...]:
+def wrenches_left(table: ColumnarTable, features: Mapping[str, Any]) -> tuple[Remark, ...]:
     """A remark on a wrench that is not taken: nothing tells a sensor's from an estimate."""
     observed = [name for name in table.names or () if name.startswith("observation.")]
     found = [name for name in observed if "wrench" in f"{name} {features.get(name)}".lower()]
@@ -190,7 +190,7 @@ def in_order(
     return [by_joint[name] for name in names]
 
 
-def elements_of(name: str, table: ParquetTable, labels: Any) -> Iterable[Element]:  # noqa: ANN401
+def elements_of(name: str, table: ColumnarTable, labels: Any) -> Iterable[Element]:  # noqa: ANN401
     """The joints' elements of a feature; none of a gripper, a pose, an action."""
     if not name.startswith("observation."):
         return
@@ -221,7 +221,7 @@ def measured_by(label: str) -> tuple[str, str] | None:
     return None
 
 
-def by_frames(raw: RawLog, table: ParquetTable, fps: Any) -> RawLog:  # noqa: ANN401 - of JSON
+def by_frames(raw: RawLog, table: ColumnarTable, fps: Any) -> RawLog:  # noqa: ANN401 - of JSON
     """The log by its frames' numbers and rate, where its stamps are these rounded to 32 bits."""
     good = isinstance(fps, int | float) and 0 < fps < 1 / CLOCK_SLACK
     if not good or FRAME not in (table.names or ()) or raw.clock != "column timestamp":
@@ -252,11 +252,14 @@ def text_of(path: Path) -> str:
     """The text of a description beside the data.
 
     Raises:
-        LogError: If it is too large to be one.
+        LogError: If it is too large to be one, or no text.
     """
     if path.stat().st_size > TOLD_LIMIT:
         raise LogError(f"{path}: larger than {TOLD_LIMIT >> 20} MiB; no description is.")
-    return path.read_text(encoding="utf-8")
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise LogError(f"{path}: not text in UTF-8; it is damaged") from None
 
 
 def features_of(info: dict[str, Any]) -> dict[str, Any]:
@@ -280,7 +283,7 @@ def episodes_told(folder: Path) -> list[Episode]:
         found = list(episodes_of_lines(lines))
     else:
         files = sorted((folder / "data").rglob("*.parquet"))
-        each = (episodes_of(ParquetTable(open_log(path)).episodes()) for path in files)
+        each = (episodes_of(parquet_table(open_log(path)).episodes()) for path in files)
         found = [Episode(number) for numbers in each for number in numbers]
     if not found:
         raise LogError(f"{folder}: a LeRobot dataset without data/**/*.parquet.")
@@ -290,7 +293,7 @@ def episodes_told(folder: Path) -> list[Episode]:
 
 def episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
     """The episodes of a table of version 3."""
-    table = ParquetTable(open_log(path))
+    table = parquet_table(open_log(path))
     names = list(table.names or ())
     if missing := [name for name in EPISODES_TABLE if name not in names]:
         raise LogError(f"{path}: no column {missing[0]}; a table of episodes has one.")
@@ -327,18 +330,18 @@ def data_file(folder: Path, episode: Episode) -> Path:
     files = sorted((folder / "data").rglob("*.parquet"))
     own = [path for path in files if path.name == f"episode_{episode.number:06d}.parquet"]
     for path in own or files:
-        if own or episode.number in episodes_of(ParquetTable(open_log(path)).episodes()):
+        if own or episode.number in episodes_of(parquet_table(open_log(path)).episodes()):
             return path
     raise LogError(f"{folder}: no file of data/**/*.parquet holds episode {episode.number}.")
 
 
-def rows_of(file: LogFile, episode: Episode) -> ParquetTable:
+def rows_of(file: LogFile, episode: Episode) -> ColumnarTable:
     """The rows of an episode in its data file, checked against the table of episodes.
 
     Raises:
         LogError: If the two differ.
     """
-    table = ParquetTable(file)
+    table = parquet_table(file)
     numbers = table.episodes()
     if not numbers.size:
         return table

@@ -8,7 +8,7 @@ import numpy as np
 from vftcli.readers.aliases import _clock, _wrench, filled_cells, grouped
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable
-from vftcli.readers.parquet import ParquetTable
+from vftcli.readers.parquet import parquet_table
 from vftcli.readers.reader import LogFile, ReadChoice, open_log
 from vftcli.readers.table import Pick, Picks, Table, listed, picked, picks_of
 from vftcli.signals.arrays import Array, check_clock
@@ -73,7 +73,7 @@ def opened(file: LogFile) -> Table:
         LogError: If it is none.
     """
     if file.head.startswith(b"PAR1"):
-        return ParquetTable(file)
+        return parquet_table(file)
     if not file.lines:
         raise LogError(
             f"{file.path}: not a text table or Parquet file; a reference is one of them."

@@ -9,17 +9,16 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.readers.columns import SIGNALS, ColumnSpec, Item
+from vftcli.readers.columns import SIGNALS, ColumnSpec, Item, tick_of
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.letters import printable
 from vftcli.signals.remarks import Remark, fact
-from vftcli.signals.series import median_step
 from vftcli.signals.wrench import WrenchFrame
 
-JACOBIAN = re.compile(r"(?i)jac(obian)?_\d_\d")
-"""A cell of a Jacobian among the columns."""
+JACOBIAN = re.compile(r"(?i)jac(obian)?_(\d)_(\d)")
+"""A cell of a Jacobian among the columns: row, then column."""
 
 Column = NDArray[Any]
 """One column as it is stored: (T,) numbers, or (T, k) for a column of lists."""
@@ -93,6 +92,14 @@ class Picks:
     rate: float | None = None
     constants: tuple[int, ...] = ()
     origin: int | None = None
+
+
+class JacobianError(LogError):
+    """Torques beside a Jacobian where positions were looked for: `vftcli.readers.jacobian`."""
+
+    def __init__(self, message: str, table: Table, picks: Picks) -> None:
+        super().__init__(message)
+        self.table, self.picks = table, picks
 
 
 def picked(
@@ -203,27 +210,6 @@ def _of_pair(table: Table, seconds: Column, rest: Column) -> Column:
             "within them. Name one column of time with --columns, as in t=…"
         )
     return seconds.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
-
-
-def tick_of(stamps: Column, name: str) -> tuple[float, str]:
-    """Length of a tick of unstated unit: from the name, else from the size of stamps and steps.
-
-    Whole numbers one apart are milliseconds of a 1 kHz log; epoch stamps tell by their size;
-    everything else is seconds.
-    """
-    units = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
-    if match := re.search(r"[_\[(.](ns|us|ms|s)[\])]?$", name.lower()):
-        return units[match[1]], match[1]
-    if len(stamps) == 0:
-        return 1.0, "s"
-    usual = abs(float(stamps[len(stamps) // 2]))  # the first may be garbage
-    # Counts since 1970 are near 1.7e18 ns, 1.7e15 µs and 1.7e12 ms.
-    for size, unit in ((1e17, "ns"), (1e14, "us"), (1e11, "ms")):
-        if size < usual < 1e20:
-            return units[unit], unit
-    step = median_step(stamps) if len(stamps) > 1 else 0.0
-    whole = stamps.dtype.kind in "iu" or bool(np.all(np.mod(stamps[:1000], 1) == 0))
-    return (1e-3, "ms") if whole and 0.8 <= step <= 1.2 else (1.0, "s")
 
 
 def picks_of(
@@ -372,11 +358,13 @@ def checked(table: Table, picks: Picks) -> Picks:
     if joints == 0:
         there = listed(table.names) if table.names else f"{table.width} columns without names"
         if any(JACOBIAN.match(name) for name in table.names or ()):
-            raise LogError(
+            raise JacobianError(
                 f"{table.path}: no joint positions (q), but a vendor's estimate beside its "
-                "Jacobian: no observer can run on that, and q cannot be told from a Jacobian in "
-                "axes of its own. The vendor's wrench is pinv(Jᵀ) tau_ext of each row, in the "
-                "log's axes. Record q, dq and torques beside them."
+                "Jacobian: no observer can run on that. The vendor's wrench, pinv(Jᵀ) tau_ext, is "
+                "written by `estimate --wrench`, and beside the log's sensor by `compare "
+                "--reference sensor --wrench`.",
+                table,
+                picks,
             )
         raise LogError(
             f"{table.path}: no joint positions (q) among {there}. Name their columns with "
@@ -384,6 +372,11 @@ def checked(table: Table, picks: Picks) -> Picks:
             "(a reference goes to --reference file:PATH)."
         )
     for pick in picks.signals:
+        if len(set(pick.cells)) < len(pick.cells):
+            raise LogError(
+                f"{table.path}: --columns names a column of {pick.signal} twice; every joint has "
+                "one of its own."
+            )
         expected = 6 if pick.signal == "wrench" else joints
         if len(pick.cells) != expected:
             raise LogError(

@@ -13,6 +13,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, check_shape, seal
 from vftcli.signals.errors import RobotError
+from vftcli.signals.packages import needed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +124,7 @@ class Chain:
         Reflected rotor inertia becomes the model's `armature`, which `rnea`, `crba` and `aba`
         include; it has no room for `rotor_coupling`.
         """
-        import pinocchio as pin
+        pin = needed("pinocchio", "a Pinocchio model (simulation, replay, --as-printed)")
 
         model = pin.Model()
         model.name = name

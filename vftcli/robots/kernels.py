@@ -1,34 +1,45 @@
-r"""Batched recursions for the momentum form of an arm's dynamics: p, Cᵀq̇ and g over all samples.
+r"""The momentum form of an arm's dynamics over all samples: p, Cᵀq̇ and g.
 
 With the Christoffel C, :math:`C^T\dot q = \tfrac12\,\partial(\dot q^T M \dot q)/\partial q`: the
 rate at which the kinetic energy would change if only q moved. Turning link j and everything behind
 it by dq_j turns their momenta, so each component is a cross product of the link's own velocity with
 the composite momentum behind it, and no derivative of M is needed. One pass out, one pass back:
 
-- out: ω_j = R_jᵀω_{j−1} + z q̇_j, v_j = R_jᵀ(v_{j−1} + ω_{j−1} × r_j), γ_j = R_jᵀγ_{j−1};
-- link: l = m(v + ω × c), k = I_c ω + c × l, first moment h = m c;
-- back, added to the parent's: l ← R_j l, k ← R_j k + r_j × (R_j l), h ← R_j h + m r_j;
-- p_j = k_z + J_j q̇_j, (Cᵀq̇)_j = v_y l_x − v_x l_y + ω_y k_x − ω_x k_y, g_j = h_y γ_x − h_x γ_y.
+- out: v_j = R_jᵀ(v_{j−1} + ω_{j−1} × r_j), ω_j = R_jᵀω_{j−1}, γ_j = R_jᵀγ_{j−1}, each turned by
+  −q_j, then ω_j += z q̇_j;
+- link: L = ω × h + m v, K = J ω + h × v with J about the frame's origin and h = m c;
+- back, turned by q_j and added to the parent's: L ← R_j L, K ← R_j K + r_j × (R_j L),
+  H ← R_j H + m r_j, so that L, K and H are those of link j and all behind it;
+- p_j = K_z + J_j q̇_j, (Cᵀq̇)_j = (K × ω + L × v)_z, −g_j = (H × γ)_z.
 
-γ₀ is the gravity vector itself, J the reflected rotor inertia. Every constant map is one small
-matrix; a chunk of samples is the other factor, so the work is done by BLAS.
+γ₀ is the gravity vector itself, J_j the reflected rotor inertia. These are p of (8), Cᵀq̇ of (14)
+and G of (16), exactly rather than by differences; the tests hold them against Pinocchio's mass
+matrix, Coriolis matrix and gravity.
 
-These are p of (8), Cᵀq̇ of (14) and G of (16), exactly rather than by differences; the tests hold
-them against Pinocchio's mass matrix, Coriolis matrix and gravity.
+The equations are recorded once for an arm (`tape`), with its constants in them, and replayed on
+chunks of samples.
 """
 
+import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.robots.chain import Chain
+from vftcli.robots.tape import NOTHING, ZERO, Program, Tape, Value, Vector, constants
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.pose import skew
 
-CHUNK = 4096
-"""Samples worked on at a time: small enough that a chunk's arrays stay in the cache."""
+CHUNK = 6144
+"""Samples worked on at a time: small enough that a chunk's rows stay in the cache, large enough
+that calling an operation costs little beside it."""
+
+KEPT = 4
+"""Programs that are kept, some 3 MB each: those of the arm in hand."""
+
+ROUNDING = 1e-15
+"""An entry of a rotation, or of an inertia relative to its largest, that is zero but for this."""
 
 
 class MomentumTerms(NamedTuple):
@@ -45,180 +56,183 @@ class MomentumTerms(NamedTuple):
     gravity: Array
 
 
-@dataclass(frozen=True)
-class Maps:
-    """A chain's constants as the matrices the recursion multiplies with.
-
-    A motion state is nine rows (ωx, vx, γx, ωy, vy, γy, ωz, vz, γz), a momentum state nine rows
-    (lx, kx, hx, ly, ky, hy, lz, kz, hz), so that a turn about z mixes two blocks of three rows.
+class Bodies(NamedTuple):
+    """The inertia of each link about the origin of its own frame.
 
     Attributes:
-        outward: Motion state of frame j−1 → frame j before it turns. (n, 9, 9)
-        back: Motion state of frame j beside the turned momentum state of frame j+1 → momentum
-            state of frame j. (n, 9, 18)
-        first_moment: What the composite masses add to the rows of h. (n, 3, 1)
-        rotor_inertia: Reflected rotor inertia. (n, 1) [kg·m²]
-        rotor_coupling: Inertia of rotors driven through other joints, or None. (n, n) [kg·m²]
-        start: Motion state of the base: gravity alone. (9, 1)
+        inertia: J. (n, 3, 3) [kg·m²]
+        moment: First moment h = m c. (n, 3) [kg·m]
+        mass: m. (n,) [kg]
     """
 
-    outward: Array
-    back: Array
-    first_moment: Array
-    rotor_inertia: Array
-    rotor_coupling: Array | None
-    start: Array
+    inertia: Array
+    moment: Array
+    mass: Array
 
 
-def interleave(rows: list[list[Array]]) -> Array:
-    """Arrange a 3×3 grid of 3×3 blocks so that x, y and z rows and columns lie together. (9, 9)"""
-    dense = np.block(rows)
-    order = np.arange(9).reshape(3, 3).T.ravel()
-    return np.ascontiguousarray(dense[np.ix_(order, order)])
+def felt_bodies(chain: Chain) -> Bodies:
+    """Bodies that move as the arm's links do, with as few numbers as possible (base parameters).
 
+    Joint j cannot feel a body of link j that is symmetric about its axis and has no moment of
+    inertia there: turning it changes neither energy nor momentum. Each link therefore hands the
+    body with J = diag(a, a, 0), a = J_yy, h = (0, 0, h_z) and all its mass to the link before,
+    whose motion is the same but for the turn, and keeps J_yy = 0, h_z = 0, m = 0. What reaches the
+    base never moves. p, Cᵀq̇ and g stay exactly what they were; the links' own energies do not.
 
-def maps_of(chain: Chain) -> Maps:
-    """Prepare a chain's constants for `momentum_terms`."""
-    n, zero = chain.joints, np.zeros((3, 3))
-    outward, back, first_moment = np.empty((n, 9, 9)), np.zeros((n, 9, 18)), np.zeros((n, 3, 1))
-    behind = np.append(np.cumsum(chain.mass[::-1])[::-1], 0.0)
-    for j in range(n):
+    M. Gautier, W. Khalil, "Direct calculation of minimum set of inertial parameters of serial
+    robots", IEEE Trans. Robotics and Automation 6(3), 1990.
+    """
+    cross = skew(chain.com)
+    J = chain.inertia - chain.mass[:, None, None] * cross @ cross
+    h, m = chain.mass[:, None] * chain.com, np.array(chain.mass)
+    for j in range(chain.joints - 1, -1, -1):
         R, r = chain.rotation[j], skew(chain.translation[j])
-        outward[j] = interleave([[R.T, zero, zero], [-R.T @ r, R.T, zero], [zero, zero, R.T]])
-        m, c = chain.mass[j], skew(chain.com[j])
-        about_origin = chain.inertia[j] - m * c @ c
-        back[j, :, :9] = interleave(
-            [[-m * c, m * np.eye(3), zero], [about_origin, m * c, zero], [zero, zero, zero]]
+        symmetric = J[j, 1, 1] * np.diag([1.0, 1.0, 0.0])
+        along = skew(R[:, 2] * h[j, 2])
+        if j > 0:
+            J[j - 1] += R @ symmetric @ R.T - r @ along - along @ r - m[j] * r @ r
+            h[j - 1] += R[:, 2] * h[j, 2] + m[j] * chain.translation[j]
+            m[j - 1] += m[j]
+        J[j] -= symmetric
+        h[j, 2] = m[j] = 0.0
+    size = np.abs(J).max(axis=(1, 2), keepdims=True, initial=0.0)
+    return Bodies(np.where(np.abs(J) <= ROUNDING * size, 0.0, J), h, m)
+
+
+class Recorded(NamedTuple):
+    """The equations of an arm on tape, and their results, one a joint."""
+
+    tape: Tape
+    results: dict[str, list[Value]]
+
+
+def record(chain: Chain) -> Recorded:
+    """Record the equations above. Rows given: q̇ (n), cos q (n), sin q (n).
+
+    The results are ``p``, ``coriolis`` Cᵀq̇, ``gravity`` g, and ``bias`` Cᵀq̇ − g.
+    """
+    n = chain.joints
+    on, bodies = Tape(inputs=3 * n), felt_bodies(chain)
+    dq, cosine, sine = ([Value(1.0, part * n + j) for j in range(n)] for part in range(3))
+    # cos(π/2) is 6e-17 in floating point, and 1 − 1e-16 is one.
+    whole = np.rint(chain.rotation)
+    R = np.where(np.abs(chain.rotation - whole) <= ROUNDING, whole, chain.rotation)
+    r = [constants(translation) for translation in chain.translation]
+
+    omega, v, gamma = NOTHING, NOTHING, constants(chain.gravity)
+    motion: list[tuple[Vector, Vector, Vector]] = []
+    for j in range(n):
+        v = on.add(v, on.cross(omega, r[j]))
+        omega, v, gamma = (
+            on.turn(on.map(R[j].T, x), cosine[j], -sine[j]) for x in (omega, v, gamma)
         )
-        moment = m * chain.com[j]
-        if j + 1 < n:
-            R, r = chain.rotation[j + 1], skew(chain.translation[j + 1])
-            back[j, :, 9:] = interleave([[R, zero, zero], [r @ R, R, zero], [zero, zero, R]])
-            moment = moment + behind[j + 1] * chain.translation[j + 1]
-        first_moment[j, :, 0] = moment
-    start = np.zeros((9, 1))
-    start[2::3, 0] = chain.gravity
-    rotor = chain.rotor_inertia[:, None].copy()
-    return Maps(outward, back, first_moment, rotor, chain.rotor_coupling, start)
+        omega = on.add(omega, (ZERO, ZERO, dq[j]))
+        motion.append((omega, v, gamma))
+
+    rotors = np.diag(chain.rotor_inertia)
+    if chain.rotor_coupling is not None:
+        rotors = rotors + chain.rotor_coupling
+    results: dict[str, list[Value]] = {"p": [], "coriolis": [], "gravity": [], "bias": []}
+    K, L, H = NOTHING, NOTHING, NOTHING  # of the links behind, in the axes of this one
+    for j in range(n - 1, -1, -1):
+        omega, v, gamma = motion[j]
+        h = constants(bodies.moment[j])  # the mass is zero
+        K = on.add(on.map(bodies.inertia[j], omega), on.cross(h, v), K)
+        L = on.add(on.cross(omega, h), L)
+        H = on.add(h, H)
+        coriolis = on.plus(on.cross_z(K, omega), on.cross_z(L, v))
+        weight = on.cross_z(H, gamma)
+        found = {
+            "p": on.plus(K[2], on.dot([Value(float(inertia)) for inertia in rotors[j]], dq)),
+            "coriolis": coriolis,
+            "gravity": -weight,
+            "bias": on.plus(coriolis, weight),
+        }
+        for name, value in found.items():
+            results[name].insert(0, value)
+        K, L, H = (on.map(R[j], on.turn(x, cosine[j], sine[j])) for x in (K, L, H))
+        K = on.add(K, on.cross(r[j], L))
+    return Recorded(on, results)
 
 
-class Workspace:
-    """Buffers of one chunk, made once and used for every chunk of a log.
+class Programs(threading.local):
+    """The programs that a thread used last; each works in memory of its own.
 
     Attributes:
-        state: Motion state of each frame above the momentum state behind it. (n+1, 18, N)
-        room: For products of three rows. (2, 3, N)
+        made: Of an arm's constants and what is wanted, the one last used at the end.
     """
 
-    def __init__(self, joints: int, samples: int) -> None:
-        self.state = np.empty((joints + 1, 18, samples))
-        self.room = np.empty((2, 3, samples))
+    def __init__(self) -> None:
+        self.made: dict[tuple[bytes, tuple[str, ...]], Program] = {}
+
+    def get(self, chain: Chain, wanted: tuple[str, ...]) -> Program:
+        """The program of an arm, recorded where it is not among the last `KEPT`."""
+        numbers = (*vars(chain).values(), chain.rotor_coupling)
+        key = b"".join(x.tobytes() for x in numbers if isinstance(x, np.ndarray)), wanted
+        if (program := self.made.pop(key, None)) is None:
+            tape, results = record(chain)
+            program = Program(tape, [value for name in wanted for value in results[name]])
+        self.made[key] = program
+        if len(self.made) > KEPT:
+            del self.made[next(iter(self.made))]
+        return program
 
 
-def momentum_chunk(
-    maps: Maps, space: Workspace, q: Array, dq: Array, p: Array, coriolis: Array, gravity: Array
-) -> None:
-    """Fill `p`, `coriolis` and `gravity`, all (n, N), for one chunk of `q` and `dq`. (n, N)"""
-    n, count = q.shape
-    cosine, sine = cosine_and_sine(q)
-    room, base = space.room[:, :, :count], space.state[0, :9, :count]
-    base[:] = maps.start
-    for j in range(n):
-        parent, state = space.state[j, :9, :count], space.state[j + 1, :9, :count]
-        np.matmul(maps.outward[j], parent, out=state)
-        turn(state, cosine[j], -sine[j], room)
-        state[6] += dq[j]
-    for j in range(n - 1, -1, -1):
-        below = space.state[j + 1, :, :count]
-        momentum = space.state[j, 9:, :count]
-        if j == n - 1:
-            np.matmul(maps.back[j, :, :9], below[:9], out=momentum)
-        else:
-            np.matmul(maps.back[j], below, out=momentum)
-        momentum[2::3] += maps.first_moment[j]
-        project(below, momentum, p[j], coriolis[j], gravity[j], room[0, 0])
-        p[j] += maps.rotor_inertia[j] * dq[j]
-        turn(momentum, cosine[j], sine[j], room)
-    if maps.rotor_coupling is not None:
-        p += maps.rotor_coupling @ dq
-
-
-def turn(vectors: Array, cosine: Array, sine: Array, room: Array) -> None:
-    """Rotate three vectors about z in place: x ← c·x − s·y, y ← s·x + c·y. (9, N)"""
-    x, y = vectors[:3], vectors[3:6]
-    np.multiply(x, sine, out=room[0])
-    np.multiply(y, sine, out=room[1])
-    x *= cosine
-    y *= cosine
-    x -= room[1]
-    y += room[0]
-
-
-def project(
-    state: Array, momentum: Array, p: Array, coriolis: Array, gravity: Array, room: Array
-) -> None:
-    """Take the joint's own components out of the composite momentum. (N,) each
-
-    p = k_z, Cᵀq̇ = v_y l_x − v_x l_y + ω_y k_x − ω_x k_y, g = h_y γ_x − h_x γ_y.
-    """
-    p[:] = momentum[7]
-    np.multiply(state[4], momentum[0], out=coriolis)
-    np.multiply(state[3], momentum[1], out=room)
-    coriolis += room
-    np.multiply(state[1], momentum[3], out=room)
-    coriolis -= room
-    np.multiply(state[0], momentum[4], out=room)
-    coriolis -= room
-    np.multiply(momentum[5], state[2], out=gravity)
-    np.multiply(momentum[2], state[5], out=room)
-    gravity -= room
-
-
-def cosine_and_sine(q: Array) -> tuple[Array, Array]:
-    """Cosine and sine through the tangent of half the angle. Like `q` [rad]
-
-    With t = tan(q/2), cos q = (1 − t²)/(1 + t²) and sin q = 2t/(1 + t²), good to some 1e-16: one
-    transcendental function instead of two, and the one that NumPy vectorises best.
-    """
-    t = np.tan(0.5 * q)
-    square = t * t
-    share = 1.0 / (1.0 + square)
-    t *= 2.0
-    t *= share
-    np.subtract(1.0, square, out=square)
-    square *= share
-    return square, t
+PROGRAMS = Programs()
 
 
 def momentum_chunks(
-    chain: Chain, q: Array, dq: Array
-) -> Iterator[tuple[slice, Array, MomentumTerms]]:
+    chain: Chain, q: Array, dq: Array, wanted: tuple[str, ...]
+) -> Iterator[tuple[slice, Array, list[Array]]]:
     """Evaluate one chunk of samples after another.
 
     Args:
         chain: The arm, its payload merged in.
         q: Joint positions. (T, n) [rad]
         dq: Joint velocities. (T, n) [rad/s]
+        wanted: Names of results, as `record` has them.
 
     Yields:
-        Which samples, their velocity (N, n) and their terms (N, n), all with their columns whole;
-        the terms are written over by the next chunk's.
+        Which samples, their velocity and each result, (N, n) with whole columns; the next chunk's
+        results are written over them.
     """
     samples, n = q.shape
-    maps, size = maps_of(chain), min(CHUNK, samples)
-    space, rows = Workspace(n, size), np.empty((3, n, size))
-    for start in range(0, samples, CHUNK):
-        span = slice(start, min(start + CHUNK, samples))
-        p, coriolis, gravity = rows[:, :, : span.stop - span.start]
-        columns = np.ascontiguousarray(q[span].T), np.ascontiguousarray(dq[span].T)
-        momentum_chunk(maps, space, *columns, p, coriolis, gravity)
-        yield span, columns[1].T, MomentumTerms(p.T, coriolis.T, gravity.T)
+    if not samples:
+        return
+    program, size = PROGRAMS.get(chain, wanted), -(-samples // -(-samples // CHUNK))
+    for start in range(0, samples, size):
+        # All chunks have one size: the last one reaches back.
+        begin = min(start, samples - size)
+        inputs, outputs = program.bind(size)
+        given, cosine, sine = inputs.reshape(3, n, size)
+        velocity = np.ascontiguousarray(dq[begin : begin + size].T)
+        given[:] = velocity
+        cosine_and_sine(q[begin : begin + size].T, cosine, sine)
+        program.run()
+        results = outputs.reshape(-1, n, size)
+        fresh = [rows[:, start - begin :].T for rows in (velocity, *results)]
+        yield slice(start, begin + size), fresh[0], fresh[1:]
+
+
+def cosine_and_sine(q: Array, cosine: Array, sine: Array) -> None:
+    """Fill in cosine and sine through the tangent of half the angle. Like `q` [rad]
+
+    With t = tan(q/2), cos q = 2/(1 + t²) − 1 and sin q = 2t/(1 + t²), good to some 1e-16: one
+    transcendental function instead of two, and the one that NumPy vectorises best.
+    """
+    np.multiply(q, 0.5, out=sine)
+    np.tan(sine, out=sine)
+    np.multiply(sine, sine, out=cosine)
+    cosine += 1.0
+    np.divide(2.0, cosine, out=cosine)
+    sine *= cosine
+    cosine -= 1.0
 
 
 def momentum_terms(chain: Chain, q: Array, dq: Array) -> MomentumTerms:
     """Evaluate p = M q̇, Cᵀq̇ and g for every sample of `q` [rad] and `dq` [rad/s]. (T, n)"""
     terms = MomentumTerms(*(empty_series(*q.shape) for _ in range(3)))
-    for span, _, chunk in momentum_chunks(chain, q, dq):
+    for span, _, chunk in momentum_chunks(chain, q, dq, ("p", "coriolis", "gravity")):
         for whole, part in zip(terms, chunk, strict=True):
             whole[span] = part
     return terms

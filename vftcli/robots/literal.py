@@ -11,6 +11,7 @@ import numpy as np
 
 from vftcli.robots.kernels import MomentumTerms
 from vftcli.signals.arrays import Array
+from vftcli.signals.packages import needed
 
 STEP = 1e-7
 """Δq of (10). [rad]"""
@@ -27,7 +28,7 @@ def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  #
         q: Joint positions. (T, n) [rad]
         dq: Joint velocities. (T, n) [rad/s]
     """
-    import pinocchio as pin
+    pin = needed("pinocchio", "the paper's numeric method")
 
     weightless = model.copy()
     weightless.gravity.linear = np.zeros(3)

@@ -17,6 +17,7 @@ from vftcli.robots.bounds import BOUNDS
 from vftcli.robots.tree import Body, BodyTree, TreeJoint
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
+from vftcli.signals.packages import needed
 from vftcli.signals.pose import Pose
 
 KINDS = {
@@ -42,13 +43,12 @@ def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
             f"{path}: includes {part.get('file')!r}, which Pinocchio would leave out; have MuJoCo "
             "write it as one file (mj_saveLastXML)"
         )
-    try:
-        import pinocchio as pin
-    except ImportError:
-        raise RobotError(
-            f"{path}: an MJCF is read by Pinocchio, which is not installed: pip install pin; or "
-            "take the robot's URDF, which needs nothing"
-        ) from None
+    pin = needed(
+        "pinocchio",
+        f"{path}: an MJCF",
+        "; or take the robot's URDF, which needs nothing",
+        RobotError,
+    )
     try:
         with parser_words() as words:
             model = pin.buildModelFromMJCF(str(path))
@@ -87,7 +87,7 @@ def link_names(model: Any) -> list[str]:  # noqa: ANN401 - Pinocchio is untyped
 
     The first is the world's.
     """
-    import pinocchio as pin
+    pin = needed("pinocchio", "an MJCF")
 
     names = [str(name) for name in model.names]
     for frame in model.frames:
@@ -162,7 +162,7 @@ def moving_joint(
 
 def joint_axis(model: Any, index: int) -> Array:  # noqa: ANN401
     """The unit axis of a joint that turns or slides, in its own frame. (3,)"""
-    import pinocchio as pin
+    pin = needed("pinocchio", "an MJCF")
 
     data = model.createData()
     pin.computeJointJacobians(model, data, pin.neutral(model))

@@ -60,6 +60,11 @@ class RunningFriction:
         )
         return joint_torque(T, torque)
 
+    @property
+    def takes_load(self) -> bool:
+        """Whether the torque grows with what the gears carry, so that `load` matters."""
+        return any(joint.parameters.get("load_coulomb", 0.0) for joint in self.friction)
+
     def deflection(self, q: Array) -> Array | None:
         """State s of the play operator along the next samples; None without one. (T, n)
 

@@ -1,6 +1,11 @@
 """DynamicsTerms: all an observer ever sees of a robot and its log."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import InitVar, dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
 
 from vftcli.robots.drive import check_joints, drive_torque, uses_current
 from vftcli.robots.kernels import momentum_chunks
@@ -17,6 +22,21 @@ from vftcli.signals.arrays import (
 )
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import Clock, clock_of
+
+
+class Instant(NamedTuple):
+    """The terms of one sample, from which those of the next block of a log go on.
+
+    Attributes:
+        t: Time. [s]
+        p: Generalised momentum. (n,) [kg·m²/s]
+        mu: μ. (n,) [N·m]
+    """
+
+    t: float
+    p: Array
+    mu: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,19 +47,49 @@ class DynamicsTerms:
         t: Time. (T,) [s]
         p: Generalised momentum M q̇. (T, n) [kg·m²/s]
         mu: μ = τ + Cᵀq̇ − g − F_f, the torque that changes p without contact. (T, n) [N·m]
+        log_clock: The whole log's clock where these are a block of it; None for a whole log.
+        before: The sample before the first, where these are a later block of a log.
+        room: Memory for `d`, if it is there already. (T, n)
+        d: dᵗ = pᵗ − pᵗ⁻¹ − ½Tsᵗ(μᵗ + μᵗ⁻¹), the change of momentum over a sample that the model
+            leaves unexplained: the one input of every observer. Zero at a log's first sample.
+            (T, n) [N·m·s]
     """
 
     t: Array
     p: Array
     mu: Array
+    log_clock: Clock | None = None
+    before: Instant | None = None
+    room: InitVar[Array | None] = None
+    d: Array = field(init=False, repr=False, compare=False)
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, room: Array | None) -> None:
         seal(self, "t", "p", "mu")
         if self.p.ndim != 2:
             raise ShapeError(f"p has shape {self.p.shape}; expected (T, n)")
         check_clock(self.t, "the dynamics terms")
         check_shape(self.p, (len(self.t), self.p.shape[1]), "p", "the dynamics terms")
         check_shape(self.mu, self.p.shape, "mu", "the dynamics terms")
+        d = momentum_change(self, empty_series(*self.p.shape) if room is None else room)
+        object.__setattr__(self, "d", handed_over(d))
+
+    @cached_property
+    def clock(self) -> Clock:
+        """How the log is sampled that these are the terms of."""
+        return clock_of(self.t) if self.log_clock is None else self.log_clock
+
+    @cached_property
+    def dt(self) -> Array:
+        """Time since the sample before: nominal at a log's first. (T, 1), (1, 1) if uniform [s]"""
+        if self.clock.uniform:
+            return np.array([[self.clock.step]])
+        first = self.t[0] - self.clock.step if self.before is None else self.before.t
+        return np.diff(self.t, prepend=first)[:, None]
+
+    @property
+    def last(self) -> Instant:
+        """The last sample, which is the one before the next block's first."""
+        return Instant(float(self.t[-1]), self.p[-1], self.mu[-1])
 
     @property
     def joints(self) -> int:
@@ -52,10 +102,94 @@ class DynamicsTerms:
         return len(self.t)
 
 
-def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False) -> DynamicsTerms:
-    """Evaluate p and μ along a recording, chunk by chunk.
+def momentum_change(terms: DynamicsTerms, out: Array) -> Array:
+    """Fill `out` with `DynamicsTerms.d`, joint by joint, so that the passes stay in the cache."""
+    half, before = 0.5 * terms.dt[:, 0], terms.before
+    explained = np.zeros(terms.samples)
+    for p, mu, d in zip(terms.p.T, terms.mu.T, out.T, strict=True):
+        np.subtract(p[1:], p[:-1], out=d[1:])
+        np.add(mu[1:], mu[:-1], out=explained[1:])
+        explained *= half
+        d[1:] -= explained[1:]
+    out[:1] = 0.0
+    if before is not None:
+        out[0] = terms.p[0] - before.p - half[0] * (terms.mu[0] + before.mu)
+    return out
 
-    Beside the recording and the two results it needs memory for one chunk only.
+
+def one_sample_earlier(terms: DynamicsTerms, name: str) -> Array:
+    """Series "p" or "mu" of each sample's predecessor; a log's first sample is its own. (T, n)"""
+    series: Array = getattr(terms, name)
+    first = series[:1] if terms.before is None else getattr(terms.before, name)[None]
+    return np.concatenate([first, series[:-1]])
+
+
+class RunningTerms:
+    """The terms of a log's blocks, one after another: together they are those of the whole log.
+
+    Attributes:
+        robot: The arm, its payload mounted.
+        clock: The clock of the whole log; None where it comes as one block.
+        literal: Whether to use the paper's numeric method (7)–(16) instead of the batched kernels.
+        before: The last sample so far, None before the first.
+    """
+
+    def __init__(self, robot: Robot, clock: Clock | None = None, *, literal: bool = False) -> None:
+        self.robot, self.clock, self.literal = robot, clock, literal
+        self.before: Instant | None = None
+        self._friction = RunningFriction(robot.friction, robot.chain.transmission)
+
+    def next(self, recording: Recording) -> DynamicsTerms:
+        """Evaluate p and μ along the next block, chunk by chunk.
+
+        Beside the recording and the results it needs memory for one chunk only.
+
+        Raises:
+            MissingSignalError: If velocities, or both currents and torques, are missing.
+            RobotError: If the number of joints differs.
+        """
+        check_joints(recording, self.robot)
+        q, dq = recording.q, recording.require("dq")
+        effort, scale = effort_of(recording, self.robot)
+        temperature = measured_temperature(recording)
+        # One block of memory: the larger it is, the fewer pages the system has to find.
+        p, mu, room = (rows.T for rows in np.empty((3, *q.T.shape)))
+        for span, velocity, (momentum, bias, *gravity) in self._chunks(q, dq):
+            p[span] = momentum
+            mu[span] = effort[span]
+            mu[span] *= scale
+            mu[span] += bias
+            if self.robot.friction:
+                load = gravity[0] if gravity else None
+                warm = None if temperature is None else temperature[span]
+                mu[span] -= self._friction.torque(q[span], velocity, load, warm)
+        terms = DynamicsTerms(
+            t=recording.t,
+            p=handed_over(p),
+            mu=handed_over(mu),
+            log_clock=self.clock,
+            before=self.before,
+            room=room,
+        )
+        self.before = terms.last
+        return terms
+
+    def _chunks(self, q: Array, dq: Array) -> Iterator[tuple[slice, Array, list[Array]]]:
+        """P, Cᵀq̇ − g and, if friction asks for it, g: by chunks, the paper's method all at once."""
+        if not self.literal:
+            wanted = ("p", "bias", *(("gravity",) if self._friction.takes_load else ()))
+            yield from momentum_chunks(self.robot.loaded_chain, q, dq, wanted)
+            return
+        from vftcli.robots.literal import literal_momentum_terms
+
+        p, coriolis, gravity = literal_momentum_terms(self.robot.model, q, dq)
+        if (rotors := self.robot.chain.rotor_coupling) is not None:
+            p = p + dq @ rotors
+        yield slice(0, len(q)), dq, [p, coriolis - gravity, gravity]
+
+
+def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False) -> DynamicsTerms:
+    """Evaluate p and μ along a whole recording.
 
     Args:
         recording: The log.
@@ -66,30 +200,7 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
         MissingSignalError: If velocities, or both currents and torques, are missing.
         RobotError: If the number of joints differs.
     """
-    check_joints(recording, robot)
-    q, dq = recording.q, recording.require("dq")
-    effort, scale = effort_of(recording, robot)
-    p, mu = empty_series(*q.shape), empty_series(*q.shape)
-    friction = RunningFriction(robot.friction, robot.chain.transmission)
-    temperature, coupling = measured_temperature(recording), robot.chain.rotor_coupling
-    chunks = momentum_chunks(robot.loaded_chain, q, dq)
-    if literal:
-        from vftcli.robots.literal import literal_momentum_terms
-
-        # The paper's method takes the whole log at once.
-        found = literal_momentum_terms(robot.model, q, dq)
-        if coupling is not None:
-            found = found._replace(p=found.p + dq @ coupling)
-        chunks = iter([(slice(0, len(q)), dq, found)])
-    for span, velocity, chunk in chunks:
-        p[span] = chunk.p
-        mu[span] = effort[span]
-        mu[span] *= scale
-        mu[span] += chunk.coriolis_transpose_dq - chunk.gravity
-        if robot.friction:
-            warm = None if temperature is None else temperature[span]
-            mu[span] -= friction.torque(q[span], velocity, chunk.gravity, warm)
-    return DynamicsTerms(t=recording.t, p=handed_over(p), mu=handed_over(mu))
+    return RunningTerms(robot, literal=literal).next(recording)
 
 
 def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]:

@@ -13,6 +13,7 @@ from xml.etree import ElementTree as ET
 
 from vftcli.robots.robot_file import robot_text
 from vftcli.signals.errors import RobotError
+from vftcli.signals.packages import needed
 from vftcli.signals.parsing import assignment, did_you_mean
 
 NAMESPACE = re.compile(r"\{[^}]*xacro[^}]*\}")
@@ -50,14 +51,9 @@ def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
     """
     given = dict(assignment(word, "--robot-arg", FORM) for word in arguments)
     line = " ".join(["xacro", path.name, *(f"{k}:={v}" for k, v in given.items())])
-    try:
-        import xacro
-        from xacrodoc import packages
-    except ImportError:
-        raise RobotError(
-            f"{path}: a xacro is expanded by a package of its own: pip install 'vftcli[xacro]'; or "
-            f"give the URDF that it writes: {line} > {path.name.split('.')[0]}.urdf"
-        ) from None
+    otherwise = f"; or give the URDF that it writes: {line} > {path.name.split('.')[0]}.urdf"
+    xacro = needed("xacro", f"{path}: a xacro", otherwise, RobotError)
+    packages = needed("xacrodoc.packages", f"{path}: a xacro", otherwise, RobotError)
     packages.update_package_cache(dict(packages_near(path)))
     text, why = "", ""
     try:

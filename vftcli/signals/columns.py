@@ -7,6 +7,7 @@ beside each column: ``pyarrow.parquet.read_schema(path).field("tau_ext/gmo/1").m
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from vftcli.signals.packages import installed, needed
 from vftcli.signals.recording import MEANINGS
 from vftcli.signals.wrench import AXES, unit_of
 
@@ -85,12 +86,15 @@ def column_facts(name: str, frames: Mapping[str, StatedFrame]) -> dict[str, str]
 def described_schema(table: "pl.DataFrame", frames: Mapping[str, StatedFrame] | None = None) -> Any:  # noqa: ANN401 - pyarrow is untyped
     """The table's pyarrow schema with what each column holds, for ``write_parquet``.
 
+    None without pyarrow: polars then writes the columns, and nothing beside them.
+
     Args:
         table: The table.
         frames: As in `column_facts`.
     """
-    import pyarrow as pa
-
+    if not installed("pyarrow"):
+        return None
+    pa = needed("pyarrow", "a schema")
     schema = table.clear().to_arrow().schema
     known = frames or {}
     return pa.schema(field.with_metadata(column_facts(field.name, known)) for field in schema)

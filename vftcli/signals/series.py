@@ -1,10 +1,38 @@
 """What is done to a time series whatever it holds: its step, its gaps, its runs, another clock."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array, Mask, median
+from vftcli.signals.arrays import Array, Mask, is_uniform, median
 from vftcli.signals.errors import ClockError
+
+
+class Clock(NamedTuple):
+    """How a log is sampled.
+
+    Attributes:
+        uniform: Whether all steps are equal, so that constant coefficients are exact.
+        step: Nominal sample time. [s]
+    """
+
+    uniform: bool
+    step: float
+
+
+def clock_of(t: Array) -> Clock:
+    """The clock of a whole log. (T,) [s]
+
+    The nominal sample time of an uneven clock is its median step; that of an even one its mean
+    step, which has more digits than any single difference of stamps; of a single sample 1 s, which
+    nothing uses.
+    """
+    if len(t) < 2:
+        return Clock(True, 1.0)
+    if is_uniform(t):
+        return Clock(True, float((t[-1] - t[0]) / (len(t) - 1)))
+    return Clock(False, median_step(t))
 
 
 def median_step(t: Array) -> float:

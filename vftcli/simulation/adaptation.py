@@ -15,6 +15,7 @@ from vftcli.robots import Robot
 from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.packages import needed
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.simulation.calibration_motions import TABLE, ExcitationSpec, is_optimised
 from vftcli.simulation.fourier_excitation import (
@@ -323,7 +324,7 @@ def bearable(robot: Robot, motion: Reference) -> dict[str, float]:
     What it holds leaves every drive within its limit and, without friction, no joint farther from
     its place than `GIVING` under a stiff position loop, whose stiffness is M(q) ω².
     """
-    import pinocchio as pin
+    pin = needed("pinocchio", "a simulation")
 
     q = motion.q[:: INSTANTS // 24]
     data = robot.model.createData()

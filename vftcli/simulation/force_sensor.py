@@ -3,6 +3,7 @@
 import numpy as np
 
 from vftcli.signals.arrays import Array
+from vftcli.signals.packages import needed
 from vftcli.signals.pose import rpy_matrix
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.scenario import ForceSensorSpec
@@ -41,7 +42,7 @@ def tool_motion(
     arm: Arm, samples: Samples, spec: ForceSensorSpec, turn: Array
 ) -> tuple[Array, Array]:
     """Orientation of the sensor in the base (M, 3, 3), and g − a of the tool's centre. (M, 3)"""
-    import pinocchio as pin
+    pin = needed("pinocchio", "a simulation")
 
     model, data = arm.plant.model, arm.plant.model.createData()
     frame = model.getFrameId("flange")

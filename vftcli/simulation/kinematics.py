@@ -7,6 +7,7 @@ import numpy as np
 from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.packages import needed
 
 ITERATIONS = 100
 REACHED = 1e-10
@@ -28,7 +29,7 @@ class FlangePose(NamedTuple):
 
 def flange_pose(model: Any, q: Array) -> FlangePose:  # noqa: ANN401 - Pinocchio is untyped
     """Pose of the flange at joint positions `q` (n,) [rad]."""
-    import pinocchio as pin
+    pin = needed("pinocchio", "a simulation")
 
     data = model.createData()
     pin.framesForwardKinematics(model, data, np.asarray(q, dtype=float))
@@ -42,7 +43,7 @@ def reach(model: Any, pose: FlangePose, guess: Array) -> Array | None:  # noqa: 
     Gauss–Newton on the error twist log(T⁻¹ T_d) with damping that vanishes with the error, so that
     redundant arms move by the least joint motion.
     """
-    import pinocchio as pin
+    pin = needed("pinocchio", "a simulation")
 
     data, frame = model.createData(), model.getFrameId("flange")
     goal = pin.SE3(np.array(pose.rotation), np.array(pose.translation))

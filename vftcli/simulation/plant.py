@@ -7,6 +7,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.packages import needed
 from vftcli.simulation.friction import TrueFriction
 from vftcli.simulation.stiction import slide_or_stick
 
@@ -46,7 +47,7 @@ class Plant:
         v: Array,
         step: float,
     ) -> None:
-        import pinocchio as pin
+        pin = needed("pinocchio", "a simulation")
 
         if not 0.0 < step <= LARGEST_STEP:
             raise ParameterError(

@@ -8,6 +8,7 @@ from vftcli.robots import Robot
 from vftcli.robots.friction import friction_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.packages import needed
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import ServoSpec
 from vftcli.simulation.schema import unknown_name
@@ -30,7 +31,7 @@ class Servo:
     """
 
     def __init__(self, spec: ServoSpec, robot: Robot, step: float) -> None:
-        import pinocchio as pin
+        pin = needed("pinocchio", "a simulation")
 
         self.inertia = pin.crba
         if isinstance(spec.stiffness, str) and spec.stiffness not in STIFFNESS:
@@ -74,7 +75,7 @@ class Servo:
 
 def rigid_torque(model: Any, reference: Reference) -> Array:  # noqa: ANN401
     """Inverse dynamics of a Pinocchio model along a motion. (T, n) [N·m]"""
-    import pinocchio as pin
+    pin = needed("pinocchio", "a simulation")
 
     data, out = model.createData(), np.empty_like(reference.q)
     for k, (q, dq, ddq) in enumerate(zip(*reference, strict=True)):

@@ -7,6 +7,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.packages import needed
 from vftcli.simulation.motion import minimum_jerk
 from vftcli.simulation.pushes import ORIGIN, Place, Vector
 
@@ -99,7 +100,7 @@ class Hand:
 
     def twist(self, turn: Array, rotation: Array) -> Array:
         """Rotation vector from the handle's orientation to the hand's, in base axes. (3,) [rad]"""
-        import pinocchio as pin
+        pin = needed("pinocchio", "a simulation")
 
         goal = pin.exp3(turn) @ self.held_as
         error: Array = pin.log3(goal @ rotation.T)

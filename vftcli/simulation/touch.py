@@ -8,6 +8,7 @@ import numpy as np
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.packages import needed
 from vftcli.signals.pose import cross
 from vftcli.simulation.pushes import LoadSpec, Place, ProfileSpec, PushesSpec, Touch
 from vftcli.simulation.springs import HandSpec, StopSpec
@@ -171,7 +172,7 @@ class Touching:
 
 def joint_jacobian(model: Any, data: Any, joint: int) -> Array:  # noqa: ANN401
     """Jacobian of a joint's origin in base axes; the data's own are current. (6, n)"""
-    import pinocchio as pin
+    pin = needed("pinocchio", "a simulation")
 
     J: Array = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
     return J

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.signals.arrays import Array
+from vftcli.signals.packages import needed
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.sensing import Samples, interpolate
 from vftcli.simulation.touch import Mounted, joint_jacobian
@@ -91,7 +92,7 @@ def torque_and_wrench(
     wrenches: Array,
 ) -> tuple[Array, Array]:
     """Joint torque of all contacts (n,) [N·m] and the wrench of those on the flange (6,)."""
-    import pinocchio as pin
+    pin = needed("pinocchio", "a simulation")
 
     pin.computeJointJacobians(model, data, q)
     tau, flange = np.zeros(len(q)), np.zeros(6)

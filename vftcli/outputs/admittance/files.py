@@ -22,6 +22,7 @@ from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.grid import json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
 from vftcli.outputs.seals import SEAL
+from vftcli.signals.packages import installed
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import AXES as FORCES
 
@@ -161,7 +162,8 @@ def write_admittance(
             folder.write(name, text)
         with table_file(folder / "motion.parquet") as file:
             motion_table(replay).write_parquet(file, compression="zstd")
-        write_ghosts(folder / "recording.rrd", replay, title)
+        if installed("rerun"):
+            write_ghosts(folder / "recording.rrd", replay, title)
         if form is not None:
             write_figures(folder, replay_figures(replay, run), form)
         seal(folder, SEAL, record)

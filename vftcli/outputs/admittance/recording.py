@@ -28,14 +28,14 @@ def write_ghosts(path: Path, replay: Replay, title: str) -> None:
     Raises:
         OutputError: If it cannot be written whole.
     """
-    import rerun as rr
-
     paint, chain, t = colours(replay, REFERENCE), replay.robot.chain, replay.motion.t
     poses = [motion(chain, t, replay.path.q[:, n]) for n in range(len(replay.controllers))]
     tabs = [Tab(name, t, group) for name, group in line_groups(replay, paint).items()]
     view = ArmView("One arm a controller", poses[0])
     documents = {"Summary": words(replay)}
     with rerun_file(path, f"{title}: admittance", tabs, documents, view) as stream:
+        import rerun as rr
+
         for n, (pose, colour) in enumerate(zip(poses, paint, strict=True)):
             base = f"/robot/{n}_{replay.controllers[n].name}".replace(" ", "")
             send_arm(stream, base, chain, pose, (*rgb(colour), GHOST))

@@ -163,7 +163,10 @@ def parameter_grid(replay: Replay) -> Grid:
         rows.append((axis, *numbers, f"{p.damping_ratio[k]:.3g}", *tail))
     heads = {
         **{f"{letter}_d": f"${letter}_d$" for letter in "MBK"},
-        "α": "", "ξ": "", "F_tsd": r"$F_\mathrm{tsd}$", "Ẋ_tsd": r"$\dot X_\mathrm{tsd}$",
+        "α": "",
+        "ξ": "",
+        "F_tsd": r"$F_\mathrm{tsd}$",
+        "Ẋ_tsd": r"$\dot X_\mathrm{tsd}$",
     }
     return Grid(
         title=f"Values used; {p.source or 'the command line'}",

@@ -24,6 +24,7 @@ from vftcli.outputs.log.run_record import (
 from vftcli.outputs.seals import SEAL
 from vftcli.robots.writing import robot_toml
 from vftcli.signals.errors import OutputError
+from vftcli.signals.packages import installed
 
 
 def beside(path: Path) -> dict[str, Path]:
@@ -80,7 +81,8 @@ def write_identification(
         "toml": robot_toml(found.robot, heading),
     }
     with OutputFolder(path.parent, force, files_beside(path, form)) as folder:
-        write_identification_rrd(folder / names["rrd"], found)
+        if installed("rerun"):
+            write_identification_rrd(folder / names["rrd"], found)
         for kind, text in texts.items():
             folder.write(names[kind], text)
         if form is not None:

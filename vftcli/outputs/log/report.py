@@ -20,6 +20,7 @@ from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds
 from vftcli.outputs.page.index_page import render_index
 from vftcli.outputs.page.page import render
 from vftcli.outputs.seals import SEAL
+from vftcli.signals.packages import installed
 
 if TYPE_CHECKING:
     import polars as pl
@@ -156,7 +157,8 @@ def fill(
     # The page shows the record that is written beside it, not one of its own.
     analysis = replace(analysis, run=record)
     folder.write(f"{place}index.html", render(analysis))
-    write_rrd(folder / f"{place}recording.rrd", analysis)
+    if installed("rerun"):  # else `left_out` says how to get it
+        write_rrd(folder / f"{place}recording.rrd", analysis)
     write_estimates(folder / f"{place}estimates.parquet", analysis)
     put_errors(folder, place, analysis.errors, [analysis])
     put_contacts(folder, place, [analysis])

@@ -143,6 +143,10 @@ def to_csv(errors: pl.DataFrame, _bounds: PaperBounds | None = None) -> str:
     return csv_rows(errors.to_dicts(), errors.columns)
 
 
+FORMS = {"json": to_json, "csv": to_csv, "markdown": to_markdown, "latex": to_latex}
+"""Name of a form → the text of the errors table in it."""
+
+
 def pairs_grid(rows: pl.DataFrame) -> Grid:
     """Every pair of observers, the better one first; a star where the difference is sure."""
     heads = ("recording", "joint", "better", "than", "by [N·m]", "95 % interval", "p")

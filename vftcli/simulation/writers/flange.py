@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.signals.arrays import Array
+from vftcli.signals.packages import needed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +28,7 @@ class FlangeSignals:
 
 def flange_signals(model: Any, q: Array, dq: Array) -> FlangeSignals:  # noqa: ANN401
     """Evaluate the flange at positions and velocities (M, n) [rad, rad/s]."""
-    import pinocchio as pin
+    pin = needed("pinocchio", "a simulation")
 
     data, frame, count = model.createData(), model.getFrameId("flange"), len(q)
     rotation, position = np.empty((count, 3, 3)), np.empty((count, 3))

@@ -16,6 +16,7 @@ from vftcli.readers.bags.ros_messages import (
     stamped,
 )
 from vftcli.signals.arrays import Array
+from vftcli.signals.packages import needed
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.writers.flange import flange_signals
 from vftcli.virtual_sensor.solvers import wrench_of
@@ -172,7 +173,7 @@ def pose(path: str, position: Array, quaternion: Array) -> dict[str, Value]:
 
 def franka_values(simulation: Simulation) -> dict[str, Array]:
     """Numbers of every sample by their mark. (M, count)"""
-    import pinocchio as pin
+    pin = needed("pinocchio", "a simulation")
 
     samples, seen, model = simulation.samples, simulation.measured, simulation.nominal.model
     actual = flange_signals(model, seen.q, seen.dq)

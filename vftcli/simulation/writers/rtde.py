@@ -12,6 +12,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.packages import needed
 from vftcli.signals.pose import log_matrix
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.writers.flange import flange_signals
@@ -181,7 +182,7 @@ def tool_fields(simulation: Simulation) -> dict[str, Array]:
 
 def linear_momentum(simulation: Simulation) -> Array:
     """Magnitude of the arm's linear momentum. (M,) [kg·m/s]"""
-    import pinocchio as pin
+    pin = needed("pinocchio", "a simulation")
 
     model, measured = simulation.nominal.model, simulation.measured
     data = model.createData()

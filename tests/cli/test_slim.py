@@ -1,0 +1,112 @@
+"""The commands without pin, rerun-sdk and pyarrow: what can be done is done, the rest says how."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
+
+FEW = "--robot", "ur5", "--interval", "0:6"
+
+HIDDEN = "pinocchio", "rerun", "pyarrow"
+
+
+def launched(*words: object) -> subprocess.CompletedProcess[str]:
+    """The command in a process in which the three cannot be imported."""
+    script = (
+        f"import sys; sys.modules |= dict.fromkeys({HIDDEN}); "
+        "from vftcli.cli import launch; launch()"
+    )
+    command = [sys.executable, "-c", script, *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report, estimates with the wrench, and the log as Parquet, made without the three."""
+    folder = tmp_path_factory.mktemp("slim")
+    for words, lines in {
+        ("report", FIXTURE, *FEW, "-o", folder / "report"): [
+            "recording.rrd not written: pip install rerun-sdk",
+            "estimates.parquet without units beside its columns: pip install pyarrow",
+        ],
+        ("estimate", FIXTURE, *FEW, "--observer", "gmo", "--wrench", "-o", folder / "out"): [
+            "estimates.parquet without units beside its columns: pip install pyarrow",
+        ],
+        ("convert", FIXTURE, "-o", folder / "log.parquet"): [
+            "log.parquet without units beside its columns: pip install pyarrow",
+        ],
+    }.items():
+        done = launched(*words)
+        assert done.returncode == 0, done.stderr
+        assert [line for line in done.stderr.splitlines() if "pip install" in line] == lines
+    return folder
+
+
+def test_a_report_holds_all_but_the_recording(folder: Path) -> None:
+    there = {path.name for path in (folder / "report").iterdir()}
+    assert {"index.html", "run.json", "estimates.parquet", "contacts.json"} <= there
+    assert "recording.rrd" not in there
+
+
+def test_a_table_made_without_pyarrow_reads_the_same_with_it(folder: Path) -> None:
+    from vftcli.readers import read
+
+    made, logged = read(folder / "log.parquet"), read(FIXTURE)
+    for name in logged.signals:
+        assert (getattr(made, name) == getattr(logged, name)).all()
+    assert "wrench/gmo/fx" in pl.read_parquet_schema(folder / "out" / "estimates.parquet")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("inspect", "log.parquet"),
+        ("compare", "log.parquet", "--robot", "ur5", "--reference", "zero", "--interval", "0:4"),
+        ("contacts", "report/estimates.parquet"),
+        ("tune", FIXTURE, "--robot", "ur5", "-o", "gains.toml"),
+        ("identify", FIXTURE, "--robot", "ur5", "--method", "friction", "-o", "mine.toml"),
+    ],
+)
+def test_what_needs_none_of_them_works(words: tuple[str, ...], folder: Path) -> None:
+    done = launched(*(folder / w if "." in str(w) and w != "-o" else w for w in words))
+    assert done.returncode == 0, done.stderr
+    assert ("mine.rrd not written: pip install rerun-sdk" in done.stderr) == (
+        words[0] == "identify"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (("simulate", "ur5-circle", "-o", "x.csv"), "vftcli simulate needs pin"),
+        (("admit", "--release", "x=0.3", "--robot", "ur5"), "vftcli admit needs pin"),
+        (("bench",), "vftcli bench needs pin"),
+        (
+            ("estimate", FIXTURE, "--robot", "ur5", "--rrd", "-o", "x"),
+            "recording.rrd (--rrd, --open) needs rerun-sdk",
+        ),
+        (
+            ("compare", FIXTURE, "--robot", "ur5", "--reference", "zero", "--as-printed"),
+            "a Pinocchio model (simulation, replay, --as-printed) needs pin",
+        ),
+    ],
+)
+def test_the_others_say_what_is_missing(words: tuple[str, ...], line: str) -> None:
+    done = launched(*words)
+    package = line.rsplit(maxsplit=1)[-1]
+    expected = f"error: {line}, which is not installed here: pip install {package}"
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (1, expected)
+    assert not Path("x.csv").exists()
+
+
+def test_an_arrow_file_is_named_with_the_remedy(tmp_path: Path) -> None:
+    (tmp_path / "log.feather").write_bytes(b"ARROW1\0\0" + bytes(64))
+    done = launched("inspect", tmp_path / "log.feather")
+    assert done.returncode == 1
+    assert done.stderr.endswith(
+        ": an Arrow file needs pyarrow, which is not installed here: pip install pyarrow\n"
+    )

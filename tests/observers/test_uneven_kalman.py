@@ -1,0 +1,101 @@
+"""Gains and filters on a jittering clock against the plain loop, however slowly they forget."""
+
+import numpy as np
+import pytest
+
+from vftcli.observers import KalmanObserver
+from vftcli.observers.kalman_gains import Covariance, Gains, update
+from vftcli.observers.uneven_kalman import Fold, gain_sequence, spans
+from vftcli.robots.terms import DynamicsTerms
+
+SAMPLES = 3000
+
+
+def steps(gaps: int = 0) -> np.ndarray:
+    """8 ms, jittering by 5 %, with some gaps of .9 s; seed 4."""
+    rng = np.random.default_rng(4)
+    dt = 0.008 * (1.0 + 0.05 * rng.uniform(-1.0, 1.0, SAMPLES))
+    dt[rng.choice(SAMPLES, gaps, replace=False)] = 0.9
+    return dt
+
+
+def looped(observer: KalmanObserver, dt: np.ndarray, prior: Covariance) -> Gains:
+    """The covariance recursion as it is written, Joseph's form, sample by sample."""
+    model = observer.model(dt[:, None], len(prior.p11))
+    found = [update(prior, model.r[0])]
+    for k in range(1, len(dt)):
+        p11, p12, p22 = found[-1].posterior
+        moved = p12 + model.a12[k] * p22
+        prior = Covariance(
+            p11 + model.a12[k] * (p12 + moved) + model.q11[k],
+            model.a22[k] * moved + model.q12[k],
+            model.a22[k] ** 2 * p22 + model.q22[k],
+        )
+        found.append(update(prior, model.r[k]))
+    p11, p12, p22 = (np.array([getattr(g.posterior, n) for g in found]) for n in Covariance._fields)
+    l1, l2 = (np.array([getattr(g, n) for g in found]) for n in ("l1", "l2"))
+    return Gains(l1, l2, Covariance(p11, p12, p22))
+
+
+SETTINGS = {
+    "default": ({}, 0, None),
+    "fast": ({"q_tau_diag": 5e7}, 0, None),
+    "slow": ({"q_tau_diag": 1e-3}, 0, None),
+    "gaps": ({}, 20, None),
+    "P0": ({}, 0, 1e6),
+    "decay": ({"decay": 2.0}, 20, 1e4),
+    "slow decay": ({"decay": 2.0, "q_tau_diag": 1e-3}, 20, 1e4),
+}
+
+
+@pytest.mark.parametrize("scheme", ["fe", "zoh"])
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_gains_are_those_of_the_plain_loop(setting: str, scheme: str) -> None:
+    more, gaps, first = SETTINGS[setting]
+    dt, observer = steps(gaps), KalmanObserver(discretisation=scheme, **more)
+    settled = observer.steady(0.008, 2)
+    prior = settled.prior
+    if first is not None:
+        prior = Covariance(np.full(2, first), np.zeros(2), np.full(2, first))
+    expected = looped(observer, dt, prior)
+    found = gain_sequence(observer.model(dt[:, None], 2), prior, settled.gains.posterior)
+    for one, other in (
+        (found.l1, expected.l1),
+        (found.l2, expected.l2),
+        *zip(found.posterior, expected.posterior, strict=True),
+    ):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize("q_tau", [1e-3, 5e3, 5e7])
+@pytest.mark.parametrize("samples", [1, 2, 50, 1000])
+def test_the_filter_is_the_plain_loop(samples: int, q_tau: float) -> None:
+    dt, rng = steps(5)[:samples], np.random.default_rng(7)
+    p = np.cumsum(rng.normal(0.0, 0.1, (samples, 2)), axis=0)
+    log = DynamicsTerms(t=np.cumsum(dt), p=p, mu=rng.normal(0.0, 5.0, (samples, 2)))
+    observer = KalmanObserver(q_tau_diag=q_tau, initial_covariance=np.array([1.0, 0.0, 9.0]))
+    found = observer.estimate(log)
+    dt = np.broadcast_to(log.dt[:, 0], samples)
+    gains = looped(observer, dt, observer.first_prior(observer.steady(log.clock.step, 2)))
+    model, e, tau = observer.model(dt[:, None], 2), np.zeros(2), np.zeros(2)
+    for k in range(samples):
+        x = e - model.a12[k] * tau + log.d[k]
+        e, tau = (1.0 - gains.l1[k]) * x, model.a22[k] * tau + gains.l2[k] * x
+        # rounding over as many steps, of torques of 10
+        np.testing.assert_allclose(found.tau[k], tau, rtol=1e-12, atol=1e-11)
+    np.testing.assert_allclose(found.sd, np.sqrt(gains.posterior.p22), rtol=1e-12)
+
+
+@pytest.mark.parametrize("samples", [1, 5, 64, 4095, 4096, 4097])
+def test_folding_is_undone(samples: int) -> None:
+    x = np.arange(2.0 * samples).reshape(samples, 2)
+    fold = Fold.of(samples)
+    folded = fold.fold(x)
+    np.testing.assert_array_equal(fold.unfold(folded), x)
+    np.testing.assert_array_equal(folded[fold.last, -1], x[-1])
+
+
+def test_pieces_end_at_the_same_samples_wherever_a_block_begins() -> None:
+    assert spans(40000, begins=True) == [slice(1, 16384), slice(16384, 32768), slice(32768, 40000)]
+    assert spans(40000, begins=False)[0] == slice(0, 16384)
+    assert spans(1, begins=True) == []

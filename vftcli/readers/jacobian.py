@@ -1,0 +1,126 @@
+"""A vendor's external torques beside its Jacobian: no positions, and yet a wrench."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vftcli.readers.opening import Digest
+from vftcli.readers.reader import ReadChoice
+from vftcli.readers.table import JACOBIAN, Cell, JacobianError, Pick, Picks, picked
+from vftcli.signals.arrays import Array, check_clock
+from vftcli.signals.errors import ClockError, LogError
+from vftcli.signals.remarks import Remark
+
+UNIT = 1e-3
+"""How far from 1 the axis of a joint may be in the Jacobian."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JacobianLog:
+    """What such a log holds; the Jacobian's axes and point are the log's own.
+
+    Attributes:
+        name: What it is called in tables.
+        path: The file.
+        sha256: Digest of its bytes.
+        t: Time since its first sample. (T,) [s]
+        tau_ext: The vendor's estimate of the torque on the robot. (T, n) [N·m]
+        jacobian: Rows of velocity, then of angular velocity. (T, 6, n)
+        wrench: What a sensor reads, in axes of its own, or None. (T, 6) [N, N·m]
+        remarks: What reading dropped or turned.
+    """
+
+    name: str
+    path: Path
+    sha256: str
+    t: Array
+    tau_ext: Array
+    jacobian: Array
+    wrench: Array | None
+    remarks: tuple[Remark, ...] = ()
+
+
+def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str) -> JacobianLog:
+    """Read the log in which positions were looked for in vain.
+
+    Args:
+        path: The file.
+        found: What the search ended with: the table and the signals that it has.
+        choice: The interval that is wanted.
+        name: What to call it.
+
+    Raises:
+        LogError: If it lacks a signal, or its Jacobian is none of an arm of six joints or more.
+        ClockError: If its clock does not increase, or no sample is in the interval.
+    """
+    table, digest = found.table, Digest((path,))
+    digest.start()
+    signals = {p.signal: p for p in found.picks.signals if p.signal in {"tau_ext", "wrench"}}
+    cells, n = jacobian_cells(found)
+    if "tau_ext" not in signals or len(signals["tau_ext"].cells) != n:
+        raise LogError(
+            f"{path}: a Jacobian of {n} joints and no external torques of {n} joints beside it. "
+            "Name their columns with --columns, as in tau_ext=tau_ext_{i}."
+        )
+    signals["jacobian"] = Pick(signal="jacobian", cells=cells)
+    picks = Picks(signals=tuple(signals.values()), clock=found.picks.clock, rate=found.picks.rate)
+    raw = picked(table, picks, ReadChoice())
+    t = np.asarray((raw.stamps - raw.stamps[0]) * raw.tick, dtype=np.float64)
+    check_clock(t, str(path))
+    for signal, values in raw.signals.items():
+        if not np.all(np.isfinite(values)):
+            row = int(np.argwhere(~np.isfinite(values))[0][0]) + 1
+            raise LogError(f"{path}: {signal} is not a number in sample {row}.")
+    start, stop = choice.interval or (-np.inf, np.inf)
+    inside = (t >= start) & (t <= stop)
+    if np.count_nonzero(inside) < 2:
+        raise ClockError(f"{path}: fewer than two samples between {start:g} and {stop:g} s")
+    jacobian = velocity_first(raw.signals["jacobian"].reshape(-1, 6, n), path)
+    wrench = raw.signals.get("wrench")
+    return JacobianLog(
+        name=name,
+        path=path,
+        sha256=digest.hexdigest(),
+        t=t[inside],
+        tau_ext=raw.signals["tau_ext"][inside],
+        jacobian=jacobian[inside],
+        wrench=None if wrench is None else wrench[inside],
+        remarks=raw.remarks,
+    )
+
+
+def jacobian_cells(found: JacobianError) -> tuple[tuple[Cell, ...], int]:
+    """The cells of jacobian_R_C row by row, and the number of joints.
+
+    Raises:
+        LogError: If it has not six rows, fewer columns, or a hole.
+    """
+    names = found.table.names or ()
+    places = {
+        (int(match[2]), int(match[3])): Cell(column)
+        for column, name in enumerate(names)
+        if (match := JACOBIAN.fullmatch(name))
+    }
+    rows, columns = (sorted({place[k] for place in places}) for k in (0, 1))
+    if len(rows) != 6 or len(columns) < 6 or len(places) != 6 * len(columns):
+        raise LogError(
+            f"{found.table.path}: the Jacobian has {len(rows)} rows, {len(columns)} columns and "
+            f"{len(places)} cells; a wrench needs 6 rows and a column for each of 6 joints or more."
+        )
+    return tuple(places[r, c] for r in rows for c in columns), len(columns)
+
+
+def velocity_first(jacobian: Array, path: Path) -> Array:
+    """The Jacobian with its rows of velocity first: the axes of revolute joints have length 1.
+
+    Raises:
+        LogError: If neither half of its rows are axes.
+    """
+    for J in (jacobian, np.roll(jacobian, 3, axis=1)):
+        if np.all(np.abs(np.linalg.norm(J[:, 3:], axis=1) - 1) < UNIT):
+            return J
+    raise LogError(
+        f"{path}: neither the first nor the last three rows of the Jacobian are axes of revolute "
+        "joints, of length 1."
+    )
