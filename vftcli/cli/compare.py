@@ -113,11 +113,10 @@ def compare(
 
     if drawn.folder() is not None and significance:
         raise typer.BadParameter("--figures draws the errors; leave --significance away")
-    library = Library(logs)
-    choice = analysis.choice(library, reference)
+    choice = analysis.choice(library := Library(logs), reference)
     # The list is for the wrench and for judging contacts; a table of torques needs none.
-    listed = choice.contacts and (analysis.wrench.asks or reference.contacts)
-    choice = replace(choice, contacts=listed)
+    asked = analysis.wrench.asks or reference.contacts
+    choice = replace(choice, contacts=choice.contacts and asked)
     left_out, analyses = LeftOut(library, logs), []
     by_jacobian = JacobianLogs(left_out, choice)
     for made in analyse_logs(logs, choice, by_jacobian.told):
