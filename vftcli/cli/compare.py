@@ -60,9 +60,9 @@ class DrawnErrors(opt.FigureOptions):
             raise typer.BadParameter("--figures and -o DIR need each other: tables go to stdout")
         if self.output is None:
             return None
-        from vftcli.outputs.figures.log import ERROR_FIGURES
         from vftcli.outputs.figures.paper import figure_files
         from vftcli.outputs.files import OutputFolder
+        from vftcli.outputs.log.figures import ERROR_FIGURES
 
         folder = OutputFolder(self.output, self.force, figure_files(form, ERROR_FIGURES))
         folder.check()
@@ -72,8 +72,8 @@ class DrawnErrors(opt.FigureOptions):
         """Draw the errors, if that is asked for, and say where."""
         if (figures := self.folder()) is not None:
             from vftcli.cli.console import say
-            from vftcli.outputs.figures.log import error_figures
             from vftcli.outputs.figures.paper import write_figures
+            from vftcli.outputs.log.figures import error_figures
 
             with figures as folder:
                 write_figures(folder, error_figures(errors), str(self.figures))

@@ -12,12 +12,12 @@ from vftcli.admittance.parameters import AXES, PER_AXIS
 from vftcli.admittance.replay import Replay
 from vftcli.admittance.stability import Verdict
 from vftcli.doctor.examination import Examination
+from vftcli.outputs.admittance.figures import REPLAY_FIGURES, replay_figures
 from vftcli.outputs.admittance.page import render_admittance
 from vftcli.outputs.admittance.recording import padded, write_ghosts
 from vftcli.outputs.admittance.tables import comparison_csv, latency_rows
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.figures.paper import figure_files, write_figures
-from vftcli.outputs.figures.replays import REPLAY_FIGURES, replay_figures
 from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.grid import json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions

@@ -7,9 +7,9 @@ from typing import Any
 from vftcli.doctor.examination import Examination
 from vftcli.identification.result import Identification
 from vftcli.outputs.examination import health_record, overridden_lines
-from vftcli.outputs.figures.identified import IDENTIFICATION_FIGURES, identification_figures
 from vftcli.outputs.figures.paper import figure_files, write_figures
 from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.identification.figures import IDENTIFICATION_FIGURES, identification_figures
 from vftcli.outputs.identification.page import render_identification
 from vftcli.outputs.identification.recording import write_identification_rrd
 from vftcli.outputs.log.run_record import (

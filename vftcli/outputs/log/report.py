@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.contacts import contacts_csv, contacts_record
-from vftcli.outputs.figures.log import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
 from vftcli.outputs.figures.paper import figure_files, write_figures
 from vftcli.outputs.files import OutputFolder, numbered
 from vftcli.outputs.log import tables
 from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
+from vftcli.outputs.log.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
 from vftcli.outputs.log.rerun_recording import write_rrd
 from vftcli.outputs.log.run_record import jsonable, run_record, seal, versions
 from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds
