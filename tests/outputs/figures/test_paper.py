@@ -106,9 +106,9 @@ def test_no_files_without_a_form_and_names_beside_a_file() -> None:
 
 
 def test_a_legend_takes_as_many_lines_as_it_needs() -> None:
-    """Five short names of five letters are .74 in each: four a line of 3.5 in, so three and two."""
-    assert legend_room(3.5, ["abcde"] * 5) == (3, pytest.approx(0.35))
-    assert legend_room(7.16, ["abcde"] * 5)[0] == 5
+    """Seven names of five letters are .625 in each: five a line of 3.5 in, so four and three."""
+    assert legend_room(3.5, ["abcde"] * 7) == (4, pytest.approx(0.35))
+    assert legend_room(7.16, ["abcde"] * 7)[0] == 7
     assert legend_room(3.5, []) == (1, 0.0)
 
 

@@ -24,9 +24,12 @@ wide. [in]"""
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 """Marks in turn: what they stand for is told by their shape where colours are not printed."""
 
-APART = 0.05
-"""Numbers of contacts stand no closer than this share of the axis; between them some are left
-out."""
+DIGIT, BETWEEN = 0.046, 0.02
+"""Width of a digit of a contact's number, and room between two numbers: where there is less, the
+second is left out. [in]"""
+
+PLOTTED = 0.75
+"""About which share of a plot's room its axes take."""
 
 AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}
 """Unit of a horizontal axis → what it is called."""
@@ -93,7 +96,7 @@ def line_figure(
         else:
             axes.set_xlabel(below or AXES[plot.chart.unit])
         if numbers and k < columns:
-            write_numbers(axes, numbers)
+            write_numbers(axes, numbers, PLOTTED * width / columns)
         for n, (x, y) in enumerate((marks or {}).values()):
             axes.plot(x[plot.panel], y[plot.panel], **dot_look(n))
         if plot.over is not None:
@@ -210,12 +213,13 @@ def legend_handles(plots: Sequence[Plot], marks: Sequence[str]) -> dict[str, Any
     return found if len(found) > 1 else {}
 
 
-def write_numbers(axes: "Axes", numbers: Mapping[int, float]) -> None:
-    """Numbers of contacts above a plot, as far as they have room."""
+def write_numbers(axes: "Axes", numbers: Mapping[int, float], inches: float) -> None:
+    """Numbers of contacts above a plot of about this width, as far as they have room."""
     start, stop = axes.get_xlim()
-    last = -np.inf
+    taken = -np.inf
     for number, at in numbers.items():
-        if at - last >= APART * (stop - start):
+        half = 0.5 * DIGIT * len(str(number)) * (stop - start) / inches
+        if at - half >= taken:
             axes.annotate(
                 str(number),
                 (at, 1.0),
@@ -226,4 +230,4 @@ def write_numbers(axes: "Axes", numbers: Mapping[int, float]) -> None:
                 va="bottom",
                 fontsize=6.5,
             )
-            last = at
+            taken = at + half + BETWEEN * (stop - start) / inches

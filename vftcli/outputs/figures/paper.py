@@ -63,7 +63,7 @@ PDF embeds it as TrueType; SVG holds its letters as paths, which need no font. A
 log's name is a dollar sign.
 """
 
-LETTER, SAMPLE, LINE = 0.052, 0.48, 0.15
+LETTER, SAMPLE, LINE = 0.043, 0.41, 0.15
 """Width of a letter in a legend, of a line's sample beside it, and height of its lines. [in]"""
 
 LONGEST = 44
