@@ -133,6 +133,7 @@ def show_report(
 
     several = len(analyses) + len(failed) > 1
     screen, names = canvas(), SUMMARY_FILES if several else (*FILES, *extra_files(extras))
+    names = (*names, "figures/")
     below = written_lines(output, names, screen, "vftcli open", several=several)
     if several:
         show(logs_screen(analyses, screen, failed, below, every=details))

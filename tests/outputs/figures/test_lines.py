@@ -128,3 +128,16 @@ def test_marks_stand_where_they_are_told_each_shape_its_own() -> None:
         "a, chosen",
         "b, chosen",
     ]
+
+
+def test_of_seven_joints_the_sixth_has_its_time_in_the_empty_place() -> None:
+    """Rows stay as close as without it: the numbers below take no room of their own."""
+    values = np.zeros((len(T), 7))
+    names = tuple(f"J{j}" for j in range(1, 8))
+    made = chart(series=(ChartLine("a", values),), units=("N·m",) * 7, panels=names)
+    *plots, empty = drawn(3.5, plots_of(made)).axes
+    assert [axes.get_xlabel() for axes in plots] == [""] * 6 + ["Time (s)"]
+    assert [text.get_text() for text in empty.texts] == ["Time (s)"]
+    assert empty.get_xlim() == plots[0].get_xlim()
+    bottoms = [plots[k].get_position().y0 for k in (0, 2, 4, 6)]
+    np.testing.assert_allclose(np.diff(bottoms), np.diff(bottoms).mean(), atol=0.01)

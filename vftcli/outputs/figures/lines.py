@@ -91,18 +91,20 @@ def line_figure(
     for k, (axes, plot) in enumerate(zip(grid, plots, strict=False)):
         draw_plot(axes, plot)
         axes.set_ylabel(f"{plot.chart.panels[plot.panel]} ({plot.chart.units[plot.panel]})")
-        if k + columns < len(plots) and plots[k + columns].chart.unit == plot.chart.unit:
-            axes.tick_params(labelbottom=False)
-        else:
+        last = k + columns >= len(grid)
+        if last or (k + columns < len(plots) and plots[k + columns].chart.unit != plot.chart.unit):
             axes.set_xlabel(below or AXES[plot.chart.unit])
+        else:
+            axes.tick_params(labelbottom=False)
         if numbers and k < columns:
             write_numbers(axes, numbers, PLOTTED * width / columns)
         for n, (x, y) in enumerate((marks or {}).values()):
             axes.plot(x[plot.panel], y[plot.panel], **dot_look(n))
         if plot.over is not None:
-            draw_over(axes, plot, named=(k + 1) % columns == 0 or k == len(plots) - 1)
-    for axes in grid[len(plots) :]:
-        axes.set_axis_off()
+            draw_over(axes, plot, named=(k + 1) % columns == 0)
+    for k in range(len(plots), len(grid)):
+        if k >= columns:
+            hang_axis(grid[k], plots[k - columns], below or AXES[plots[k - columns].chart.unit])
     figure.align_ylabels(list(grid[: len(plots)]))
     add_legend(figure, labels, legend_columns)
     return figure
@@ -110,7 +112,7 @@ def line_figure(
 
 def draw_plot(axes: "Axes", plot: Plot) -> None:
     """One panel with its contacts, bands and lines."""
-    from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+    from matplotlib.ticker import MaxNLocator
 
     chart, j = plot.chart, plot.panel
     for start, stop in chart.spans:
@@ -121,13 +123,40 @@ def draw_plot(axes: "Axes", plot: Plot) -> None:
     for series in chart.series:
         if series.shown:
             draw_line(axes, chart, series, j)
+    set_scale(axes, chart)
+    axes.set_ylim(*ends_of_family(chart, j))
+    axes.yaxis.set_major_locator(MaxNLocator(4))
+
+
+def set_scale(axes: "Axes", chart: Chart) -> None:
+    """The horizontal axis of a chart."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
     if chart.log:
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter(FuncFormatter(plain))
         axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlim(float(chart.x[0]), float(chart.x[-1]))
-    axes.set_ylim(*ends_of_family(chart, j))
-    axes.yaxis.set_major_locator(MaxNLocator(4))
+
+
+def hang_axis(axes: "Axes", above: Plot, label: str) -> None:
+    """In a place without a plot, the numbers and the label of the axis above it."""
+    set_scale(axes, above.chart)
+    axes.patch.set_visible(False)
+    axes.spines[:].set_visible(False)
+    axes.yaxis.set_visible(False)
+    # Numbers inside of the empty place take no room of their own.
+    axes.tick_params(which="both", bottom=False, labelbottom=False)
+    axes.tick_params(labeltop=True, pad=-10.0)
+    axes.annotate(
+        label,
+        (0.5, 1.0),
+        xycoords="axes fraction",
+        xytext=(0, -12),
+        textcoords="offset points",
+        ha="center",
+        va="top",
+    )
 
 
 def plain(value: float, _place: int) -> str:
