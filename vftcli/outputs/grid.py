@@ -46,6 +46,7 @@ LATEX_LETTERS = {
     "−": "$-$",
     "α": r"$\alpha$",
     "ξ": r"$\xi$",
+    "µ": r"$\mu$",
     "τ": r"$\tau$",
     "σ": r"$\sigma$",
     "ω": r"$\omega$",
