@@ -32,8 +32,11 @@ ORDER = (
     "admittance",
     "analysis",
     "outputs",
+    "datasets",
     "pipeline",
+    "streaming",
     "proposal",
+    "batch",
     "notebook",
     "yardsticks",
     "benchmark",
@@ -48,7 +51,9 @@ KNOWN = {("evaluation", "refinement")}
 """Pairs of those that do, the first the second."""
 
 FILES = (
+    "batch/shipping.py",  # unpacks what was sent
     "cli/",  # asks before it overwrites
+    "datasets/",
     "outputs/",
     "readers/",
     "observers/settings.py",  # gains in a file of their own

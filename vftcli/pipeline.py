@@ -21,6 +21,7 @@ from vftcli.robots import Robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import MissingSignalError, ParameterError, VftError
 from vftcli.signals.identity import refuse_repeated_logs
+from vftcli.signals.progress import no_stage
 from vftcli.signals.recording import Recording
 
 if TYPE_CHECKING:
@@ -33,8 +34,7 @@ if TYPE_CHECKING:
     from vftcli.virtual_sensor.smoother.observer_wrench import Gate
 
 
-def silent(_stage: str) -> None:
-    """Tell nobody what is being done."""
+WRITING = 0.7  # share of a log's work that is done before its files are written
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +52,7 @@ class AnalysisChoice:
         contacts: Whether what touched the arm is listed, where the complete log may be used.
         library: Where the logs of the command are read, each once.
         examiner: Who examines them, each once, and says whether results mean anything.
-        progress: Who is told what is being done.
+        progress: Told what is being done, and from which share of a log's work to which.
     """
 
     read: ReadChoice = field(default_factory=ReadChoice)
@@ -65,7 +65,9 @@ class AnalysisChoice:
     contacts: bool = True
     library: Library = field(default_factory=Library, repr=False, compare=False)
     examiner: Examiner = field(default_factory=Examiner, repr=False, compare=False)
-    progress: Callable[[str], None] = field(default=silent, repr=False, compare=False)
+    progress: Callable[[str, float, float], None] = field(
+        default=no_stage, repr=False, compare=False
+    )
 
     def __post_init__(self) -> None:
         if self.zero_log is not None and self.refinement.removes_bias:
@@ -104,14 +106,13 @@ class AnalysisChoice:
 Analyser = Callable[[Recording, Robot, AnalysisChoice, Models], "Analysis"]
 """What is done with each log of a command."""
 
+Failed = Callable[[Path, VftError], None]
+"""Who is told which log could not be analysed, and why."""
+
 
 def raise_error(_log: Path, error: VftError) -> None:
     """Raise what is wrong with a log."""
     raise error
-
-
-Failed = Callable[[Path, VftError], None]
-"""Who is told which log could not be analysed, and why."""
 
 
 def analyse_logs(
@@ -135,7 +136,7 @@ def analyse_logs(
     models, work, tell = Models(), work or analyse, failed or raise_error
     recordings: list[tuple[Path, Recording]] = []
     for path in logs:
-        choice.progress(f"reading {path.name}")
+        choice.progress(f"reading {path.name}", 0.0, 0.05)
         try:
             if choice.read.columns is None:
                 refuse_estimates(path)
@@ -165,15 +166,9 @@ def list_touches(
 
     motion = read(recording, robot, choice, models)
     examinations = examine(motion, choice)
-    choice.progress("listing contacts")
-    return Analysis(
-        motion=motion,
-        observers=(),
-        estimates=(),
-        tunings={},
-        contacts=list_contacts(motion),
-        examinations=examinations,
-    )
+    choice.progress(f"{recording.name}: listing contacts", 0.3, 1.0)
+    made = Analysis(motion=motion, observers=(), estimates=(), tunings={})
+    return replace(made, contacts=list_contacts(motion), examinations=examinations)
 
 
 def prepared(recording: Recording, choice: AnalysisChoice) -> tuple[Recording, Robot]:
@@ -217,16 +212,17 @@ def analyse(
         choice: What is asked of it.
         models: What the command has modelled so far, for several logs that share a free run.
     """
-    tell = choice.progress
+    tell, name = choice.progress, recording.name
+    tell(f"{name}: examining", 0.05, 0.15)
     motion = read(recording, robot, choice, models or Models())
     examinations = examine(motion, choice)
-    tell(f"{recording.name}: running observers")
+    tell(f"{name}: running observers", 0.15, 0.3)
     baseline = model(motion, choice)
     analysis = replace(observe(motion, baseline, choice), examinations=examinations)
     analysis = refine(analysis, baseline, choice)
-    tell(f"{recording.name}: listing contacts, errors")
     analysis = find_contacts(analysis, choice)
     analysis = sense(analysis, choice)
+    tell(f"{name}: comparing", 0.5, WRITING)
     return judge(analysis, choice)
 
 
@@ -270,16 +266,16 @@ def observe(motion: FreeMotion, baseline: "Baseline | None", choice: AnalysisCho
     from vftcli.analysis import Analysis, terms_of
     from vftcli.signals.remarks import caution
 
-    log, step = motion.log, motion.log.recording.median_step
-    shown = NOT_SHOWN
-    if baseline is not None:
-        shown = baseline.shown(gains=choice.observers.gains_of_log)
+    log, run, step = motion.log, choice.observers.run, motion.log.recording.median_step
+    own = choice.observers.gains_of_log
+    shown = NOT_SHOWN if baseline is None else baseline.shown(gains=own)
     observers, remarks = choice.observers.build(log.robot, step, shown)
     printed = (caution("as-printed"),) if choice.observers.as_printed else ()
+    whole = observers if log.recording.long is None else ()  # of a long log, block by block
     return Analysis(
         motion=motion,
         observers=observers,
-        estimates=tuple(o.estimate(terms_of(baseline, o.name, log)) for o in observers),
+        estimates=tuple(run(o, terms_of(baseline, o.name, log)) for o in whole),
         tunings={o.name: o.tuning(step, log.robot.joints) for o in observers},
         remarks=(*remarks, *printed),
     )
@@ -306,6 +302,7 @@ def find_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
     from vftcli.contacts.listing import list_contacts
     from vftcli.signals.remarks import caution
 
+    choice.progress(f"{analysis.recording.name}: listing contacts", 0.3, 0.5)
     try:
         return replace(analysis, contacts=list_contacts(unloaded_motion(analysis.motion, choice)))
     except VftError as error:
@@ -370,8 +367,8 @@ def told_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "ToldContacts
     from vftcli.contacts.untouched import free_part
     from vftcli.virtual_sensor.detection import ToldContacts, read_in_free_runs
 
-    motion = unloaded_motion(analysis.motion, choice)
-    part, rows = free_part(motion), analysis.contacts
+    motion, rows = unloaded_motion(analysis.motion, choice), analysis.contacts
+    part = free_part(motion)
     listed = {} if rows is None else {BEST: rows.contacts}
     if part is None:
         return ToldContacts(untouched=np.zeros(motion.log.recording.samples, bool), listed=listed)

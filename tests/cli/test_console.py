@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from vftcli.cli.console import LeftOut, canvas, detail, say, show, speaking
-from vftcli.cli.progress import Stages
 from vftcli.readers.library import Library
 from vftcli.signals.errors import ParameterError
 
@@ -68,21 +67,6 @@ def test_letters_are_those_of_the_terminal(monkeypatch: pytest.MonkeyPatch) -> N
     ascii_only = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
     monkeypatch.setattr("sys.stdout", ascii_only)
     assert not canvas().unicode
-
-
-def test_a_stage_is_shown_only_once_it_takes_long(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    now = [0.0]
-    monkeypatch.setattr("vftcli.cli.progress.time.monotonic", lambda: now[0])
-    stages = Stages()
-    stages.begin("reading")
-    assert capsys.readouterr().err == ""
-    now[0] = 1.5
-    stages.begin("running observers")
-    assert "running observers" in capsys.readouterr().err
-    stages.end()
-    assert capsys.readouterr().err.strip() == ""
 
 
 def test_of_a_single_log_the_error_is_the_commands_own() -> None:

@@ -30,6 +30,7 @@ READING = {
 OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
        ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
        ("init", "--output"), ("compare", "--output"),
+       ("annotate", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, what is written where, and --csv, which
 the contract makes a file of `estimate` and a table of the others."""
@@ -47,6 +48,7 @@ BAD = {
     "--robot-arg": ("name", "--robot-arg 'name' is not NAME=VALUE"),
     "--payload": ("bucket", "no payload 'bucket'"),
     "--observer": ("kalman", "no observer 'kalman'; there is best, fdo, gmo"),
+    "--rrd-detail": ("many", "many is none of full, levels and none"),
     "--set": ("gmo.gain=much", "is not a number or a list"),
     "--gains": ("nowhere.toml", "nowhere.toml"),
     "--set-file": ("nowhere.toml", "nowhere.toml"),
@@ -155,7 +157,7 @@ def test_a_command_that_reads_a_log_reads_it_as_all_do(command: str) -> None:
 @pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
 def test_a_command_that_estimates_takes_all_that_can_be_asked(command: str) -> None:
     whole = {*BAD, "--causal", "--wrench", "--as-printed", "--sensor-weight"}
-    whole -= {"--reference", "--figures"}  # what it is compared with, and how it is shown
+    whole -= {"--reference", "--figures", "--rrd-detail"}  # what is compared, shown, written
     assert set(parameters(command)) >= whole
 
 
@@ -168,8 +170,8 @@ def test_summaries_are_those_of_the_commands() -> None:
 
 
 ROOT = Path(__file__).parent.parent.parent
-OF_OTHER_TOOLS = {"--binary", "--storage", "--help", "--all-extras"}
-"""Options in the documents that are those of pip, of ros2 bag, or of all programs."""
+OF_OTHER_TOOLS = {"--binary", "--storage", "--help", "--all-extras", "--nthreads"}
+"""Options in the documents that are those of pip, of ros2 bag, of Dask, or of all programs."""
 
 
 def test_documents_name_every_option_and_no_other() -> None:

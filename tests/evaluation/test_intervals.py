@@ -164,3 +164,20 @@ def test_a_resampled_series_closes_to_a_ring() -> None:
     # 1000 draws of a mean of ~1.25 with a scatter of .25: told to .008, four times that allowed.
     assert resample(last).draws.mean() == pytest.approx(last.mean(), abs=0.035)
     assert resample(first).draws.mean() == pytest.approx(first.mean(), abs=0.035)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.99, 0.9995])
+@pytest.mark.parametrize("count", [30, 3000, 20_000])
+def test_a_correlation_time_by_blocks_is_that_of_the_whole(memory: float, count: int) -> None:
+    """Of one transform of the whole series, whichever of the growing numbers of lags is enough."""
+    x = lfilter([1.0], [1.0, -memory], np.random.default_rng(8).standard_normal((count, 2)), axis=0)
+    centred = x - x.mean(axis=0)
+    spectrum = np.abs(np.fft.rfft(centred, 2 * count, axis=0)) ** 2
+    product = np.fft.irfft(spectrum, axis=0)[: count // 2]
+    expected = []
+    for rho in (product / product[0]).T:
+        fallen = np.flatnonzero(rho < 0.05)
+        end = int(fallen[0]) if len(fallen) else len(rho)
+        expected.append(max(1.0, 2.0 * float(np.sum(rho[:end])) - 1.0))
+    # rounding of two ways of summing up to 10 000 correlations
+    np.testing.assert_allclose(correlation_time(x), expected, rtol=1e-9)

@@ -91,7 +91,7 @@ def test_methods_of_the_whole_arm_name_the_links_too(method):
 
 def test_a_load_says_how_it_was_found_and_in_which_log():
     load = Payload(mass=1.5, com=np.array([0.0, 0.0, 0.1]), inertia=np.zeros((3, 3)))
-    origin = fact("load-from-poses", poses=7)
+    origin = fact("load-from-poses", poses=7, different=7, logs=1)
     carried = (log("a/log.csv"),)
     fit = LoadFit(load, 0.1, np.full(3, 0.01), np.ones(6), carried, origin)
     loaded = UR5.with_payload(load)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vftcli.outputs.arm import arm_length, capsules, motion
+from vftcli.outputs.arm import MOST_POSES, arm_length, capsules, motion
 from vftcli.robots import PROFILES, load_robot
 from vftcli.robots.kinematics import link_poses
 
@@ -26,3 +26,10 @@ def test_motion_follows_the_log_at_its_rate() -> None:
     poses = motion(chain, t, q)
     np.testing.assert_allclose(np.diff(poses.t), 0.02, atol=1e-9)
     np.testing.assert_array_equal(poses.translation, link_poses(chain, q[::20]).translation)
+
+
+def test_of_a_long_log_no_more_poses_are_drawn_than_can_be_looked_at() -> None:
+    t = 0.02 * np.arange(50_001)  # 1000 s at the rate that is drawn
+    chain = load_robot("panda").chain
+    poses = motion(chain, t, np.zeros((len(t), chain.joints)))
+    assert MOST_POSES / 2 < len(poses.t) <= MOST_POSES

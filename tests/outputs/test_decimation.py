@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vftcli.outputs.decimation import decimated
+from vftcli.outputs.decimation import decimated, extremes, level_rows
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -52,3 +52,35 @@ def test_nothing_known_is_nothing_drawn() -> None:
     t = 0.01 * np.arange(1000)
     (line,) = decimated(t, np.full((1000, 1), np.nan), 20)
     assert np.all(np.isnan(line.y))
+
+
+def test_of_a_plot_the_spike_of_one_sample_survives_in_every_line_at_its_own_time() -> None:
+    rng, stretches = np.random.default_rng(2), 40
+    t = 0.001 * np.arange(10_000)
+    values = rng.normal(size=(len(t), 3))
+    spikes = rng.choice(len(t), 3, replace=False)
+    values[spikes, [0, 1, 2]] = 1e3, -1e3, 1e3
+    rows = level_rows(t, values, stretches)
+    assert rows is not None
+    assert set(spikes) <= set(rows)
+    assert {0, len(t) - 1} <= set(rows)
+    assert len(rows) <= 2 * 3 * stretches + 2
+    lows, highs = extremes(values, stretches)
+    assert set(lows.ravel()) | set(highs.ravel()) <= set(rows)
+
+
+def test_every_sample_of_a_whole_span_and_the_edges_of_what_is_unknown_stay() -> None:
+    t = 0.001 * np.arange(10_000)
+    values = np.where((t > 3.0005) & (t < 3.0105), np.nan, np.sin(t))[:, None]
+    rows = level_rows(t, values, 40, [(6.9995, 7.1005), (9.9, 12.0)])
+    assert rows is not None
+    assert {*range(7000, 7101), *range(9900, 10_000)} <= set(rows)
+    assert np.isnan(values[rows]).any()  # ten unknown samples amid a stretch of 250
+    assert len(rows) <= 2 * 40 + 2 + 1 + 101 + 100
+
+
+def test_a_plot_that_levels_would_not_shorten_is_kept_whole() -> None:
+    t = 0.001 * np.arange(1200)
+    values = np.zeros((1200, 3))
+    assert level_rows(t, values, 200) is None  # two of each line and stretch: as many
+    assert level_rows(t, values, 199) is not None

@@ -52,7 +52,7 @@ def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -
 
 
 def test_the_recording_shows_both_edges_of_the_last_band(worked_up: Analysis) -> None:
-    plot = line_groups(worked_up)["Joint torques"][0]
+    plot = next(iter(line_groups(worked_up)["Joint torques"]))
     lines = {line.name: line.values for line in plot.lines}
     upper, lower = (lines[f"rts-auto 95 % {edge}"] for edge in ("upper", "lower"))
     estimate = worked_up.estimates[-1]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from vftcli.repetition.drive_run import band
 from vftcli.repetition.error_model import (
     ErrorModel,
-    band,
     less_noise,
     local_rms,
     noise_of,

@@ -7,7 +7,7 @@ import pytest
 
 from vftcli.repetition.cycles import Cycles
 from vftcli.repetition.drive_run import DriveRun
-from vftcli.repetition.free_cycles import find_free_cycles
+from vftcli.repetition.free_cycles import FreeCycles, find_free_cycles
 from vftcli.signals.errors import ReferenceTorqueError
 
 T = 0.01 * np.arange(1200)
@@ -65,3 +65,13 @@ def test_of_cycles_that_are_all_alike_the_last_is_left_to_be_compared(
 def test_a_log_shorter_than_a_cycle_has_no_free_one(pushed: Callable[..., DriveRun]) -> None:
     with pytest.raises(ReferenceTorqueError, match=r"no whole cycle of 13 s.*--free"):
         find_free_cycles(pushed(), Cycles(period=13.0, begin=0.0, end=12.0))
+
+
+def test_of_many_free_cycles_eight_are_laid_under_the_others_from_the_first_to_the_last() -> None:
+    many = FreeCycles(tuple(range(3, 62)), None)
+    assert many.drawn == (3, 11, 20, 28, 36, 44, 53, 61)  # 58/7 cycles apart, rounded
+    remark = many.remarks(64)[1]
+    assert (remark.code, remark.values["free"]) == ("free-cycles-drawn", 59)
+    assert remark.values["wider"] == pytest.approx(0.0518, abs=1e-4)  # √((1 + 1/8)/(1 + 1/59)) − 1
+    few = FreeCycles(tuple(range(8)), None)
+    assert (few.drawn, len(few.remarks(9))) == (few.numbers, 1)

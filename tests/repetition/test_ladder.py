@@ -9,6 +9,7 @@ import pytest
 from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.error_model import ErrorModel
 from vftcli.repetition.ladder import WORTH, Difference, difference, differences, most_certain
+from vftcli.repetition.laid_over import LaidOver
 from vftcli.repetition.pairing import pair_with_run
 from vftcli.signals.errors import ReferenceTorqueError
 
@@ -33,10 +34,10 @@ MODEL, FREE_MODEL = RNG.standard_normal((2, len(T), 1))
 def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off(drive: Make) -> None:
     """τ + τ_ext is what the model says of each motion: the push comes out exactly."""
     loaded, free = drive(MODEL - PUSH, MODEL), drive(FREE_MODEL, FREE_MODEL)
-    pairing = pair_with_run(T, free, 0.0)
-    corrected = difference(loaded, [pairing], "model", None)
+    laid = LaidOver(motion=loaded, pairings=[pair_with_run(T, free, 0.0)])
+    corrected = difference(laid, "model", None)
     np.testing.assert_allclose(corrected.tau, PUSH, atol=1e-9)
-    plain = difference(loaded, [pairing], "period", None)
+    plain = difference(laid, "period", None)
     np.testing.assert_allclose(plain.tau, FREE_MODEL - MODEL + PUSH, atol=1e-9)
     assert np.all(corrected.error.floor < plain.error.floor)
 
@@ -44,21 +45,22 @@ def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off(drive: 
 def test_rungs_without_their_clock_are_left_out(drive: Make) -> None:
     loaded = drive(MODEL, MODEL)
     clocks = {"found": [pair_with_run(T, loaded, 0.0)]}
-    made = differences(loaded, clocks, ("commanded", "period", "model"), (None, 12.0))
+    made = list(differences(loaded, clocks, ("commanded", "period", "model"), (None, 12.0)))
     assert [(d.rung, d.cutoff) for d in made] == [
         ("period", None),
         ("period", 12.0),
         ("model", None),
         ("model", 12.0),
     ]
-    assert made[1].remark("alignment-floor").code == "alignment-floor-filtered"
-    assert made[0].remark("alignment-floor").code == "alignment-floor"
+    assert made[1].floor_remark().code == "alignment-floor-filtered"
+    assert made[0].floor_remark().code == "alignment-floor"
 
 
 def test_too_few_partners_are_refused(drive: Make) -> None:
     loaded = drive(MODEL, MODEL)
+    laid = LaidOver(motion=loaded, pairings=[pair_with_run(T, loaded, T[-1] - T[14])])
     with pytest.raises(ReferenceTorqueError, match="only 15 samples have a partner"):
-        difference(loaded, [pair_with_run(T, loaded, T[-1] - T[14])], "period", None)
+        difference(laid, "period", None)
 
 
 def test_the_simpler_of_two_alike_is_taken() -> None:
@@ -70,13 +72,13 @@ def test_the_simpler_of_two_alike_is_taken() -> None:
         )
 
     low = made("period", 1.0, 1.0)
-    assert most_certain([low, made("phase", WORTH + 0.01, WORTH + 0.01)]).rung == "period"
-    assert most_certain([low, made("phase", WORTH - 0.01, WORTH - 0.01)]).rung == "phase"
+    assert most_certain([low, made("phase", WORTH + 0.01, WORTH + 0.01)]).chosen.rung == "period"
+    assert most_certain([low, made("phase", WORTH - 0.01, WORTH - 0.01)]).chosen.rung == "phase"
     better = [low, made("phase", 0.9, 0.9), made("model", 0.9 * WORTH + 0.01, 0.88)]
-    assert most_certain(better).rung == "phase"
+    assert most_certain(better).chosen.rung == "phase"
     # A joint that stands decides nothing.
     stands = replace_standing(made("model", 0.5, 9.0), joint=1)
-    assert most_certain([replace_standing(low, joint=1), stands]).rung == "model"
+    assert most_certain([replace_standing(low, joint=1), stands]).chosen.rung == "model"
 
 
 def replace_standing(made: Difference, joint: int) -> Difference:

@@ -5,7 +5,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vftcli.signals.lag import lag_fit, lags, parabola, time_offset
+from vftcli.signals.lag import (
+    LEAD,
+    LONGEST,
+    lag_fit,
+    lags,
+    lags_of_each,
+    parabola,
+    peak,
+    sliding,
+    time_offset,
+)
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -86,3 +96,50 @@ def test_the_parabola_s_peak(at: float, height: float) -> None:
     values = [height * (1.0 - (k - at) ** 2) for k in (-1.0, 0.0, 1.0)]
     assert parabola(*values) == pytest.approx(at, abs=1e-12)
     assert parabola(0.0, 0.0, 0.0) == 0.0
+
+
+def whole_lags(late: np.ndarray, early: np.ndarray, step: float) -> np.ndarray:
+    """As `lags`, by plain sums over all samples at every lag."""
+    count, found = len(late), []
+    first = -min(round(LEAD / step), count // 4)
+    last = max(1, min(round(LONGEST / step), count // 4))
+    for column, other in zip(late.T, early.T, strict=True):
+        known = np.isfinite(column) & np.isfinite(other)
+        x, y = (np.where(known, z - z[known].mean(), 0.0) for z in (column, other))
+        fit = []
+        for lag in range(first - 1, last + 2):
+            here = slice(max(lag, 0), count + min(lag, 0)), slice(max(-lag, 0), count - max(lag, 0))
+            a, b, both = x[here[0]], y[here[1]], known[here[0]] & known[here[1]]
+            power = np.sum(a[both] ** 2) * np.sum(b[both] ** 2)
+            fit.append(np.sum(a * b) / np.sqrt(power) if power > 0 else 0.0)
+        found.append(step * (first - 1 + peak(np.array(fit))))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("unknown", [0.0, 0.1])
+@pytest.mark.parametrize(("count", "step"), [(40, 0.1), (20_000, 0.001), (9000, 0.008)])
+def test_lags_by_blocks_are_those_of_plain_sums(count: int, step: float, unknown: float) -> None:
+    rng = np.random.default_rng(5)
+    early = np.cumsum(rng.standard_normal((count, 2)), axis=0)
+    late = np.roll(early, 3, axis=0) + rng.standard_normal((count, 2))
+    late[rng.random((count, 2)) < unknown] = np.nan
+    other = np.where(rng.random((count, 2)) < unknown, np.nan, early)
+    found = lags_of_each([late, other], early, step)
+    for lag, series in zip(found, (late, other), strict=True):
+        # rounding of sums of 20 000 products, through the bend of the parabola
+        np.testing.assert_allclose(lag, whole_lags(series, early, step), atol=1e-9)
+
+
+def test_a_sum_at_many_lags_is_the_plain_one_whatever_the_blocks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(6)
+    x, y = rng.standard_normal((2, 2, 1000))
+    at = np.arange(-30, 50)
+    plain = [
+        np.sum(x[:, max(k, 0) : 1000 + min(k, 0)] * y[:, max(-k, 0) : 1000 - max(k, 0)], axis=1)
+        for k in at
+    ]
+    for block in (64, 256, 8192):
+        monkeypatch.setattr("vftcli.signals.lag.BLOCK", block)
+        np.testing.assert_allclose(sliding(x, y, at), np.transpose(plain), atol=1e-10)

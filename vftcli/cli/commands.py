@@ -43,6 +43,11 @@ COMMANDS = {
         "Print every observer's error against a reference, and its floor.",
         ASK,
     ),
+    "batch": ListedCommand(
+        "batch:batch",
+        "Ask many logs the same, on every core or on a cluster.",
+        ASK,
+    ),
     "thresholds": ListedCommand(
         "thresholds:contact_thresholds",
         "Learn from free motion the thresholds that a robot is given.",
@@ -61,6 +66,11 @@ COMMANDS = {
     "identify": ListedCommand(
         "identify:identify_robot",
         "Make a robot file from logs: friction, inertias, payload.",
+        PREPARE,
+    ),
+    "annotate": ListedCommand(
+        "annotate:annotate_dataset",
+        "Write the forces of every frame into a copy of a dataset.",
         PREPARE,
     ),
     "tune": ListedCommand(

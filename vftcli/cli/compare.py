@@ -1,6 +1,5 @@
 """`vftcli compare`: errors of the observers against a reference."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -102,6 +101,7 @@ def compare(
     """
     import polars as pl
 
+    from vftcli.batch.kinds import for_comparison
     from vftcli.cli.console import LeftOut, say_analysis
     from vftcli.cli.jacobian import JacobianLogs
     from vftcli.evaluation import paired_significance
@@ -113,10 +113,8 @@ def compare(
 
     if drawn.folder() is not None and significance:
         raise typer.BadParameter("--figures draws the errors; leave --significance away")
-    choice = analysis.choice(library := Library(logs), reference)
-    # The list is for the wrench and for judging contacts; a table of torques needs none.
-    asked = analysis.wrench.asks or reference.contacts
-    choice = replace(choice, contacts=choice.contacts and asked)
+    library = Library(logs)
+    choice = for_comparison(analysis.choice(library, reference))
     left_out, analyses = LeftOut(library, logs), []
     by_jacobian = JacobianLogs(left_out, choice)
     for made in analyse_logs(logs, choice, by_jacobian.told):

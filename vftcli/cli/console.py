@@ -154,7 +154,7 @@ def say_recording(recording: "Recording") -> None:
     rate = f", {1.0 / recording.median_step:.4g} Hz" if recording.samples > 1 else ""
     detail(
         f"{recording.name}: {source.format}, {recording.joints} joints, "
-        f"{recording.samples} samples, {recording.duration:.1f} s{rate}"
+        f"{recording.all_samples} samples, {recording.duration:.1f} s{rate}"
     )
     # That a part was taken is said with the health of the log.
     others = [remark for remark in source.remarks if remark.code not in PARTS]
@@ -224,8 +224,7 @@ def say_wrenches(sensed: "SensorReading") -> None:
             detail(f"note: {remark}")
 
 
-def stages() -> "Callable[[str], None]":
+def stages() -> "Callable[[str, float, float], None]":
     """Who shows on stderr what is being done, if somebody watches and it takes a while."""
-    from vftcli.pipeline import silent
-
-    return STAGES.begin if _level.get() > QUIET and sys.stderr.isatty() else silent
+    watched = _level.get() > QUIET and sys.stderr.isatty()
+    return STAGES.begin if watched else lambda *_: None

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,9 +11,11 @@ from vftcli.cli.bundles import taken_apart
 from vftcli.cli.help import WRITE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from vftcli.analysis import Analysis
+    from vftcli.pipeline import AnalysisChoice
+    from vftcli.signals.recording import Recording
 
 
 @taken_apart
@@ -45,44 +47,80 @@ def estimate(
     from vftcli.readers.library import Library
     from vftcli.signals.packages import check_installed
 
-    extras = also.names(csv=csv, rrd=rrd or show)
-    if "rrd" in extras:
+    written = also.choice(csv=csv, rrd=rrd or show)
+    if "rrd" in written.extras:
         check_installed("rerun", "recording.rrd (--rrd, --open)")
     # Of a large log only the columns that are looked at are read; outputs show the others too.
     causal = analysis.observers.causal or analysis.contacts.no_contacts
-    signals = EXAMINED if causal and not (analysis.wrench.asks or extras) else None
+    signals = EXAMINED if causal and not (analysis.wrench.asks or written.extras) else None
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
+    # What needs no complete log comes in blocks, so that memory does not grow with it.
+    chosen = replace(
+        chosen, blocks=causal and set(written.extras) <= {"csv"} and not chosen.interval
+    )
     if chosen.columns is None:
         refuse_estimates(log)
     reading = Background(lambda: library.open(log, chosen))
 
+    from vftcli.batch.kinds import for_estimates
     from vftcli.cli.console import command_line, say_left_out
     from vftcli.cli.jacobian import write_by_jacobian
     from vftcli.cli.opening import open_made
-    from vftcli.observers.table import BEST
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
-    from vftcli.pipeline import analyse, prepared
+    from vftcli.outputs.log.estimates import estimate_files
     from vftcli.readers.table import JacobianError
 
-    OutputFolder(output, force, estimate_files(extras)).check()
-    choice = analysis.choice(library)
-    # The list comes with the smoothed wrench of best, the observer that sees the complete log.
-    choice = replace(choice, contacts=choice.contacts and BEST in choice.observers.names)
+    OutputFolder(output, force, estimate_files(written.extras)).check()
+    choice = for_estimates(analysis.choice(library))
     try:
-        recording = reading.result()
+        made, record = write_estimates(
+            reading.result(),
+            lambda: library.open(log, replace(chosen, blocks=False)),
+            choice,
+            output,
+            {"command": command_line(), "choice": written, "force": force},
+        )
     except JacobianError as found:
         write_by_jacobian(log, found, choice, output, force=force, json=json)
         return
-    made = analyse(*prepared(recording, choice), choice)
-    record = write_estimate_folder(output, made, command=command_line(), extras=extras, force=force)
-    say_left_out(estimate_files(extras))
+    say_left_out(estimate_files(written.extras))
     if json:
         typer.echo(record)
     else:
-        show_estimates(made, output, estimate_files(extras))
+        show_estimates(made, output, estimate_files(written.extras))
     if show:
         open_made(output)
+
+
+def write_estimates(
+    recording: "Recording",
+    whole: "Callable[[], Recording]",
+    choice: "AnalysisChoice",
+    output: Path,
+    how: dict[str, Any],
+) -> "tuple[Analysis, str]":
+    """Analyse a log, in one piece or block by block, and write its estimates.
+
+    Args:
+        recording: The log, in blocks if it is long.
+        whole: Reads it in one piece.
+        choice: What is asked of it.
+        output: The folder.
+        how: What else the writers take.
+
+    Returns:
+        The analysis, and the record that was written.
+    """
+    from vftcli.outputs.log.estimates import write_estimate_folder, write_long_estimates
+    from vftcli.pipeline import analyse
+    from vftcli.streaming import BlockAnalysis, prepared_in_blocks
+
+    recording, robot = prepared_in_blocks(recording, choice, whole)
+    run = BlockAnalysis(analyse(recording, robot, choice), choice)
+    if recording.long is None:
+        return run.made, write_estimate_folder(output, run.made, **how)
+    record = write_long_estimates(output, run.blocks(), lambda: run.made, **how)
+    return run.made, record
 
 
 def show_estimates(made: "Analysis", output: Path, files: "Sequence[str]") -> None:

@@ -108,7 +108,8 @@ def identify_robot(
 ) -> None:
     """Make a robot file from logs: friction, inertias, payload.
 
-    Writes FILE.toml for --robot, and FILE.html, FILE.rrd and FILE.run.json beside it.
+    Writes FILE.toml for --robot, and FILE.html, FILE.rrd and FILE.run.json beside it. With
+    --find-payload a LOG may be a dataset, of which every episode counts.
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
@@ -143,10 +144,13 @@ def identify_robot(
     examiner = health_of(library, anyway=anyway.anyway, fitting=keeps)
     profile = examiner.robot(next(library.open_each(logs, choice)), chosen)
 
-    def opened(paths: list[Path] | tuple[Path, ...], how: "ReadChoice") -> list["Recording"]:
-        return [examiner.taken(log, profile, how) for log in library.open_each(paths, how)]
+    def opened(
+        paths: list[Path] | tuple[Path, ...], how: "ReadChoice", *, whole: bool = False
+    ) -> list["Recording"]:
+        each = library.open_each(paths, how, whole=whole)
+        return [examiner.taken(log, profile, how) for log in each]
 
-    train = opened(logs, choice)
+    train = opened(logs, choice, whole=asked.find_payload)
     held_out, unloaded = opened(validated, held_out_choice), opened(without_load, unloaded_choice)
     for recording in (*train, *held_out, *unloaded):
         say_recording(recording)

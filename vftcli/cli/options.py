@@ -16,6 +16,7 @@ from vftcli.cli.log_options import ReadOptions, RobotOptions, Words
 if TYPE_CHECKING:
     from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.observers.choice import ObserverChoice
+    from vftcli.outputs.log.choice import OutputChoice
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
     from vftcli.refinement.choice import RefinementChoice
@@ -263,10 +264,26 @@ class ExtraOptions(Bundle):
         seldom=True,
     )
 
-    def names(self, **others: bool) -> list[str]:
-        """The extras that are asked for, with those of the command's own options."""
+    rrd_detail: str = option(
+        "--rrd-detail",
+        "full|levels|none",
+        "How much of a long log recording.rrd holds. Levels, unless another is given: the lowest "
+        "and highest samples of 5000 stretches, every sample where the strongest contacts begin.",
+        "levels",
+        seldom=True,
+    )
+
+    def choice(self, **others: bool) -> "OutputChoice":
+        """What is written, with what the command's own options ask for.
+
+        Raises:
+            ParameterError: If words are none of ours, or ask for a recording and for none.
+        """
+        from vftcli.outputs.log.choice import OutputChoice
+
         asked = {**others, "mcap": self.mcap or self.layouts, "layouts": self.layouts}
-        return [name for name, wanted in asked.items() if wanted]
+        extras = [name for name, wanted in asked.items() if wanted]
+        return OutputChoice.parsed(extras=extras, rrd_detail=self.rrd_detail)
 
 
 class FigureOptions(Bundle):
@@ -372,8 +389,10 @@ class AnalysisOptions(Bundle):
             VftError: If a word is not what its room takes.
         """
         from vftcli.cli.console import health_of, stages
+        from vftcli.cli.memory import give_back
         from vftcli.pipeline import AnalysisChoice
 
+        give_back()
         return AnalysisChoice(
             read=self.reading.choice(),
             robot=self.robot.choice(),

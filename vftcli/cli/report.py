@@ -52,12 +52,13 @@ def report(
     from vftcli.evaluation.print_table import check_published
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.report import FILES, report_files, write_report, write_reports
+    from vftcli.pipeline import WRITING
     from vftcli.readers.library import Library
     from vftcli.readers.table import JacobianError
 
     library = Library(logs)
-    extras, form = also.names(), drawn.form()
-    names = report_files([library.label(log) for log in logs], extras, form)
+    written, form = also.choice(), drawn.form()
+    names = report_files([library.label(log) for log in logs], written.extras, form)
     OutputFolder(output, force, names).check()
     choice = analysis.choice(library, reference, on_screen=not json)
     if published is not None:
@@ -71,21 +72,21 @@ def report(
         return
     if not analyses:
         left_out.end(0)
-    choice.progress("writing")
+    choice.progress("writing", WRITING, 1.0)
     command, failed = command_line(), left_out.reasons
     if len(analyses) + len(failed) == 1:
         record = write_report(
-            output, analyses[0], command=command, force=force, extras=extras, form=form
+            output, analyses[0], command=command, force=force, choice=written, form=form
         )
     else:
         record = write_reports(
-            output, analyses, command=command, force=force, extras=extras, form=form, failed=failed
+            output, analyses, command=command, force=force, choice=written, form=form, failed=failed
         )
     say_left_out(FILES)
     if json:
         typer.echo(record)
     else:
-        show_report(analyses, output, failed, extras, details=analysis.talk.details)
+        show_report(analyses, output, failed, written.extras, details=analysis.talk.details)
     if show:
         open_made(output)
     left_out.end(len(analyses))

@@ -7,7 +7,6 @@ import numpy as np
 from vftcli.doctor.velocity import VelocityFit, common_factor, is_clock, time_unit
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
 from vftcli.signals.remarks import Remark, fact, warning
-from vftcli.signals.series import gaps_of
 
 SLOW_RATE = 50.0
 """Below this rate a contact of a tenth of a second is a handful of samples. [Hz]"""
@@ -79,18 +78,12 @@ def uneven_steps(recording: Recording) -> Iterator[Remark]:
 
 def long_steps(recording: Recording) -> Iterator[Remark]:
     """Gaps, with the longest of them."""
-    steps = np.diff(recording.t)
-    gaps = gaps_of(recording.t, GAP_STEPS)
-    if gaps.size:
-        k = int(gaps[np.argmax(steps[gaps])])
-        level = warning if steps[k] > LONG_GAP else fact
-        yield level(
-            "gaps",
-            gaps=int(gaps.size),
-            steps=GAP_STEPS,
-            longest_s=float(steps[k]),
-            at_s=float(recording.t[k]),
-        )
+    steps = recording.steps
+    gaps = steps[steps[:, 0] > GAP_STEPS * recording.median_step]
+    if len(gaps):
+        longest, at = gaps[np.argmax(gaps[:, 0])].tolist()
+        level = warning if longest > LONG_GAP else fact
+        yield level("gaps", gaps=len(gaps), steps=GAP_STEPS, longest_s=longest, at_s=at)
 
 
 def stale_rows(recording: Recording) -> Iterator[Remark]:

@@ -1,6 +1,6 @@
 """Errors of estimates against a reference: one tidy table, the unit in each column's name."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +11,8 @@ from vftcli.evaluation.significance import p_value
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import COVERS, ExternalTorque
-from vftcli.signals.lag import lags
+from vftcli.signals.lag import lags_of_each
+from vftcli.signals.progress import steps
 from vftcli.signals.series import median_step
 
 SCHEMA: dict[str, type[pl.DataType]] = {
@@ -115,12 +116,15 @@ def evaluate(
     Raises:
         ShapeError: If an estimate and the reference have different shapes.
     """
-    joints = scored(tuple(estimates), reference)
-    return table(recording, reference.name, joints)
+    return table(recording, reference.name, scored(tuple(estimates), reference))
 
 
-def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> list[Scored]:
-    """Estimates and reference joint by joint, resampled, with their lags."""
+def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> Iterator[Scored]:
+    """Estimates and reference joint by joint, resampled, with their lags.
+
+    Raises:
+        ShapeError: If an estimate and the reference have different shapes.
+    """
     for estimate in estimates:
         if estimate.tau.shape != reference.tau.shape:
             raise ShapeError(
@@ -128,30 +132,27 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> li
             )
     names = tuple(estimate.name for estimate in estimates)
     step = median_step(reference.t) if len(reference.t) > 1 else 1.0
-    lag = np.array([lags(e.tau, reference.tau, step) for e in estimates])
+    lag = lags_of_each([e.tau for e in estimates], reference.tau, step)
     covered = [covered_samples(e, reference) for e in estimates]
     moving = reference.moving if reference.moving is not None else reference.known
-    found = []
-    for j in range(reference.joints if estimates else 0):
+    for j in steps(range(reference.joints if estimates else 0)):
         x, y = np.column_stack([e.tau[:, j] for e in estimates]), reference.tau[:, j]
         known = comparable(x, y)
-        squares = np.nan_to_num((x[known] - y[known, None]) ** 2)
+        x, y = x[known], y[known]
+        squares = np.nan_to_num((x - y[:, None]) ** 2)
         draws = resample(squares) if len(squares) else Resampled(np.ones((1, len(names))), 0)
-        found.append(
-            Scored(
-                names=names,
-                joint=j + 1,
-                estimates=x[known],
-                reference=y[known],
-                moving=moving[known, j],
-                floor=floor_over(reference, j, known),
-                resampled=draws,
-                lag=lag[:, j],
-                within=np.array([within[j] for within, _ in covered]),
-                banded=np.array([banded[j] for _, banded in covered]),
-            )
+        yield Scored(
+            names=names,
+            joint=j + 1,
+            estimates=x,
+            reference=y,
+            moving=moving[known, j],
+            floor=floor_over(reference, j, known),
+            resampled=draws,
+            lag=lag[:, j],
+            within=np.array([within[j] for within, _ in covered]),
+            banded=np.array([banded[j] for _, banded in covered]),
         )
-    return found
 
 
 def floor_over(reference: ExternalTorque, joint: int, known: Mask) -> float:
@@ -200,38 +201,52 @@ def comparable(estimates: Array, reference: Array) -> Mask:
     return np.asarray(finite[:, count >= 0.5 * count.max()].all(axis=1))
 
 
-def table(recording: str, reference: str, joints: Sequence[Scored]) -> pl.DataFrame:
+def table(recording: str, reference: str, joints: Iterable[Scored]) -> pl.DataFrame:
     """The tidy table of scored joints, observer by observer."""
-    rows = [[row(recording, reference, s, k) for s in joints] for k in range(width(joints))]
-    return pl.DataFrame([line for observer in rows for line in observer], schema=SCHEMA)
+    # One joint after the other: of a long log not all of them have room at once.
+    of_joints = [rows(recording, reference, joint) for joint in joints]
+    lines = [line for observer in zip(*of_joints, strict=True) for line in observer]
+    return pl.DataFrame(lines, schema=SCHEMA)
 
 
-def width(joints: Sequence[Scored]) -> int:
-    """How many observers were scored."""
-    return len(joints[0].names) if joints else 0
+def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object]]:
+    """One row an observer on one joint."""
+    error, found = joint.error, []
+    best = int(np.nanargmin(np.mean(error**2, axis=0))) if known_anywhere(error) else 0
+    for k, name in enumerate(joint.names):
+        here: dict[str, object] = {
+            "recording": recording,
+            "observer": name,
+            "joint": joint.joint,
+            "reference": reference,
+            "reference_floor_Nm": number(joint.floor),
+            "samples": len(joint.reference),
+        }
+        own = np.ascontiguousarray(error[:, k])
+        if not len(own) or not np.isfinite(own).all():
+            found.append(here | {"samples": 0})
+        else:
+            found.append(here | sizes(joint, k, own, best) | trust(joint, k, own))
+    return found
 
 
-def row(recording: str, reference: str, joint: Scored, k: int) -> dict[str, object]:
-    """One row: observer k on one joint."""
-    here = {
-        "recording": recording,
-        "observer": joint.names[k],
-        "joint": joint.joint,
-        "reference": reference,
-        "reference_floor_Nm": number(joint.floor),
-        "samples": len(joint.reference),
-    }
-    if not len(joint.reference) or not np.isfinite(joint.error[:, k]).all():
-        return here | {"samples": 0}
-    return here | sizes(joint, k) | trust(joint, k)
+def known_anywhere(error: Array) -> bool:
+    """Whether any observer's error is known throughout."""
+    return bool(len(error) and np.isfinite(error).all(axis=0).any())
 
 
-def sizes(joint: Scored, k: int) -> dict[str, object]:
-    """How large the error is, how sure that is, and what shape it has."""
-    error, draws = joint.error[:, k], joint.resampled
+def sizes(joint: Scored, k: int, error: Array, best: int) -> dict[str, object]:
+    """How large the error is, how sure that is, and what shape it has.
+
+    Args:
+        joint: The scored joint.
+        k: Which observer.
+        error: Its error. (T,) [N·m]
+        best: The observer with the smallest one.
+    """
+    draws = joint.resampled
     square = float(np.mean(error**2))
     low, high = interval(square, draws.draws[:, k], draws.blocks)
-    best = int(np.nanargmin(np.mean(joint.error**2, axis=0)))
     return {
         "rmse_Nm": number(np.sqrt(square)),
         "rmse_low_Nm": number(low),
@@ -244,10 +259,10 @@ def sizes(joint: Scored, k: int) -> dict[str, object]:
     }
 
 
-def trust(joint: Scored, k: int) -> dict[str, object]:
+def trust(joint: Scored, k: int, error: Array) -> dict[str, object]:
     """How far the reference of this joint can be trusted, and the error where it can."""
     share = float(np.mean(joint.moving))
-    error = joint.error[joint.moving, k]
+    error = error[joint.moving]
     enough = joint.banded[k] >= LEAST
     return {
         "reference_trusted": share >= TRUSTED_SHARE,

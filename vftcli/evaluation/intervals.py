@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.lag import sliding
 
 REPETITIONS = 1000
 """Bootstrap repetitions; the ends of a 95 % interval rest on 25 of them."""
@@ -26,6 +27,9 @@ WIDEST = 0.96
 
 LEVEL = 0.95
 """Coverage of the intervals."""
+
+FIRST_LAGS = 1024
+"""Lags over which an autocorrelation is looked at first. [samples]"""
 
 
 class Resampled(NamedTuple):
@@ -54,12 +58,11 @@ def resample(squares: Array, seed: int = SEED) -> Resampled:
     samples = len(squares)
     length = block_length(squares)
     blocks = max(1, round(samples / length))
-    ring = np.concatenate([np.zeros((1, squares.shape[1])), squares, squares[: length - 1]])
-    total = np.cumsum(ring, axis=0)
     starts = np.random.default_rng(seed).integers(0, samples, (REPETITIONS, blocks))
     picked = np.zeros((REPETITIONS, squares.shape[1]))
-    for column in range(squares.shape[1]):
-        sums = total[length:, column] - total[:-length, column]
+    for column, x in enumerate(squares.T):
+        total = np.cumsum(np.concatenate([[0.0], x, x[: length - 1]]))
+        sums = total[length:] - total[:-length]
         picked[:, column] = sums[starts].sum(axis=1) / (blocks * length)
     return Resampled(picked, blocks)
 
@@ -76,17 +79,21 @@ def block_length(squares: Array) -> int:
 def correlation_time(x: Array) -> Array:
     """Integral of each column's autocorrelation up to its first value below 0.05. (m,) [samples]
 
-    1 for white noise.
+    1 for white noise. Lags are looked at `FIRST_LAGS` at first, then four times as many, until
+    every column has fallen or half of the log is reached.
     """
-    samples = len(x)
-    x = x - x.mean(axis=0)
-    size = 1 << int(np.ceil(np.log2(2 * samples)))
-    spectrum = np.abs(np.fft.rfft(x, size, axis=0)) ** 2
-    product = np.fft.irfft(spectrum, size, axis=0)[: max(samples // 2, 1)]
-    rho = product / np.where(product[0] > 0, product[0], 1.0)
-    fallen = rho < 0.05
-    end = np.where(fallen.any(axis=0), fallen.argmax(axis=0), len(rho))
-    inside = np.arange(len(rho))[:, None] < end
+    most = max(len(x) // 2, 1)
+    columns = np.ascontiguousarray((x - x.mean(axis=0)).T)
+    count = 0
+    while count < most:
+        count = min(4 * count or FIRST_LAGS, most)
+        product = sliding(columns, columns, np.arange(count)).T
+        rho = product / np.where(product[0] > 0, product[0], 1.0)
+        fallen = rho < 0.05
+        if fallen.any(axis=0).all():
+            break
+    end = np.where(fallen.any(axis=0), fallen.argmax(axis=0), count)
+    inside = np.arange(count)[:, None] < end
     time: Array = 2.0 * np.sum(np.where(inside, rho, 0.0), axis=0) - 1.0
     return np.maximum(time, 1.0)
 

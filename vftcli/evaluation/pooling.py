@@ -37,7 +37,7 @@ def evaluate_pooled(members: Sequence[PoolMember]) -> pl.DataFrame:
     kinds = {(m.robot, m.reference.joints, tuple(e.name for e in m.estimates)) for m in members}
     if len(members) < 2 or len(kinds) != 1:
         return pl.DataFrame(schema=SCHEMA)
-    each = [scored(member.estimates, member.reference) for member in members]
+    each = [list(scored(member.estimates, member.reference)) for member in members]
     references = list(dict.fromkeys(member.reference.name for member in members))
     return table(
         POOLED, " + ".join(references), [together(joints) for joints in zip(*each, strict=True)]

@@ -170,8 +170,10 @@ def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -
                 f"{free.name}, given as free of load, is the heavier one; swap the two logs"
             )
         return fit
-    # A pair repeats a motion: in both logs some joint travels further than it would at rest.
-    if len(logs) == 2 and all(np.ptp(r.q, axis=0).max() > 0.05 for r in logs):
+    # A pair repeats a motion: in both logs some joint travels further than it would at rest. Two
+    # episodes of a dataset carry the same.
+    moved = all(np.ptp(r.q, axis=0).max() > 0.05 for r in logs)
+    if len(logs) == 2 and moved and not all(r.source.part for r in logs):
         try:
             return payload_from_pair(logs[0], logs[1], bare)
         except NotSameMotionError:

@@ -13,12 +13,13 @@ from vftcli.identification.processing import (
     prepare,
 )
 from vftcli.identification.result import root_mean_square
+from vftcli.readers.table import listed
 from vftcli.robots.chain import Payload
 from vftcli.robots.drive import drive_torque, gain_sd
 from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import zero_phase
 from vftcli.signals.recording import Recording
@@ -43,6 +44,12 @@ WINDOW, STILL = 0.2, 1e-3
 POSES = 4
 """Fewest different poses for mass and centre of mass."""
 
+APART = 0.1
+"""Poses are different if a joint is this far elsewhere. [rad]"""
+
+MOST_NAMED = 4
+"""Logs that are called by their names; there may be thousands of episodes."""
+
 STRETCHES = 12
 """Stretches of a motion whose errors are taken as each other's strangers."""
 
@@ -51,8 +58,8 @@ REACH = 1.0
 
 
 def names_of(recordings: Sequence[Recording]) -> str:
-    """Names of several logs as one text, for messages and tables."""
-    return ", ".join(recording.name for recording in recordings)
+    """Names of several logs as one text, for messages and tables; of many the first."""
+    return listed([recording.name for recording in recordings], MOST_NAMED)
 
 
 class NotSameMotionError(IdentificationError):
@@ -225,23 +232,38 @@ def inverse_gram(rows: Array) -> Array:
 def stretch_covariance(A: Array, left: Array, usable: Array) -> Array:
     """Covariance of least squares for a residual that is coloured and shared by joints. (k, k)
 
-    The motion is cut into `STRETCHES`, and what each of them pulls the solution by is taken as it
-    is: G (Σ_b A_bᵀ r_b r_bᵀ A_b) G · B/(B − 1), G = (AᵀA)⁻¹ (K.-Y. Liang, S. Zeger, "Longitudinal
-    data analysis using generalized linear models", Biometrika 73(1), 1986, for clusters). Friction
-    that another temperature changed, or a model that misses, lasts as long as a motion goes one
-    way; the residual's own correlation time, some tenths of a second, would not count it.
+    The motion is cut into `STRETCHES`. Friction that another temperature changed, or a model that
+    misses, lasts as long as a motion goes one way; the residual's own correlation time, some tenths
+    of a second, would not count it.
 
     Args:
         A: Columns. (N, n, k)
         left: Residual. (N, n)
         usable: Weights. (N, n)
     """
+    return cluster_covariance(A, left, usable, folds(len(A), STRETCHES))
+
+
+def cluster_covariance(
+    A: Array, left: Array, usable: Array, clusters: Sequence[slice | Indices]
+) -> Array:
+    """Covariance of least squares for a residual that is a cluster's own. (k, k)
+
+    What each cluster pulls the solution by is taken as it is: G (Σ_b A_bᵀ r_b r_bᵀ A_b) G ·
+    B/(B − 1), G = (AᵀA)⁻¹ (K.-Y. Liang, S. Zeger, "Longitudinal data analysis using generalized
+    linear models", Biometrika 73(1), 1986).
+
+    Args:
+        A: Columns. (N, n, k)
+        left: Residual. (N, n)
+        usable: Weights. (N, n)
+        clusters: The rows of each, B of them.
+    """
     rows, rest = weighted_rows(A, left, usable, left)
     inverse = inverse_gram(rows)
-    stretches = folds(len(rows), STRETCHES)
-    pulls = np.array([np.einsum("knp,kn->p", rows[s], rest[s]) for s in stretches])
+    pulls = np.array([np.einsum("knp,kn->p", rows[c], rest[c]) for c in clusters])
     covariance: Array = inverse @ (pulls.T @ pulls) @ inverse
-    return covariance * STRETCHES / (STRETCHES - 1)
+    return covariance * len(clusters) / (len(clusters) - 1)
 
 
 def gain_covariance(A: Array, left: Array, y: Array, usable: Array, gain: float) -> Array:
@@ -299,15 +321,19 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     """Find a load from poses at rest: what the torque has beyond the robot's own gravity.
 
     Stiction hides in every pose; its size is what the residual shows, and many poses average it.
+    What the model misses of an arm, and what a day does to its drives, is alike in all poses of a
+    log: of several logs, how they differ is part of the standard deviations.
 
     Raises:
         IdentificationError: If there are too few different poses.
     """
-    q, torque = resting_poses(recordings, robot)
-    if len(q) < POSES or np.max(np.ptp(q, axis=0), initial=0.0) < 0.1:
+    each = [resting_poses([recording], robot) for recording in recordings]
+    q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))
+    if (different := different_poses(q)) < POSES:
         raise IdentificationError(
-            f"{names_of(recordings)}: {len(q)} poses at rest of at least {DWELL:g} s; a load needs "
-            f"{POSES} different ones, or a pair of logs of one motion with and without it"
+            f"{names_of(recordings)}: {len(q)} poses at rest of at least {DWELL:g} s, {different} "
+            f"of them different; a load needs {POSES} different ones, or a pair of logs of one "
+            "motion with and without it"
         )
     zero = np.zeros_like(q)
     Y = torque_regressor(robot.chain, q, zero, zero)[:, :, -LINK:][:, :, :STATIC]
@@ -320,8 +346,23 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     noise = inverse_gram(weighted_rows(Y, left, usable, left)[0]) / freedom
     gain = max(gain_sd(recording, robot) for recording in recordings)
     covariance = noise + gain_covariance(Y, left, extra, usable, gain)
-    sd, origin = np.sqrt(np.diag(covariance)), fact("load-from-poses", poses=len(q))
+    ends = np.cumsum([len(poses) for poses, _ in each])
+    logs = [slice(end - len(poses), end) for end, (poses, _) in zip(ends, each, strict=True)]
+    logs = [log for log in logs if log.stop > log.start]
+    if len(logs) > 1:
+        covariance = covariance + cluster_covariance(Y, left, usable, logs)
+    sd = np.sqrt(np.diag(covariance))
+    origin = fact("load-from-poses", poses=len(q), different=different, logs=len(logs))
     return load_at_flange(LoadSolution(x, sd, np.std(left, axis=0)), robot, recordings, origin)
+
+
+def different_poses(q: Array) -> int:
+    """How many poses (P, n) there are that lie `APART` from each other."""
+    found: list[Array] = []
+    for pose in q:
+        if not found or np.min(np.max(np.abs(np.array(found) - pose), axis=1)) > APART:
+            found.append(pose)
+    return len(found)
 
 
 def resting_poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:

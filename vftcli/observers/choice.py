@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vftcli.observers.lead import estimate_from_rest
 from vftcli.observers.observer import Observer
 from vftcli.observers.settings import Gains, Settings, check_gains, load_gains, overlay_gains
 from vftcli.observers.table import (
@@ -20,7 +21,9 @@ from vftcli.observers.table import (
     sections,
 )
 from vftcli.robots.robot import Robot
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, caution
 
@@ -49,6 +52,7 @@ class ObserverChoice:
         match: What every observer is to have alike on every joint, or None.
         as_printed: Whether the paper's printed formulas run, and its numeric dynamics.
         causal: Whether to leave out what could not run while the log is being written.
+        from_rest: Whether estimates start at the static residual of the first sample, not at zero.
 
     Raises:
         ParameterError: If there is no such observer, or none of those named could run online.
@@ -61,6 +65,7 @@ class ObserverChoice:
     match: "MatchTarget | None" = None
     as_printed: bool = False
     causal: bool = False
+    from_rest: bool = False
 
     def __post_init__(self) -> None:
         alike = self.as_printed or self.match is not None
@@ -177,6 +182,10 @@ class ObserverChoice:
 
         observers, on_match = match_observers(observers, self.match, setup)
         return observers, (*remarks, *on_match)
+
+    def run(self, observer: Observer, terms: DynamicsTerms) -> ExternalTorque:
+        """Run one of the observers over a log, from where it is to start."""
+        return estimate_from_rest(observer, terms) if self.from_rest else observer.estimate(terms)
 
     def gains_over(self, gains: Gains, shown: LogSpectra = NOT_SHOWN) -> Gains:
         """A robot's gains with those of the log or of the gains file put over them."""

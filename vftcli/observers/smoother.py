@@ -78,18 +78,11 @@ class KalmanSmoother:
         driven[1:] = innovation[:0:-1] / S
         weights = np.stack([gains.posterior.p12, gains.posterior.p22])
         tau -= steady_filter(backward, b, driven, start, wanted=weights)[0][::-1]
-        return tau, self._steady_deviation(gains, model, S, terms.samples)
-
-    def _steady_deviation(self, gains: Gains, model: Discrete, S: Array, samples: int) -> Array:
-        """√P₂₂ of the smoother: it settles within a few time constants of the log's end. (T, n)"""
-        step = information_step(gains, model.a12, model.a22)
-        missing = missing_information(step, information_gain(model.a12, S), samples)
-        information = (missing[0] - missing).transpose(1, 0, 2)
-        variances = smoothed_variance(gains.posterior, information)
-        sd = empty_series(samples, len(S))
-        sd[:] = np.sqrt(variances[-1])
-        sd[samples - len(variances) :] = np.sqrt(variances[::-1])
-        return sd
+        deviation = steady_deviation(gains, model, S, terms.samples)
+        sd = empty_series(terms.samples, n)
+        sd[:] = deviation[-1]
+        sd[terms.samples - len(deviation) :] = deviation[::-1]
+        return tau, sd
 
     def _step_by_step(self, terms: DynamicsTerms) -> tuple[Array, Array]:
         """Smooth with gains that follow each step's own sample time. (T, n) each"""
@@ -140,6 +133,15 @@ class KalmanSmoother:
         c = 4.0 * causal.zeta**2 - 2.0
         response: Complex = (1.0 / (1.0 + c * x**2 + x**4)).astype(np.complex128)
         return response
+
+
+def steady_deviation(gains: Gains, model: Discrete, S: Array, samples: int) -> Array:
+    """√P₂₂ of the smoother from a log's last sample backwards, until it has settled. (≤ T, n)"""
+    step = information_step(gains, model.a12, model.a22)
+    missing = missing_information(step, information_gain(model.a12, S), samples)
+    information = (missing[0] - missing).transpose(1, 0, 2)
+    variances = smoothed_variance(gains.posterior, information)
+    return np.sqrt(variances)
 
 
 def innovations(tau: Array, l2: Array, a22: Array) -> Array:

@@ -15,6 +15,9 @@ THICKNESS = (0.048, 0.030)
 RATE = 50.0
 """Poses a second that are drawn. [Hz]"""
 
+MOST_POSES = 20_000
+"""Poses that are drawn, however long the log is."""
+
 SHORTEST = 0.02
 """A link shorter than this share of the arm's length is not drawn: its joints are. """
 
@@ -76,9 +79,9 @@ def capsules(chain: Chain) -> list[list[Capsule]]:
 
 
 def motion(chain: Chain, t: Array, q: Array) -> ArmPoses:
-    """Poses of all links at about `RATE` samples a second."""
+    """Poses of all links at about `RATE` samples a second, `MOST_POSES` of them at most."""
     # At least each sample: a slow log is drawn as it is.
-    every = max(1, int(len(t) / max(float(t[-1] - t[0]) * RATE, 1.0)))
+    every = max(1, int(len(t) / max(float(t[-1] - t[0]) * RATE, 1.0)), -(-len(t) // MOST_POSES))
     t, q = t[::every], np.ascontiguousarray(q[::every])
     poses = link_poses(chain, q)
     scalar_last = np.roll(matrix_quaternion(poses.rotation), -1, axis=-1)

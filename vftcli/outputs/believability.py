@@ -215,14 +215,13 @@ def warned(analysis: Analysis, examination: Examination, *, own: bool) -> Iterat
 
 def clock_ground(recording: Recording) -> Ground:
     """Gaps in the clock, and what was dropped, turned or derived in reading."""
-    steps = np.diff(recording.t)
-    longest = float(steps.max()) if len(steps) else 0.0
-    gaps = int(np.count_nonzero(steps > 0.1))
+    steps = recording.steps
+    longest, at = steps[np.argmax(steps[:, 0])].tolist() if len(steps) else (0.0, 0.0)
+    gaps = int(np.count_nonzero(steps[:, 0] > 0.1))
     odd = [r for r in recording.source.remarks if r.level != "fact"]
     repaired = [r for r in recording.source.remarks if r.level == "fact"]
     words = f"no gap above {1e3 * longest:.0f} ms"
     if gaps:
-        at = float(recording.t[int(np.argmax(steps))])
         words = f"{gaps} gap{'s' * (gaps > 1)}, the longest {longest:.2g} s at {at:.1f} s"
     told = [sentence(remark) for remark in (*odd, *repaired)]
     more = f", and {len(told) - 1} more" if len(told) > 1 else ""

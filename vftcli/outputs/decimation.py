@@ -1,5 +1,6 @@
 """Honest decimation: of every stretch of a series its lowest and its highest sample stay."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -53,20 +54,59 @@ def decimated(t: Array, values: Array, stretches: int) -> list[Line]:
     return lines
 
 
+def level_rows(
+    t: Array, values: Array, stretches: int, whole: Sequence[tuple[float, float]] = ()
+) -> Index | None:
+    """Sample numbers of a plot whose lines share one clock, None for all of them. (P,)
+
+    Of every stretch the lowest and highest sample of every line stay, and the first unknown one,
+    so that no spike is lost and no gap closed. A log of which that would leave out nothing is kept
+    whole.
+
+    Args:
+        t: Time. (T,) [s]
+        values: One column a line; NaN where not known. (T, k)
+        stretches: Number of stretches the log is cut into.
+        whole: Spans in which every sample stays. [s]
+    """
+    if len(t) <= 2 * values.shape[1] * stretches:
+        return None
+    kept = np.zeros(len(t), dtype=bool)
+    kept[[0, -1]] = True
+    low, high = extremes(values, stretches)
+    kept[low.ravel()] = kept[high.ravel()] = True
+    for column in values.T:
+        unknown = np.flatnonzero(np.isnan(column))
+        stretch = unknown // stretch_width(len(t), stretches)
+        kept[unknown[np.unique(stretch, return_index=True)[1]]] = True
+    gaps = gaps_of(t, GAP_STEPS)
+    kept[gaps] = kept[gaps + 1] = True
+    for begin, end in whole:
+        kept[(t >= begin) & (t <= end)] = True
+    return np.flatnonzero(kept)
+
+
+def stretch_width(samples: int, stretches: int) -> int:
+    """Samples a stretch, rounded up, so that no sample is left over."""
+    return -(-samples // stretches)
+
+
 def extremes(values: Array, stretches: int) -> tuple[Index, Index]:
     """Sample numbers of the lowest and highest known value of every stretch. (stretches, n)"""
     samples, n = values.shape
-    # Rounded up, so that no sample is left over; the last stretch is filled with unknowns.
-    width = -(-samples // stretches)
+    width = stretch_width(samples, stretches)
     count = -(-samples // width)
-    padded = np.full((count * width, n), np.nan)
-    padded[:samples] = values
-    cut = padded.reshape(count, width, n)
-    unknown = np.isnan(cut)
-    start = (np.arange(count) * width)[:, None]
-    # argmin of a stretch without a known value is its first sample, which is NaN: a break.
-    low = np.where(unknown, np.inf, cut).argmin(axis=1) + start
-    high = np.where(unknown, -np.inf, cut).argmax(axis=1) + start
+    start = np.arange(count) * width
+    low, high = np.zeros((2, count, n), dtype=np.intp)
+    # The last stretch is filled with unknowns. One column at once: of a long log all have no room.
+    padded = np.full(count * width, np.nan)
+    for j, column in enumerate(values.T):
+        padded[:samples] = column
+        cut = padded.reshape(count, width)
+        unknown = np.isnan(cut)
+        # argmin of a stretch without a known value is its first sample, which is NaN: a break.
+        low[:, j] = np.where(unknown, np.inf, cut).argmin(axis=1) + start
+        high[:, j] = np.where(unknown, -np.inf, cut).argmax(axis=1) + start
     return low, high
 
 

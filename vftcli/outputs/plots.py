@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.outputs.decimation import level_rows
 from vftcli.signals.arrays import Array
 
 
@@ -50,6 +51,7 @@ class Lines(NamedTuple):
         family: Plots of one family have the same vertical axis; "" stands alone.
         points: Single points among the lines, or none.
         legend: Whether a legend may cover a corner of it, where the title does not say it all.
+        t: Times of these samples where they are not all of the tab's. (T,) [s]
     """
 
     path: str
@@ -58,6 +60,23 @@ class Lines(NamedTuple):
     family: str = ""
     points: PlotPoints | None = None
     legend: bool = True
+    t: Array | None = None
+
+    def thinned(
+        self, t: Array, stretches: int, whole: Sequence[tuple[float, float]] = ()
+    ) -> "Lines":
+        """The same with the samples that `level_rows` keeps; all of them where nothing is gained.
+
+        Args:
+            t: Time of its samples. (T,) [s]
+            stretches: Number of stretches the log is cut into.
+            whole: Spans in which every sample stays. [s]
+        """
+        rows = level_rows(t, self.values, stretches, whole)
+        if rows is None:
+            return self
+        lines = [line._replace(values=line.values[rows]) for line in self.lines]
+        return self._replace(lines=lines, t=t[rows])
 
     @property
     def values(self) -> Array:

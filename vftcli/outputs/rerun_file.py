@@ -103,7 +103,7 @@ def rerun_file(
     stream.send_recording_name(drawable(title))
     for tab in tabs:
         for lines in tab.plots:
-            send_lines(stream, tab.t, lines)
+            send_lines(stream, tab.t if lines.t is None else lines.t, lines)
         send_log(stream, tab.log)
     for name, text in words.items():
         document = rr.TextDocument(drawable(text), media_type="text/markdown")

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,13 +25,22 @@ from vftcli.readers import (
 )
 from vftcli.readers.bags import formats as bags
 from vftcli.readers.cleaning import RestartError, cleaned
+from vftcli.readers.long_log import long_recording
 from vftcli.readers.opening import Digest
 from vftcli.readers.parts import refuse_arm
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
+from vftcli.readers.reader import (
+    InOnePieceError,
+    LogFile,
+    RawLog,
+    ReadChoice,
+    Reader,
+    open_log,
+)
+from vftcli.readers.rows import without_unknown_rows
 from vftcli.readers.unrecognised import description, known_kind
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 from vftcli.signals.parsing import did_you_mean
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import warning
 
 READERS: dict[str, Reader] = {
@@ -62,6 +72,10 @@ READERS: dict[str, Reader] = {
     )
 }
 """Every format by name: one reader, one line."""
+
+
+COMPUTED_WITH = frozenset(("dq", *EFFORTS, "temperature"))
+"""Signals that an estimate is made of, beside time and positions; others are only examined."""
 
 
 def read(
@@ -116,9 +130,22 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     digest = Digest((path,))
     if "polars" not in sys.modules and reader.episodes is None:
         digest.start()  # its import takes longer than the hash and leaves a core idle
-    with np.errstate(all="ignore"):  # whatever a damaged file holds is judged when it is cleaned
-        raw = reader.read(file, choice)
-        raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
+
+    def found(choice: ReadChoice = choice) -> RawLog:
+        with np.errstate(all="ignore"):  # what a damaged file holds is judged when it is cleaned
+            raw = reader.read(file, choice)
+            raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
+            return without_unknown_rows(raw) if choice.skips_unknown else raw
+
+    try:
+        raw = found()
+        if raw.rest is not None:
+            digest.start()
+            used = None if choice.signals is None else choice.signals & COMPUTED_WITH
+            again = partial(found, replace(choice, signals=used))
+            return long_recording(raw, again, path, reader.name, digest.hexdigest, label)
+    except InOnePieceError:
+        raw = found(replace(choice, blocks=False))
     digest = Digest(raw.files) if raw.files else digest
     if not raw.part:
         digest.start()  # of one of many parts it may never be asked for
@@ -138,6 +165,13 @@ def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
     return reader.episodes(file)
 
 
+def holds_episodes(path: str | Path, choice: ReadChoice) -> bool:
+    """Whether a file holds several episodes."""
+    file = open_log(Path(path))
+    reader = _reader(file, choice.format, choice.columns)
+    return reader.episodes is not None and len(reader.episodes(file)) > 1
+
+
 def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> Recording:
     """Read a log as `read` does; of a file that holds several recordings or arms, the first.
 
@@ -154,13 +188,15 @@ def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> 
         return replace(first, source=replace(first.source, remarks=remarks))
 
 
-def recognise(path: str | Path) -> Reader:
-    """Return the reader that a path's content calls for.
+def recognise(path: str | Path, choice: ReadChoice | None = None) -> Reader:
+    """Return the reader that a path's content calls for, or that is chosen.
 
     Raises:
         UnknownFormatError: If no format fits, or more than one.
+        LogError: If there is nothing at the path, or it cannot be opened.
     """
-    return _recognise(open_log(Path(path)))
+    choice = choice or ReadChoice()
+    return _reader(open_log(Path(path)), choice.format, choice.columns)
 
 
 def _reader(file: LogFile, name: str | None, columns: str | None) -> Reader:
@@ -204,6 +240,7 @@ __all__ = [
     "ReadChoice",
     "Reader",
     "episode_numbers",
+    "holds_episodes",
     "read",
     "read_chosen",
     "read_first_recording",

@@ -1,13 +1,15 @@
 """Cleaning: what every log goes through on its way to a Recording. Nothing is repaired silently."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from vftcli.readers.reader import RawLog
-from vftcli.signals.arrays import Array, Mask, handed_over, median
+from vftcli.readers.rows import kept, row_samples
+from vftcli.signals.arrays import Array, handed_over, median
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import Remark, caution, fact
@@ -61,9 +63,9 @@ def cleaned(
         LogError: If a signal holds NaN or infinity, or its unit cannot be radians.
         ClockError: If the clock is not finite, runs backwards, or holds no samples.
     """
-    rows = len(raw.stamps)
-    if rows == 0:
+    if len(raw.stamps) == 0:
         raise ClockError(f"{path}: no samples; the log holds a header only.")
+    rows = len(raw.stamps) + (0 if raw.unknown is None else len(raw.unknown))
     if raw.segment is not None:
         raw = segment_of(raw, raw.segment, path)
     raw = without_leading_garbage(without_empty_joints(raw))
@@ -74,28 +76,47 @@ def cleaned(
     if raw.degrees_possible:
         refuse_degrees(fresh, path)
     t = seconds(fresh)
-    signals = {name: handed_over(np.ascontiguousarray(v)) for name, v in fresh.signals.items()}
+    source = source_of(raw, path, format_name, sha256, label)
+    source = replace(
+        source,
+        rows=rows,
+        duplicates=len(raw.stamps) - len(fresh.stamps),
+        row_samples=row_samples(fresh, rows),
+        remarks=(*fresh.remarks, *gaps_in(t)),
+    )
+    return recording_of(raw, t, fresh.signals, source)
+
+
+def source_of(
+    raw: RawLog, path: Path, format_name: str, sha256: str | Callable[[], str], label: str
+) -> Source:
+    """Where a log came from, by its first samples."""
+    return Source(
+        path=path,
+        label=f"{label or path.name} {raw.part}" if raw.part else label,
+        part=raw.part,
+        format=format_name,
+        sha256=sha256,
+        clock=raw.clock,
+        t0=float(raw.stamps[0]) * raw.tick + raw.origin,
+        t0_ns=first_nanosecond(raw),
+    )
+
+
+def recording_of(raw: RawLog, t: Array, signals: Mapping[str, Array], source: Source) -> Recording:
+    """The recording of clean samples, with all else that a log says."""
+    arrays: dict[str, Any] = {
+        name: handed_over(np.ascontiguousarray(v)) for name, v in signals.items()
+    }
     return Recording(
         t=handed_over(t),
-        **signals,
-        wrench_frame=raw.wrench_frame if "wrench" in signals else None,
+        **arrays,
+        wrench_frame=raw.wrench_frame if "wrench" in arrays else None,
         joint_names=raw.joint_names,
         robot_hint=raw.robot_hint,
         payload_mass=raw.payload_mass,
         payload_com=raw.payload_com,
-        source=Source(
-            path=path,
-            label=f"{label or path.name} {raw.part}" if raw.part else label,
-            part=raw.part,
-            format=format_name,
-            sha256=sha256,
-            clock=raw.clock,
-            t0=float(raw.stamps[0]) * raw.tick + raw.origin,
-            t0_ns=first_nanosecond(raw),
-            rows=rows,
-            duplicates=len(raw.stamps) - len(fresh.stamps),
-            remarks=(*fresh.remarks, *gaps_in(t)),
-        ),
+        source=source,
     )
 
 
@@ -111,16 +132,6 @@ def first_nanosecond(raw: RawLog) -> int | None:
         return None
     per_tick = round(raw.tick * 1e9)
     return int(raw.stamps[0]) * per_tick if per_tick >= 1 else None
-
-
-def kept(raw: RawLog, keep: Mask | slice, *remarks: Remark) -> RawLog:
-    """The log with some of its rows only, and what is to be said of the others."""
-    return replace(
-        raw,
-        stamps=raw.stamps[keep],
-        signals={name: value[keep] for name, value in raw.signals.items()},
-        remarks=(*raw.remarks, *remarks),
-    )
 
 
 def without_empty_joints(raw: RawLog) -> RawLog:
@@ -315,25 +326,34 @@ def without_repeats(raw: RawLog, path: Path) -> RawLog:
             "have the stamp of the row before but other values. Name a finer column as t with "
             "--columns, or state the rate of a log without a clock, as in t@125Hz."
         )
-    remarks = [fact("repeats-dropped" if again.size > 1 else "repeat-dropped", rows=again.size)]
-    if different := int(changed.sum()):
-        remarks.append(caution("repeats-differ", changed=different, repeats=again.size))
-    return kept(raw, fresh, *remarks)
+    return kept(raw, fresh, *told_repeats(again.size, int(changed.sum())))
+
+
+def told_repeats(repeats: int, different: int) -> list[Remark]:
+    """What is said of rows that were dropped, of which so many had other values."""
+    remarks = [fact("repeats-dropped" if repeats > 1 else "repeat-dropped", rows=repeats)]
+    if different:
+        remarks.append(caution("repeats-differ", changed=different, repeats=repeats))
+    return remarks
 
 
 def gaps_in(t: Array) -> tuple[Remark, ...]:
     """A remark on steps several times the median, which are kept as they are."""
     gaps = gaps_of(t, GAP_STEPS)
-    if len(t) < 3 or not gaps.size:
+    return told_gaps(np.column_stack([np.diff(t)[gaps], t[gaps]])) if len(t) > 2 else ()
+
+
+def told_gaps(gaps: Array) -> tuple[Remark, ...]:
+    """A remark on gaps: their lengths, and the times at which they begin. (G, 2) [s]"""
+    if not len(gaps):
         return ()
-    steps = np.diff(t)
-    k = int(gaps[np.argmax(steps[gaps])])
+    longest, at = gaps[np.argmax(gaps[:, 0])]
     remark = caution(
-        "clock-gaps" if gaps.size > 1 else "clock-gap",
-        gaps=int(gaps.size),
+        "clock-gaps" if len(gaps) > 1 else "clock-gap",
+        gaps=len(gaps),
         steps=GAP_STEPS,
-        longest_s=float(steps[k]),
-        at_s=float(t[k]),
+        longest_s=float(longest),
+        at_s=float(at),
     )
     return (remark,)
 

@@ -3,7 +3,7 @@
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +21,19 @@ from vftcli.signals.remarks import Remark
 from vftcli.signals.wrench import WrenchFrame
 
 EPISODE = "episode_index"
+
+
+@contextmanager
+def guarded(path: Path, errors: tuple[type[BaseException], ...]) -> Iterator[None]:
+    """Turn the errors of a decoder, beside Python's own, into a LogError that names the file."""
+    usual = (OSError, ValueError, KeyError, MemoryError, OverflowError)
+    try:
+        yield
+    except BaseException as error:
+        if not isinstance(error, (*usual, *errors)):
+            raise
+        reason = str(error).split("\n")[0][:120]
+        raise LogError(f"{path}: a damaged Parquet or Arrow file ({reason})") from None
 
 
 class HeldColumns(NamedTuple):
@@ -80,17 +93,9 @@ class ColumnarTable(ABC):
             LogError: If one holds no numbers or its lists differ in length.
         """
 
-    @contextmanager
-    def _guarded(self) -> Iterator[None]:
-        """Turn the errors of a decoder into a LogError that names the file."""
-        usual = (OSError, ValueError, KeyError, MemoryError, OverflowError)
-        try:
-            yield
-        except BaseException as error:
-            if not isinstance(error, (*usual, *self._errors())):
-                raise
-            reason = str(error).split("\n")[0][:120]
-            raise LogError(f"{self.path}: a damaged Parquet or Arrow file ({reason})") from None
+    def _guarded(self) -> AbstractContextManager[None]:
+        """Turn the errors of its decoder into a LogError that names the file."""
+        return guarded(self.path, self._errors())
 
     @property
     def width(self) -> int:
@@ -123,13 +128,22 @@ class ColumnarTable(ABC):
         Raises:
             LogError: If a column holds no numbers or its lists differ in length.
         """
+        self._names_of(columns)
+        self._check_size(columns)
+        with self._guarded():
+            return self._numbers(sorted(columns), clock)
+
+    def _names_of(self, columns: Sequence[int]) -> dict[int, str]:
+        """The names of some columns, each of one column only.
+
+        Raises:
+            LogError: If one is the name of two.
+        """
         names = self._held.names
         # Decoders hand over both under one name.
         if any(names.count(names[c]) > 1 for c in columns):
             raise LogError(f"{self.path}: two columns have one name; rename one of them.")
-        self._check_size(columns)
-        with self._guarded():
-            return self._numbers(sorted(columns), clock)
+        return {c: names[c] for c in columns}
 
     def _check_size(self, columns: Sequence[int]) -> None:
         """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.

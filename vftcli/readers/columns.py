@@ -2,13 +2,8 @@
 
 import re
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.signals.errors import LogError
-from vftcli.signals.series import median_step
 
 SIGNALS: dict[str, str] = {
     "q": "q",
@@ -198,24 +193,3 @@ def unit_factor(signal: str, unit: str | None) -> float:
     if unit not in units:
         raise LogError(f"--columns: {signal} has no unit {unit!r}; units: {', '.join(units)}.")
     return units[unit]
-
-
-def tick_of(stamps: NDArray[Any], name: str) -> tuple[float, str]:
-    """Length of a tick of unstated unit: from the name, else from the size of stamps and steps.
-
-    Whole numbers one apart are milliseconds of a 1 kHz log; epoch stamps tell by their size;
-    everything else is seconds.
-    """
-    units = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
-    if match := re.search(r"[_\[(.](ns|us|ms|s)[\])]?$", name.lower()):
-        return units[match[1]], match[1]
-    if len(stamps) == 0:
-        return 1.0, "s"
-    usual = abs(float(stamps[len(stamps) // 2]))  # the first may be garbage
-    # Counts since 1970 are near 1.7e18 ns, 1.7e15 µs and 1.7e12 ms.
-    for size, unit in ((1e17, "ns"), (1e14, "us"), (1e11, "ms")):
-        if size < usual < 1e20:
-            return units[unit], unit
-    step = median_step(stamps) if len(stamps) > 1 else 0.0
-    whole = stamps.dtype.kind in "iu" or bool(np.all(np.mod(stamps[:1000], 1) == 0))
-    return (1e-3, "ms") if whole and 0.8 <= step <= 1.2 else (1.0, "s")

@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,13 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.reader import LogFile
+from vftcli.readers.reader import InOnePieceError, LogFile
 from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
 SEPARATORS = (",", ";", "\t", " ")
 TAIL_BYTES = 128 * 1024
+BLOCK_BYTES = 1 << 22
+"""Text that is parsed at a time, of a long table."""
 COMPARED_ROWS = 20
 """Rows before the last that tell whether its last number is whole."""
 
@@ -135,9 +137,7 @@ class TextTable:
         """
         import polars as pl
 
-        kinds = dict.fromkeys(columns, pl.Float64)
-        if clock is not None:
-            kinds[clock] = self._clock_kind(clock)
+        kinds = self._kinds(columns, clock)
         # Most files parse as they are; mending copies them, so it waits for a failure.
         for text in (self._text, self._mended):
             try:
@@ -147,6 +147,48 @@ class TextTable:
             if not self._has_blank_rows(frame):
                 return {c: _numbers(frame[str(c)], self.path) for c in columns}
         raise self._diagnosed(kinds)
+
+    @property
+    def rows(self) -> int:
+        """About how many rows it has, by its size and its first lines."""
+        lines = self.sample[1:] or self.sample
+        return len(self.file.content) * len(lines) // sum(len(line) + 1 for line in lines)
+
+    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
+        """Parse some columns as `load` does, some megabytes of text at a time.
+
+        Raises:
+            InOnePieceError: If something must be mended, or is no number.
+        """
+        import polars as pl
+
+        path, kinds = self.file.direct, self._kinds(columns, clock)
+        quoted = any('"' in line for line in self.sample)
+        if path is None or quoted or self._needs_mending(self.file.head):
+            raise InOnePieceError
+        end = self._end() or len(self.file.content)
+        with path.open("rb") as source:
+            for _ in range(self._lines_before_rows):
+                source.readline()
+            while (left := end - source.tell()) > 0:
+                text = source.read(min(BLOCK_BYTES, left))
+                text += source.readline() if source.tell() < end else b""
+                try:
+                    frame = self._parse(text, kinds)
+                except pl.exceptions.PolarsError:
+                    raise InOnePieceError from None
+                if self._has_blank_rows(frame):
+                    raise InOnePieceError
+                yield {c: _numbers(frame[str(c)], self.path) for c in columns}
+
+    def _kinds(self, columns: Sequence[int], clock: int | None) -> dict[int, Any]:
+        """Column → its polars type."""
+        import polars as pl
+
+        kinds: dict[int, Any] = dict.fromkeys(columns, pl.Float64)
+        if clock is not None:
+            kinds[clock] = self._clock_kind(clock)
+        return kinds
 
     def words(self, column: int) -> tuple[str, ...]:
         """The different texts that a column holds, in the order in which they come.

@@ -31,7 +31,8 @@ def trajectories(folder: Path) -> Iterator[Path | None]:
 
 def is_droid(file: LogFile) -> bool:
     """Whether a folder holds DROID's episodes, at any depth."""
-    if not file.is_folder or {"metadata.yaml", "meta"} & set(file.entries):
+    is_lerobot = (file.path / "meta" / "info.json").is_file()
+    if not file.is_folder or "metadata.yaml" in file.entries or is_lerobot:
         return False
     looked_at = zip(range(MOST_LOOKED_AT), trajectories(file.path), strict=False)
     return any(path is not None for _, path in looked_at)

@@ -11,10 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.readers.aliases import ALIASES
+from vftcli.readers.columns import parse_columns
 from vftcli.readers.hdf5 import Hdf5Table, is_hdf5, natural, opened, table_of
 from vftcli.readers.parts import arm_of, episode_of, refuse_arm
+from vftcli.readers.picking import rate_words
 from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Column, listed, rate_words
+from vftcli.readers.table import Column, listed
 from vftcli.readers.tables import ArrayTable, described, from_table, states_positions
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.remarks import fact
@@ -254,6 +256,26 @@ def episodes_in(file: LogFile) -> tuple[int, ...]:
     """The numbers of the episodes of an HDF5 file."""
     with opened(file) as content:
         return numbers_of(layout_of(table_of(file.path, content))[1])
+
+
+def episode_places(file: LogFile, columns: str | None = None) -> dict[int, str]:
+    """The group, as "observations/", in which each episode of an HDF5 file has its positions.
+
+    Args:
+        file: The file.
+        columns: A --columns text, which goes before what their names say, or None.
+
+    Raises:
+        LogError: If several groups have positions.
+    """
+    stated = parse_columns(columns).item("q") if columns is not None else None
+    with opened(file) as content:
+        table = table_of(file.path, content)
+        layout, groups = layout_of(table)
+        anchor = (stated.pattern if stated is not None else None) or layout.anchor
+        anchor = anchor or level_of(file.path, table.names or (), "/")
+    below = anchor[: anchor.rfind("/") + 1]
+    return dict(zip(numbers_of(groups), (group + below for group in groups), strict=True))
 
 
 HDF5 = Reader(

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.readers.columns import tick_of
+from vftcli.readers.picking import tick_of
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import median_step
 

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from vftcli.readers.opening import Digest
+from vftcli.readers.picking import picked
 from vftcli.readers.reader import ReadChoice
-from vftcli.readers.table import JACOBIAN, Cell, JacobianError, Pick, Picks, picked
+from vftcli.readers.table import JACOBIAN, Cell, JacobianError, Pick, Picks
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.remarks import Remark

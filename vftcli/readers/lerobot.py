@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -277,10 +278,10 @@ def episodes_told(folder: Path) -> list[Episode]:
     """
     tables = sorted((folder / "meta" / "episodes").rglob("*.parquet"))
     lines = folder / "meta" / "episodes.jsonl"
-    if tables:
-        found = [episode for path in tables for episode in episodes_of_table(folder, path)]
-    elif lines.is_file():
-        found = list(episodes_of_lines(lines))
+    if there := tables or ([lines] if lines.is_file() else []):
+        # Who reads all episodes asks for each again.
+        states = tuple((path, path.stat().st_mtime_ns, path.stat().st_size) for path in there)
+        found = remembered_episodes(folder, states)
     else:
         files = sorted((folder / "data").rglob("*.parquet"))
         each = (episodes_of(parquet_table(open_log(path)).episodes()) for path in files)
@@ -289,6 +290,16 @@ def episodes_told(folder: Path) -> list[Episode]:
         raise LogError(f"{folder}: a LeRobot dataset without data/**/*.parquet.")
     by_number = {episode.number: episode for episode in found}
     return [by_number[number] for number in sorted(by_number)]
+
+
+@lru_cache(maxsize=2)
+def remembered_episodes(folder: Path, states: tuple[tuple[Path, int, int], ...]) -> list[Episode]:
+    """The episodes that tables of these paths, times and sizes tell."""
+    each = [
+        (episodes_of_table if path.suffix == ".parquet" else episodes_of_lines)(folder, path)
+        for path, _, _ in states
+    ]
+    return [episode for episodes in each for episode in episodes]
 
 
 def episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
@@ -309,14 +320,18 @@ def episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
         yield Episode(number, length, start, place)
 
 
-def episodes_of_lines(path: Path) -> Iterable[Episode]:
+def episodes_of_lines(folder: Path, path: Path) -> Iterable[Episode]:
     """The episodes of a table of version 2, one object a line."""
+    chunk = info_of(folder).get("chunks_size")
+    chunk = chunk if isinstance(chunk, int) and chunk > 0 else 1000
     for line in filter(str.strip, text_of(path).splitlines()):
         try:
             told = json.loads(line)
-            yield Episode(int(told[EPISODE]), int(told["length"]))
+            number, length = int(told[EPISODE]), int(told["length"])
         except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
             raise LogError(f"{path}: a line that tells no episode: {line[:60]!r}.") from None
+        name = f"episode_{number:06d}.parquet"
+        yield Episode(number, length, file=folder / "data" / f"chunk-{number // chunk:03d}" / name)
 
 
 def data_file(folder: Path, episode: Episode) -> Path:

@@ -9,8 +9,9 @@ import numpy as np
 
 from vftcli.readers.aliases import table_clock, vendor_pick
 from vftcli.readers.delimited import TextTable
+from vftcli.readers.picking import picked
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Cell, Column, Pick, Picks, Table, checked, picked
+from vftcli.readers.table import Cell, Column, Pick, Picks, Table, checked
 from vftcli.readers.tables import ArrayTable
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact

@@ -1,7 +1,8 @@
 """Library: the logs of one command, each read once and each under a label of its own."""
 
 import os
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,16 +42,24 @@ class Library:
             self._recordings[at, read] = read.taken(read_chosen(path, read, label))
         return choice.within(self._recordings[at, read])
 
-    def open_each(self, paths: Iterable[str | Path], choice: ReadChoice) -> Iterator[Recording]:
+    def open_each(
+        self, paths: Iterable[str | Path], choice: ReadChoice, *, whole: bool = False
+    ) -> Iterator[Recording]:
         """Read some logs, each episode as a log of its own where all are chosen.
+
+        Args:
+            paths: The logs.
+            choice: How they are read.
+            whole: Whether all episodes of a dataset are meant where none is chosen.
 
         Raises:
             LogError: If all episodes are chosen, of a log that has none.
         """
-        from vftcli.readers import episode_numbers
+        from vftcli.readers import episode_numbers, holds_episodes
 
         for path in paths:
-            if not choice.all_episodes:
+            unasked = whole and choice.episode is None and holds_episodes(path, choice)
+            if not (choice.all_episodes or unasked):
                 yield self.open(path, choice)
                 continue
             for number in episode_numbers(path, choice):
@@ -85,8 +94,8 @@ def labelled(paths: Iterable[str | Path]) -> dict[Path, str]:
     given = [Path(path) for path in paths]
     # Spellings of one path count once, or no tail of it would be unique.
     parts = {path: absolute(path).parts for path in given}
-    every = set(parts.values())
-    return {path: printable(_shortest_tail(parts[path], every)) for path in given}
+    tails = Counter(each[-k:] for each in set(parts.values()) for k in range(1, len(each) + 1))
+    return {path: printable(_shortest_tail(parts[path], tails)) for path in given}
 
 
 def absolute(path: str | Path) -> Path:
@@ -94,10 +103,7 @@ def absolute(path: str | Path) -> Path:
     return Path(os.path.abspath(path))  # noqa: PTH100 - Path.absolute leaves `..` in the path
 
 
-def _shortest_tail(parts: tuple[str, ...], all_parts: set[tuple[str, ...]]) -> str:
+def _shortest_tail(parts: tuple[str, ...], tails: Mapping[tuple[str, ...], int]) -> str:
     """The last parts of a path, as many as no other path ends with."""
-    for count in range(1, len(parts) + 1):
-        tail = parts[-count:]
-        if sum(other[-count:] == tail for other in all_parts) == 1:
-            break
-    return str(Path(*tail))
+    own = (parts[-count:] for count in range(1, len(parts) + 1))
+    return str(Path(*next((tail for tail in own if tails[tail] == 1), parts)))

@@ -1,6 +1,6 @@
 """Parquet tables: pyarrow decodes them, and polars where it is not installed."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from io import BytesIO
 from typing import Any
 
@@ -8,10 +8,13 @@ import numpy as np
 
 from vftcli.readers.columnar import ColumnarTable, HeldColumns, episodes_of, read_columns
 from vftcli.readers.pyarrow_table import PyarrowTable
-from vftcli.readers.reader import LogFile, Reader
+from vftcli.readers.reader import InOnePieceError, LogFile, Reader
 from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
 from vftcli.signals.packages import installed, needed
+
+BLOCK_ROWS, BUFFER_BYTES = 1 << 13, 1 << 18
+"""Rows that are decoded at a time of a long table, and bytes of a column that are read for them."""
 
 
 def parquet_table(file: LogFile) -> ColumnarTable:
@@ -25,7 +28,8 @@ class PyarrowParquet(PyarrowTable):
     def _opened(self, file: LogFile) -> HeldColumns:
         pq = needed("pyarrow.parquet", "a Parquet file")
         source = file.direct or BytesIO(file.content)
-        self._file = pq.ParquetFile(source, memory_map=file.direct is not None)
+        self._direct = file.direct
+        self._file = pq.ParquetFile(source, memory_map=False, pre_buffer=False)
         about = self._file.metadata
         return self._held_of(self._file.schema_arrow, int(about.num_rows), about.metadata)
 
@@ -38,6 +42,38 @@ class PyarrowParquet(PyarrowTable):
     def _decoded(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
         names = self._held.names
         return self._file.read(columns=[names[c] for c in columns], use_threads=False)
+
+    @property
+    def rows(self) -> int:
+        """How many rows it has."""
+        return self._held.rows
+
+    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
+        """Decode some columns as `load` does, some thousand rows at a time.
+
+        Raises:
+            InOnePieceError: If rows of one episode stand among others.
+            LogError: As `load` raises it.
+        """
+        pa = needed("pyarrow", "a Parquet file")
+        pq = needed("pyarrow.parquet", "a Parquet file")
+
+        if self._rows is not None or self._direct is None:
+            raise InOnePieceError
+        names = self._names_of(columns)
+        self._check_size(columns)
+        with self._guarded():
+            # Read ahead, or as a mapped file, all of it would lie in memory; so would groups that
+            # are asked for together.
+            file = pq.ParquetFile(
+                self._direct, memory_map=False, pre_buffer=False, buffer_size=BUFFER_BYTES
+            )
+            for group in range(file.num_row_groups):
+                for batch in file.iter_batches(
+                    BLOCK_ROWS, [group], list(names.values()), use_threads=False
+                ):
+                    table = pa.Table.from_batches([batch])
+                    yield {c: self._column(table.column(names[c]), c, clock) for c in columns}
 
 
 class PolarsParquet(ColumnarTable):

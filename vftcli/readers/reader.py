@@ -1,15 +1,18 @@
 """Reader: what a log format is to this package, and the file a reader is handed."""
 
+import math
+import mmap
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
+from typing import Self
 
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.derivation import is_fast, with_velocity
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
@@ -61,6 +64,12 @@ class LogFile:
         """
         return self._unwrapped[0]
 
+    def release(self) -> None:
+        """Let go of the pages of a mapped file that were touched so far; they can be read again."""
+        mapped = self.content.obj
+        if isinstance(mapped, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
+            mapped.madvise(mmap.MADV_DONTNEED)
+
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """What had to be left behind to open the file."""
@@ -104,11 +113,15 @@ class RawLog:
         robot_hint: Name of the profile that the log itself settles, or None.
         degrees_possible: Whether nothing says that the positions are in radians.
         remarks: What the reader dropped, turned or derived, and what looks suspicious.
-        constants: Last values of further columns that the reader asked for.
+        constants: Last values of the columns with the payload: its mass, its centre of mass.
         payload_mass: Mass the controller was told of. [kg]
         payload_com: Its centre of mass in flange axes. (3,) [m]
         part: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
         files: The files of a folder that it was read from; () for all.
+        rest: What follows in the file, block by block, where this is the first of several; None
+            where it is all.
+        rows: Which rows of the file these are, counted from 0; None for all. (T,)
+        unknown: Rows of the file that were left out because a value is no number.
     """
 
     stamps: Array
@@ -128,6 +141,24 @@ class RawLog:
     payload_com: tuple[float, ...] | None = None
     part: str = ""
     files: tuple[Path, ...] = ()
+    rest: "Iterator[RawLog] | None" = None
+    rows: Indices | None = None
+    unknown: Indices | None = None
+
+    def told_payload(self, constants: tuple[float, ...]) -> Self:
+        """The log with the payload that its controller was told of last.
+
+        Args:
+            constants: Mass and centre of mass, as `constants` has them. [kg, m]
+        """
+        if len(constants) != 4 or not all(map(math.isfinite, constants)):
+            return self
+        mass, *com = constants
+        return replace(self, constants=constants, payload_mass=mass, payload_com=tuple(com))
+
+
+class InOnePieceError(Exception):
+    """A log that was to come in blocks has to be read whole: only that tells what is odd."""
 
 
 ARMS = ("left", "right")
@@ -163,6 +194,9 @@ class ReadChoice:
         arm: Which arm of a log of two, a member of `ARMS`; None for the only one.
         examining: Whether the log is only looked at, where a part and a word say more than a
             refusal.
+        blocks: Whether a long log may come in blocks, where its format allows it.
+        skips_unknown: Whether rows with a value that is no number are left out and said, not
+            refused.
 
     Raises:
         ParameterError: If the effort, the derived signal or the arm is none of these.
@@ -178,6 +212,8 @@ class ReadChoice:
     all_episodes: bool = False
     arm: str | None = None
     examining: bool = False
+    blocks: bool = False
+    skips_unknown: bool = False
 
     def __post_init__(self) -> None:
         if self.arm is not None:

@@ -9,8 +9,9 @@ from vftcli.readers.aliases import _clock, _wrench, filled_cells, grouped
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.parquet import parquet_table
+from vftcli.readers.picking import picked
 from vftcli.readers.reader import LogFile, ReadChoice, open_log
-from vftcli.readers.table import Pick, Picks, Table, listed, picked, picks_of
+from vftcli.readers.table import Pick, Picks, Table, listed, picks_of
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import LogError
 from vftcli.signals.wrench import WrenchFrame

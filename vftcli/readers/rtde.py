@@ -8,8 +8,9 @@ import numpy as np
 
 from vftcli.readers.aliases import vector_picks
 from vftcli.readers.delimited import TextTable
+from vftcli.readers.picking import picked
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Cell, Pick, Picks, Table, checked, picked
+from vftcli.readers.table import Cell, Pick, Picks, Table, checked
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
@@ -75,9 +76,7 @@ def read_rtde(table: Table, request: ReadChoice) -> RawLog:
         )
     raw = picked(table, checked(table, picks), request, clock_name=CLOCK)
     raw = replace(raw, wrench_frame=force_frame(names, raw.stamps * raw.tick))
-    if len(raw.constants) != len(PAYLOAD) or not np.all(np.isfinite(raw.constants)):
-        return raw
-    return replace(raw, payload_mass=raw.constants[0], payload_com=raw.constants[1:])
+    return raw.told_payload(raw.constants)
 
 
 def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:

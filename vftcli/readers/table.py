@@ -1,17 +1,14 @@
 """Tables: columns of numbers under names or in file order, whatever file they come from."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
-import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.readers.columns import SIGNALS, ColumnSpec, Item, tick_of
-from vftcli.readers.reader import RawLog, ReadChoice
-from vftcli.signals.arrays import Array
+from vftcli.readers.columns import SIGNALS, ColumnSpec, Item
 from vftcli.signals.errors import LogError
 from vftcli.signals.letters import printable
 from vftcli.signals.remarks import Remark, fact
@@ -19,6 +16,9 @@ from vftcli.signals.wrench import WrenchFrame
 
 JACOBIAN = re.compile(r"(?i)jac(obian)?_(\d)_(\d)")
 """A cell of a Jacobian among the columns: row, then column."""
+
+WHOLE_ROWS = 100_000
+"""A log of no more rows is read in one piece: there is memory for all that is done with it."""
 
 Column = NDArray[Any]
 """One column as it is stored: (T,) numbers, or (T, k) for a column of lists."""
@@ -49,6 +49,22 @@ class Table(Protocol):
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
         """Load columns as float64; the clock's column may stay whole numbers."""
+
+
+@runtime_checkable
+class LongTable(Table, Protocol):
+    """A table that can be loaded a block of rows after another."""
+
+    @property
+    def rows(self) -> int:
+        """About how many rows it has."""
+
+    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
+        """Load columns as `load` does, some thousand rows at a time.
+
+        Raises:
+            InOnePieceError: If only the whole table tells what a row is.
+        """
 
 
 class Cell(NamedTuple):
@@ -100,116 +116,6 @@ class JacobianError(LogError):
     def __init__(self, message: str, table: Table, picks: Picks) -> None:
         super().__init__(message)
         self.table, self.picks = table, picks
-
-
-def picked(
-    table: Table,
-    picks: Picks,
-    request: ReadChoice,
-    *,
-    clock_name: str = "",
-    **more: Any,  # noqa: ANN401
-) -> RawLog:
-    """Load the picked columns of a table and scale them.
-
-    Args:
-        table: The table.
-        picks: What to load.
-        request: Signals nobody asked for are left unread.
-        clock_name: Which clock the stamps are from, in words.
-        more: Further fields of the RawLog.
-
-    Raises:
-        LogError: If the table has no clock, or no positions.
-    """
-    signals = tuple(p for p in picks.signals if request.wants(p.signal))
-    clock = picks.clock.cells[0] if picks.clock else None
-    wanted = {cell.column for pick in signals for cell in pick.cells} | set(picks.constants)
-    wanted |= set() if picks.origin is None else {picks.origin}
-    if picks.clock is not None:
-        wanted |= {cell.column for cell in picks.clock.cells}
-    loaded = table.load(sorted(wanted), clock.column if clock else None)
-    arrays = {pick.signal: _stacked(pick, loaded) for pick in signals}
-    stamps, tick, words = _stamps(table, picks, loaded, clock_name)
-    if picks.origin is not None and len(stamps):
-        more["origin"] = float(loaded[picks.origin][0]) * 1e-9 - float(stamps[0]) * tick
-    remarks = (*table.remarks, *(pick.remark for pick in signals if pick.remark))
-    wrench = next((pick for pick in signals if pick.signal == "wrench"), None)
-    more.setdefault("wrench_frame", wrench.frame if wrench else None)
-    return RawLog(
-        stamps=stamps,
-        tick=tick,
-        clock=words,
-        signals=arrays,
-        remarks=(*remarks, *more.pop("remarks", ())),
-        constants=tuple(
-            float(column[-1]) if len(column) else float("nan")
-            for column in (loaded[c] for c in picks.constants)
-        ),
-        **more,
-    )
-
-
-def _stacked(pick: Pick, loaded: Mapping[int, Column]) -> Array:
-    """One signal's cells side by side, scaled. (T, n)"""
-    rows = len(loaded[pick.cells[0].column])
-    out = np.empty((rows, len(pick.cells)))
-    for j, cell in enumerate(pick.cells):
-        column = loaded[cell.column]
-        out[:, j] = column if cell.element is None else column[:, cell.element]
-    if pick.factor != 1.0:
-        out *= pick.factor
-        out += 0.0  # a turned zero is plain zero
-    return out
-
-
-def _stamps(
-    table: Table, picks: Picks, loaded: Mapping[int, Column], clock_name: str
-) -> tuple[Column, float, str]:
-    """The stamps, the length of their tick and which clock they are."""
-    if picks.clock is None:
-        if picks.rate is None:
-            raise LogError(
-                f"{table.path}: no clock. Name its column with --columns (t=…, or t in file "
-                "order), or say the rate of a log without one: t@125Hz."
-            )
-        rows = len(next(iter(loaded.values())))
-        return np.arange(rows), 1 / picks.rate, rate_words(picks.rate)
-    cell = picks.clock.cells[0]
-    column = loaded[cell.column]
-    stamps = column if cell.element is None else column[:, cell.element]
-    name = table.names[cell.column] if table.names else f"column {cell.column + 1}"
-    words = clock_name or f"column {name}" if table.names else name
-    if picks.clock.factor < 0:
-        raise LogError(
-            f"{table.path}: --columns turns the sign of the clock; time cannot run back."
-        )
-    if len(picks.clock.cells) == 2:
-        return _of_pair(table, stamps, loaded[picks.clock.cells[1].column]), 1e-9, words
-    if picks.clock.unit is not None:
-        return stamps, picks.clock.factor, f"{words} [{picks.clock.unit}]"
-    tick, unit = tick_of(stamps, name)
-    return stamps, tick, words if unit == "s" else f"{words}, taken as {unit}"
-
-
-def rate_words(rate: float) -> str:
-    """What the clock of a table without one is, given its rate. [Hz]"""
-    return f"none: {rate:g} Hz as stated"
-
-
-def _of_pair(table: Table, seconds: Column, rest: Column) -> Column:
-    """Stamps of a column of whole seconds and one of the nanoseconds within them. (T,) [ns]
-
-    Raises:
-        LogError: If they are no such pair: seconds with a fraction, or a second too many.
-    """
-    whole = all(bool(np.all(np.mod(part, 1) == 0)) for part in (seconds, rest))
-    if not whole or not np.all((rest >= 0) & (rest < 1e9) & (np.abs(seconds) < 9e9)):
-        raise LogError(
-            f"{table.path}: the two columns of the clock are no whole seconds and the nanoseconds "
-            "within them. Name one column of time with --columns, as in t=…"
-        )
-    return seconds.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
 
 
 def picks_of(

@@ -16,8 +16,9 @@ from vftcli.readers.columns import ColumnSpec, Item, parse_columns
 from vftcli.readers.delimited import TextTable, as_number
 from vftcli.readers.headless import guessed
 from vftcli.readers.joints import robot_of
+from vftcli.readers.picking import picked
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Column, Table, missing_column, picked, picks_of
+from vftcli.readers.table import Column, Table, missing_column, picks_of
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 

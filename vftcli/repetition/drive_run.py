@@ -1,6 +1,7 @@
 """What a difference of two motions is made from: the drive torques, and the model's of them."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import median_step
 
@@ -48,6 +50,21 @@ class DriveRun:
         """Median sample time. [s]"""
         return median_step(self.t)
 
+    @cached_property
+    def smooth_gap(self) -> Array:
+        """What the model misses of the torque, below the band of the noise. (T, n) [N·m]"""
+        return low_pass(self.t, self.torque - self.model, band(self.step, None)[0])
+
+    @cached_property
+    def smooth_model(self) -> Array:
+        """The model's torque, below the band of the noise. (T, n) [N·m]"""
+        return low_pass(self.t, self.model, band(self.step, None)[0])
+
+    @cached_property
+    def smooth_dq(self) -> Array:
+        """Joint velocities without their noise: the direction of the path. (T, n) [rad/s]"""
+        return low_pass(self.t, self.dq, min(12.0, 0.2 / self.step))
+
     def taken(self, samples: slice) -> "DriveRun":
         """Some of its samples as a run of its own."""
         series = {name: x[samples] for name, x in vars(self).items() if name in ALONG_TIME}
@@ -84,3 +101,9 @@ def drive_run_of(recording: Recording, robot: Robot, terms: DynamicsTerms) -> Dr
         standstill_s=duration(recording.t, dq),
         standing=standing(recording.t, dq),
     )
+
+
+def band(step: float, cutoff: float | None) -> tuple[float, float]:
+    """The band above the signal in which noise is measured. [Hz]"""
+    low = min(12.0 if cutoff is None else cutoff, 0.22 / step)
+    return low, min(2.0 * low, 0.45 / step)

@@ -1,27 +1,20 @@
 """What a two-cycle difference cannot know: its own error, sample by sample and joint by joint."""
 
-from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.repetition.drive_run import DriveRun
-from vftcli.repetition.pairing import Pairing, mean_of
+from vftcli.repetition.drive_run import band
+from vftcli.repetition.laid_over import LaidOver
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.filters import band_pass, low_pass, noise_passed
-
-STUCK = 0.3
-"""A stop of this length leaves the whole of the dry friction open, a shorter one its share. [s]"""
 
 LEAST_BAND = 12.0
 """Noise is not measured in a band about less than this: contacts live there. [Hz]"""
 
 LEAST_SHARE = 0.05
 """Share of the correction that is wrong even where the model is as good as it gets."""
-
-REPEATED = 0.5
-"""Share of the stiction that cancels between two stops of the same length at the same place."""
 
 PIECE = 0.4
 """Length of the pieces in which noise is told from slow loads. [s]"""
@@ -99,15 +92,7 @@ class ErrorModel(NamedTuple):
         return np.where(np.any(standing, axis=0), rms(self.sd[self.known], standing), np.nan)
 
 
-def error_model(
-    motion: DriveRun,
-    pairings: Sequence[Pairing],
-    raw: Array,
-    change: Array,
-    *,
-    corrected: bool,
-    cutoff: float | None,
-) -> ErrorModel:
+def error_model(laid: LaidOver, *, corrected: bool, cutoff: float | None) -> ErrorModel:
     """Estimate the error of a difference.
 
     Its square is the sum of
@@ -121,53 +106,40 @@ def error_model(
       stop shorter than `STUCK` by its share, and by `AT_REST` of F_c where the whole arm rests.
 
     Args:
-        motion: The log.
-        pairings: Its free runs.
-        raw: Torque difference, not corrected, not filtered; NaN without partner. (T, n) [N·m]
-        change: The model's torque of the motion difference. (T, n) [N·m]
-        corrected: Whether the difference is corrected by `change`.
+        laid: The log over its free runs.
+        corrected: Whether the difference is corrected by the model's torque.
         cutoff: Cutoff of its low-pass, None without. [Hz]
     """
-    known = np.isfinite(raw).all(axis=1)
-    t = motion.t[known]
-    standing = stands_in_any(motion, pairings)
-    momentum = motion.momentum - mean_of(pairings, [p.free.momentum for p in pairings])
-    moving, step = ~standing[known], motion.step
-    modelled = change[known]
-    signal = raw[known] + modelled if corrected else raw[known]
+    motion, known = laid.motion, laid.known
+    t, step = motion.t[known], motion.step
+    moving = ~laid.standing[known]
+    modelled = laid.change[known]
+    signal = laid.torque[known]
+    if corrected:
+        signal += modelled
     noise = noise_of(t, signal, moving, step, cutoff)
     noise = np.maximum(noise, noise_when_quiet(t, signal, moving, step, cutoff))
-    motion_error = local_rms(low_pass(t, modelled, band(step, cutoff)[0]), step)
+    low = band(step, cutoff)[0]
+    motion_error = laid.once("motion", low, lambda: local_rms(low_pass(t, modelled, low), step))
     if corrected:
-        motion_error = motion_error * np.maximum(LEAST_SHARE, misfit(pairings))
+        motion_error = motion_error * np.maximum(LEAST_SHARE, laid.misfit)
     else:
         # The model's torque differentiates momenta: their noise is no difference of the motions.
-        own = slope_noise(t, momentum[known], moving, step, band(step, cutoff)[0])
+        momentum = laid.momentum[known]
+        own = laid.once("slope", low, lambda: slope_noise(t, momentum, moving, step, low))
         motion_error = less_noise(motion_error, own)
-    share = ANYWHERE * stopped(motion, pairings)
-    share[standing.all(axis=1)] = AT_REST
+    share = ANYWHERE * laid.stopped
+    share[laid.standing.all(axis=1)] = AT_REST
     stuck = motion.coulomb * share[known]
     square = noise**2 + motion_error**2 + stuck**2
-    sd = np.full(raw.shape, np.nan)
+    sd = np.full(share.shape, np.nan)
     sd[known] = np.sqrt(square)
-    return ErrorModel(sd, standing)
+    return ErrorModel(sd, laid.standing)
 
 
 def less_noise(size: Array, noise: Array) -> Array:
     """Standard deviations without that of an independent noise in them, 0 where it is larger."""
     return np.sqrt(np.maximum(size**2 - noise**2, 0.0))
-
-
-def stands_in_any(motion: DriveRun, pairings: Sequence[Pairing]) -> Mask:
-    """Where a joint stands in the log or in any free run. (T, n)"""
-    there = [np.nan_to_num(p.there(p.free.standing.astype(np.float64))) > 0.0 for p in pairings]
-    return np.asarray(np.any(np.stack([motion.standing, *there]), axis=0))
-
-
-def band(step: float, cutoff: float | None) -> tuple[float, float]:
-    """The band above the signal in which noise is measured. [Hz]"""
-    low = min(12.0 if cutoff is None else cutoff, 0.22 / step)
-    return low, min(2.0 * low, 0.45 / step)
 
 
 def noise_of(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:
@@ -266,25 +238,3 @@ def local_rms(x: Array, step: float) -> Array:
     here = np.arange(len(x))
     first, last = np.maximum(here - width, 0), np.minimum(here + width + 1, len(x))
     return np.asarray(np.sqrt((total[last] - total[first]) / (last - first)[:, None]))
-
-
-def stopped(motion: DriveRun, pairings: Sequence[Pairing]) -> Array:
-    """Share of the dry friction a stop leaves open, in the log or in a free run, 0 to 1. (T, n)"""
-    there = [np.nan_to_num(p.there(p.free.standstill_s)) for p in pairings]
-    stops = np.stack([motion.standstill_s, *there])
-    longest = np.max(stops, axis=0)
-    alike = np.min(stops, axis=0) / np.maximum(longest, 1e-9)
-    share = np.minimum(longest / STUCK, 1.0) * (1.0 - REPEATED * alike)
-    return np.asarray(np.maximum(share, stands_in_any(motion, pairings)))
-
-
-def misfit(pairings: Sequence[Pairing]) -> Array:
-    """How much of its own torque's variation the model misses in the free run, at most 1. (n,)"""
-    missed = total = np.zeros(pairings[0].free.torque.shape[1])
-    for p in pairings:
-        free, cutoff = p.free, band(p.free.step, None)[0]
-        used = np.unique(np.searchsorted(free.t, p.times[p.known]).clip(0, len(free.t) - 1))
-        gap = low_pass(free.t, free.torque - free.model, cutoff)[used]
-        missed = missed + np.var(gap, axis=0)
-        total = total + np.var(low_pass(free.t, free.model, cutoff)[used], axis=0)
-    return np.asarray(np.sqrt(np.minimum(missed / np.maximum(total, 1e-12), 1.0)))

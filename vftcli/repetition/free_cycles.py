@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.repetition.cycles import Cycles
-from vftcli.repetition.drive_run import DriveRun
-from vftcli.repetition.error_model import band
+from vftcli.repetition.drive_run import DriveRun, band
 from vftcli.repetition.ladder import difference
+from vftcli.repetition.laid_over import LaidOver
 from vftcli.repetition.pairing import Pairing, pair_with_cycle
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
@@ -16,6 +16,9 @@ from vftcli.signals.remarks import Remark, fact
 
 ALIKE = 1.5
 """A cycle is free too if its difference from the freest is within this many expected errors."""
+
+MOST_LAID = 8
+"""Free cycles that are laid under the others, at most."""
 
 SETTLES = 2.0
 """A cycle is taken with what is around it, in which filters settle. [s]"""
@@ -33,6 +36,17 @@ class FreeCycles(NamedTuple):
     numbers: tuple[int, ...]
     residuals: Array | None
 
+    @property
+    def drawn(self) -> tuple[int, ...]:
+        """Those that are laid under the others: all, or `MOST_LAID` from the first to the last.
+
+        Every cycle more costs a pass over the whole log, and takes little off the error.
+        """
+        if len(self.numbers) <= MOST_LAID:
+            return self.numbers
+        at = np.linspace(0, len(self.numbers) - 1, MOST_LAID).round().astype(int)
+        return tuple(self.numbers[k] for k in at)
+
     def remark(self, whole: int) -> Remark:
         """Which of so many whole cycles they are, and how they were found."""
         code = "free-cycle" if len(self.numbers) == 1 else "free-cycles"
@@ -41,6 +55,19 @@ class FreeCycles(NamedTuple):
             return fact(f"{code}-given", cycles=named, whole=whole)
         residuals = [float(x) for x in self.residuals]
         return fact(f"{code}-found", cycles=named, whole=whole, residuals=residuals)
+
+    def remarks(self, whole: int) -> list[Remark]:
+        """The same, and which of them are laid under the others where not all are."""
+        count = len(self.numbers)
+        if count <= MOST_LAID:
+            return [self.remark(whole)]
+        # The mean of k cycles with independent noise adds 1/k of one cycle's to the square.
+        wider = float(np.sqrt((1.0 + 1.0 / MOST_LAID) / (1.0 + 1.0 / count)) - 1.0)
+        drawn = [number + 1 for number in self.drawn]
+        return [
+            self.remark(whole),
+            fact("free-cycles-drawn", cycles=drawn, free=count, wider=wider),
+        ]
 
 
 def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
@@ -96,6 +123,7 @@ def differs_by_noise(motion: DriveRun, pairing: Pairing) -> bool:
         motion: The log in that cycle.
         pairing: Where in another cycle its samples belong.
     """
-    found = difference(motion, [pairing], "model", band(motion.step, None)[0])
+    laid = LaidOver(motion=motion, pairings=[pairing])
+    found = difference(laid, "model", band(motion.step, None)[0])
     shown = found.error.rms_moving(found.tau)
     return bool(np.all(shown <= ALIKE * found.error.floor_moving))

@@ -155,6 +155,8 @@ class FreeMotion:
             ReferenceTorqueError: If nothing is given and the log repeats nothing.
             ParameterError: If a given span holds no samples, or the whole log.
         """
+        from vftcli.repetition.free_cycles import FreeCycles
+
         log, choice = self.log, self.choice
         own, t = self.within_spans, log.recording.t
         remarks = [
@@ -165,10 +167,11 @@ class FreeMotion:
         if choice.cycles or not choice.is_given:
             found = self.free_cycles
             own = own | np.isin(self.cycles.number(t), found.numbers)
-            pairings = self.pairings_by(self.cycles.period, found.numbers)
-            remarks.append(found.remark(self.cycles.whole))
+            pairings = self.pairings_by(self.cycles.period, found.drawn)
+            remarks += found.remarks(self.cycles.whole)
         elif choice.spans and self.repeats:
-            pairings = self.pairings_by(self.cycles.period, self.cycles_given)
+            given = FreeCycles(self.cycles_given, None)
+            pairings = self.pairings_by(self.cycles.period, given.drawn)
         pieces = [FreePiece(log, own, pairings)] if own.any() else []
         for run in self.runs:
             whole = np.ones(run.recording.samples, dtype=bool)

@@ -1,13 +1,14 @@
 """The alignment ladder: ways to lay a free run under a log, each a rung better than the last."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.error_model import ErrorModel, error_model
-from vftcli.repetition.pairing import Pairing, by_phase, mean_of
+from vftcli.repetition.laid_over import LaidOver
+from vftcli.repetition.pairing import Pairing, by_phase
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
@@ -68,14 +69,18 @@ class Difference(NamedTuple):
             return fact(code, rung=self.rung, **values)
         return fact(f"{code}-filtered", rung=self.rung, cutoff_Hz=self.cutoff, **values)
 
+    def floor_remark(self) -> Remark:
+        """The floor on this rung."""
+        return self.remark("alignment-floor", floor_Nm=self.error.floor.tolist())
+
 
 def differences(
     motion: DriveRun,
     clocks: Mapping[str, Sequence[Pairing]],
     rungs: Sequence[str],
     cutoffs: Sequence[float | None],
-) -> list[Difference]:
-    """Make the difference on every rung asked for, with and without the low-pass.
+) -> Iterator[Difference]:
+    """Make the difference on every rung asked for, with and without the low-pass, one by one.
 
     Args:
         motion: The log.
@@ -83,53 +88,74 @@ def differences(
         rungs: Names in `RUNGS`; those whose clock is not there are left out.
         cutoffs: Cutoffs of the low-pass to try, None for none. [Hz]
     """
-    steps = []
+    laid: dict[tuple[str, bool], LaidOver] = {}
     for name in rungs:
         rung = RUNGS[name]
         if rung.clock not in clocks:
             continue
-        pairings = clocks[rung.clock]
-        if rung.phase:
-            pairings = [by_phase(motion, p) for p in pairings]
-        steps += [difference(motion, pairings, name, cutoff) for cutoff in cutoffs]
-    return steps
+        way = (rung.clock, rung.phase)
+        if way not in laid:
+            # One way of pairing after the other: of a long log two have no room at once.
+            laid = {way: laid_over(motion, clocks[rung.clock], phase=rung.phase)}
+        for cutoff in cutoffs:
+            yield difference(laid[way], name, cutoff)
 
 
-def difference(
-    motion: DriveRun, pairings: Sequence[Pairing], name: str, cutoff: float | None
-) -> Difference:
+def laid_over(motion: DriveRun, pairings: Sequence[Pairing], *, phase: bool) -> LaidOver:
+    """The log over its free runs, its partners moved along their path if asked."""
+    moved = [by_phase(motion, p) for p in pairings] if phase else pairings
+    return LaidOver(motion=motion, pairings=moved)
+
+
+def difference(laid: LaidOver, name: str, cutoff: float | None) -> Difference:
     """τ_ext = τ_free − τ (+ model − model_free) at paired instants, low-passed if asked.
 
     With Mq̈ + Cq̇ + g + F_f = τ + τ_ext for both motions and τ_ext = 0 in the free one, the
     bracket is exact; without it the two motions are taken to be the same.
+
+    Raises:
+        ReferenceTorqueError: If hardly a sample has a partner.
     """
-    raw = mean_of(pairings, [p.free.torque for p in pairings]) - motion.torque
-    change = motion.model - mean_of(pairings, [p.free.model for p in pairings])
-    known = np.isfinite(raw).all(axis=1)
+    motion, known = laid.motion, laid.known
     if np.count_nonzero(known) < 16:
         raise ReferenceTorqueError(
             f"{motion.name}: only {np.count_nonzero(known)} samples have a partner in the free "
             "run; record a longer one, or choose other free cycles with --free-cycles"
         )
     corrected = RUNGS[name].corrected
-    tau = np.full(raw.shape, np.nan)
-    wanted = raw[known] + change[known] if corrected else raw[known]
+    wanted = laid.torque[known]
+    if corrected:
+        wanted += laid.change[known]
+    tau = np.full(motion.torque.shape, np.nan)
     tau[known] = wanted if cutoff is None else low_pass(motion.t[known], wanted, cutoff)
-    error = error_model(motion, pairings, raw, change, corrected=corrected, cutoff=cutoff)
-    return Difference(name, cutoff, tau, error)
+    return Difference(name, cutoff, tau, error_model(laid, corrected=corrected, cutoff=cutoff))
 
 
-def most_certain(made: Sequence[Difference]) -> Difference:
+class Climbed(NamedTuple):
+    """What the rungs brought.
+
+    Attributes:
+        chosen: The difference that is most certain.
+        floors: The floor of each rung.
+    """
+
+    chosen: Difference
+    floors: tuple[Remark, ...]
+
+
+def most_certain(made: Iterable[Difference]) -> Climbed:
     """The difference with the smallest expected error, the simpler one where they are alike.
 
     Compared is the mean over trusted joints of expected error in motion, relative to the lowest
-    rung's.
+    rung's. Only the best so far is kept: of a long log not all have room at once.
     """
-    lowest = made[0].error.floor_moving
-    trusted = made[0].error.trusted_joints
-    chosen, least = made[0], 1.0
-    for candidate in made[1:]:
+    steps = iter(made)
+    chosen = next(steps)
+    lowest, trusted, least = chosen.error.floor_moving, chosen.error.trusted_joints, 1.0
+    floors = [chosen.floor_remark()]
+    for candidate in steps:
+        floors.append(candidate.floor_remark())
         share = float(np.mean((candidate.error.floor_moving / lowest)[trusted]))
         if share < WORTH * least:
             chosen, least = candidate, share
-    return chosen
+    return Climbed(chosen, tuple(floors))

@@ -87,7 +87,7 @@ def by_phase(motion: DriveRun, pairing: Pairing) -> Pairing:
         return pairing
     times, q = pairing.times[known], motion.q[known]
     free = pairing.free
-    speed = low_pass(free.t, free.dq, min(12.0, 0.2 / free.step))
+    speed = free.smooth_dq
     shift = np.zeros(len(times))
     damping = 0.01 * float(np.mean(np.sum(speed**2, axis=1))) + 1e-6
     for _ in range(4):
@@ -105,7 +105,11 @@ def by_phase(motion: DriveRun, pairing: Pairing) -> Pairing:
 
 def mean_of(pairings: Sequence[Pairing], signals: Sequence[Array]) -> Array:
     """Mean over free runs of a signal at the paired instants, over those that are known. (T, n)"""
-    values = np.stack([p.there(x) for p, x in zip(pairings, signals, strict=True)])
-    count = np.sum(np.isfinite(values), axis=0)
-    total = np.nansum(values, axis=0)
+    count = np.zeros(len(pairings[0].times), dtype=np.intp)[:, None]
+    total: Array = np.zeros(1)
+    for p, x in zip(pairings, signals, strict=True):
+        there = p.there(x)
+        known = np.isfinite(there)
+        count = count + known
+        total = total + np.where(known, there, 0.0)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -82,8 +82,7 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     partners = partners_in_logs(motion) if motion.runs else partners_in_log(motion)
     rungs = tuple(RUNGS) if choice.alignment == AUTOMATIC else (choice.alignment,)
     cutoffs = cutoffs_for(choice.low_pass, log.recording.median_step)
-    ladder = differences(log.drive, partners.clocks, rungs, cutoffs)
-    chosen = most_certain(ladder)
+    chosen, floors = most_certain(differences(log.drive, partners.clocks, rungs, cutoffs))
     measured = measured_scale(partners, chosen)
     scale = measured if measured is not None else np.ones(chosen.tau.shape[1])
     moving = np.isfinite(chosen.tau) & ~chosen.error.standing
@@ -101,12 +100,9 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
         moving=moving,
         remarks=(
             *partners.remarks,
-            *(
-                step.remark("alignment-floor", floor_Nm=step.error.floor.tolist())
-                for step in ladder
-            ),
+            *floors,
             chosen.remark(
-                "alignment-chosen" if len(ladder) > 1 else "alignment-asked",
+                "alignment-chosen" if len(floors) > 1 else "alignment-asked",
                 title=RUNGS[chosen.rung].title,
             ),
             *floor_remarks(chosen, measured),
@@ -119,7 +115,7 @@ def partners_in_log(motion: FreeMotion) -> Partners:
     """The free cycles of a log, laid under the others."""
     period, cycles, stated = motion.period, motion.cycles, motion.choice.period
     free = motion.free_cycles
-    clocks = {"found": motion.pairings_by(cycles.period, free.numbers)}
+    clocks = {"found": motion.pairings_by(cycles.period, free.drawn)}
     values: dict[str, Any] = {
         "period_s": cycles.period,
         "deviation_rad": period.deviation,
@@ -129,9 +125,9 @@ def partners_in_log(motion: FreeMotion) -> Partners:
     }
     remarks = [fact("period", **values)]
     if stated is not None:
-        clocks["commanded"] = motion.pairings_by(stated, free.numbers)
+        clocks["commanded"] = motion.pairings_by(stated, free.drawn)
         remarks = [fact("period-near-stated", stated_s=stated, **values)]
-    remarks.append(free.remark(cycles.whole))
+    remarks += free.remarks(cycles.whole)
     if len(free.numbers) == 1:
         remarks.append(fact("free-cycle-without-reference"))
     inside = np.isin(cycles.number(motion.log.recording.t), free.numbers)
@@ -196,7 +192,7 @@ def measured_scale(partners: Partners, chosen: Difference) -> Array | None:
     for first, second in permutations(pairings, 2):
         shared = [pair_runs(first, second)]
         both = {"found": shared, "commanded": shared}
-        spread = differences(first.free, both, (chosen.rung,), (chosen.cutoff,))[0]
+        spread = next(differences(first.free, both, (chosen.rung,), (chosen.cutoff,)))
         ratios.append(error_ratio(spread, spread.error.known))
     return np.asarray(np.sqrt(np.mean(np.square(ratios), axis=0)))
 

@@ -13,6 +13,9 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 """True or false, sample by sample or joint by joint, named for what is true."""
 
+Indices = NDArray[np.int64]
+"""Numbers of rows or samples, counted from 0."""
+
 
 def frozen(value: ArrayLike) -> Array:
     """Return a read-only float64 array that nobody else can write to.
@@ -109,7 +112,11 @@ def median(values: Array) -> float:
     return 0.5 * float(lower + upper)
 
 
-def is_uniform(t: Array, tolerance: float = 1e-6) -> bool:
+EVEN = 1e-6
+"""How far the steps of an even clock are from their median at most, relative to it."""
+
+
+def is_uniform(t: Array, tolerance: float = EVEN) -> bool:
     """Whether all steps of a clock are equal to within `tolerance` of their median.
 
     The tolerance covers the rounding of stamps printed with nine digits; a clock that jitters more

@@ -83,7 +83,11 @@ def column_facts(name: str, frames: Mapping[str, StatedFrame]) -> dict[str, str]
     return facts
 
 
-def described_schema(table: "pl.DataFrame", frames: Mapping[str, StatedFrame] | None = None) -> Any:  # noqa: ANN401 - pyarrow is untyped
+def described_schema(
+    table: "pl.DataFrame",
+    frames: Mapping[str, StatedFrame] | None = None,
+    metadata: Mapping[str, str] | None = None,
+) -> Any:  # noqa: ANN401 - pyarrow is untyped
     """The table's pyarrow schema with what each column holds, for ``write_parquet``.
 
     None without pyarrow: polars then writes the columns, and nothing beside them.
@@ -91,10 +95,12 @@ def described_schema(table: "pl.DataFrame", frames: Mapping[str, StatedFrame] | 
     Args:
         table: The table.
         frames: As in `column_facts`.
+        metadata: What is said of the table.
     """
     if not installed("pyarrow"):
         return None
     pa = needed("pyarrow", "a schema")
     schema = table.clear().to_arrow().schema
     known = frames or {}
-    return pa.schema(field.with_metadata(column_facts(field.name, known)) for field in schema)
+    fields = [field.with_metadata(column_facts(field.name, known)) for field in schema]
+    return pa.schema(fields, metadata=metadata)

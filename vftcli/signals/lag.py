@@ -4,6 +4,7 @@ In every function the late series comes first, the early one second, and a posit
 the first runs behind.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,41 +23,104 @@ LEAST_FIT = 0.3
 """Below this correlation at the best delay there is nothing to tell a delay by."""
 
 
+BLOCK = 8192
+"""Samples that one Fourier transform takes, unless the lags looked for need more."""
+
+
 def lags(late: Array, early: Array, step: float) -> Array:
     """Delay of each column at which it fits best, NaN where nothing fits. (n,) [s]
+
+    As `lags_of_each` of one series.
+    """
+    delays: Array = lags_of_each([late], early, step)[0]
+    return delays
+
+
+def lags_of_each(late: Sequence[Array], early: Array, step: float) -> Array:
+    """Delay of each column of several series at which it fits best, NaN where nothing fits. (m, n)
 
     Maximises the correlation over the samples that overlap, for delays from −`LEAD` to `LONGEST`,
     refined between samples by a parabola.
 
     Args:
-        late: An estimate, NaN where unknown. (T, n)
-        early: Its reference, likewise. (T, n)
+        late: m estimates, NaN where unknown. Each (T, n)
+        early: Their reference, likewise. (T, n)
         step: Sample time; an uneven clock's delay is in median steps. [s]
     """
-    known = np.isfinite(late) & np.isfinite(early)
-    x, y = (centred(signal, known) for signal in (late, early))
-    first = -min(round(LEAD / step), len(x) // 4)
-    last = max(1, min(round(LONGEST / step), len(x) // 4))
-    size = 1 << int(np.ceil(np.log2(2 * len(x))))
-    at = np.arange(first - 1, last + 2) % size
-    there = known.astype(np.float64)
-    # Each column is normalised by the samples that overlap at that lag, unknown ones left out.
-    power = sliding(x**2, there, size, at) * sliding(there, y**2, size, at)
-    fit = sliding(x, y, size, at) / np.sqrt(np.where(power > 0, power, np.inf))
-    return np.array([step * (first - 1 + peak(column)) for column in fit.T])
+    samples = len(early)
+    first = -min(round(LEAD / step), samples // 4)
+    last = max(1, min(round(LONGEST / step), samples // 4))
+    at = np.arange(first - 1, last + 2)
+    found = np.full((len(late), early.shape[1]), np.nan)
+    for j, y in enumerate(early.T):
+        alike: dict[bytes, list[int]] = {}
+        for k, x in enumerate(late):
+            known = np.isfinite(x[:, j]) & np.isfinite(y)
+            alike.setdefault(np.packbits(known).tobytes(), []).append(k)
+        for members in alike.values():
+            columns = np.stack([late[k][:, j] for k in members])
+            known = np.isfinite(columns[0]) & np.isfinite(y)
+            fit = fits(centred(columns, known), centred(y[None], known), known, at)
+            found[members, j] = [step * (first - 1 + peak(row)) for row in fit]
+    return found
 
 
-def sliding(later: Array, earlier: Array, size: int, at: NDArray[np.int64]) -> Array:
-    """Sum over time of `later`, `at` samples on, times `earlier`. (len(at), n)"""
-    spectra = np.conj(np.fft.rfft(earlier, size, axis=0)) * np.fft.rfft(later, size, axis=0)
-    return np.asarray(np.fft.irfft(spectra, size, axis=0)[at])
+def fits(late: Array, early: Array, known: Mask, at: NDArray[np.int64]) -> Array:
+    """Correlation of series with one that they lag, over the samples that overlap. (m, len(at))
+
+    Args:
+        late: Series without mean, zero where unknown. (m, T)
+        early: Another, likewise. (1, T)
+        known: Where all of them are known. (T,)
+        at: Successive lags. [samples]
+    """
+    # Each is normalised by the samples that overlap at that lag, unknown ones left out.
+    if known.all():
+        samples = len(known)
+        behind = np.stack([overlap_energy(x[:, None], at, samples) for x in late])
+        power = behind * overlap_energy(early.T, -at, samples)
+    else:
+        there = known.astype(np.float64)[None]
+        power = sliding(late**2, there, at) * sliding(there, early**2, at)
+    return np.asarray(sliding(late, early, at) / np.sqrt(np.where(power > 0, power, np.inf)))
 
 
-def centred(signal: Array, known: Mask) -> Array:
-    """A signal without its mean over the known samples, zero elsewhere. (T, n)"""
-    count = np.maximum(np.sum(known, axis=0), 1)
-    filled = np.where(known, signal, 0.0)
-    centre: Array = np.where(known, filled - filled.sum(axis=0) / count, 0.0)
+def sliding(later: Array, earlier: Array, at: NDArray[np.int64]) -> Array:
+    """Sum over time of `later`, so many samples on, times `earlier`. (m, len(at))
+
+    By blocks: each block of `earlier` meets the part of `later` that its lags reach, and their
+    cross-spectra are added up before one transform back (overlap-save).
+
+    Args:
+        later: Series. (m, T)
+        earlier: As many, or one for all of them. (m, T) or (1, T)
+        at: Successive lags. [samples]
+    """
+    samples, first, reach = earlier.shape[1], int(at[0]), len(at) - 1
+    # A block no longer than the log, and no shorter than what its lags reach besides.
+    size = min(max(BLOCK, power_of_two(2 * reach)), power_of_two(samples + reach))
+    hop = size - reach
+    total = np.zeros((len(later), size // 2 + 1), dtype=np.complex128)
+    for start in range(0, samples, hop):
+        begin, end = start + first, start + first + size
+        block = later[:, max(begin, 0) : max(min(end, later.shape[1]), 0)]
+        if begin < 0:
+            block = np.pad(block, ((0, 0), (min(-begin, size), 0)))[:, :size]
+        spectrum = np.conj(np.fft.rfft(earlier[:, start : start + hop], size))
+        total += spectrum * np.fft.rfft(block, size)
+    return np.asarray(np.fft.irfft(total, size)[:, : reach + 1])
+
+
+def power_of_two(count: int) -> int:
+    """The first power of two that is not below a count."""
+    return 1 << max(count - 1, 1).bit_length()
+
+
+def centred(signals: Array, known: Mask) -> Array:
+    """Signals without their mean over the known samples, zero elsewhere. (m, T)"""
+    filled = np.where(known, signals, 0.0)
+    mean = filled.sum(axis=1, keepdims=True) / max(np.count_nonzero(known), 1)
+    centre: Array = np.where(known, filled - mean, 0.0)
     return centre
 
 
@@ -106,8 +170,7 @@ def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offs
     count = len(even)
     reach = min(int(limit / step), count - 2)
     at = np.arange(-reach, reach + 1)
-    size = 1 << int(np.ceil(np.log2(2 * count)))
-    cross = sliding(x, y, size, at % size).sum(axis=1)
+    cross = sliding(x.T, y.T, at).sum(axis=0)
     energy = overlap_energy(x, at, count) * overlap_energy(y, -at, count)
     value = cross / np.sqrt(np.maximum(energy, np.finfo(np.float64).tiny))
     best = int(np.argmax(value))
@@ -158,10 +221,9 @@ def lag_fit(late: Array, early: Array, least: float) -> LagFit:
     # A common offset changes no difference, and without it the sums of squares keep their digits.
     middle = late.mean(axis=0)
     x, y = late - middle, early - middle
-    size = 1 << int(np.ceil(np.log2(len(x) + len(y))))
     at = np.arange(-(len(y) - 1), len(x))
     overlap = np.minimum(len(y), len(x) - at) - np.maximum(0, -at)
-    cross = sliding(x, y, size, at % size).sum(axis=1)
+    cross = sliding(x.T, y.T, at).sum(axis=0)
     energy = overlap_energy(x, at, len(y)) + overlap_energy(y, -at, len(x))
     enough = overlap >= max(2, int(least * min(len(x), len(y))))
     mean = np.where(enough, (energy - 2.0 * cross) / np.maximum(overlap, 1), np.inf)

@@ -1,16 +1,17 @@
 """Recording: one log, in SI units, on one strictly increasing clock."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_clock, check_shape, frozen
+from vftcli.signals.arrays import Array, Indices, check_clock, check_shape, frozen
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
+from vftcli.signals.timing import Timing
 from vftcli.signals.wrench import WrenchFrame
 
 MEANINGS = {
@@ -79,6 +80,8 @@ class Source:
         remarks: Facts on what was dropped, turned or derived; cautions and warnings on what looks
             suspicious but was left as it is.
         part: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
+        row_samples: The sample that each of the rows is, or repeats; −1 for one that was dropped
+            otherwise. None where each row is the sample of its number. (rows,)
     """
 
     path: Path | None = None
@@ -93,6 +96,7 @@ class Source:
     derived: tuple[str, ...] = ()
     remarks: tuple[Remark, ...] = ()
     part: str = ""
+    row_samples: Indices | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         if not self.label and self.path is not None:
@@ -107,6 +111,38 @@ class Source:
     def warnings(self) -> tuple[str, ...]:
         """What looks suspicious, in words."""
         return tuple(str(remark) for remark in self.remarks if remark.level != "fact")
+
+
+Change = Callable[["Recording"], "Recording"]
+"""What is done to one block of a long log after another."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LongLog:
+    """A log that is read block by block, each block a recording, each time it is asked for.
+
+    Attributes:
+        timing: What is known of its clock.
+        read: Reads it in blocks of so many samples, but for the last.
+        changes: Make what is done to the blocks since; anew for each time it is read.
+    """
+
+    timing: Timing
+    read: Callable[[int], Iterator["Recording"]]
+    changes: tuple[Callable[[], Change], ...] = ()
+
+    def blocks(self, samples: int) -> Iterator["Recording"]:
+        """Blocks of so many samples, but for the last; their times are those of the whole log."""
+        changes = [make() for make in self.changes]
+        for block in self.read(samples):
+            changed = block
+            for change in changes:
+                changed = change(changed)
+            yield changed
+
+    def changed(self, make: Callable[[], Change]) -> "LongLog":
+        """The log with something more done to its blocks."""
+        return replace(self, changes=(*self.changes, make))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,6 +170,8 @@ class Recording:
         payload_mass: Mass of the payload the controller was told of, None if not logged. [kg]
         payload_com: Its centre of mass in flange axes. (3,) [m]
         source: Where it came from and what was repaired.
+        long: The log that these samples are stretches of, evenly drawn, where it is too long to be
+            held whole; None where they are all.
     """
 
     t: Array
@@ -155,11 +193,12 @@ class Recording:
     payload_mass: float | None = None
     payload_com: tuple[float, ...] | None = None
     source: Source = Source()
+    long: LongLog | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if isinstance(value := getattr(self, field.name), np.ndarray):
-                object.__setattr__(self, field.name, frozen(value))
+        for each in fields(self):
+            if isinstance(value := getattr(self, each.name), np.ndarray):
+                object.__setattr__(self, each.name, frozen(value))
         if self.q.ndim != 2:
             raise ShapeError(f"q of the recording has shape {self.q.shape}; expected (T, n)")
         if len(self.t) == 0:
@@ -190,9 +229,36 @@ class Recording:
     @property
     def median_step(self) -> float:
         """Median time between samples, the nominal sample time. [s]"""
+        if self.long is not None:
+            return self.long.timing.step
         if self.samples < 2:
             raise ClockError(f"{self.name}: one sample has no sample time")
         return median_step(self.t)
+
+    @property
+    def all_samples(self) -> int:
+        """Number of samples of the log, of which this may hold stretches only."""
+        return self.samples if self.long is None else self.long.timing.samples
+
+    @property
+    def steps(self) -> Array:
+        """Times between samples, and when they begin; of a long log those that may be gaps. (S, 2)
+
+        The longest is always among them. [s]
+        """
+        if self.long is not None:
+            return self.long.timing.steps
+        return np.column_stack([np.diff(self.t), self.t[:-1]])
+
+    def changed(self, make: Callable[[], Change], **values: Any) -> "Recording":  # noqa: ANN401
+        """The recording with other values, and the long log behind it changed alike.
+
+        Args:
+            make: Makes what gives a block its values, as in `LongLog`.
+            values: Fields of this recording.
+        """
+        long = None if self.long is None else self.long.changed(make)
+        return replace(self, long=long, **values)
 
     @property
     def name(self) -> str:
@@ -247,7 +313,11 @@ class Recording:
         where = replace(self.source, remarks=(*self.source.remarks, taken))
         # 0 + x: no zero of the other sign.
         changed: dict[str, Any] = {**dict.fromkeys(there), kind: 0.0 + factor * value}
-        return replace(self, source=where, **changed)
+        return self.changed(
+            lambda: lambda block: block.with_effort(kind, source=source, factor=factor),
+            source=where,
+            **changed,
+        )
 
     def with_joints(self, places: Sequence[int]) -> "Recording":
         """Return the recording with some of its joints, in an order; what goes is said.
@@ -264,8 +334,8 @@ class Recording:
         remarks += [fact("joints-left-out", joints=left)] if left else []
         joints = [name for name in JOINT_SIGNALS if getattr(self, name) is not None]
         changed: dict[str, Any] = {name: getattr(self, name)[:, order] for name in joints}
-        return replace(
-            self,
+        return self.changed(
+            lambda: lambda block: block.with_joints(order),
             joint_names=tuple(names[k] for k in order),
             source=replace(self.source, remarks=(*self.source.remarks, *remarks)),
             **changed,
@@ -292,7 +362,9 @@ class Recording:
         }
         taken = fact("gear-applied", ratios=gear.tolist())
         source = replace(self.source, remarks=(*self.source.remarks, taken))
-        return replace(self, source=source, **changed)
+        return self.changed(
+            lambda: lambda block: block.behind_gear(gear, efficiency), source=source, **changed
+        )
 
     def between(self, start: float, stop: float) -> "Recording":
         """Return the samples with start ≤ t ≤ stop; their times stay those of the whole log. [s]

@@ -10,7 +10,7 @@ import numpy as np
 from vftcli.observers.observer import Observer
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Mask
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
@@ -153,7 +153,11 @@ def sense(
             *warnings,
             *found,
             *payload_remark(recording, robot),
-            *(mask_remark(raw) if any(w.hidden.any() for w in wrenches) else ()),
+            *(
+                mask_remark(raw.hidden, raw.sigma_min)
+                if any(w.hidden.any() for w in wrenches)
+                else ()
+            ),
             *moved,
             *bands,
             *(() if free_run is None else (free_run.remark,)),
@@ -220,10 +224,15 @@ def payload_remark(recording: Recording, robot: Robot) -> tuple[Remark, ...]:
     return (caution("payload-differs", told_kg=told, mounted_kg=mounted, weight_N=weight),)
 
 
-def mask_remark(wrench: Wrench) -> tuple[Remark, ...]:
-    """How many samples are masked, and how near to a singularity the arm comes."""
-    count, sigma = int(np.count_nonzero(wrench.hidden)), wrench.sigma_min
+def mask_remark(hidden: Mask, sigma: Array | None) -> tuple[Remark, ...]:
+    """How many samples are masked, and how near to a singularity the arm comes.
+
+    Args:
+        hidden: Samples in which the pose cannot tell a wrench. (T,)
+        sigma: Smallest singular value of the Jacobian, if it was looked at, somewhere. [m]
+    """
+    count = int(np.count_nonzero(hidden))
     if not count or sigma is None:
         return ()
-    values: dict[str, Any] = {"masked": count, "samples": len(sigma), "share": count / len(sigma)}
+    values: dict[str, Any] = {"masked": count, "samples": len(hidden), "share": count / len(hidden)}
     return (caution("pose-hides-wrench", **values, sigma_min_m=float(np.min(sigma))),)

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pyarrow.parquet as pq
+import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.log.estimates import estimates_table, write_csv, write_estimates
@@ -65,3 +66,18 @@ def test_the_columns_say_unit_sign_and_frame(analysis: Analysis, tmp_path: Path)
     assert force["sign"] == "on the robot"
     assert force["frame"] == "flange axes, moment about the flange point"
     assert schema.field("tau_ext/gmo/2").metadata[b"unit"] == "N·m".encode()
+
+
+def test_a_long_table_is_written_in_groups_that_hold_the_same(
+    analysis: Analysis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_estimates(tmp_path / "whole.parquet", analysis)
+    monkeypatch.setattr("vftcli.outputs.log.estimates.LONG", 100)
+    monkeypatch.setattr("vftcli.outputs.log.estimates.GROUP_ROWS", 300)
+    write_estimates(tmp_path / "groups.parquet", analysis)
+    whole, groups = (pl.read_parquet(tmp_path / f"{n}.parquet") for n in ("whole", "groups"))
+    assert whole.equals(groups, null_equal=True)
+    files = [pq.ParquetFile(tmp_path / f"{n}.parquet") for n in ("whole", "groups")]
+    assert files[1].num_row_groups == -(-len(whole) // 300)
+    described = [[field.metadata for field in file.schema_arrow] for file in files]
+    assert described[0] == described[1]

@@ -8,6 +8,7 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.log import report
+from vftcli.outputs.log.choice import NONE, OutputChoice
 from vftcli.outputs.log.estimates import extra_files, write_estimate_folder
 from vftcli.outputs.log.report import (
     ERROR_TABLES,
@@ -56,8 +57,8 @@ def test_the_list_of_contacts_is_written_as_it_is_printed(
 def test_a_report_writes_an_mcap_with_its_layouts_on_request(
     touched: Analysis, tmp_path: Path
 ) -> None:
-    extras = ["mcap", "layouts"]
-    write_report(tmp_path / "out", touched, command="", extras=extras)
+    extras = ("mcap", "layouts")
+    write_report(tmp_path / "out", touched, command="", choice=OutputChoice(extras=extras))
     found = {p.name for p in (tmp_path / "out").iterdir()}
     assert found == {*FILES, *extra_files(extras)}
 
@@ -124,7 +125,9 @@ def test_an_existing_report_needs_force(without_reference: Analysis, tmp_path: P
 
 
 def test_estimate_writes_its_extras(analysis: Analysis, tmp_path: Path) -> None:
-    write_estimate_folder(tmp_path / "out", analysis, "vftcli estimate x", ["csv", "mcap", "rrd"])
+    write_estimate_folder(
+        tmp_path / "out", analysis, "vftcli estimate x", OutputChoice(extras=("csv", "mcap", "rrd"))
+    )
     names = {p.name for p in (tmp_path / "out").iterdir()}
     assert names == {
         "estimates.parquet",
@@ -133,3 +136,13 @@ def test_estimate_writes_its_extras(analysis: Analysis, tmp_path: Path) -> None:
         "estimates.mcap",
         "recording.rrd",
     }
+
+
+def test_a_report_without_a_recording_takes_away_the_one_that_was_there(
+    without_reference: Analysis, tmp_path: Path
+) -> None:
+    write_report(tmp_path, without_reference, command="")
+    assert (tmp_path / "recording.rrd").exists()
+    none = OutputChoice(rrd_detail=NONE)
+    write_report(tmp_path, without_reference, command="", force=True, choice=none)
+    assert not (tmp_path / "recording.rrd").exists()

@@ -12,7 +12,13 @@ from rerun_rows import rows_of
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.arm import motion
-from vftcli.outputs.log.rerun_recording import force_arrow, line_groups, write_rrd
+from vftcli.outputs.log.choice import FULL, LEVELS
+from vftcli.outputs.log.rerun_recording import (
+    force_arrow,
+    line_groups,
+    tabs_of,
+    write_rrd,
+)
 from vftcli.outputs.rerun_arm import NEWTON_PER_METRE
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.robots.choice import RobotChoice
@@ -123,7 +129,7 @@ def test_without_a_reference_there_are_no_residuals(
 
 
 def test_wrenches_have_their_own_tab(with_wrench: Analysis) -> None:
-    lines = line_groups(with_wrench)["Wrench"]
+    lines = list(line_groups(with_wrench)["Wrench"])
     assert [entry.path for entry in lines] == [f"/wrench/{a}" for a in (*AXES, "sigma_min")]
     np.testing.assert_array_equal(lines[4].values[:, 1], with_wrench.wrenches[1].known[:, 4])
 
@@ -169,3 +175,26 @@ def test_the_arrow_is_the_tabled_force_at_its_own_point(frame: str) -> None:
     assert np.all(np.abs(np.nanmean(arrow.force[span], axis=0)) < 0.25)
     point = flange.translation[:, -1] + flange.rotation[:, -1] @ pose.translation
     np.testing.assert_allclose(arrow.origin, point, atol=1e-12)
+
+
+def test_a_long_log_is_held_by_levels_and_whole_where_the_strongest_contacts_begin(
+    analysis: Analysis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vftcli.outputs.log.rerun_recording.STRETCHES", 20)
+    monkeypatch.setattr("vftcli.outputs.log.rerun_recording.AROUND", 0.2)
+    monkeypatch.setattr("vftcli.outputs.log.rerun_recording.WHOLE_TIME", 0.4)
+    t, found = analysis.t, analysis.contacts
+    assert found is not None
+    strongest = max(found.contacts, key=lambda contact: contact.peak_force or 0.0)
+    near = t[np.abs(t - strongest.start) <= 0.2]
+    for tab in tabs_of(analysis, LEVELS):
+        for lines in tab.plots:
+            assert lines.t is not None
+            assert set(near) <= set(lines.t)
+            # two, and one unknown, of each line and stretch, the ends, and what is whole
+            assert len(lines.t) <= 3 * 20 * len(lines.lines) + 2 + len(near)
+    whole = {lines.path: lines for tab in tabs_of(analysis, FULL) for lines in tab.plots}
+    for tab in tabs_of(analysis, LEVELS):
+        for lines in tab.plots:
+            assert whole[lines.path].t is None
+            assert lines.ends == whole[lines.path].ends  # no spike is lost

@@ -1,19 +1,24 @@
 """What `vftcli estimate` writes: the estimates as flat columns, `run.json`, extras on demand."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.examination import overridden_lines
 from vftcli.outputs.files import OutputFolder, table_file
+from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.outputs.log.run_record import run_record, seal
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
+from vftcli.signals.packages import installed, needed
+from vftcli.signals.progress import steps
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.frames import FRAMES
 
@@ -23,7 +28,14 @@ if TYPE_CHECKING:
     from vftcli.contacts.contact_list import ContactList
 
 
-def estimates_table(analysis: Analysis) -> "pl.DataFrame":
+ALL = slice(None)
+"""All rows of a table."""
+
+LONG, GROUP_ROWS = 1 << 17, 1 << 15
+"""Rows from which on a table is written as several groups, and rows of such a group."""
+
+
+def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
     """Time, motion, every observer's torque and the reference's, one flat column each.
 
     Columns: ``t`` [s]; ``q/1``… [rad]; ``dq/1``… [rad/s]; ``tau_ext/<observer>/1``… [N·m];
@@ -37,10 +49,10 @@ def estimates_table(analysis: Analysis) -> "pl.DataFrame":
     """
     import polars as pl
 
-    table = pl.DataFrame(dict(columns(analysis)))
+    table = pl.DataFrame(dict(columns(analysis, rows)))
     # Only columns that need it: to fill all of a long log takes longer than to write it.
     if analysis.contacts is not None:
-        table = table.with_columns(contact_column(analysis.t, analysis.contacts))
+        table = table.with_columns(contact_column(analysis.t[rows], analysis.contacts))
     unknown = [s.name for s in table if s.dtype == pl.Float64 and s.is_nan().any()]
     return table.with_columns(pl.col(unknown).fill_nan(None)) if unknown else table
 
@@ -55,24 +67,25 @@ def contact_column(t: Array, found: "ContactList") -> "pl.Series":
     return pl.Series("contact", number)
 
 
-def columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
-    """Name and values of every column, in order."""
+def columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
+    """Name and values of every column, in order, of some rows."""
     recording = analysis.recording
-    yield "t", recording.t
-    yield from per_joint("q", recording.q)
+    yield "t", recording.t[rows]
+    yield from per_joint("q", recording.q[rows])
     if recording.dq is not None:
-        yield from per_joint("dq", recording.dq)
+        yield from per_joint("dq", recording.dq[rows])
     for estimate in analysis.estimates:
-        yield from per_joint(f"tau_ext/{estimate.name}", estimate.tau)
+        yield from per_joint(f"tau_ext/{estimate.name}", estimate.tau[rows])
         if estimate.sd is not None:
-            yield from per_joint(f"sd/{estimate.name}", estimate.sd)
+            yield from per_joint(f"sd/{estimate.name}", estimate.sd[rows])
         if estimate.error_sd is not None:
-            yield from per_joint(f"band/{estimate.name}", estimate.error_sd)
+            yield from per_joint(f"band/{estimate.name}", estimate.error_sd[rows])
     if analysis.reference is not None:
-        yield from per_joint("tau_ext/reference", analysis.reference.tau)
+        yield from per_joint("tau_ext/reference", analysis.reference.tau[rows])
         if analysis.reference.sd is not None:
-            yield from per_joint("sd/reference", analysis.reference.sd)
-    yield from wrench_columns(analysis)
+            yield from per_joint("sd/reference", analysis.reference.sd[rows])
+    for name, values in wrench_columns(analysis):
+        yield name, values[rows]
 
 
 def per_joint(name: str, values: Array) -> Iterator[tuple[str, Array]]:
@@ -107,25 +120,66 @@ def per_axis(name: str, values: Array) -> Iterator[tuple[str, Array]]:
 
 
 def write_estimates(path: Path, analysis: Analysis) -> None:
-    """Write the table as Parquet (zstd).
+    """Write the table as Parquet (zstd), that of a long log in groups of rows.
 
     Raises:
         OutputError: If the disk is full.
     """
+    if len(analysis.t) > LONG and installed("pyarrow"):
+        starts = range(0, len(analysis.t), GROUP_ROWS)
+        groups = ((analysis, slice(start, start + GROUP_ROWS)) for start in steps(starts))
+        write_groups(path, groups)
+        return
     table = estimates_table(analysis)
-    # For who finds the table alone, without the record beside it.
-    doubts = overridden_lines(analysis.examinations)
-    metadata = {"vftcli": json.dumps({"overridden": doubts})} if doubts else None
-    schema = described_schema(table, frames_of(analysis))
     with table_file(path) as file:
         table.write_parquet(
             file,
             compression="zstd",
             compression_level=1,
             statistics=False,
-            metadata=metadata,
-            arrow_schema=schema,
+            metadata=doubts_of(analysis) or None,
+            arrow_schema=described_schema(table, frames_of(analysis)),
         )
+
+
+def write_groups(
+    path: Path, groups: Iterable[tuple[Analysis, slice]], csv: Path | None = None
+) -> None:
+    """Write the table of a long log as groups of rows: all of it has no room beside the log.
+
+    Args:
+        path: The Parquet file.
+        groups: The analysis that holds each group, and its rows of that.
+        csv: Where to write the table as CSV as well, None for nowhere.
+
+    Raises:
+        OutputError: If the disk is full.
+    """
+    pq = needed("pyarrow.parquet", "the estimates of a long log")
+
+    # Measured numbers hardly repeat: a dictionary of them costs time and room.
+    how: Any = {"compression": "zstd", "compression_level": 1, "use_dictionary": False}
+    schema: Any = None
+    with ExitStack() as files:
+        file = files.enter_context(table_file(path))
+        for analysis, rows in groups:
+            table = estimates_table(analysis, rows)
+            if schema is None:
+                schema = described_schema(table, frames_of(analysis), doubts_of(analysis))
+                writer = pq.ParquetWriter(file, schema, write_statistics=False, **how)
+                files.enter_context(writer)
+                if csv is not None:
+                    text = files.enter_context(csv.open("wb"))
+                    table.clear().write_csv(text)
+            writer.write_table(table.to_arrow().cast(schema))
+            if csv is not None:
+                table.write_csv(text, include_header=False, float_precision=9)
+
+
+def doubts_of(analysis: Analysis) -> dict[str, str]:
+    """What is said beside the columns for who finds the table without the record beside it."""
+    doubts = overridden_lines(analysis.examinations)
+    return {"vftcli": json.dumps({"overridden": doubts})} if doubts else {}
 
 
 def frames_of(analysis: Analysis) -> dict[str, StatedFrame]:
@@ -164,16 +218,20 @@ def estimate_files(extras: Sequence[str]) -> tuple[str, ...]:
 
 
 def write_extras(
-    folder: OutputFolder, place: str, analysis: Analysis, extras: Sequence[str]
+    folder: OutputFolder, place: str, analysis: Analysis, choice: OutputChoice
 ) -> None:
     """Write what was asked for besides, below a place of a folder."""
     from vftcli.outputs.log.layouts import foxglove_layout, plotjuggler_layout
     from vftcli.outputs.log.mcap_output import write_mcap
     from vftcli.outputs.log.rerun_recording import write_rrd
 
+    writers: dict[str, Callable[[Path, Analysis], None]] = {
+        "csv": write_csv,
+        "mcap": write_mcap,
+        "rrd": partial(write_rrd, detail=choice.rrd_detail),
+    }
     texts = dict(zip(EXTRAS["layouts"], (foxglove_layout, plotjuggler_layout), strict=True))
-    writers = {"csv": write_csv, "mcap": write_mcap, "rrd": write_rrd}
-    for extra in extras:
+    for extra in choice.extras:
         for name in EXTRAS[extra]:
             if name in texts:
                 folder.write(f"{place}{name}", texts[name](analysis))
@@ -182,7 +240,11 @@ def write_extras(
 
 
 def write_estimate_folder(
-    path: Path, analysis: Analysis, command: str, extras: Sequence[str] = (), force: bool = False
+    path: Path,
+    analysis: Analysis,
+    command: str,
+    choice: OutputChoice = PLAIN,
+    force: bool = False,
 ) -> str:
     """Write `estimates.parquet`, `run.json` and the extras into a folder, all or nothing.
 
@@ -193,8 +255,38 @@ def write_estimate_folder(
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     record = run_record(analysis, command)
-    with OutputFolder(path, force, estimate_files(extras)) as folder:
+    with OutputFolder(path, force, estimate_files(choice.extras)) as folder:
         write_estimates(folder / "estimates.parquet", analysis)
         # After the record: it names the packages that are loaded, and these made no number.
-        write_extras(folder, "", analysis, extras)
+        write_extras(folder, "", analysis, choice)
         return seal(folder, SEAL, record)
+
+
+def write_long_estimates(
+    path: Path,
+    blocks: Iterable[Analysis],
+    whole: Callable[[], Analysis],
+    command: str,
+    choice: OutputChoice = PLAIN,
+    force: bool = False,
+) -> str:
+    """Write the folder of a long log as `write_estimate_folder` does, block by block.
+
+    Args:
+        path: The folder.
+        blocks: The analyses of the log's blocks, in order.
+        whole: Gives what is known of the log when the last has gone by.
+        command: The command line.
+        choice: What is written besides: "csv" or nothing.
+        force: Whether files that are there may be replaced.
+
+    Returns:
+        The text of `run.json`.
+
+    Raises:
+        OutputError: As `write_estimate_folder` does.
+    """
+    with OutputFolder(path, force, estimate_files(choice.extras)) as folder:
+        csv = folder / "estimates.csv" if "csv" in choice.extras else None
+        write_groups(folder / "estimates.parquet", ((block, ALL) for block in blocks), csv)
+        return seal(folder, SEAL, run_record(whole(), command))

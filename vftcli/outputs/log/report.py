@@ -12,6 +12,7 @@ from vftcli.outputs.contacts import contacts_csv, contacts_record
 from vftcli.outputs.figures.paper import figure_files, write_figures
 from vftcli.outputs.files import OutputFolder, numbered
 from vftcli.outputs.log import tables
+from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.log.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
 from vftcli.outputs.log.rerun_recording import write_rrd
@@ -21,6 +22,7 @@ from vftcli.outputs.page.index_page import render_index
 from vftcli.outputs.page.page import render
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.packages import installed
+from vftcli.signals.progress import steps
 
 if TYPE_CHECKING:
     import polars as pl
@@ -75,7 +77,7 @@ def write_report(
     *,
     command: str,
     force: bool = False,
-    extras: Sequence[str] = (),
+    choice: OutputChoice = PLAIN,
     form: str | None = None,
 ) -> str:
     """Write the report of one log, all files or none; figures in a form, or none.
@@ -86,9 +88,9 @@ def write_report(
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
-    names = report_files([analysis.recording.name], extras, form)
+    names = report_files([analysis.recording.name], choice.extras, form)
     with OutputFolder(path, force, names) as folder:
-        return fill(folder, "", analysis, command, extras, form)
+        return fill(folder, "", analysis, command, choice, form)
 
 
 def write_reports(
@@ -97,7 +99,7 @@ def write_reports(
     *,
     command: str,
     force: bool = False,
-    extras: Sequence[str] = (),
+    choice: OutputChoice = PLAIN,
     form: str | None = None,
     failed: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
@@ -108,7 +110,7 @@ def write_reports(
         analyses: The logs that could be analysed.
         command: The command line as the user typed it.
         force: Whether files that are there may be replaced.
-        extras: What else is written of each log, names of `estimates.extra_files`.
+        choice: What else is written of each log.
         form: What figures are written as, None for no figures.
         failed: Why each of the other logs could not be, by its label.
 
@@ -122,10 +124,10 @@ def write_reports(
 
     labels = [a.recording.name for a in analyses]
     places = places_of(labels)
-    with OutputFolder(path, force, files_of_several(labels, extras, form)) as folder:
+    with OutputFolder(path, force, files_of_several(labels, choice.extras, form)) as folder:
         records = [
-            fill(folder, f"{place}/", analysis, command, extras, form)
-            for place, analysis in zip(places, analyses, strict=True)
+            fill(folder, f"{place}/", analysis, command, choice, form)
+            for place, analysis in steps(list(zip(places, analyses, strict=True)))
         ]
         pages = list(zip(places, analyses, strict=True))
         folder.write("index.html", render_index(pages, failed))
@@ -149,20 +151,25 @@ def fill(
     place: str,
     analysis: Analysis,
     command: str,
-    extras: Sequence[str] = (),
+    choice: OutputChoice,
     form: str | None = None,
 ) -> str:
     """Write one log's files; return the text of its `run.json`."""
     record = run_record(analysis, command)
     # The page shows the record that is written beside it, not one of its own.
     analysis = replace(analysis, run=record)
-    folder.write(f"{place}index.html", render(analysis))
-    if installed("rerun"):  # else `left_out` says how to get it
-        write_rrd(folder / f"{place}recording.rrd", analysis)
-    write_estimates(folder / f"{place}estimates.parquet", analysis)
+    writers: list[Callable[[], None]] = [
+        lambda: folder.write(f"{place}index.html", render(analysis)),
+        lambda: write_estimates(folder / f"{place}estimates.parquet", analysis),
+    ]
+    if choice.writes_recording and installed("rerun"):  # else `left_out` says how to get it
+        path = folder / f"{place}recording.rrd"
+        writers.insert(1, lambda: write_rrd(path, analysis, choice.rrd_detail))
+    for write in steps(writers):
+        write()
     put_errors(folder, place, analysis.errors, [analysis])
     put_contacts(folder, place, [analysis])
-    write_extras(folder, place, analysis, extras)
+    write_extras(folder, place, analysis, choice)
     if form is not None:
         write_figures(folder, log_figures(analysis), form, f"{place}figures/")
     return seal(folder, f"{place}{SEAL}", record)

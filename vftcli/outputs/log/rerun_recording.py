@@ -6,7 +6,8 @@ joint), `/wrench/fx` … where wrenches are known, `/robot` with the arm, and th
 contacts are listed.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from vftcli.analysis import Analysis
 from vftcli.observers.table import BEST
 from vftcli.outputs.arm import ArmPoses, motion
 from vftcli.outputs.grid import escape_markdown
+from vftcli.outputs.log.choice import FULL, LEVELS
 from vftcli.outputs.log.contact_recording import (
     SHAFT,
     contact_log,
@@ -34,6 +36,7 @@ from vftcli.outputs.rerun_file import ArmView, rerun_file
 from vftcli.robots.drive import drive_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS, ExternalTorque
+from vftcli.signals.progress import steps
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
@@ -41,36 +44,70 @@ from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
 WRIST = 3
 """The last joints, whose torques are smaller than the others': they share a vertical axis."""
 
+STRETCHES = 5000
+"""Stretches of a long log of which a plot keeps the lowest and highest samples of its lines."""
+
+AROUND = 1.0
+"""Time before and after the start of a contact in which every sample is kept. [s]"""
+
+WHOLE_TIME = 20.0
+"""Time of which every sample is kept, all contacts together. [s]"""
+
 LEADING = 2.0
 """Width of the line of `best`; the others are thinner. [px]"""
 
 
-def write_rrd(path: Path, analysis: Analysis) -> None:
+def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
     """Write the recording with its blueprint, so that it opens arranged.
+
+    Args:
+        path: Where to; an existing file is replaced.
+        analysis: The log.
+        detail: How much of a long log it holds: `FULL` or `LEVELS`.
 
     Raises:
         OutputError: If it cannot be written whole.
     """
-    chain, errors, found = analysis.robot.chain, analysis.errors, analysis.contacts
-    tabs = [Tab(name, analysis.t, lines) for name, lines in line_groups(analysis).items()]
+    arm, errors, found = analysis.robot.chain, analysis.errors, analysis.contacts
+    tabs = tabs_of(analysis, detail)
     if found is not None:
         tabs[0] = tabs[0]._replace(log=contact_log(found))
     table = to_markdown(errors, paper_bounds([analysis])) if errors is not None else ""
     words = {"Summary": summary(analysis)} | ({"Errors": table} if table else {})
-    poses = motion(chain, analysis.t, analysis.recording.q)
+    poses = motion(arm, analysis.t, analysis.recording.q)
     sampled = np.searchsorted(analysis.t, poses.t)
     scale = newton_per_metre(analysis)
     view = ArmView(f"Arm (arrow: 1 m is {scale:g} N)", poses)
     first = found.contacts[0] if found is not None and found.contacts else None
     marked = (first.start, first.stop) if first is not None else None
     with rerun_file(path, analysis.recording.name, tabs, words, view, marked) as stream:
-        painted = painted_links(found, chain.joints) if found is not None else {}
-        send_arm(stream, "/robot", chain, poses, painted=painted)
+        painted = painted_links(found, arm.joints) if found is not None else {}
+        send_arm(stream, "/robot", arm, poses, painted=painted)
         if found is not None:
-            force = flange_force(analysis, poses.q, sampled, chain)
+            force = flange_force(analysis, poses.q, sampled, arm)
             send_contacts(stream, found, poses, force, scale)
         elif (arrow := force_arrow(analysis, poses, sampled)) is not None:
             send_force(stream, "/robot/flange_force", poses.t, arrow.origin, arrow.force, SHAFT)
+
+
+def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
+    """All plots; of a long log what `STRETCHES` show, every sample where contacts begin."""
+    t, whole = analysis.t, whole_spans(analysis)
+    tabs = []
+    for name, group in steps(list(line_groups(analysis).items())):
+        # One plot after the other: of a long log all of them have no room at once.
+        shown = group if detail == FULL else (lines.thinned(t, STRETCHES, whole) for lines in group)
+        tabs.append(Tab(name, t, list(shown)))
+    return tabs
+
+
+def whole_spans(analysis: Analysis) -> list[tuple[float, float]]:
+    """Where every sample is kept: around the starts of the strongest contacts. [s]"""
+    if analysis.contacts is None:
+        return []
+    strongest = sorted(analysis.contacts.contacts, key=lambda c: -(c.peak_force or 0.0))
+    most = int(WHOLE_TIME / (2.0 * AROUND))
+    return [(c.start - AROUND, c.start + AROUND) for c in strongest[:most]]
 
 
 def newton_per_metre(analysis: Analysis) -> float:
@@ -81,19 +118,19 @@ def newton_per_metre(analysis: Analysis) -> float:
     return arrow_scale(found.hardest.peak_force or NEWTON_PER_METRE)
 
 
-def line_groups(analysis: Analysis) -> dict[str, list[Lines]]:
+def line_groups(analysis: Analysis) -> dict[str, Iterable[Lines]]:
     """All plots, tab by tab: the force, torques and residuals joint by joint, then the motion."""
     reference, joints = analysis.reference, range(analysis.recording.joints)
     force = force_lines(analysis)
-    groups = {"Contacts": [force]} if force is not None else {}
-    groups |= {"Joint torques": [joint_lines("tau_ext", analysis, j, reference) for j in joints]}
+    groups: dict[str, Iterable[Lines]] = {"Contacts": [force]} if force is not None else {}
+    groups["Joint torques"] = (joint_lines("tau_ext", analysis, j, reference) for j in joints)
     if reference is not None:
-        groups["Residual"] = [
+        groups["Residual"] = (
             joint_lines("residual", analysis, j, None, reference.tau[:, j]) for j in joints
-        ]
+        )
     if analysis.wrenches:
-        axes = [wrench_lines(analysis, k) for k in range(len(AXES))]
-        groups["Wrench"] = [*axes, *condition_lines(analysis)]
+        axes = (wrench_lines(analysis, k) for k in range(len(AXES)))
+        groups["Wrench"] = chain(axes, condition_lines(analysis))
     return {**groups, "Motion": motion_lines(analysis)}
 
 

@@ -5,7 +5,7 @@ script; with a script the plotting library draws the chosen one large beside the
 """
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
@@ -122,7 +122,9 @@ def multiples(chart: Chart) -> str:
 
 def pictures_of(chart: Chart) -> str:
     """The small pictures of a chart alone."""
-    return "".join(picture(chart, j, ends_of_family(chart, j)) for j in range(len(chart.panels)))
+    families = chart.families or (0,) * len(chart.panels)
+    ends = {family: ends_of_family(chart, families.index(family)) for family in set(families)}
+    return "".join(picture(chart, j, ends[families[j]]) for j in range(len(chart.panels)))
 
 
 def legend(chart: Chart) -> str:
@@ -165,19 +167,24 @@ def look_of(colour: str, dash: str, *, leads: bool = False) -> str:
 
 def ends_of_family(chart: Chart, panel: int) -> Span:
     """Ends of a panel's vertical axis: those of all panels of its family."""
-    family = chart.families or tuple(range(len(chart.panels)))
-    members = [j for j, number in enumerate(family) if number == family[panel]]
-    values = []
+    families = chart.families or (0,) * len(chart.panels)
+    members = [j for j, family in enumerate(families) if family == families[panel]]
+    span = figures.ends_of(values for j in members for values in drawn_values(chart, j))
+    return span if chart.lowest is None else Span(max(span.low, chart.lowest), span.high)
+
+
+def drawn_values(chart: Chart, panel: int) -> Iterator[Array]:
+    """What is drawn at once in a panel, line by line: of a long log all have no room at once."""
     for series in chart.series:
         if series.shown:
-            half = 0.0 if series.half is None else np.nan_to_num(series.half[:, members])
-            drawn = series.values[:, members]
-            values += [drawn - half, drawn + half]
+            values = series.values[:, panel]
+            if series.half is None:
+                yield values
+            else:
+                half = np.nan_to_num(series.half[:, panel])
+                yield from (values - half, values + half)
     if chart.band is not None:
-        bounds = np.array([chart.band[j] for j in members])
-        values += [bounds, -bounds]
-    span = figures.ends_of(values)
-    return span if chart.lowest is None else Span(max(span.low, chart.lowest), span.high)
+        yield np.array([chart.band[panel], -chart.band[panel]])
 
 
 def picture(chart: Chart, panel: int, ends: Span) -> str:

@@ -1,6 +1,6 @@
 """Charts that stand still: SVG that prints and needs no script, its ticks and its lines."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 from itertools import pairwise
 from typing import NamedTuple
@@ -115,13 +115,15 @@ def label(value: float) -> str:
     return f"{value + 0.0:.6g}".replace("-", "−")
 
 
-def ends_of(values: Sequence[Array], *, zero: bool = False) -> Span:
+def ends_of(values: Iterable[Array], *, zero: bool = False) -> Span:
     """Ends of an axis that shows all values, with some room; about ±1 where none is known."""
-    known = [v[np.isfinite(v)] for v in values]
-    known = [v for v in known if v.size]
-    if not known:
+    low, high = np.inf, -np.inf
+    for x in values:
+        known = np.isfinite(x)
+        low = min(low, float(np.min(x, where=known, initial=np.inf)))
+        high = max(high, float(np.max(x, where=known, initial=-np.inf)))
+    if low > high:
         return Span(-1.0, 1.0)
-    low, high = min(float(v.min()) for v in known), max(float(v.max()) for v in known)
     if zero:
         low, high = min(low, 0.0), max(high, 0.0)
     # A line that does not change has no scale of its own.

@@ -1,22 +1,52 @@
 """The index over the reports of several logs: one line a log, the worst first."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from types import MappingProxyType
+from typing import NamedTuple
 from urllib.parse import quote
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.believability import Ground, grounds, health
+from vftcli.outputs.believability import MARKS, SEVERITY, Ground, Standing, grounds, health
 from vftcli.outputs.contacts import by_force, hardest_words
 from vftcli.outputs.grid import DASH, Column, Grid, GridCell, html, significant
 from vftcli.outputs.log.rmse_tables import blocks, mean_of, rmse_grid
 from vftcli.outputs.page.shell import alarms, document, lead, section, soft, top
 
-ORDER = ("bad", "caution", "unknown", "good")
-"""Standings, the worst first."""
-
 HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Not told below", "Mean RMSE", "Health")
 """Heads of the overview."""
+
+WORST_FIRST = "The worst first: by the health of the log, then by the hardest contact."
+
+
+class IndexLine(NamedTuple):
+    """One log in the overview.
+
+    Attributes:
+        name: What it is called.
+        page: Its own page, relative to the index; "" without one.
+        robot: Its arm.
+        duration: How long it is. [s]
+        contacts: How many, or that they are a load, or `DASH`.
+        hardest: The hardest contact in words, or `DASH`.
+        force: Its force, 0 without one. [N]
+        least: The force below which nothing is told, None where that is not known. [N]
+        error: The least mean RMSE and its observer, or `DASH`.
+        standing: How healthy the log is.
+        words: Why.
+    """
+
+    name: str
+    page: str
+    robot: str
+    duration: float
+    contacts: str
+    hardest: str
+    force: float
+    least: float | None
+    error: str
+    standing: Standing
+    words: str
 
 
 def render_index(
@@ -29,13 +59,9 @@ def render_index(
         failed: Why each of the other logs could not be analysed, by its label.
     """
     lines = [(folder, analysis, health(grounds(analysis))) for folder, analysis in analyses]
-    lines.sort(key=rank)
-    overview = Grid(
-        columns=tuple(Column(head, words=True) for head in HEADS),
-        rows=tuple(index_row(*line) for line in lines),
-    )
+    lines.sort(key=lambda line: rank(index_line(*line)))
     tables = "".join(
-        f"<h3>{link(folder, analysis.recording.name)}</h3>"
+        f"<h3>{link(page_in(folder), analysis.recording.name)}</h3>"
         f"{''.join(html(rmse_grid(block)) for block in blocks(analysis.errors))}"
         for folder, analysis, _ in lines
         if analysis.errors is not None
@@ -46,12 +72,18 @@ def render_index(
     parts = (
         alarms(found),
         top((f"{len(analyses) + len(failed)} logs", ", ".join(robots)), title, lead(words)),
-        html(overview),
+        overview(index_line(*line) for line in lines),
         *(soft(escape(f"✗ {name} is left out: {reason}")) for name, reason in failed.items()),
-        soft("The worst first: by the health of the log, then by the hardest contact."),
+        soft(WORST_FIRST),
         section("Errors against a reference", tables),
     )
-    return document(title, "".join(parts))
+    return document(title, "".join(parts), scripts=["sort.js"])
+
+
+def overview(lines: Iterable[IndexLine]) -> str:
+    """The table of all logs, the worst first; a click on a head sorts by it."""
+    rows = tuple(map(index_row, sorted(lines, key=rank)))
+    return html(Grid(columns=tuple(Column(head, words=True) for head in HEADS), rows=rows))
 
 
 def headline(analyses: Sequence[tuple[str, Analysis]]) -> tuple[str, str]:
@@ -74,43 +106,62 @@ def headline(analyses: Sequence[tuple[str, Analysis]]) -> tuple[str, str]:
     return title, words.strip()
 
 
-def rank(line: tuple[str, Analysis, Ground]) -> tuple[int, float]:
+def rank(line: IndexLine) -> tuple[int, float]:
     """Where a log stands: the worst health first, then the hardest contact."""
-    _, analysis, ground = line
-    hardest = analysis.contacts.hardest if analysis.contacts is not None else None
-    return ORDER.index(ground.standing), -((hardest and hardest.peak_force) or 0.0)
+    return SEVERITY.index(line.standing), -line.force
 
 
-def index_row(folder: str, analysis: Analysis, ground: Ground) -> tuple[GridCell | str, ...]:
-    """One log's entries in the overview: its name links to its own page."""
-    recording, found = analysis.recording, analysis.contacts
-    contacts = hardest = least = DASH
+def index_line(folder: str, analysis: Analysis, ground: Ground) -> IndexLine:
+    """One log's entries in the overview."""
+    found, contacts, hardest = analysis.contacts, DASH, DASH
     if found is not None:
         is_load = bool(found.contacts) and found.contacts[0].is_load
         contacts = "load" if is_load else str(len(found.contacts))
         hardest = hardest_words(found)
-        if found.told_force is not None:
-            least = f"{found.told_force:.0f} N"
     best, errors = DASH, blocks(analysis.errors) if analysis.errors is not None else ()
     if errors:
         means = [mean_of(row) for row in errors[0].rmse]
         # A mean that is not known comes last.
         k = min(range(len(means)), key=lambda i: (means[i] != means[i], means[i]))
         best = f"{significant(means[k])} N·m ({errors[0].observers[k]})"
-    words = f"{ground.subject}: {ground.sentence}" if ground.standing != "good" else "sound"
-    sign = f'<b class="{ground.standing}">{ground.mark}</b> {escape(words)}'
-    return (
-        GridCell(recording.name, html=link(folder, recording.name)),
-        analysis.robot.name,
-        f"{recording.duration:.1f} s",
-        contacts,
-        hardest,
-        least,
-        best,
-        GridCell(f"{ground.mark} {words}", html=f'<span class="wrapped">{sign}</span>'),
+    most = None if found is None else found.hardest
+    return IndexLine(
+        name=analysis.recording.name,
+        page=page_in(folder),
+        robot=analysis.robot.name,
+        duration=analysis.recording.duration,
+        contacts=contacts,
+        hardest=hardest,
+        force=(most and most.peak_force) or 0.0,
+        least=None if found is None else found.told_force,
+        error=best,
+        standing=ground.standing,
+        words=f"{ground.subject}: {ground.sentence}" if ground.standing != "good" else "sound",
     )
 
 
-def link(folder: str, name: str) -> str:
-    """HTML of a link to the report in a sub-folder; both texts may hold any letter."""
-    return f'<a href="{escape(quote(folder))}/index.html">{escape(name)}</a>'
+def index_row(line: IndexLine) -> tuple[GridCell | str, ...]:
+    """A line of the overview: the log's name links to its own page, where it has one."""
+    mark = MARKS[line.standing]
+    sign = f'<b class="{line.standing}">{mark}</b> {escape(line.words)}'
+    name = link(line.page, line.name) if line.page else ""
+    return (
+        GridCell(line.name, html=name),
+        line.robot,
+        f"{line.duration:.1f} s",
+        line.contacts,
+        line.hardest,
+        DASH if line.least is None else f"{line.least:.0f} N",
+        line.error,
+        GridCell(f"{mark} {line.words}", html=f'<span class="wrapped">{sign}</span>'),
+    )
+
+
+def page_in(folder: str) -> str:
+    """The page in a report's sub-folder, relative to the index."""
+    return f"{folder}/index.html"
+
+
+def link(page: str, name: str) -> str:
+    """HTML of a link to a log's page; both texts may hold any letter."""
+    return f'<a href="{escape(quote(page))}">{escape(name)}</a>'

@@ -26,6 +26,7 @@ def document(
     body: str,
     charts: Sequence[Chart] = (),
     styles: Mapping[str, LineStyle] | None = None,
+    scripts: Sequence[str] = (),
 ) -> str:
     """A whole HTML page with its style: self-contained, nothing is loaded from anywhere.
 
@@ -34,12 +35,14 @@ def document(
         body: HTML of all sections.
         charts: What the script draws large, none for a page without `large` charts.
         styles: Colour and dash of the names that head the rows of tables.
+        scripts: Further scripts, as ``sort.js``.
     """
-    script, style = "", asset("page.css") + swatch_rules(styles or {})
+    script = "".join(f"<script>{asset(name)}</script>" for name in scripts)
+    style = asset("page.css") + swatch_rules(styles or {})
     # JSON in an element of its own cannot run, so that a name in a log cannot either.
     if charts:
         style += asset("uplot.css")
-        script = (
+        script += (
             f'<script type="application/json" id="data">{script_json(packed_charts(charts))}'
             f"</script><script>/*{asset('uplot_licence.txt')}*/{asset('uplot.js')}</script>"
             f"<script>{asset('page.js')}</script>"

@@ -195,6 +195,13 @@ class Decoder:
             for key, parts in topic.parts.items()
         ]
 
+    def taken(self) -> list[Stream]:
+        """The streams that were decoded since this was last asked for."""
+        found = self.streams()
+        for topic in self.topics.values():
+            topic.parts.clear()
+        return found
+
 
 def _stamps(layout: MessageLayout, batch: Batch, offsets: Integers) -> Integers | None:
     """Header stamps in nanoseconds, or None if the type has no header. (k,)"""

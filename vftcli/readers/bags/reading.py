@@ -3,8 +3,10 @@
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 from vftcli.readers.bags import db3
+from vftcli.readers.bags.blocks import WHOLE_BYTES, bag_blocks
 from vftcli.readers.bags.container import (
     MCAP,
     ROSBAG1,
@@ -31,13 +33,17 @@ def read_bag(file: LogFile, request: ReadChoice) -> RawLog:
         LogError: If it is damaged before its first whole chunk, or holds no joint positions.
     """
     ingest = Ingest(path=file.path, size=_size(file))
+    if request.blocks and ingest.size > WHOLE_BYTES:
+        count = partial(_check_count, file, ingest)
+        blocks = bag_blocks(_batches(file, ingest), ingest, request, count)
+        return replace(next(blocks), rest=blocks)
     decoder, documents = Decoder(ingest), Documents(ingest)
     messages = 0
     for batch in _batches(file, ingest):
         messages += len(batch.offsets)
         if not documents.take(batch):
             decoder.take(batch)
-    _check_count(file, messages, ingest)
+    _check_count(file, ingest, messages)
     if messages == 0:
         said = "; ".join(["no messages in any whole chunk", *map(str, ingest.remarks)])
         raise LogError(f"{file.path}: {said}.")
@@ -80,7 +86,9 @@ def _file_batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
         LogError: If it is no container, or damaged.
     """
     try:
-        yield from _container(file, ingest)
+        for batch in _container(file, ingest):
+            yield batch
+            file.release()
     except LogError:
         raise
     except MemoryError:
@@ -107,7 +115,7 @@ def _container(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
     raise LogError(f"{file.path}: neither a ROS bag nor an MCAP file.")
 
 
-def _check_count(file: LogFile, messages: int, ingest: Ingest) -> None:
+def _check_count(file: LogFile, ingest: Ingest, messages: int) -> None:
     """Say so if metadata.yaml counts another number of messages than were found."""
     if "metadata.yaml" not in file.entries:
         return

@@ -1,0 +1,74 @@
+"""The engine, with functions of the standard library as its work: workers can import these."""
+
+import math
+import os
+import signal
+
+import pytest
+
+from vftcli.batch.choice import WorkersChoice
+from vftcli.batch.engine import Failure, Outcome, begin, run_tasks
+from vftcli.batch.outcome import failure_of, perform
+
+HERE = WorkersChoice(workers=0)
+
+
+def silent(_words: str) -> None:
+    pass
+
+
+def test_here_every_task_is_done_in_order_and_errors_are_outcomes() -> None:
+    ended = list(run_tasks([(4.0,), (-1.0, 9.0)], math.sqrt, HERE, silent))
+    assert [outcome.task for outcome in ended] == [4.0, -1.0, 9.0]
+    assert [outcome.value for outcome in ended] == [2.0, None, 3.0]
+    assert ended[1].failure is not None
+    assert ended[1].failure[:2] == ("starting", "ValueError")
+    assert all(outcome.effort is not None for outcome in ended)
+
+
+def test_a_failure_is_one_line_at_the_stage_that_was_begun() -> None:
+    begin("reading")
+    assert failure_of(ValueError("two\n  lines")) == Failure("reading", "ValueError", "two lines")
+    assert failure_of(MemoryError()).line == "no words"
+
+
+def test_the_stage_of_one_task_is_not_that_of_the_next() -> None:
+    begin("writing")
+    assert perform(math.sqrt, -1.0)[1] == Failure("starting", "ValueError", "math domain error")
+
+
+def test_groups_are_taken_only_as_workers_get_free() -> None:
+    taken = []
+
+    def groups():
+        for k in range(3):
+            taken.append(k)
+            yield (float(k),)
+
+    ended = run_tasks(groups(), math.sqrt, HERE, silent)
+    next(ended)
+    assert taken == [0]
+
+
+@pytest.mark.statistical
+def test_a_task_that_kills_its_worker_fails_alone_and_nothing_is_lost() -> None:
+    """Eleven tasks that return, in groups too, and one that ends its process each time."""
+    groups = [(0,)] * 4 + [(0, signal.SIGKILL, 0)] + [(0, 0)] * 2 + [(0,)]
+    # raise(0) does nothing, by POSIX; raise(9) cannot be caught.
+    ended: list[Outcome[int]] = list(
+        run_tasks(groups, signal.raise_signal, WorkersChoice(workers=2), silent)
+    )
+    assert len(ended) == 12
+    failed = [outcome for outcome in ended if outcome.failure is not None]
+    assert [outcome.task for outcome in failed] == [signal.SIGKILL]
+    assert failed[0].failure is not None
+    assert failed[0].failure.type == "KilledWorker"
+
+
+def test_workers_are_processes_with_one_thread_a_library() -> None:
+    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
+    ended = list(run_tasks([names], os.getenv, WorkersChoice(workers=1), silent))
+    assert sorted((outcome.task, outcome.value) for outcome in ended) == sorted(
+        (name, "1") for name in names
+    )
+    assert all(f":{os.getpid()}" not in (o.effort.place if o.effort else "") for o in ended)

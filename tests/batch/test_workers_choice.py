@@ -1,0 +1,47 @@
+"""What may be chosen of where work is done."""
+
+from pathlib import Path
+
+import pytest
+
+from vftcli.batch import choice
+from vftcli.batch.choice import WorkersChoice
+from vftcli.signals.errors import ParameterError
+
+KEY = Path("key.pem")
+
+
+def test_without_dask_work_is_done_here_unless_workers_are_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(choice, "is_installed", lambda: False)
+    assert WorkersChoice().in_process
+    assert WorkersChoice(workers=0).in_process
+    with pytest.raises(ParameterError, match=r"vftcli\[cluster\]"):
+        WorkersChoice(workers=2)
+
+
+def test_with_dask_the_cores_are_used() -> None:
+    assert not WorkersChoice().in_process
+    assert not WorkersChoice(scheduler="tcp://host:8786").in_process
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        {"scheduler": "host:8786"},
+        {"scheduler": "tcp://host"},
+        {"scheduler": "tls://host:8786"},
+        {"scheduler": "tcp://host:8786", "workers": 2},
+        {"scheduler": "tls://host:8786", "tls_ca": KEY},
+        {"scheduler": "tcp://host:8786", "tls_ca": KEY, "tls_cert": KEY, "tls_key": KEY},
+        {"ship": True},
+    ],
+)
+def test_what_does_not_go_together_is_refused(words: dict[str, object]) -> None:
+    with pytest.raises(ParameterError):
+        WorkersChoice.parsed(**words)
+
+
+def test_a_worker_s_memory_is_in_gigabytes() -> None:
+    assert WorkersChoice.parsed(workers=1, worker_memory=0.6).memory == 600_000_000

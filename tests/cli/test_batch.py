@@ -1,0 +1,170 @@
+"""`vftcli batch` as a user sees it: every log once, exit codes, equal bytes, resume."""
+
+import json
+import shutil
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from vftcli.batch.keys import digest_of
+from vftcli.cli.batch import duration
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+CIRCLE = FIXTURES / "ur5_circle.csv"
+ONE = ("--robot", "ur5", "--observer", "gmo", "--no-contacts")
+HERE = ("--do", "estimate", *ONE, "--workers", "0")
+
+
+@pytest.fixture(autouse=True)
+def _unread() -> None:
+    digest_of.cache_clear()
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two logs of one name in two folders, one of them twice, and an empty one."""
+    for place in ("a", "b"):
+        (tmp_path / "logs" / place).mkdir(parents=True)
+    shutil.copy(CIRCLE, tmp_path / "logs" / "a" / "log.csv")
+    shutil.copy(CIRCLE, tmp_path / "logs" / "a" / "same.csv")
+    shutil.copy(FIXTURES / "ur5_table1.csv", tmp_path / "logs" / "b" / "log.csv")
+    return tmp_path / "logs"
+
+
+def rows_there(out: Path) -> dict[str, tuple[int, int]]:
+    """Every row file with what changes when it is written again."""
+    return {p.name: (p.stat().st_ino, p.stat().st_mtime_ns) for p in out.glob("rows/*/*.parquet")}
+
+
+def record(out: Path) -> dict[str, object]:
+    return json.loads((out / "run.json").read_text())
+
+
+def test_every_log_is_done_once_whatever_the_workers(run, folder: Path, tmp_path: Path) -> None:
+    """A LocalCluster of two workers against this process against the command of one log."""
+    out, cluster = tmp_path / "out", tmp_path / "cluster"
+    assert run("batch", folder, *HERE, "-o", out)[0] == 0
+    done = run("batch", folder, "--do", "estimate", *ONE, "--workers", "2", "-o", cluster)
+    assert done[0] == 0, done[2]
+    assert (out / "batch.parquet").read_bytes() == (cluster / "batch.parquet").read_bytes()
+    table = pl.read_parquet(out / "batch.parquet")
+    assert table["log"].unique(maintain_order=True).to_list() == [
+        "a/log.csv", "same.csv", "b/log.csv"
+    ]  # fmt: skip
+    # Two logs of equal bytes are one result.
+    keys = dict(table.select("log", "key").unique().iter_rows())
+    assert keys["a/log.csv"] == keys["same.csv"] != keys["b/log.csv"]
+    assert len(rows_there(out)) == 2
+    assert run("estimate", CIRCLE, *ONE, "-o", tmp_path / "one")[0] == 0
+    single = (tmp_path / "one" / "estimates.parquet").read_bytes()
+    for made in (out, cluster):
+        place = made / "logs" / keys["same.csv"][:2] / keys["same.csv"]
+        assert (place / "estimates.parquet").read_bytes() == single
+    places = {task["place"] for task in record(cluster)["tasks"]}
+    assert len(places) == 2
+
+
+def test_a_second_run_does_what_is_left(run, folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    (folder / "empty.csv").touch()
+    assert run("batch", folder, *HERE, "-o", out, "--limit", "1")[0] == 0
+    first = rows_there(out)
+    code, _, err = run("batch", folder, *HERE, "-o", out)
+    assert code == 3
+    assert "empty.csv" in err
+    assert first.items() <= rows_there(out).items()
+    # The equal log was done before, under another name.
+    assert (record(out)["done_before"], record(out)["done_now"]) == (2, 1)
+    done, table = rows_there(out), (out / "batch.parquet").read_bytes()
+    assert run("batch", folder, *HERE, "-o", out)[0] == 3
+    assert record(out)["tasks"] == []
+    assert rows_there(out) == done
+    assert (out / "batch.parquet").read_bytes() == table
+    failures = pl.read_parquet(out / "failures.parquet")
+    assert failures.select("log", "stage", "error").rows() == [("empty.csv", "reading", "LogError")]
+
+
+def test_what_failed_is_tried_again_on_request(run, folder: Path, tmp_path: Path) -> None:
+    out, gone = tmp_path / "out", folder / "gone.csv"
+    words = ("batch", folder / "b" / "log.csv", gone, *HERE, "-o", out)
+    assert run(*words)[0] == 3
+    assert pl.read_parquet(out / "failures.parquet")["stage"].to_list() == ["finding"]
+    # A log that was not there is no failure of its bytes.
+    shutil.copy(CIRCLE, gone)
+    assert run(*words)[0] == 0
+    (folder / "bad.csv").write_text("no,log\n1,2\n")
+    words = ("batch", folder / "bad.csv", *HERE, "-o", tmp_path / "bad")
+    assert run(*words)[0] == 1
+    assert run(*words)[0] == 1
+    assert record(tmp_path / "bad")["tasks"] == []
+    assert run(*words, "--retry-failed")[0] == 1
+    assert len(record(tmp_path / "bad")["tasks"]) == 1
+
+
+def test_it_stops_after_so_many_failures(run, tmp_path: Path) -> None:
+    for k in range(4):
+        (tmp_path / f"{k}.csv").write_text(f"no,log\n{k},2\n")
+    words = [tmp_path / f"{k}.csv" for k in range(4)]
+    code, _, err = run("batch", *words, *HERE, "-o", tmp_path / "out", "--max-failures", "2")
+    assert code == 1
+    assert "stopped after 2 failures" in err
+    assert record(tmp_path / "out")["not_begun"] == 2
+
+
+def test_compare_has_the_errors_of_compare(run, tmp_path: Path) -> None:
+    words = (*ONE, "--reference", "zero", "--interval", "0:4")
+    out = tmp_path / "out"
+    assert run("batch", CIRCLE, "--do", "compare", *words, "-o", out, "--workers", "0")[0] == 0
+    rows = json.loads(run("compare", CIRCLE, *words, "--json")[1])
+    table = pl.read_parquet(out / "batch.parquet")
+    assert table["rmse_Nm"].to_list() == [row["rmse_Nm"] for row in rows]
+    assert table["reference_floor_Nm"].to_list() == [row["reference_floor_Nm"] for row in rows]
+
+
+def test_contacts_are_counted_and_listed(run, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = ("--robot", "ur5", "--interval", "3:8", "--workers", "0", "-o", out)
+    assert run("batch", CIRCLE, "--do", "contacts", *words)[0] == 0
+    (row,) = pl.read_parquet(out / "batch.parquet").iter_rows(named=True)
+    (listed,) = out.glob("logs/*/*/contacts.json")
+    assert row["contacts"] == len(json.loads(listed.read_text())["contacts"])
+
+
+def test_an_episode_is_a_log(run, samples: Path, tmp_path: Path) -> None:
+    out, words = tmp_path / "out", ("--observer", "gmo", "--workers", "0")
+    done = run("batch", samples / "lerobot_v3_effort", "--do", "estimate", *words, "-o", out)
+    assert done[0] == 0, done[2]
+    table = pl.read_parquet(out / "batch.parquet").unique("log", maintain_order=True)
+    assert table["episode"].to_list() == [0, 1, 2]
+    # Lengths of the sample's episodes, by its table.
+    assert table["samples"].to_list() == [700, 600, 650]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("nothing/*.csv", "--do", "estimate"), "no log"),
+        ((CIRCLE, "--do", "compare"), "--reference"),
+        ((CIRCLE, "--do", "dance"), "estimate, compare, report, contacts"),
+        ((CIRCLE, "--do", "estimate", "--ship"), "--scheduler"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line(run, tmp_path: Path, words, told: str) -> None:
+    code, _, err = run("batch", *words, "-o", tmp_path / "out")
+    assert code == 1
+    assert told in err
+    assert err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.statistical
+def test_an_address_that_does_not_answer_is_one_line(run, tmp_path: Path) -> None:
+    address = ("--scheduler", "tcp://127.0.0.1:1")
+    code, _, err = run("batch", CIRCLE, "--do", "estimate", *ONE, *address, "-o", tmp_path / "out")
+    assert code == 1
+    assert "no Dask scheduler answers at tcp://127.0.0.1:1 within 10 s" in err
+
+
+def test_the_time_that_is_left_is_short() -> None:
+    assert [duration(s) for s in (12.0, 600.0, 7200.0)] == ["12 s", "10 min", "2.0 h"]

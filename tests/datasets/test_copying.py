@@ -1,0 +1,125 @@
+"""Copies of datasets: where they may stand, what is linked, and what a stop leaves."""
+
+from pathlib import Path
+
+import pytest
+
+from vftcli.datasets.copying import (
+    RECORD,
+    WORK,
+    check_copy,
+    copy_others,
+    partial_of,
+    put_rows,
+    stored_rows,
+    unfinished,
+)
+from vftcli.signals.errors import OutputError
+
+
+@pytest.fixture
+def dataset(tmp_path: Path) -> Path:
+    folder = tmp_path / "set"
+    (folder / "videos").mkdir(parents=True)
+    (folder / "videos" / "a.mp4").write_bytes(b"film")
+    (folder / "meta.json").write_text("{}")
+    (folder / "data.h5").write_text("data")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("copy", "words"),
+    [
+        ("set", "is .*set; give another -o"),
+        ("set/copy", "one inside the other"),
+        (".", "one inside the other"),
+    ],
+)
+def test_a_copy_stands_beside_its_dataset(dataset: Path, copy: str, words: str) -> None:
+    with pytest.raises(OutputError, match=words):
+        check_copy(dataset, dataset.parent / copy, force=True)
+
+
+def test_only_an_earlier_copy_is_replaced(dataset: Path) -> None:
+    copy = dataset.parent / "copy"
+    check_copy(dataset, copy, force=False)
+    (copy / RECORD).parent.mkdir(parents=True)
+    (copy / "other").write_text("")
+    with pytest.raises(OutputError, match="exists; give another -o, or --force"):
+        check_copy(dataset, copy, force=False)
+    with pytest.raises(OutputError, match="no copy that annotate made"):
+        check_copy(dataset, copy, force=True)
+    (copy / RECORD).write_text("{}")
+    check_copy(dataset, copy, force=True)
+    (dataset.parent / "file").write_text("")
+    with pytest.raises(OutputError, match="is no folder"):
+        check_copy(dataset, dataset.parent / "file", force=True)
+
+
+def test_films_are_linked_and_the_rest_is_copied(dataset: Path) -> None:
+    for link, same in ((True, True), (False, False)):
+        copy = dataset.parent / f"copy {link}"
+        copy_others(dataset, copy, {Path("data.h5")}, link=link)
+        film, meta = copy / "videos" / "a.mp4", copy / "meta.json"
+        assert film.samefile(dataset / "videos" / "a.mp4") is same
+        assert film.read_bytes() == b"film"
+        assert not meta.samefile(dataset / "meta.json")
+        assert not (copy / "data.h5").exists()
+
+
+def test_a_film_is_copied_where_links_cannot_be(
+    dataset: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(18, "cross-device link")
+
+    monkeypatch.setattr("os.link", refuse)
+    copy_others(dataset, dataset.parent / "copy", (), link=True)
+    assert (dataset.parent / "copy" / "videos" / "a.mp4").read_bytes() == b"film"
+
+
+def test_a_finished_copy_takes_the_place_of_an_earlier_one(tmp_path: Path) -> None:
+    copy = tmp_path / "copy"
+    copy.mkdir()
+    (copy / "old").write_text("")
+    with unfinished(copy, "key") as folder:
+        assert folder == partial_of(copy)
+        (folder / "new").write_text("")
+    assert [path.name for path in tmp_path.rglob("*")] == ["copy", "new"]
+
+
+def test_what_a_stop_leaves_goes_on_with_the_same_key_only(tmp_path: Path) -> None:
+    copy, found = tmp_path / "copy", []
+
+    def stopped(key: str) -> None:
+        with unfinished(copy, key) as folder:
+            found.append((folder / WORK / "rows").is_file())
+            (folder / WORK / "rows").write_text("")
+            raise KeyboardInterrupt
+
+    for key in ("one", "one", "two"):
+        with pytest.raises(KeyboardInterrupt):
+            stopped(key)
+        assert not copy.exists()
+    assert found == [False, True, False]
+
+
+def test_two_runs_do_not_write_one_copy(tmp_path: Path) -> None:
+    second = unfinished(tmp_path / "copy", "key")
+    with unfinished(tmp_path / "copy", "key"), pytest.raises(OutputError, match="another run"):
+        second.__enter__()
+
+
+def test_a_run_that_did_nothing_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), unfinished(tmp_path / "copy", "key"):
+        raise KeyboardInterrupt
+    assert not any(tmp_path.iterdir())
+
+
+def test_rows_are_whole_or_not_there(tmp_path: Path) -> None:
+    import numpy as np
+
+    put_rows(tmp_path / "rows.npz", told=np.array("{}"), a=np.ones(2))
+    held = stored_rows(tmp_path / "rows.npz")
+    assert (str(held["told"]), held["a"].tolist()) == ("{}", [1.0, 1.0])
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.npz"]

@@ -1,0 +1,154 @@
+"""Columns written into LeRobot's files: everything else stays, and every description tells them."""
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from vftcli.datasets import open_dataset
+from vftcli.datasets.episodes import ForceColumn
+from vftcli.datasets.lerobot import LeRobotDataset, with_features
+from vftcli.datasets.statistics import statistics_of
+from vftcli.signals.errors import LogError
+
+FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "panda_episodes"
+TORQUE = ForceColumn("external_torque", tuple(f"j{k}.external_torque" for k in range(7)), {"a": 1})
+VALID = ForceColumn("valid", (), {})
+COLUMNS = [TORQUE, VALID]
+
+
+def forces(episodes: Any, seed: int = 1) -> dict[int, dict[str, Any]]:
+    rng, frames = np.random.default_rng(seed), (200, 160, 180)
+    return {
+        k: {
+            "external_torque": rng.standard_normal((frames[k], 7)).astype(np.float32),
+            "valid": np.ones((frames[k], 1), np.float32),
+        }
+        for k in episodes
+    }
+
+
+def test_the_other_columns_the_rows_and_their_groups_stay(tmp_path: Path) -> None:
+    dataset = LeRobotDataset(FIXTURE)
+    for file in dataset.files():
+        source, target = FIXTURE / file.place, tmp_path / file.place.name
+        own = forces(file.episodes)
+        dataset.write(file, COLUMNS, own, target)
+        before, after = pq.read_table(source), pq.read_table(target)
+        assert after.select(before.column_names).equals(before)
+        assert after.column_names[-2:] == ["observation.external_torque", "observation.valid"]
+        assert str(after.schema.field("observation.external_torque").type) == (
+            "fixed_size_list<element: float>[7]"
+        )
+        written = np.array(after.column("observation.external_torque").to_pylist(), np.float32)
+        np.testing.assert_array_equal(
+            written, np.concatenate([own[k]["external_torque"] for k in file.episodes])
+        )
+        assert pq.ParquetFile(target).num_row_groups == pq.ParquetFile(source).num_row_groups
+        told = json.loads(after.schema.metadata[b"huggingface"])["info"]["features"]
+        assert list(told) == after.column_names
+        assert told["observation.external_torque"]["length"] == 7
+
+
+def test_row_groups_and_rows_in_any_order_are_kept(tmp_path: Path) -> None:
+    """An episode's rows may stand apart: its values go to its own rows, in their order."""
+    dataset = tmp_path / "set"
+    shutil.copytree(FIXTURE, dataset)
+    path = dataset / "data" / "chunk-000" / "file-000.parquet"
+    table = pq.read_table(path)
+    turned = table.take(np.r_[200:360, 0:200])
+    pq.write_table(turned, path, row_group_size=50)
+    opened = LeRobotDataset(dataset)
+    file = next(iter(opened.files()))
+    own = forces(file.episodes)
+    opened.write(file, COLUMNS, own, tmp_path / "out.parquet")
+    made = pq.ParquetFile(tmp_path / "out.parquet")
+    assert made.num_row_groups == 8
+    written = np.array(made.read().column("observation.external_torque").to_pylist(), np.float32)
+    np.testing.assert_array_equal(written[:160], own[1]["external_torque"])
+    np.testing.assert_array_equal(written[160:], own[0]["external_torque"])
+
+
+def test_what_was_edited_in_between_is_refused(tmp_path: Path) -> None:
+    dataset = LeRobotDataset(FIXTURE)
+    file = next(iter(dataset.files()))
+    own = forces(file.episodes)
+    own[0]["external_torque"] = own[0]["external_torque"][1:]
+    with pytest.raises(LogError, match="episode 0 has 200 rows, 199 were read"):
+        dataset.write(file, COLUMNS, own, tmp_path / "out.parquet")
+    with pytest.raises(LogError, match="rows of episodes that the table"):
+        dataset.write(file, COLUMNS, forces([0]), tmp_path / "out.parquet")
+
+
+def test_the_descriptions_tell_the_columns(tmp_path: Path) -> None:
+    statistics = {
+        k: {name: statistics_of(values) for name, values in own.items()}
+        for k, own in forces(range(3)).items()
+    }
+    LeRobotDataset(FIXTURE).finish(COLUMNS, statistics, tmp_path)
+    info = json.loads((tmp_path / "meta" / "info.json").read_text())
+    feature = info["features"].pop("observation.external_torque")
+    assert feature == {
+        "dtype": "float32", "shape": [7], "names": list(TORQUE.elements), "fps": 25,
+        "info": {"a": 1},
+    }  # fmt: skip
+    assert info["features"].pop("observation.valid")["names"] is None
+    assert info == json.loads((FIXTURE / "meta" / "info.json").read_text())
+    stats = json.loads((tmp_path / "meta" / "stats.json").read_text())
+    whole = np.concatenate([own["external_torque"] for own in forces(range(3)).values()])
+    # float32 values, sums in double
+    np.testing.assert_allclose(
+        stats["observation.external_torque"]["mean"], whole.astype(float).mean(axis=0), atol=1e-12
+    )
+    place = Path("meta", "episodes", "chunk-000", "file-000.parquet")
+    before, after = pq.read_table(FIXTURE / place), pq.read_table(tmp_path / place)
+    assert after.select(before.column_names).equals(before)
+    added = [name for name in after.column_names if name not in before.column_names]
+    assert len(added) == 2 * 10
+    assert after.column("stats/observation.external_torque/count").to_pylist() == [
+        [200], [160], [180]
+    ]  # fmt: skip
+
+
+def test_version_2_1_has_its_statistics_a_line_an_episode(tmp_path: Path) -> None:
+    dataset = tmp_path / "set"
+    (dataset / "meta").mkdir(parents=True)
+    info = json.loads((FIXTURE / "meta" / "info.json").read_text())
+    (dataset / "meta" / "info.json").write_text(json.dumps(info | {"codebase_version": "v2.1"}))
+    keys = ("min", "max", "mean", "std", "count")
+    line = {"episode_index": 1, "stats": {"action": {key: [0.0] for key in keys}}}
+    (dataset / "meta" / "episodes_stats.jsonl").write_text(json.dumps(line) + "\n")
+    statistics = {1: {n: statistics_of(v) for n, v in forces([1])[1].items()}}
+    LeRobotDataset(dataset).finish(COLUMNS, statistics, tmp_path / "copy")
+    text = (tmp_path / "copy" / "meta" / "episodes_stats.jsonl").read_text()
+    assert tuple(json.loads(text)["stats"]["observation.valid"]) == keys
+    told = json.loads((tmp_path / "copy" / "meta" / "info.json").read_text())["features"]
+    assert "fps" not in told["observation.valid"]  # as version 2 has it
+    assert not (tmp_path / "copy" / "meta" / "stats.json").exists()
+
+
+def test_metadata_of_other_kinds_is_left_alone() -> None:
+    assert with_features({}, COLUMNS) == {}
+    assert with_features({b"huggingface": b"[]"}, COLUMNS) == {b"huggingface": b"[]"}
+    new = {"a": {"feature": {"dtype": "float32"}, "length": 3, "_type": "List"}}
+    told = with_features(
+        {b"huggingface": json.dumps({"info": {"features": new}}).encode()}, COLUMNS
+    )
+    features = json.loads(told[b"huggingface"])["info"]["features"]
+    assert features["observation.external_torque"]["_type"] == "List"
+
+
+def test_a_column_that_is_there_and_what_is_no_dataset_are_refused(tmp_path: Path) -> None:
+    dataset = LeRobotDataset(FIXTURE)
+    file = next(iter(dataset.files()))
+    dataset.check_new(file, COLUMNS)
+    with pytest.raises(LogError, match=r"has observation\.effort already"):
+        dataset.check_new(file, [ForceColumn("effort", (), {})])
+    (tmp_path / "log.csv").write_text("t,q\n")
+    for path in (tmp_path, tmp_path / "log.csv"):
+        with pytest.raises(LogError, match="neither a LeRobot dataset"):
+            open_dataset(path)

@@ -1,0 +1,97 @@
+"""Long logs through `vftcli estimate`: the same numbers, the same record, nothing half done."""
+
+import importlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+from typer.testing import CliRunner
+
+from vftcli import streaming
+from vftcli.analysis import Analysis
+from vftcli.cli import app
+
+FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"
+
+
+@pytest.fixture
+def in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every table counts as a long log, in blocks of 320 samples."""
+    monkeypatch.setattr(importlib.import_module("vftcli.readers.picking"), "WHOLE_ROWS", 0)
+    monkeypatch.setattr(importlib.import_module("vftcli.readers.delimited"), "BLOCK_BYTES", 1 << 16)
+    monkeypatch.setattr(streaming, "PIECE", 320)
+
+
+def estimated(folder: Path, *words: str) -> tuple[pl.DataFrame, dict[str, Any]]:
+    """The table and the record of an estimate of the fixture."""
+    command = ["estimate", str(FIXTURE), "--robot", "ur5", "-o", str(folder), *words]
+    done = CliRunner().invoke(app, command, catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    record = json.loads((folder / "run.json").read_text("utf-8"))
+    return pl.read_parquet(folder / "estimates.parquet"), record
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--causal",),
+        ("--causal", "--as-printed"),
+        ("--causal", "--wrench", "--observer", "kfo-zoh"),
+        ("--no-contacts", "--observer", "kfo-rts", "--observer", "gmo"),
+    ],
+)
+def test_numbers_and_record_of_the_whole(
+    tmp_path: Path, request: pytest.FixtureRequest, words: tuple[str, ...]
+) -> None:
+    """All columns to 1e-9 N·m, the bar of the smoother; blocks are shorter than its pieces."""
+    whole, of_whole = estimated(tmp_path / "whole", *words, "--csv")
+    request.getfixturevalue("in_blocks")
+    made, record = estimated(tmp_path / "blocks", *words, "--csv")
+    assert made.schema == whole.schema
+    for name in whole.columns:
+        known = whole[name].to_numpy()
+        np.testing.assert_allclose(made[name].to_numpy(), known, rtol=0, atol=1e-9, err_msg=name)
+    for key in ("command", "files", "versions"):
+        of_whole.pop(key), record.pop(key)
+    assert record == of_whole
+    text = pl.read_csv(tmp_path / "blocks" / "estimates.csv")
+    assert text.columns == made.columns
+    assert len(text) == len(made)
+
+
+@pytest.mark.usefixtures("in_blocks")
+def test_interruption_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that ends in the middle of a log leaves no folder."""
+    whole = streaming.BlockAnalysis.blocks
+
+    def broken(self: streaming.BlockAnalysis) -> Iterator[Analysis]:
+        for number, block in enumerate(whole(self)):
+            if number == 3:
+                raise KeyboardInterrupt
+            yield block
+
+    monkeypatch.setattr(streaming.BlockAnalysis, "blocks", broken)
+    command = ["estimate", str(FIXTURE), "--robot", "ur5", "-o", str(tmp_path / "out"), "--causal"]
+    CliRunner().invoke(app, command)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("in_blocks")
+def test_wrong_robot_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    """The stretches that are drawn tell what the whole log tells."""
+    command = ["estimate", str(FIXTURE), "--robot", "ur10", "-o", str(tmp_path / "o"), "--causal"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code != 0
+    assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.usefixtures("in_blocks")
+def test_what_needs_the_whole_log_has_it(tmp_path: Path) -> None:
+    """A zero span is of the whole log: it is read in one piece, and the numbers are there."""
+    made, record = estimated(tmp_path / "o", "--causal", "--wrench", "--zero", "0:1")
+    assert "wrench/gmo/fx" in made.columns
+    assert record["input"]["samples"] == len(made)

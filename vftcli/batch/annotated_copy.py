@@ -1,0 +1,361 @@
+"""A copy of a dataset with forces: its episodes on the engine, then its files, then the rest."""
+
+import hashlib
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.batch.annotation import (
+    SIGN,
+    EpisodesTask,
+    ForceChoice,
+    estimate_episodes,
+    force_columns,
+)
+from vftcli.batch.choice import WorkersChoice
+from vftcli.batch.engine import Outcome, begin, run_tasks
+from vftcli.datasets import Dataset, open_dataset
+from vftcli.datasets.copying import (
+    RECORD,
+    WORK,
+    check_copy,
+    copy_others,
+    finished,
+    stored_rows,
+    unfinished,
+)
+from vftcli.datasets.episodes import DataFile, ForceColumn, Single, Statistics
+from vftcli.datasets.statistics import statistics_of
+from vftcli.outputs.files import put_text
+from vftcli.outputs.log.run_record import to_json, versions
+from vftcli.outputs.seals import digest
+from vftcli.signals.errors import LogError, ParameterError
+
+TOGETHER = 16
+"""Episodes that go to a worker together, and into one file of rows."""
+
+
+FEW = 32
+"""Episodes, and files to write, for which no processes are started unasked: that takes seconds."""
+
+HERE = WorkersChoice(workers=0)
+"""This process alone."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CopyChoice:
+    """How the copy is made.
+
+    Attributes:
+        allow_missing: Whether frames of which nothing can be told are filled with zeros and marked,
+            instead of stopping the run.
+        link: Whether films may be second names of the dataset's files.
+        force: Whether an earlier copy may be replaced.
+    """
+
+    allow_missing: bool = False
+    link: bool = True
+    force: bool = False
+
+
+class FileTask(NamedTuple):
+    """A data file that is written.
+
+    Attributes:
+        file: The data file.
+        rows: The files in which its episodes' columns are.
+        target: Where it is written.
+    """
+
+    file: DataFile
+    rows: tuple[Path, ...]
+    target: Path
+
+
+def annotate(
+    path: Path,
+    copy: Path,
+    choice: ForceChoice,
+    how: CopyChoice,
+    workers: WorkersChoice,
+    command: str,
+    tell: Callable[[str], None],
+    progress: Callable[[str, float, float], None],
+) -> dict[str, Any]:
+    """Write a copy of a dataset with the forces of every frame.
+
+    Args:
+        path: The dataset.
+        copy: The folder of the copy.
+        choice: What is asked of every episode.
+        how: How the copy is made.
+        workers: Where the work is done.
+        command: The command as the user typed it.
+        tell: Who is told what the engine does.
+        progress: Who is told what is being done.
+
+    Returns:
+        What ``meta/vftcli.json`` holds.
+
+    Raises:
+        LogError: If an episode tells nothing and none may be missing.
+        OutputError: If the copy cannot be written.
+        ParameterError: If workers are not to see the folders.
+    """
+    if workers.ship:
+        raise ParameterError(
+            "workers write the copy themselves, so they have to see its folder; leave --ship out"
+        )
+    dataset = open_dataset(path, choice.read.columns)
+    check_copy(path, copy, force=how.force)
+    beside = [Path(n) for n in (choice.robot.name, choice.observers.gains_file) if n is not None]
+    files_beside = " ".join(digest(file) for file in beside if file.is_file())
+    key = hashlib.sha256(f"{path.resolve()} {choice.key(files_beside)}".encode()).hexdigest()
+    with unfinished(copy, key) as folder:
+        work = folder / WORK
+        plan = Plan(dataset, work, key)
+        run = partial(run_tasks, tell=tell, seen=[str(path), str(work)])
+        expected = force_columns(choice, (), derived=False, valid=how.allow_missing)
+        outcomes = run(
+            plan.groups(expected), partial(estimate_episodes, choice), started(workers, dataset)
+        )
+        made = gathered(outcomes, how, progress)
+        told = first_known(made)
+        columns = force_columns(
+            choice,
+            told["names"],
+            derived=any(one.get("derived") for one in made.episodes),
+            valid=how.allow_missing,
+        )
+        write = partial(write_file, dataset, columns, choice.suffix)
+        tasks = [FileTask(f, tuple(r), folder / f.place) for f, r in plan.rows.items()]
+        each = (tasks[k : k + TOGETHER] for k in range(0, len(tasks), TOGETHER))
+        statistics: dict[int, Mapping[str, Statistics]] = {}
+        for outcome in run(each, write, workers if len(tasks) > FEW else HERE):
+            progress(f"writing {value_of(outcome)['place']}", 0.8, 1.0)
+            statistics |= outcome.value["statistics"]
+        progress("writing descriptions", 0.9, 1.0)
+        if path.is_dir():
+            copy_others(path, folder, plan.places, link=how.link)
+        dataset.finish(columns, dict(sorted(statistics.items())), folder)
+        record = record_of_copy(path, command, choice, columns, made, plan.sources)
+        with finished(folder / RECORD) as temporary:
+            put_text(temporary, to_json(record))
+    return record
+
+
+def started(workers: WorkersChoice, dataset: Dataset) -> WorkersChoice:
+    """Where the episodes are done: here where nothing is asked and there are few."""
+    some = islice(dataset.files(), FEW + 1)
+    few = sum(len(file.episodes) for file in some) <= FEW
+    return HERE if few and workers == WorkersChoice() else workers
+
+
+class Plan:
+    """The work on a dataset, planned while workers already do the first of it.
+
+    Attributes:
+        rows: Data file → the files in which its episodes' columns are.
+        sources: Data file → its sha256.
+    """
+
+    def __init__(self, dataset: Dataset, work: Path, key: str) -> None:
+        self._dataset, self._work, self._key = dataset, work, key
+        self.rows: dict[DataFile, list[Path]] = {}
+        self.sources: dict[str, str] = {}
+
+    @property
+    def places(self) -> set[Path]:
+        """The data files, by their paths in the dataset."""
+        return {file.place for file in self.rows}
+
+    def groups(self, columns: list[ForceColumn]) -> Iterator[list[EpisodesTask]]:
+        """The episodes in groups that go to a worker together.
+
+        Args:
+            columns: What will be added, which no file may have yet.
+        """
+        group: list[EpisodesTask] = []
+        for file in self._dataset.files():
+            self._dataset.check_new(file, columns)
+            source = digest(self._dataset.folder / file.place)
+            self.sources[file.place.as_posix()] = source
+            for first in range(0, len(file.episodes), TOGETHER):
+                some = file._replace(episodes=file.episodes[first : first + TOGETHER])
+                name = hashlib.sha256(f"{self._key} {source} {some}".encode()).hexdigest()
+                rows = self._work / f"{name}.npz"
+                self.rows.setdefault(file, []).append(rows)
+                group.append(EpisodesTask(some, rows))
+                if sum(len(task.file.episodes) for task in group) >= TOGETHER:
+                    yield group
+                    group = []
+        if group:
+            yield group
+
+
+class Made(NamedTuple):
+    """What was told of the episodes.
+
+    Attributes:
+        episodes: A record each.
+        robot: The robot of the first that could be done.
+        observer: Its observer.
+    """
+
+    episodes: list[dict[str, Any]]
+    robot: dict[str, Any] | None
+    observer: dict[str, Any] | None
+
+
+def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work returns
+    """What a task returned.
+
+    Raises:
+        LogError: If it failed.
+    """
+    if outcome.failure is None:
+        return outcome.value
+    place = outcome.task.file.place
+    raise LogError(f"{place}: {outcome.failure.line} ({outcome.failure.stage})")
+
+
+def gathered(
+    outcomes: Iterable[Outcome[Any]], how: CopyChoice, progress: Callable[[str, float, float], None]
+) -> Made:
+    """All that is told of the episodes, in the order of their files.
+
+    Raises:
+        LogError: If one tells nothing and none may be missing.
+    """
+    episodes: list[dict[str, Any]] = []
+    robot = observer = None
+    for outcome in outcomes:
+        told = value_of(outcome)
+        for record in told["episodes"]:
+            if not how.allow_missing:
+                refuse_missing(record)
+        episodes += told["episodes"]
+        robot, observer = robot or told["robot"], observer or told["observer"]
+        progress(f"{len(episodes)} episodes estimated", 0.0, 0.8)
+    episodes.sort(key=lambda record: (record["file"], record["episode"]))
+    return Made(episodes, robot, observer)
+
+
+REMEDY = "--allow-missing writes 0 there, and a column that says so"
+
+
+def refuse_missing(record: Mapping[str, Any]) -> None:
+    """Refuse an episode of which frames are missing.
+
+    Raises:
+        LogError: If some are.
+    """
+    if record["status"] == "missing":
+        # Of DROID every file has the same name.
+        reason = record["reason"].removeprefix(Path(record["file"]).name).rstrip(".")
+        place = record["file"] if reason != record["reason"].rstrip(".") else ""
+        raise LogError(f"{place}{reason}. {REMEDY}")
+    if record["status"] == "part":
+        name, count = next(iter(record["missing_frames"].items()))
+        why = (
+            "in these poses it cannot be told; --solver damped or map says something everywhere"
+            if name == "wrench"
+            else "a value of the log is no number there"
+        )
+        raise LogError(
+            f"{record['file']}: episode {record['episode']}: {name} is missing in {count} of "
+            f"{record['frames']} frames: {why}; {REMEDY}"
+        )
+
+
+def first_known(made: Made) -> dict[str, Any]:
+    """The names of the joints, of the first episode that tells any; all must have as many.
+
+    Raises:
+        LogError: If no episode could be done, or they are of different arms.
+    """
+    known = [one for one in made.episodes if one["status"] != "missing"]
+    if not known:
+        count = len(made.episodes)
+        raise LogError(
+            f"none of the {count} episodes can be done; the first: {made.episodes[0]['reason']}"
+            if made.episodes
+            else "the dataset has no episodes"
+        )
+    if len(widths := {one["joint_count"] for one in known}) > 1:
+        raise LogError(
+            f"the episodes are of arms of {' and '.join(map(str, sorted(widths)))} joints"
+        )
+    names = known[0]["joints"] or [f"joint_{k + 1}" for k in range(known[0]["joint_count"])]
+    return {"names": names}
+
+
+def write_file(
+    dataset: Dataset, columns: list[ForceColumn], suffix: str, task: FileTask
+) -> dict[str, Any]:
+    """Write a data file with its columns; return its place and the statistics of its episodes."""
+    begin("writing")
+    rows: dict[str, Any] = {}
+    for path in filter(Path.is_file, task.rows):
+        rows |= stored_rows(path)
+    forces = {
+        number: filled(number, rows, columns, suffix, dataset.frames(task.file, number))
+        for number in task.file.episodes
+    }
+    with finished(task.target) as temporary:
+        dataset.write(task.file, columns, forces, temporary)
+    statistics = {
+        number: {name: statistics_of(values) for name, values in own.items()}
+        for number, own in forces.items()
+        if dataset.has_statistics
+    }
+    return {"place": task.file.place.as_posix(), "statistics": statistics}
+
+
+def filled(
+    number: int, rows: Mapping[str, Any], columns: list[ForceColumn], suffix: str, frames: int
+) -> dict[str, Single]:
+    """An episode's columns with 0 where nothing is told, and the columns that say where that is."""
+    found: dict[str, Single] = {}
+    for column in columns:
+        name = column.name.removesuffix(suffix)
+        of = name.removesuffix("_valid")
+        values = rows.get(f"{number}/{of}")
+        if values is None:
+            values = np.full((frames, column.width), np.nan, np.float32)
+        if of != name:
+            values = np.isfinite(values).all(axis=1, keepdims=True).astype(np.float32)
+        found[column.name] = np.nan_to_num(values, nan=0.0)
+    return found
+
+
+def record_of_copy(
+    path: Path,
+    command: str,
+    choice: ForceChoice,
+    columns: list[ForceColumn],
+    made: Made,
+    sources: Mapping[str, str],
+) -> dict[str, Any]:
+    """What ``meta/vftcli.json`` holds."""
+    return {
+        "command": command,
+        "versions": versions(),
+        "dataset": str(path),
+        "sign": SIGN,
+        "robot": made.robot,
+        "observer": made.observer,
+        "causal": columns[0].told["causal"],
+        "columns": {c.name: {**c.told, "names": list(c.elements) or None} for c in columns},
+        "status": dict(Counter(one["status"] for one in made.episodes)),
+        "transient_frames": max(one.get("transient_frames", 0) for one in made.episodes),
+        "friction": choice.robot.friction,
+        "episodes": made.episodes,
+        "sources": dict(sorted(sources.items())),
+    }

@@ -1,0 +1,304 @@
+"""Forces of a dataset's episodes: what is asked, and each episode's columns, on the engine."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import vftcli
+from vftcli.analysis import Analysis
+from vftcli.batch.engine import begin
+from vftcli.datasets.copying import put_rows, stored_rows
+from vftcli.datasets.episodes import DataFile, ForceColumn, Single
+from vftcli.doctor.examiner import Examiner
+from vftcli.observers.choice import ObserverChoice
+from vftcli.observers.lead import settling_samples
+from vftcli.observers.table import OBSERVERS
+from vftcli.outputs.log.run_record import observer_record, robot_record, to_json
+from vftcli.pipeline import AnalysisChoice, analyse, prepared
+from vftcli.readers.library import Library
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.arrays import Array, Indices
+from vftcli.signals.errors import LogError, MissingSignalError, ParameterError, VftError
+from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.wrench import AXES
+from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.virtual_sensor.frames import FRAMES
+
+USUAL = "kfo-zoh"
+"""The observer where none is named: it needs no sample that comes later."""
+
+SIGN = "what the environment exerts ON the robot"
+"""Sign of all that is added."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceChoice:
+    """What is asked of every episode.
+
+    Attributes:
+        read: How an episode is read.
+        robot: Which arm made it.
+        observers: The one observer, and its gains.
+        wrench: What is asked of the virtual sensor, None for joint torques alone.
+        sd: Whether the observer's own standard deviation is wanted.
+        contact: Whether it is wanted which frames lie in a contact of the list.
+        anyway: Whether results are wanted even where a finding makes them meaningless.
+
+    Raises:
+        ParameterError: If more than one observer, an episode or an interval is chosen.
+    """
+
+    read: ReadChoice = field(default_factory=ReadChoice)
+    robot: RobotChoice = field(default_factory=RobotChoice)
+    observers: ObserverChoice = field(default_factory=lambda: ObserverChoice(names=(USUAL,)))
+    wrench: WrenchChoice | None = None
+    sd: bool = False
+    contact: bool = False
+    anyway: bool = False
+
+    def __post_init__(self) -> None:
+        if len(self.observers.names) != 1:
+            raise ParameterError(
+                "annotate writes the torques of one observer; give --observer once"
+            )
+        if self.read.interval or self.read.all_episodes or self.read.episode is not None:
+            raise ParameterError(
+                "annotate writes every frame of every episode; leave --interval and --episode out"
+            )
+        read = replace(self.read, skips_unknown=True, derive=self.read.derive or "none")
+        object.__setattr__(self, "read", read)
+        object.__setattr__(self, "observers", replace(self.observers, from_rest=True))
+
+    @property
+    def observer(self) -> str:
+        """The observer's name."""
+        return self.observers.names[0]
+
+    @property
+    def is_online(self) -> bool:
+        """Whether torques and wrench could be told while the episode goes on, if dq is logged."""
+        wrench = self.wrench
+        back = wrench is not None and (
+            wrench.smooths(self.observer) or bool(wrench.zero.spans) or wrench.zero.start
+        )
+        return OBSERVERS[self.observer].online and not self.observers.gains_of_log and not back
+
+    @property
+    def suffix(self) -> str:
+        """What the names of the columns end with: the arm, of a dataset of two."""
+        return f"_{self.read.arm}" if self.read.arm is not None else ""
+
+    def key(self, robot_file: str) -> str:
+        """What the columns depend on beside the episode: this, the robot file and the program."""
+        return f"{self!r} {robot_file} {vftcli.__version__}"
+
+    def analysis(self, number: int, library: Library, examiner: Examiner) -> AnalysisChoice:
+        """The same as what is asked of a log."""
+        return AnalysisChoice(
+            read=replace(self.read, episode=number),
+            robot=self.robot,
+            observers=self.observers,
+            wrench=self.wrench,
+            contacts=self.contact,
+            library=library,
+            examiner=examiner,
+        )
+
+
+class EpisodesTask(NamedTuple):
+    """Some episodes of one data file.
+
+    Attributes:
+        file: The data file, with these episodes only.
+        rows: Where their columns are put.
+    """
+
+    file: DataFile
+    rows: Path
+
+
+def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> dict[str, Any]:
+    """Estimate the forces of some episodes and put them into a file, unless they are there.
+
+    Args:
+        choice: What is asked.
+        task: Which episodes.
+
+    Returns:
+        What is told of them: ``episodes``, a record each; ``robot`` and ``observer``, those of the
+        first that could be done, or None.
+    """
+    if task.rows.is_file():
+        return dict(json.loads(str(stored_rows(task.rows)["told"])))
+    library, examiner = Library([task.file.log]), Examiner(anyway=choice.anyway)
+    arrays: dict[str, Single] = {}
+    records: list[dict[str, Any]] = []
+    told: dict[str, Any] = {"episodes": records, "robot": None, "observer": None}
+    for number in task.file.episodes:
+        begin(f"episode {number}")
+        record: dict[str, Any] = {"episode": number, "file": task.file.place.as_posix()}
+        try:
+            analysis = analysed(choice, choice.analysis(number, library, examiner), task.file.log)
+            columns = columns_of(analysis, choice)
+        except ParameterError:
+            raise  # what is asked cannot be had of any episode
+        except VftError as error:
+            record |= {"status": "missing", "reason": " ".join(str(error).split())}
+        else:
+            arrays |= {f"{number}/{name}": values for name, values in columns.items()}
+            record |= record_of(analysis, columns)
+            if told["robot"] is None:
+                observer = analysis.observers[0]
+                told["robot"] = robot_record(analysis.robot)
+                told["observer"] = observer_record(observer, analysis.tunings[observer.name])
+        records.append(record)
+    text = to_json(told)
+    if arrays:
+        put_rows(task.rows, told=np.array(text), **arrays)
+    return dict(json.loads(text))
+
+
+def analysed(choice: ForceChoice, asked: AnalysisChoice, path: Path) -> Analysis:
+    """One episode's estimates.
+
+    Raises:
+        VftError: If it cannot be read, or no result means anything.
+    """
+    recording = asked.library.open(path, asked.read)
+    check_signals(recording, anyway=choice.anyway)
+    made = analyse(*prepared(recording, asked), asked)
+    if asked.contacts and made.contacts is None:
+        reason = next(str(r) for r in made.remarks if r.code == "contacts-not-told")
+        raise LogError(f"{recording.name}: {reason}")
+    return made
+
+
+def check_signals(recording: Recording, *, anyway: bool) -> None:
+    """See that velocities and efforts are there, and that the efforts were measured.
+
+    Raises:
+        MissingSignalError: If one is not.
+        LogError: If the effort never changes on half of the joints or more.
+    """
+    if recording.dq is None:
+        raise MissingSignalError(
+            f"{recording.name}: no joint velocities. --derive dq makes them of the positions over "
+            "the complete episode, so that the forces are not causal, and that is recorded"
+        )
+    efforts = [value for name in EFFORTS if (value := getattr(recording, name)) is not None]
+    if not efforts:
+        raise MissingSignalError(
+            f"{recording.name}: no joint torques or currents, so no forces can be told; ports of "
+            "DROID and Open X-Embodiment leave them out, DROID's raw release has them"
+        )
+    for value in efforts if not anyway else ():
+        same = np.flatnonzero((value == value[0]).all(axis=0)) + 1
+        if 2 * len(same) >= recording.joints:
+            joints = ", ".join(f"J{joint}" for joint in same)
+            raise LogError(
+                f"{recording.name}: the effort of {joints} is {value[0, same[0] - 1]:g} in every "
+                "frame, so it was not measured: gravity would be written as force. Name the column "
+                "that was measured with --columns. With --anyway it goes on all the same"
+            )
+
+
+def columns_of(analysis: Analysis, choice: ForceChoice) -> dict[str, Single]:
+    """The columns of an episode by name, a row a frame, NaN where nothing can be told.
+
+    Raises:
+        ParameterError: If the observer states no standard deviation.
+    """
+    estimate, t = analysis.estimates[0], analysis.t
+    found: dict[str, Array] = {"external_torque": estimate.tau}
+    if choice.sd:
+        if estimate.sd is None:
+            raise ParameterError(
+                f"--sd: {estimate.name} states no standard deviation; choose another --observer, "
+                "as kfo-zoh"
+            )
+        found["external_torque_sd"] = estimate.sd
+    if choice.wrench is not None:
+        found["wrench"] = analysis.wrenches[0].known
+    if choice.contact and analysis.contacts is not None:
+        inside = [(t >= c.start) & (t <= c.stop) for c in analysis.contacts.contacts]
+        touched = np.any(inside, axis=0) if inside else np.zeros(len(t), dtype=bool)
+        found["contact"] = touched[:, None].astype(np.float64)
+    samples = analysis.recording.source.row_samples
+    return {name: by_row(values, samples) for name, values in found.items()}
+
+
+def by_row(values: Array, samples: Indices | None) -> Single:
+    """Values of samples (T, k) as those of the file's rows, NaN for a row that is no sample."""
+    if samples is None:
+        return values.astype(np.float32)
+    return np.where(samples[:, None] >= 0, values[samples], np.nan).astype(np.float32)
+
+
+def record_of(analysis: Analysis, columns: Mapping[str, Single]) -> dict[str, Any]:
+    """What is told of an episode that could be done."""
+    recording, observer = analysis.recording, analysis.observers[0]
+    missing = {name: int(np.isnan(v).any(axis=1).sum()) for name, v in columns.items()}
+    some = {name: count for name, count in missing.items() if count}
+    warnings = {f.code: None for one in analysis.examinations for f in one.warnings}
+    refusals = [f.code for one in analysis.examinations for f in one.refusals()]
+    return {
+        "status": "part" if some else "done",
+        "frames": len(columns["external_torque"]),
+        **({"missing_frames": some} if some else {}),
+        "transient_frames": settling_samples(observer, recording.median_step, recording.joints),
+        "clock": recording.source.clock,
+        "joints": list(recording.joint_names) or None,
+        "joint_count": recording.joints,
+        "robot": analysis.robot.name,
+        "derived": list(recording.source.derived),
+        "warnings": list(warnings),
+        **({"overridden": refusals} if refusals else {}),
+        "notes": [str(r) for r in (*recording.source.remarks, *analysis.estimates[0].remarks)],
+    }
+
+
+def force_columns(
+    choice: ForceChoice, names: Sequence[str], *, derived: bool, valid: bool
+) -> list[ForceColumn]:
+    """The columns that are written.
+
+    Args:
+        choice: What is asked.
+        names: The joints' names.
+        derived: Whether an episode's velocities are derived over the complete episode.
+        valid: Whether frames may be missing, and columns say which.
+    """
+    online = choice.is_online and not derived
+    made = {
+        "observer": choice.observer,
+        "causal": online,
+        "version": f"vftcli {vftcli.__version__}",
+    }
+    joint = {"units": "N·m", "frame": "joint axes", "sign": SIGN, **made}
+    flag = {"units": "1", "frame": "none", "sign": "1 where told, 0 where filled with 0", **made}
+    found = [("external_torque", tuple(names), joint)]
+    if choice.sd:
+        found.append(("external_torque_sd", tuple(names), {**joint, "sign": "not negative"}))
+    if valid:
+        found.append(("external_torque_valid", (), flag))
+    if choice.wrench is not None:
+        frame = FRAMES[choice.wrench.frame]
+        found.append(("wrench", AXES, {**joint, "units": "N, N·m", "frame": frame}))
+        if valid:
+            found.append(("wrench_valid", (), flag))
+    if choice.contact:
+        listed = {**flag, "sign": "1 in a contact of the list, else 0", "causal": False}
+        found.append(("contact", (), listed))
+    return [
+        ForceColumn(
+            name + choice.suffix,
+            elements if elements == AXES else tuple(f"{each}.{name}" for each in elements),
+            told,
+        )
+        for name, elements, told in found
+    ]

@@ -1,0 +1,105 @@
+"""WorkersChoice: where many pieces of work are done."""
+
+import re
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from vftcli.signals.errors import ParameterError
+
+ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]{1,5}")
+"""tcp://host:8786"""
+
+MEMORY = 1.5e9
+"""What a worker needs of the machine's memory at least. [B]"""
+
+MOST_WORKERS = 8
+"""Workers that are started unasked."""
+
+EXTRA = "pip install 'vftcli[cluster]'"
+"""How Dask comes in."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorkersChoice:
+    """Where many pieces of work are done.
+
+    Attributes:
+        workers: How many processes of this machine; 0 for this process alone, None for as many as
+            it has cores and memory for.
+        scheduler: Address of a Dask scheduler that stands, or None.
+        tls: Files of the authority's certificate, the own certificate and its key, or None.
+        memory: Bytes that a worker of this machine may take before it is ended, None for its share.
+        ship: Whether logs are sent to workers that do not see the files, and results sent back.
+
+    Raises:
+        ParameterError: If these contradict one another.
+    """
+
+    workers: int | None = None
+    scheduler: str | None = None
+    tls: tuple[Path, Path, Path] | None = None
+    memory: int | None = None
+    ship: bool = False
+
+    def __post_init__(self) -> None:
+        if self.scheduler is not None:
+            self._check_address(self.scheduler)
+        elif self.ship or self.tls is not None:
+            raise ParameterError(
+                "--ship and --tls-… are for the workers of a cluster; add --scheduler ADDRESS"
+            )
+        if not self.in_process and not is_installed():
+            raise ParameterError(f"--workers and --scheduler need Dask: {EXTRA}, or --workers 0")
+
+    def _check_address(self, address: str) -> None:
+        if not ADDRESS.fullmatch(address):
+            raise ParameterError(
+                f"--scheduler {address!r} is no address, as tcp://host:8786 or tls://host:8786"
+            )
+        if address.startswith("tls") != (self.tls is not None):
+            raise ParameterError(
+                "tls:// and --tls-ca, --tls-cert, --tls-key (all three) belong together"
+            )
+        if self.workers is not None:
+            raise ParameterError("--scheduler has its own workers; leave --workers out")
+
+    @classmethod
+    def parsed(
+        cls,
+        *,
+        workers: int | None = None,
+        scheduler: str | None = None,
+        ship: bool = False,
+        worker_memory: float | None = None,
+        tls_ca: Path | None = None,
+        tls_cert: Path | None = None,
+        tls_key: Path | None = None,
+    ) -> "WorkersChoice":
+        """The choice that ``--workers``, ``--scheduler`` and what goes with them state.
+
+        Raises:
+            ParameterError: If these contradict one another.
+        """
+        given = [path for path in (tls_ca, tls_cert, tls_key) if path is not None]
+        if len(given) in {1, 2}:
+            raise ParameterError("--tls-ca, --tls-cert and --tls-key are given together")
+        return cls(
+            workers=workers,
+            scheduler=scheduler,
+            tls=(given[0], given[1], given[2]) if given else None,
+            memory=None if worker_memory is None else int(worker_memory * 1e9),
+            ship=ship,
+        )
+
+    @property
+    def in_process(self) -> bool:
+        """Whether the work is done here, one piece after the other."""
+        if self.scheduler is not None:
+            return False
+        return self.workers == 0 or (self.workers is None and not is_installed())
+
+
+def is_installed() -> bool:
+    """Whether Dask's scheduler is there."""
+    return find_spec("distributed") is not None

@@ -1,0 +1,325 @@
+"""Dask distributed: a cluster of this machine's processes, or one that stands; its limits."""
+
+import hashlib
+import logging
+import os
+import signal
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from itertools import count, islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vftcli.batch.choice import MEMORY, MOST_WORKERS, WorkersChoice
+from vftcli.batch.outcome import (
+    KILLED,
+    EngineError,
+    Failure,
+    Outcome,
+    Task,
+    Work,
+    failure_of,
+    perform_all,
+)
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+ANSWER = 10.0
+"""A scheduler has to answer within this time, and to have a worker. [s]"""
+
+LOOK = 5.0
+"""How often the workers are counted while nothing ends. [s]"""
+
+WITHOUT = 60.0
+"""A cluster that has no worker for so long is given up. [s]"""
+
+DEATHS = 3
+"""A task that ended its worker so often is not done again."""
+
+THREADS = {
+    f"{library}_THREADS": "1"
+    for library in ("OPENBLAS_NUM", "OMP_NUM", "MKL_NUM", "POLARS_MAX", "RAYON_NUM")
+}
+"""A worker has one core: threads of a library would wait for each other."""
+
+CONFIG: Mapping[str, object] = {
+    "distributed.scheduler.worker-saturation": 1.0,  # else a neighbour is blamed for a death
+    "distributed.scheduler.allowed-failures": DEATHS - 1,
+    "distributed.admin.large-graph-warning-threshold": "1GB",  # logs that are sent
+    "distributed.worker.memory.target": False,  # results are small: nothing to spill
+    "distributed.worker.memory.spill": False,
+    "distributed.comm.timeouts.connect": f"{ANSWER:g}s",
+    "distributed.nanny.pre-spawn-environ": THREADS,
+    "distributed.worker.preload": [__name__],
+}
+
+PACKAGES = ("vftcli", "numpy", "scipy", "polars", "pin")
+"""Packages that make the numbers, or write them."""
+
+HEAD = 4096
+"""Bytes of a file by which workers are asked whether they see the same. [B]"""
+
+
+def dask_setup(_worker: object) -> None:
+    """Leave Ctrl-C, which every process of a terminal gets, to the one that ends the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def connected(
+    choice: WorkersChoice, seen: Sequence[str], tell: Callable[[str], None]
+) -> Iterator["Client"]:
+    """Start a cluster on this machine for a block, or connect to the one that stands.
+
+    Raises:
+        EngineError: If it does not answer, is of other versions, or does not see the files.
+    """
+    import dask.config
+    import distributed  # noqa: F401 - its settings, which are changed here for a block
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # who dies is told in outcomes
+    with dask.config.set(dict(CONFIG)):
+        if choice.scheduler is None:
+            with local(choice, tell) as client:
+                yield client
+        else:
+            with standing(choice, tell) as client:
+                check_versions(client)
+                if not choice.ship:
+                    check_sight(client, seen)
+                yield client
+
+
+@contextmanager
+def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Client"]:
+    """A cluster of processes on this machine, which nobody else can reach."""
+    from distributed import Client, LocalCluster
+    from distributed.system import MEMORY_LIMIT
+
+    workers = choice.workers or most_workers()
+    memory = choice.memory or int(MEMORY_LIMIT / workers)
+    tell(f"{workers} worker{'s' * (workers > 1)} of {memory / 1e9:.1f} GB")
+    with (
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            # Without an address of its own Dask's HTTP server is open to every network.
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            memory_limit=memory,
+            silence_logs=logging.CRITICAL + 1,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
+
+
+def most_workers() -> int:
+    """As many workers as this machine has cores and memory for, at most `MOST_WORKERS`."""
+    from dask.system import CPU_COUNT
+    from distributed.system import MEMORY_LIMIT
+
+    return max(1, min(int(CPU_COUNT), int(MEMORY_LIMIT / MEMORY), MOST_WORKERS))
+
+
+@contextmanager
+def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Client"]:
+    """The cluster whose scheduler has this address, with one worker at least.
+
+    Raises:
+        EngineError: If it does not answer within `ANSWER`, or has no worker then.
+    """
+    from distributed import Client
+    from distributed.security import Security
+
+    security = None
+    if choice.tls is not None:
+        authority, certificate, key = map(str, choice.tls)
+        security = Security(
+            tls_ca_file=authority,
+            tls_client_cert=certificate,
+            tls_client_key=key,
+            require_encryption=True,
+        )
+    try:
+        client = Client(choice.scheduler, security=security, timeout=ANSWER)
+    except Exception as error:  # noqa: BLE001 - what answers there may be anything
+        raise EngineError(
+            f"no Dask scheduler answers at {choice.scheduler} within {ANSWER:g} s "
+            f"({failure_of(error).line[:120]}); start one with `dask scheduler`, or leave "
+            "--scheduler out"
+        ) from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=ANSWER)
+        except TimeoutError:
+            raise EngineError(
+                f"the scheduler at {choice.scheduler} has no worker; start some with `dask worker "
+                f"{choice.scheduler} --nthreads 1`"
+            ) from None
+        tell(f"{len(client.nthreads())} workers of {choice.scheduler}")
+        yield client
+
+
+def check_versions(client: "Client") -> None:
+    """See that every worker makes the numbers with the same code as this process would.
+
+    Raises:
+        EngineError: If one does not, or lacks it.
+    """
+    here = packages_here()
+    for address, there in client.run(packages_here, on_error="return").items():
+        if not isinstance(there, dict):
+            raise EngineError(
+                f"worker {address} cannot run vftcli ({failure_of(there).line[:120]}); install "
+                f"vftcli {here['vftcli']} there"
+            )
+        for name, version in here.items():
+            if there.get(name) != version:
+                raise EngineError(
+                    f"worker {address} has {name} {there.get(name) or 'not at all'}, here it is "
+                    f"{version}: results would differ. Install the same there"
+                )
+
+
+def packages_here() -> dict[str, str | None]:
+    """Version of Python and of every package that takes part, None for one that is not there."""
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    import vftcli
+
+    found: dict[str, str | None] = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = None
+    return {**found, "vftcli": vftcli.__version__}
+
+
+def check_sight(client: "Client", seen: Sequence[str]) -> None:
+    """See that every worker sees the same files as this process.
+
+    Raises:
+        EngineError: If one does not.
+    """
+    here = heads_of(seen)
+    for address, there in client.run(heads_of, seen, on_error="return").items():
+        for path, head in here.items():
+            if not isinstance(there, dict) or there.get(path) != head:
+                raise EngineError(
+                    f"worker {address} does not see {path} as it is here; share the folder, or "
+                    "send the logs there with --ship"
+                )
+
+
+def heads_of(paths: Sequence[str]) -> dict[str, str]:
+    """What is at each path: the digest of a file's size and first bytes, "folder", or "nothing"."""
+    found = {}
+    for path in paths:
+        found[path] = "folder" if os.path.isdir(path) else "nothing"  # noqa: PTH112
+        with suppress(OSError), Path(path).open("rb") as file:
+            size = str(os.fstat(file.fileno()).st_size).encode()
+            found[path] = hashlib.sha256(size + file.read(HEAD)).hexdigest()
+    return found
+
+
+def outcomes(
+    client: "Client", groups: Iterable[Sequence[Task]], work: Work[Task], *, standing: bool
+) -> Iterator[Outcome[Task]]:
+    """Do the work on a cluster; no more groups are sent than its workers do next.
+
+    Args:
+        client: Who is connected to it.
+        groups: The tasks.
+        work: What is done with each.
+        standing: Whether the cluster's limits are its own: there a neighbour of the task that ended
+            a worker may be blamed, and is tried again.
+    """
+    sent: dict[Future[Any], Sequence[Task]] = {}
+    waiting, again, number = iter(groups), list[Sequence[Task]](), count()
+    most = 2 * sum(client.nthreads().values()) + 2
+
+    def send(group: Sequence[Task]) -> None:
+        key = f"vftcli-{os.getpid()}-{next(number)}"
+        sent[client.submit(perform_all, work, group, key=key, pure=False, retries=0)] = group
+
+    try:
+        while True:
+            for group in islice(waiting, max(0, most - len(sent))):
+                send(group)
+            if not sent and again:
+                # Alone, so that nobody else is blamed.
+                standing = False
+                send(again.pop())
+            if not sent:
+                return
+            for future in first_done(client, list(sent)):
+                group, ended = sent.pop(future), result_of(future)
+                if ended is None:
+                    sent[future] = group  # its worker died with the result: it is done again
+                elif isinstance(ended, Failure) and (len(group) > 1 or standing):
+                    again += [(task,) for task in group]
+                else:
+                    yield from told(group, ended)
+    finally:
+        with suppress(Exception):  # the cluster may be gone
+            client.cancel(list(sent))
+
+
+def told(group: Sequence[Task], ended: "list[Any] | Failure") -> Iterator[Outcome[Task]]:
+    """The outcomes of a group's tasks; only one of a single task can have ended its worker."""
+    if isinstance(ended, Failure):
+        yield Outcome(group[0], failure=ended)
+        return
+    for task, each in zip(group, ended, strict=True):
+        yield Outcome(task, *each)
+
+
+def first_done(client: "Client", futures: "list[Future[Any]]") -> "list[Future[Any]]":
+    """Wait until any of these ended, and return those that did.
+
+    Raises:
+        EngineError: If the scheduler is gone, or has had no worker for `WITHOUT`.
+    """
+    from concurrent.futures import CancelledError
+
+    from distributed import wait
+
+    idle = 0.0
+    while True:
+        try:
+            done = list(wait(futures, timeout=LOOK, return_when="FIRST_COMPLETED").done)
+        except TimeoutError:
+            idle = 0.0 if client.nthreads() else idle + LOOK
+            if idle >= WITHOUT:
+                raise EngineError(
+                    f"no worker is left for {WITHOUT:g} s; what is done is kept: run the command "
+                    "again when there are some"
+                ) from None
+        except (CancelledError, OSError):
+            raise EngineError(
+                "the connection to the scheduler is lost; what is done is kept: run the command "
+                "again"
+            ) from None
+        else:
+            return done
+
+
+def result_of(future: "Future[Any]") -> "list[Any] | Failure | None":
+    """What a group's tasks made, why they did not end, or None where that is not known yet."""
+    from distributed.scheduler import KilledWorker
+
+    if future.status not in {"finished", "error"}:
+        return None
+    try:
+        made: list[Any] = future.result()
+    except KilledWorker:
+        why = f"its worker died {DEATHS} times: memory, or a crash of a library"
+        return Failure("working", KILLED, why)
+    except Exception as error:  # noqa: BLE001 - that of a worker that cannot even begin
+        return failure_of(error)._replace(stage="starting")
+    return made

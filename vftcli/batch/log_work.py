@@ -1,0 +1,146 @@
+"""The work on one log of a batch: what `--do` asks, written before the task is told done."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from vftcli.analysis import Analysis
+from vftcli.batch.engine import begin
+from vftcli.doctor.examiner import Examiner
+from vftcli.outputs.batch_folder import BatchFolder
+from vftcli.outputs.log.choice import PLAIN, OutputChoice
+from vftcli.pipeline import Analyser, AnalysisChoice, analyse, list_touches, prepared
+from vftcli.readers.estimates import refuse_estimates
+from vftcli.readers.library import Library
+from vftcli.repetition.free_run import Models
+from vftcli.signals.errors import LogError
+from vftcli.signals.parsing import check_known
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogJob:
+    """What is done with every log of a batch.
+
+    Attributes:
+        do: A key of `WRITERS`.
+        choice: What is asked of each log.
+        anyway: Whether results are wanted even where a finding makes them meaningless.
+        written: What is written of each log besides what always is.
+
+    Raises:
+        ParameterError: If there is no such thing to do.
+    """
+
+    do: str
+    choice: AnalysisChoice
+    anyway: bool = False
+    written: OutputChoice = PLAIN
+
+    def __post_init__(self) -> None:
+        check_known(self.do, tuple(WRITERS), f"--do {self.do!r}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogTask:
+    """One log of a batch.
+
+    Attributes:
+        job: What is done with it.
+        folder: Where the batch is written, from the root.
+        command: The command line, for the records.
+        path: The log's file or folder, from the root.
+        episode: Its episode, None for a file of one recording.
+        label: What it is called.
+        key: What its result is kept under.
+        sha256: Of its file's bytes; "" for several files.
+        told_path: Its path where the user has it, if it was sent.
+    """
+
+    job: LogJob
+    folder: Path
+    command: str
+    path: Path
+    episode: int | None
+    label: str
+    key: str
+    sha256: str
+    told_path: Path | None = None
+
+
+def work_on_log(task: LogTask) -> None:
+    """Analyse a log and write its result, unless it is there.
+
+    Raises:
+        VftError: If it cannot be analysed or written.
+    """
+    folder = BatchFolder(task.folder)
+    if folder.row_file(task.key).exists():
+        return
+    analysis = analysed(task)
+    begin("writing")
+    WRITERS[task.job.do](folder.result(task.key), analysis, task)
+    from vftcli.batch.rows import rows_of
+
+    folder.put_rows(task.key, rows_of(analysis, task.key))
+
+
+def analysed(task: LogTask) -> Analysis:
+    """The log as its job asks, as the command of that name alone would analyse it.
+
+    Raises:
+        VftError: If it cannot be read or analysed, or is not what it was.
+    """
+    begin("reading")
+    choice = replace(
+        task.job.choice,
+        read=replace(task.job.choice.read, episode=task.episode, all_episodes=False),
+        library=Library([task.path]),
+        examiner=Examiner(anyway=task.job.anyway),
+    )
+    if choice.read.columns is None:
+        refuse_estimates(task.path)
+    recording = choice.library.open(task.path, choice.read)
+    if task.sha256 and recording.source.sha256 != task.sha256:
+        raise LogError(f"{task.path} was changed while the batch ran; run the command again")
+    source = replace(recording.source, label=task.label, path=task.told_path or task.path)
+    recording = replace(recording, source=source)
+    begin("analysing")
+    work: Analyser = list_touches if task.job.do == "contacts" else analyse
+    return work(*prepared(recording, choice), choice, Models())
+
+
+def write_estimates(folder: Path, analysis: Analysis, task: LogTask) -> None:
+    """What `vftcli estimate` writes."""
+    from vftcli.outputs.log.estimates import write_estimate_folder
+
+    write_estimate_folder(folder, analysis, task.command, task.job.written, force=True)
+
+
+def write_page(folder: Path, analysis: Analysis, task: LogTask) -> None:
+    """What `vftcli report` writes."""
+    from vftcli.outputs.log.report import write_report
+
+    written = task.job.written
+    write_report(folder, analysis, command=task.command, force=True, choice=written)
+
+
+def write_contacts(folder: Path, analysis: Analysis, _task: LogTask) -> None:
+    """The list as `vftcli contacts` prints it, as JSON and CSV."""
+    from vftcli.outputs.files import OutputFolder
+    from vftcli.outputs.log.report import CONTACTS, put_contacts
+
+    with OutputFolder(folder, True, CONTACTS) as files:
+        put_contacts(files, "", [analysis])
+
+
+def write_nothing(_folder: Path, _analysis: Analysis, _task: LogTask) -> None:
+    """Nothing: the errors are the rows."""
+
+
+WRITERS: dict[str, Callable[[Path, Analysis, LogTask], None]] = {
+    "estimate": write_estimates,
+    "compare": write_nothing,
+    "report": write_page,
+    "contacts": write_contacts,
+}
+"""What is done with a log → what it writes beside its rows."""

@@ -1,0 +1,106 @@
+"""Outcome: how a piece of work ended, and what it took; an error is an outcome like any other."""
+
+import os
+import socket
+import time
+from collections.abc import Callable, Sequence
+from contextvars import ContextVar
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from vftcli.signals.errors import VftError
+
+Task = TypeVar("Task")
+
+Work = Callable[[Task], Any]
+"""What is done with each task; what it returns is small, and can be pickled."""
+
+KILLED = "KilledWorker"
+"""Error type of a task whose worker died each time."""
+
+_stage: ContextVar[str] = ContextVar("stage", default="")
+
+
+class EngineError(VftError):
+    """The engine does not answer, or its workers cannot do the work."""
+
+
+class Failure(NamedTuple):
+    """Why a task was not done.
+
+    Attributes:
+        stage: What was being done, as the work called it with `begin`.
+        type: Name of the error's class.
+        line: What it says, on one line.
+    """
+
+    stage: str
+    type: str
+    line: str
+
+
+class Effort(NamedTuple):
+    """What a task took, and where.
+
+    Attributes:
+        started: When it began, on the clock of where it ran. [s since 1970]
+        seconds: Time from then to its end. [s]
+        cpu_seconds: Time of its thread on a processor. [s]
+        place: Host and process.
+    """
+
+    started: float
+    seconds: float
+    cpu_seconds: float
+    place: str
+
+
+class Outcome(NamedTuple, Generic[Task]):
+    """How a task ended.
+
+    Attributes:
+        task: The task.
+        value: What the work returned, None if it failed.
+        failure: Why it failed, or None.
+        effort: What it took; None of a task whose worker died.
+    """
+
+    task: Task
+    value: Any = None
+    failure: Failure | None = None
+    effort: Effort | None = None
+
+
+def begin(stage: str) -> None:
+    """Say what the work does now; a failure is told with it."""
+    _stage.set(stage)
+
+
+def perform_all(
+    work: Work[Task], tasks: Sequence[Task]
+) -> list[tuple[Any, Failure | None, Effort]]:
+    """Do the work on each task of a group; this is what runs in a worker."""
+    return [perform(work, task) for task in tasks]
+
+
+def perform(work: Work[Task], task: Task) -> tuple[Any, Failure | None, Effort]:
+    """Do the work on one task: what it returned, why it failed or None, what it took."""
+    begin("starting")
+    started, wall, cpu = time.time(), time.monotonic(), time.thread_time()
+    value, failure = None, None
+    try:
+        value = work(task)
+    except Exception as error:  # noqa: BLE001 - one log must not stop the others
+        failure = failure_of(error)
+    took = Effort(
+        started,
+        time.monotonic() - wall,
+        time.thread_time() - cpu,
+        f"{socket.gethostname()}:{os.getpid()}",
+    )
+    return value, failure, took
+
+
+def failure_of(error: BaseException) -> Failure:
+    """What an error says, on one line, at the stage that was begun last."""
+    words = " ".join(str(error).split()) or "no words"
+    return Failure(_stage.get(), type(error).__name__, words)

@@ -1,0 +1,338 @@
+"""A batch: every log of a collection done once, on an engine, and gathered in one table."""
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from vftcli.batch.choice import WorkersChoice
+from vftcli.batch.engine import Effort, Failure, Outcome, run_tasks
+from vftcli.batch.keys import content_digest, key_of, options_digest, with_files
+from vftcli.batch.log_work import LogJob, LogTask, work_on_log
+from vftcli.batch.rows import SCHEMA
+from vftcli.batch.shipping import Parcel, packed, work_on_parcel
+from vftcli.outputs.batch_folder import FAILED, BatchFolder
+from vftcli.outputs.log.run_record import versions
+from vftcli.outputs.page.batch_page import batch_lines, render_batch
+from vftcli.outputs.page.index_page import IndexLine
+from vftcli.readers.collection import LogEntry
+from vftcli.readers.library import absolute, labelled
+
+if TYPE_CHECKING:
+    import polars as pl
+
+SMALL = 300_000
+"""Logs of fewer bytes go to a worker together. [B]"""
+
+TOGETHER = 64
+"""At most so many."""
+
+SHARES = 8
+"""A worker gets at least so many groups, so that all end at about the same time."""
+
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BatchPlan:
+    """What a batch is to do.
+
+    Attributes:
+        logs: The logs.
+        job: What is done with each.
+        folder: Where it is written.
+        workers: Where it is done.
+        command: The command line, for the records.
+        retry_failed: Whether logs that failed in an earlier run are done again.
+        max_failures: How many logs may fail before the rest is left, None for all.
+        force: Whether a batch with other options may be gone on with.
+        tell: Who is told in a sentence what is done.
+        progress: Who is told after each log how many are done.
+    """
+
+    logs: Sequence[LogEntry]
+    job: LogJob
+    folder: Path
+    workers: WorkersChoice
+    command: str
+    retry_failed: bool = False
+    max_failures: int | None = None
+    force: bool = False
+    tell: Tell = field(repr=False)
+    progress: "Callable[[BatchCount], None]" = field(repr=False)
+
+
+class BatchCount(NamedTuple):
+    """How far a batch is.
+
+    Attributes:
+        logs: How many logs there are.
+        before: How many of them an earlier run did.
+        done: How many this run did.
+        failed: How many failed, in this run or, not tried again, before.
+        seconds: Time since its start. [s]
+    """
+
+    logs: int
+    before: int = 0
+    done: int = 0
+    failed: int = 0
+    seconds: float = 0.0
+
+    @property
+    def left(self) -> int:
+        """How many are still to be done."""
+        return self.logs - self.before - self.done - self.failed
+
+
+class _Run:
+    """One run of a plan: which logs are done, which failed, what each took."""
+
+    def __init__(self, plan: BatchPlan) -> None:
+        self.plan = plan
+        self.folder = BatchFolder(absolute(plan.folder))
+        choice = with_files(plan.job.choice, absolute)
+        self.job = replace(plan.job, choice=choice)
+        self.options = options_digest(self.job)
+        names = labelled(entry.path for entry in plan.logs)
+        self.labels = [
+            names[e.path] if e.episode is None else f"{names[e.path]} episode {e.episode}"
+            for e in plan.logs
+        ]
+        self.keys: dict[int, str] = {}
+        self.failures: dict[int, Failure] = {}
+        self.efforts: dict[str, Effort] = {}
+        self.before, self.began = 0, time.monotonic()
+        self.done: set[str] = set()
+
+    def waiting(self) -> Iterator[tuple[int, LogTask]]:
+        """The logs that are to be done, with their numbers; those of equal bytes once."""
+        failed = self.folder.keys(FAILED)
+        there, begun = self.folder.keys(), set[str]()
+        for number, entry in enumerate(self.plan.logs):
+            try:
+                content = content_digest(entry.files)
+            except OSError as error:
+                line = f"{entry.path}: cannot be read ({error.strerror})"
+                self.failures[number] = Failure("finding", type(error).__name__, line)
+                continue
+            key = self.keys[number] = key_of(content, self.options, entry.episode)
+            if key in there:
+                self.before += 1
+                continue
+            if key in failed and not self.plan.retry_failed:
+                self.failures[number] = Failure(**self.folder.failure(key))
+                continue
+            if key in begun:
+                continue
+            begun.add(key)
+            yield (
+                number,
+                LogTask(
+                    job=self.job,
+                    folder=self.folder.path,
+                    command=self.plan.command,
+                    path=entry.path,
+                    episode=entry.episode,
+                    label=self.labels[number],
+                    key=key,
+                    sha256=content if entry.files == (entry.path,) else "",
+                ),
+            )
+
+    def grouped(self, waiting: Iterable[tuple[int, LogTask]]) -> Iterator[list[LogTask | Parcel]]:
+        """The same in groups: small logs go together."""
+        workers = max(1, self.plan.workers.workers or 4)
+        most = max(1, min(TOGETHER, len(self.plan.logs) // (SHARES * workers)))
+        group: list[LogTask | Parcel] = []
+        room = float(most)
+        for number, task in waiting:
+            entry = self.plan.logs[number]
+            share = 1.0 if entry.episode is not None or size_of(entry) < SMALL else float(most)
+            if group and share > room:
+                yield group
+                group, room = [], float(most)
+            group.append(packed(task, entry.files) if self.plan.workers.ship else task)
+            room -= share
+        if group:
+            yield group
+
+    def work(self) -> None:
+        """Do what is left of the batch.
+
+        Raises:
+            EngineError: If the cluster does not answer, or cannot do the work.
+        """
+        groups = self.grouped(self.waiting())
+        first = next(groups, None)
+        if first is None:
+            self.plan.progress(self.count())
+            return
+        ship, seen = self.plan.workers.ship, [str(self.folder.path), *self.named(first)]
+
+        def every() -> Iterator[list[LogTask | Parcel]]:
+            yield first
+            yield from groups
+
+        ended = run_tasks(
+            every(), done_there if ship else done_here, self.plan.workers, self.plan.tell, seen
+        )
+        # A batch that stops early takes its cluster down at once.
+        with closing(ended):  # type: ignore[type-var]
+            for outcome in ended:
+                self.take(outcome)
+                self.plan.progress(self.count())
+                most = self.plan.max_failures
+                if most is not None and len(self.failures) >= most:
+                    self.plan.tell(f"stopped after {len(self.failures)} failures")
+                    return
+
+    def named(self, group: Sequence[LogTask | Parcel]) -> list[str]:
+        """The files that every worker has to see: the first log, and what the options name."""
+        found: list[str] = []
+
+        def noted(path: Path) -> Path:
+            found.append(str(path))
+            return path
+
+        with_files(self.job.choice, noted)
+        return [*found, *(str(task.path) for task in group[:1] if isinstance(task, LogTask))]
+
+    def take(self, outcome: "Outcome[LogTask | Parcel]") -> None:
+        """Keep what a log came to: its files where they were sent, why it failed, what it took."""
+        task = outcome.task.task if isinstance(outcome.task, Parcel) else outcome.task
+        if outcome.effort is not None:
+            self.efforts[task.key] = outcome.effort
+        failure = outcome.failure
+        if failure is None:
+            for name, content in (outcome.value or {}).items():
+                self.folder.put(name, content)
+            self.folder.forget(task.key)
+            self.done.add(task.key)
+            return
+        for number in [n for n, key in self.keys.items() if key == task.key]:
+            self.failures[number] = failure
+        # A log that vanished, or changed, may be there again: that is no property of its bytes.
+        if task.path.exists() and failure.stage != "sending":
+            self.folder.put_failure(task.key, failure._asdict())
+
+    def count(self) -> BatchCount:
+        """How far it is."""
+        return BatchCount(
+            logs=len(self.plan.logs),
+            before=self.before,
+            done=len(self.done),
+            failed=len(self.failures),
+            seconds=time.monotonic() - self.began,
+        )
+
+    def gather(self) -> "tuple[pl.DataFrame, BatchCount]":
+        """Write the tables, the page and the record of what every log took."""
+        import polars as pl
+
+        there = self.folder.keys()
+        finished = [n for n, key in sorted(self.keys.items()) if key in there]
+        logs = pl.DataFrame(
+            {
+                "log": [self.labels[n] for n in finished],
+                "episode": [self.plan.logs[n].episode for n in finished],
+                "key": [self.keys[n] for n in finished],
+            },
+            schema={"log": pl.String, "episode": pl.Int64, "key": pl.String},
+        )
+        failures = pl.DataFrame(
+            [
+                (self.labels[n], self.keys.get(n), *failure)
+                for n, failure in sorted(self.failures.items())
+            ],
+            schema={
+                "log": pl.String,
+                "key": pl.String,
+                "stage": pl.String,
+                "error": pl.String,
+                "line": pl.String,
+            },
+            orient="row",
+        )
+        missing = set(range(len(self.plan.logs))) - set(finished) - self.failures.keys()
+        count = self.count()._replace(done=len(finished) - self.before)
+        pages, lines = self.pages(finished), list[IndexLine]()
+
+        def noted() -> "Iterator[pl.DataFrame]":
+            for piece in self.folder.gather(logs, SCHEMA):
+                lines.extend(batch_lines(piece, pages))
+                yield piece
+
+        self.folder.put_gathered(
+            noted(),
+            failures,
+            lambda: render_batch(lines, failures),
+            self.record(count, len(missing)),
+        )
+        return failures, count
+
+    def pages(self, finished: Sequence[int]) -> dict[str, str]:
+        """Label of a log → its own page, where it has one."""
+        if self.job.do != "report":
+            return {}
+        return {self.labels[n]: f"{self.folder.place(self.keys[n])}/index.html" for n in finished}
+
+    def record(self, count: BatchCount, left: int) -> dict[str, Any]:
+        """What `run.json` holds: all that depends on when and where a log was done."""
+        label_of = {key: self.labels[n] for n, key in self.keys.items()}
+        spans = [(e.started, e.started + e.seconds) for e in self.efforts.values()]
+        return {
+            "command": self.plan.command,
+            "versions": versions(),
+            "do": self.job.do,
+            "options_sha256": self.options,
+            "logs": count.logs,
+            "done_before": count.before,
+            "done_now": count.done,
+            "failed": count.failed,
+            "not_begun": left,
+            "in_task_s": sum(e.seconds for e in self.efforts.values()),
+            "in_task_cpu_s": sum(e.cpu_seconds for e in self.efforts.values()),
+            "first_to_last_s": max(b for _, b in spans) - min(a for a, _ in spans)
+            if spans
+            else None,
+            "tasks": [
+                {"log": label_of[key], "key": key, **effort._asdict()}
+                for key, effort in self.efforts.items()
+            ],
+        }
+
+
+def run_batch(plan: BatchPlan) -> "tuple[pl.DataFrame, BatchCount]":
+    """Do what is left of a batch, and gather all of it.
+
+    Returns:
+        Why logs failed (columns log, key, stage, error, line), and how many did.
+
+    Raises:
+        OutputError: If the folder is another's or cannot be written.
+        EngineError: If the cluster does not answer, or cannot do the work.
+    """
+    run = _Run(plan)
+    record = {"command": plan.command, "do": plan.job.do, "versions": versions()}
+    with run.folder.opened(run.options, record, force=plan.force):
+        run.work()
+        return run.gather()
+
+
+def done_here(task: "LogTask | Parcel") -> None:
+    """Do the work on a log that the worker sees."""
+    if isinstance(task, LogTask):
+        work_on_log(task)
+
+
+def done_there(task: "LogTask | Parcel") -> dict[str, bytes]:
+    """Do the work on a log that was sent."""
+    return work_on_parcel(task) if isinstance(task, Parcel) else {}
+
+
+def size_of(entry: LogEntry) -> int:
+    """Bytes of a log's files, 0 of those that are gone."""
+    return sum(path.stat().st_size for path in entry.files if path.exists())

@@ -1,0 +1,123 @@
+"""`vftcli annotate`: a dataset becomes a copy with forces in it."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from vftcli.cli import options as opt
+from vftcli.cli.batch import WorkerOptions
+from vftcli.cli.bundles import Bundle, flag, taken_apart
+from vftcli.cli.help import WRITE
+from vftcli.cli.log_options import ReadOptions, RobotOptions
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from vftcli.batch.annotation import ForceChoice
+
+
+class ColumnOptions(Bundle):
+    """Which columns are added, and how the copy is made."""
+
+    GROUP = WRITE
+
+    sd: bool = flag("--sd", "Also the observer's own standard deviation of each torque.")
+    contact: bool = flag(
+        "--contact",
+        "Also 1 in a listed contact, else 0. The list sees the complete episode: a label, no "
+        "causal input.",
+    )
+    allow_missing: bool = flag(
+        "--allow-missing",
+        "Write 0 where nothing can be told. Columns …_valid say where; without it, such a frame "
+        "stops the run.",
+    )
+    copy: bool = flag("--copy", "Copy videos too. They are linked else, where that can be.")
+
+
+@taken_apart
+def annotate_dataset(
+    dataset: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DATASET", help="A LeRobot folder, a DROID folder, or HDF5 episodes."
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="COPY", help="Folder of the copy.", rich_help_panel=WRITE
+        ),
+    ],
+    reading: ReadOptions,
+    robot: RobotOptions,
+    observers: opt.ObserverOptions,
+    wrench: opt.WrenchOptions,
+    columns: ColumnOptions,
+    workers: WorkerOptions,
+    anyway: opt.AnywayOptions,
+    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
+    json: opt.Json = False,
+    force: opt.Force = False,
+) -> None:
+    """Write the forces of every frame into a copy of a dataset.
+
+    Adds observation.external_torque, with --wrench observation.wrench, and their statistics; what
+    was done stands in COPY/meta/vftcli.json. A run that was cut off goes on where it stopped.
+
+    Example: vftcli annotate fixtures/panda_episodes -o forces
+    """
+    from vftcli.batch.annotated_copy import CopyChoice, annotate
+    from vftcli.batch.annotation import USUAL, ForceChoice
+    from vftcli.cli.console import command_line, detail, say, say_json, stages
+
+    asked = ForceChoice(
+        read=reading.choice(),
+        robot=robot.choice(),
+        observers=observers.changed(observer=observers.observer or [USUAL]).choice(),
+        wrench=wrench.choice(),
+        sd=columns.sd,
+        contact=columns.contact,
+        anyway=anyway.anyway,
+    )
+    how = CopyChoice(allow_missing=columns.allow_missing, link=not columns.copy, force=force)
+    record = annotate(
+        dataset,
+        output,
+        asked,
+        how,
+        workers.choice(),
+        command=command_line(),
+        tell=detail,
+        progress=stages(),
+    )
+    if json:
+        say_json(record)
+        return
+    for line in told_lines(record, asked):
+        say(line)
+    say(f"wrote {output}")
+
+
+def told_lines(record: "Mapping[str, Any]", asked: "ForceChoice") -> list[str]:
+    """What was written, and what a user of it should know."""
+    done, frames = record["status"], sum(one.get("frames", 0) for one in record["episodes"])
+    count = ", ".join(f"{n} {status}" for status, n in done.items())
+    kind = "causal" if record["causal"] else "NOT causal: it looks ahead, no policy can run on it"
+    delay = record["transient_frames"]
+    lines = [
+        f"{sum(done.values())} episodes ({count}), {frames} frames, {record['robot']['name']}, "
+        f"{asked.observer}, {kind}",
+        *(
+            f"  {name}: {column['units']}, {column['frame']}"
+            for name, column in record["columns"].items()
+        ),
+        f"  the first {delay} frames of an episode still show where the observer started",
+    ]
+    clocks = dict.fromkeys(one["clock"] for one in record["episodes"] if "clock" in one)
+    lines += [f"  clock: {clock}" for clock in clocks]
+    overridden = sorted({code for one in record["episodes"] for code in one.get("overridden", ())})
+    if overridden:
+        lines.append(f"MEANINGLESS unless this is wrong (--anyway): {', '.join(overridden)}")
+    return lines

@@ -1,0 +1,192 @@
+"""`vftcli batch`: the same question to many logs."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vftcli.cli import options as opt
+from vftcli.cli.bundles import Bundle, ChoiceBundle, flag, option, taken_apart
+
+if TYPE_CHECKING:
+    from vftcli.batch.choice import WorkersChoice
+    from vftcli.batch.run import BatchCount
+
+Places = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG|FOLDER...",
+        help="Logs, folders, data sets; an episode is a log.",
+    ),
+]
+EVERY = 2.0
+"""How often a line of progress is printed where nobody watches. [s]"""
+
+SOME_FAILED = 3
+"""Exit code where some logs failed, and others did not."""
+
+
+class WorkerOptions(ChoiceBundle["WorkersChoice"]):
+    """Where the work is done."""
+
+    HOME = "batch.choice:WorkersChoice"
+
+    workers: int | None = option(
+        "--workers",
+        "N",
+        "Processes of this machine. Default: one a core, at most 8. 0 does one log after the other "
+        "in this process, and needs no Dask.",
+        min=0,
+        max=4096,
+    )
+    scheduler: str | None = option(
+        "--scheduler",
+        "ADDRESS",
+        "A Dask cluster that stands. As tcp://host:8786 or tls://host:8786.",
+    )
+    ship: bool = flag(
+        "--ship",
+        "Send the logs to its workers. For those that do not see the files, at most 64 MB.",
+    )
+    worker_memory: float | None = option(
+        "--worker-memory",
+        "GB",
+        "What a process of this machine may take before it is ended; default: its share.",
+        seldom=True,
+        min=0.1,
+    )
+    tls_ca: Path | None = option(
+        "--tls-ca", "FILE", "Certificate of the authority, for tls://.", seldom=True
+    )
+    tls_cert: Path | None = option(
+        "--tls-cert", "FILE", "Own certificate, for tls://.", seldom=True
+    )
+    tls_key: Path | None = option("--tls-key", "FILE", "Its key, for tls://.", seldom=True)
+
+
+class ResumeOptions(Bundle):
+    """Which logs are done, in a second run and at all."""
+
+    limit: int | None = option("--limit", "N", "Only the first N logs.", seldom=True, min=1)
+    retry_failed: bool = flag("--retry-failed", "Also logs that failed in an earlier run.")
+    max_failures: int | None = option(
+        "--max-failures", "N", "Stop when so many logs failed.", seldom=True, min=1
+    )
+
+
+@taken_apart
+def batch(
+    logs: Places,
+    output: opt.Folder,
+    do: Annotated[
+        str,
+        typer.Option(
+            "--do",
+            metavar="COMMAND",
+            help="estimate, compare, report or contacts.",
+        ),
+    ],
+    workers: WorkerOptions,
+    resume: ResumeOptions,
+    reference: opt.ReferenceOptions,
+    analysis: opt.AnalysisOptions,
+    also: opt.ExtraOptions,
+    force: opt.Force = False,
+) -> None:
+    """Ask many logs the same, on every core or on a cluster.
+
+    Writes DIR/batch.parquet, failures.parquet, index.html and run.json; a second run does no
+    finished log again. Exit code 3: some failed.
+
+    Example: vftcli batch fixtures/ur5_t*.csv --robot ur5 --do estimate -o out
+    """
+    from vftcli.batch.kinds import for_comparison, for_estimates
+    from vftcli.batch.log_work import LogJob
+    from vftcli.batch.run import BatchPlan, run_batch
+    from vftcli.cli.console import command_line, detail, say
+    from vftcli.cli.progress import STAGES
+    from vftcli.doctor.examiner import Examiner
+    from vftcli.readers.collection import LogCollection
+    from vftcli.readers.library import Library
+    from vftcli.signals.errors import LogError, ParameterError
+    from vftcli.signals.progress import no_stage
+
+    choice = analysis.choice(Library(), reference)
+    if do == "compare" and choice.reference is None:
+        raise ParameterError("--do compare needs --reference: two-cycle, sensor, vendor, zero, …")
+    narrowed = {"estimate": for_estimates, "compare": for_comparison}
+    choice = narrowed[do](choice) if do in narrowed else choice
+    # These are of each worker.
+    choice = replace(choice, library=Library(), examiner=Examiner(), progress=no_stage)
+    job = LogJob(do=do, choice=choice, anyway=analysis.anyway.anyway, written=also.choice())
+    engine = workers.choice()
+    collection = LogCollection(choice.read, output)
+    found = list(collection.find(logs))[: resume.limit]
+    if collection.passed:
+        detail(f"note: {len(collection.passed)} files of the folders are no logs")
+    if not found:
+        raise LogError(
+            f"no log in {', '.join(map(str, logs[:3]))}; give files, folders or patterns of logs"
+        )
+    plan = BatchPlan(
+        logs=found,
+        job=job,
+        folder=output,
+        workers=engine,
+        command=command_line(),
+        retry_failed=resume.retry_failed,
+        max_failures=resume.max_failures,
+        force=force,
+        tell=say,
+        progress=progress_line(),
+    )
+    failures, count = run_batch(plan)
+    STAGES.end()
+    for name, reason in failures.select("log", "line").head(MOST_TOLD).iter_rows():
+        say(f"error: {name}: {reason}")
+    if failures.height > MOST_TOLD:
+        say(f"… {failures.height - MOST_TOLD} more in failures.parquet")
+    say(
+        f"{count.logs} logs: {count.done} done now, {count.before} before, {count.failed} failed; "
+        f"{output / 'index.html'}, {output / 'batch.parquet'}"
+    )
+    if count.failed:
+        raise typer.Exit(SOME_FAILED if count.done + count.before else 1)
+
+
+MOST_TOLD = 10
+"""Failures that are printed."""
+
+
+def progress_line() -> "Callable[[BatchCount], None]":
+    """Who shows how far the batch is: a line that changes on a terminal, else one now and then."""
+    import sys
+    import time
+
+    from vftcli.cli.console import say
+    from vftcli.cli.progress import STAGES
+
+    watched, last = sys.stderr.isatty(), time.monotonic()
+
+    def told(count: "BatchCount") -> None:
+        nonlocal last
+        rate = count.done / count.seconds if count.seconds else 0.0
+        words = f"{count.logs - count.left}/{count.logs} logs, {count.failed} failed"
+        if rate and count.left:
+            words += f", {rate:.2g} logs/s, {duration(count.left / rate)} left"
+        if watched:
+            STAGES.begin(words, (count.logs - count.left) / max(count.logs, 1))
+        elif time.monotonic() - last > EVERY and count.left:
+            last = time.monotonic()
+            say(words)
+
+    return told
+
+
+def duration(seconds: float) -> str:
+    """A time in seconds, minutes or hours."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -1,0 +1,167 @@
+"""Copies of datasets: made beside their place, renamed when all is there, taken up after a stop."""
+
+import os
+import shutil
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.outputs.files import unwritable
+from vftcli.outputs.partial import check_writable, held
+from vftcli.signals.errors import OutputError
+
+RECORD = Path("meta", "vftcli.json")
+"""What a copy tells of how it was made."""
+
+WORK = ".vftcli"
+"""Folder, in an unfinished copy, of what is done so far."""
+
+FILMS = frozenset({".mp4", ".svo", ".svo2", ".mkv", ".webm", ".avi", ".png", ".jpg", ".jpeg"})
+"""Endings of files that are large, and that nobody edits in place: they are linked."""
+
+
+def partial_of(copy: Path) -> Path:
+    """Where a copy is made."""
+    return copy.with_name(f"{copy.name}.partial")
+
+
+def check_copy(dataset: Path, copy: Path, *, force: bool) -> None:
+    """See before anything is computed that a copy may be made at a path.
+
+    Raises:
+        OutputError: If it is the dataset, inside it or around it, or exists without `force`, or is
+            none that this command made.
+    """
+    source, target = dataset.resolve(), copy.resolve()
+    if source == target or source in target.parents or target in source.parents:
+        where = "is" if source == target else "and the dataset are one inside the other:"
+        raise OutputError(f"{copy} {where} {dataset}; give another -o, outside of the dataset")
+    if copy.is_symlink() or (copy.exists() and not copy.is_dir()):
+        raise OutputError(f"{copy} is no folder; -o needs the name of a new one")
+    if copy.exists() and any(copy.iterdir()):
+        if not force:
+            raise OutputError(f"{copy} exists; give another -o, or --force to overwrite it")
+        if not (copy / RECORD).is_file():
+            raise OutputError(
+                f"{copy} is no copy that annotate made (it has no {RECORD}), and --force removes "
+                "no other folder; give another -o"
+            )
+    try:
+        check_writable(next(p for p in target.parents if p.exists()))
+    except OSError as error:
+        raise unwritable(copy, error) from None
+
+
+@contextmanager
+def unfinished(copy: Path, key: str) -> Iterator[Path]:
+    """The folder in which a copy is made: that of an earlier run of the same key goes on.
+
+    It stays if the block fails after something was done, to go on from; if the block ends well it
+    takes the copy's place, whatever was there before.
+
+    Args:
+        copy: Where the copy shall be.
+        key: What the work depends on beside the dataset.
+
+    Raises:
+        OutputError: If another run is at it, or it cannot be written.
+    """
+    partial = partial_of(copy)
+    work = partial / WORK
+    try:
+        work.mkdir(parents=True, exist_ok=True)
+        with held(work, wait=False):
+            state = work / "key"
+            if not state.is_file() or state.read_text(encoding="utf-8") != key:
+                emptied(partial, keep=work)
+                state.write_text(key, encoding="utf-8")
+            try:
+                yield partial
+            except BaseException:
+                if not any(path.is_file() and path != state for path in partial.rglob("*")):
+                    shutil.rmtree(partial, ignore_errors=True)
+                raise
+            shutil.rmtree(work)
+            take_place(partial, copy)
+    except BlockingIOError:
+        raise OutputError(f"another run writes {copy}; wait for it, or give another -o") from None
+    except OSError as error:
+        if error.filename is None or str(error.filename).startswith(str(copy)):
+            raise unwritable(copy, error) from None
+        raise
+
+
+def emptied(folder: Path, keep: Path) -> None:
+    """Remove all of a folder that an earlier run left, one folder stays but is emptied too."""
+    for path in (*folder.iterdir(), *keep.iterdir()):
+        if path == keep:
+            continue
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+
+
+def take_place(partial: Path, copy: Path) -> None:
+    """Give a finished copy its name; an earlier copy under that name goes."""
+    earlier = copy.with_name(f"{copy.name}.earlier")
+    shutil.rmtree(earlier, ignore_errors=True)
+    if copy.exists():
+        copy.rename(earlier)
+    try:
+        partial.rename(copy)
+    except OSError:
+        if earlier.exists():
+            earlier.rename(copy)
+        raise
+    shutil.rmtree(earlier, ignore_errors=True)
+
+
+@contextmanager
+def finished(path: Path) -> Iterator[Path]:
+    """Where to write a file of a copy: it has its name when the block ends well."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f"{path.name}.partial")
+    yield temporary
+    temporary.replace(path)
+
+
+def put_rows(path: Path, **arrays: NDArray[Any]) -> None:
+    """Put arrays into a file that is whole or not there."""
+    with finished(path) as temporary, temporary.open("wb") as file:
+        np.savez(file, allow_pickle=False, **arrays)
+
+
+def stored_rows(path: Path) -> dict[str, NDArray[Any]]:
+    """The arrays of such a file."""
+    with np.load(path, allow_pickle=False) as held:
+        return {name: held[name] for name in held.files}
+
+
+def copy_others(folder: Path, partial: Path, done: Collection[Path], *, link: bool) -> None:
+    """Bring everything else of a dataset into a copy; films are linked where that can be.
+
+    Args:
+        folder: The dataset's.
+        partial: The copy's.
+        done: Files that are there already, or will be, by their paths in the folder.
+        link: Whether a film may be a second name of the dataset's file.
+    """
+    for place, _, names in os.walk(folder, followlinks=True):
+        inside = Path(place).relative_to(folder)
+        for name in sorted(names):
+            if inside / name in done:
+                continue
+            target = partial / inside / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.unlink(missing_ok=True)
+            source = (Path(place) / name).resolve()
+            if link and target.suffix.lower() in FILMS:
+                with suppress(OSError):  # another file system, or one without links
+                    os.link(source, target)
+                    continue
+            shutil.copyfile(source, target)

@@ -1,0 +1,90 @@
+"""What is written back into a dataset: columns of forces, a value a frame, and whose they are."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Single = NDArray[np.float32]
+"""Values of a column, as they are written. (frames, width)"""
+
+
+class ForceColumn(NamedTuple):
+    """A column that is added.
+
+    Attributes:
+        name: What it is, as external_torque; where it stands is the dataset's affair.
+        elements: What each of its numbers is, empty for a single one.
+        told: Unit, sign, frame, observer and whether it is causal, for who reads the dataset.
+    """
+
+    name: str
+    elements: tuple[str, ...]
+    told: Mapping[str, Any]
+
+    @property
+    def width(self) -> int:
+        """Numbers a frame."""
+        return max(1, len(self.elements))
+
+
+class DataFile(NamedTuple):
+    """One file of a dataset with the episodes in it.
+
+    Attributes:
+        place: Its path in the dataset's folder.
+        log: What is read to get an episode: the file, or the folder of the whole dataset.
+        episodes: Their numbers, as ``--episode`` takes them.
+    """
+
+    place: Path
+    log: Path
+    episodes: tuple[int, ...]
+
+
+Forces = Mapping[int, Mapping[str, Single]]
+"""Episode → name of a column → its values, a row a frame of the episode."""
+
+Statistics = Mapping[str, NDArray[Any]]
+"""Key of a statistic, as mean → its values. (width,)"""
+
+
+class Dataset(Protocol):
+    """A folder of episodes that a copy is made of."""
+
+    folder: Path
+    has_statistics: bool
+
+    def files(self) -> Iterator[DataFile]:
+        """The data files with their episodes."""
+
+    def frames(self, file: DataFile, number: int) -> int:
+        """How many frames an episode has, also one that cannot be read as a log."""
+
+    def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
+        """Refuse a file that has such columns already.
+
+        Raises:
+            LogError: If it has.
+        """
+
+    def write(
+        self, file: DataFile, columns: Sequence[ForceColumn], forces: Forces, target: Path
+    ) -> None:
+        """Write a data file with the columns added."""
+
+    def finish(
+        self,
+        columns: Sequence[ForceColumn],
+        statistics: Mapping[int, Mapping[str, Statistics]],
+        copy: Path,
+    ) -> None:
+        """Write the descriptions of the copy that tell of its columns.
+
+        Args:
+            columns: The columns that were added.
+            statistics: Episode → name of a column → its statistics.
+            copy: The folder of the copy, where everything else is.
+        """

@@ -1,0 +1,107 @@
+"""HDF5 episodes written back: new data sets beside the positions, in a copy of the file."""
+
+import os
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from vftcli.datasets.episodes import DataFile, ForceColumn, Forces, Statistics
+from vftcli.readers.hdf5 import is_hdf5
+from vftcli.readers.hdf5_layouts import episode_places, episodes_in
+from vftcli.readers.reader import open_log
+from vftcli.signals.errors import LogError
+
+ENDINGS = (".h5", ".hdf5")
+"""Names that files of episodes end with."""
+
+
+def is_hdf5_file(path: Path) -> bool:
+    """Whether a file is HDF5."""
+    return is_hdf5(open_log(path).head)
+
+
+def files_below(folder: Path) -> list[Path]:
+    """The files of such names in a folder, at any depth, in the order of their names."""
+    walked = os.walk(folder, followlinks=True)
+    names = [Path(place) / name for place, _, each in walked for name in each]
+    return sorted(path for path in names if path.suffix.lower() in ENDINGS)
+
+
+class Hdf5Dataset:
+    """HDF5 files of one episode or many: DROID's, ALOHA's, robomimic's, any.
+
+    Args:
+        folder: The folder in which they are, at any depth.
+        only: The only one of them that is meant, or None for all.
+        columns: What ``--columns`` says of them, or None.
+    """
+
+    has_statistics = False
+
+    def __init__(self, folder: Path, only: Path | None = None, columns: str | None = None) -> None:
+        self.folder = folder
+        self._only = only
+        self._columns = columns
+
+    def files(self) -> Iterator[DataFile]:
+        """The files with their episodes, by name."""
+        for path in [self._only] if self._only is not None else files_below(self.folder):
+            yield DataFile(path.relative_to(self.folder), path, tuple(episodes_in(open_log(path))))
+
+    def frames(self, file: DataFile, number: int) -> int:
+        """How many frames an episode has: those of the first data set beside its positions."""
+        import h5py
+
+        path = self.folder / file.place
+        group = episode_places(open_log(path), self._columns)[number]
+        with h5py.File(path, "r") as content:
+            there = content[group or "/"].values()
+            return next(int(each.shape[0]) for each in there if isinstance(each, h5py.Dataset))
+
+    def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
+        """Refuse a file that has such data sets already.
+
+        Raises:
+            LogError: If it has.
+        """
+        import h5py
+
+        path = self.folder / file.place
+        places = episode_places(open_log(path), self._columns)
+        with h5py.File(path, "r") as content:
+            for name in (places[k] + c.name for k in file.episodes for c in columns):
+                if name in content:
+                    raise LogError(f"{path}: has {name} already; annotate the original dataset")
+
+    def write(
+        self, file: DataFile, columns: Sequence[ForceColumn], forces: Forces, target: Path
+    ) -> None:
+        """Copy a file and add the data sets to the copy; the original is never opened to write."""
+        import h5py
+
+        path = self.folder / file.place
+        places = episode_places(open_log(path), self._columns)
+        shutil.copyfile(path, target)
+        target.chmod(0o644)
+        with h5py.File(target, "r+") as content:
+            for number, own in forces.items():
+                for column in columns:
+                    values = own[column.name]
+                    data = content.create_dataset(
+                        places[number] + column.name,
+                        data=values[:, 0] if column.width == 1 else values,
+                        compression="gzip",
+                        shuffle=True,
+                    )
+                    for key, value in column.told.items():
+                        data.attrs[key] = value
+                    if column.elements:
+                        data.attrs["names"] = list(column.elements)
+
+    def finish(
+        self,
+        columns: Sequence[ForceColumn],
+        statistics: Mapping[int, Mapping[str, Statistics]],
+        copy: Path,
+    ) -> None:
+        """Nothing: what there is to tell stands in the files."""

@@ -1,0 +1,277 @@
+"""LeRobot datasets written back: columns, info.json, Parquet metadata and statistics."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vftcli.datasets.episodes import DataFile, ForceColumn, Forces, Statistics
+from vftcli.datasets.statistics import KEYS, pooled
+from vftcli.readers.columnar import EPISODE, guarded
+from vftcli.readers.lerobot import data_file, episodes_told, info_of, text_of
+from vftcli.signals.errors import LogError
+from vftcli.signals.packages import needed
+
+PREFIX = "observation."
+"""What the names of observations begin with."""
+
+DATASET = "a dataset of LeRobot"
+"""What needs pyarrow."""
+
+METADATA = b"huggingface"
+"""Key of a Parquet schema's metadata under which the `datasets` library tells its features."""
+
+
+class LeRobotDataset:
+    """A dataset of version 2 (an episode a file) or 3 (many).
+
+    Attributes:
+        folder: Its folder.
+        has_statistics: Whether statistics of its columns are kept: they are.
+    """
+
+    has_statistics = True
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def files(self) -> Iterator[DataFile]:
+        """The data files with their episodes, in the order of these."""
+        numbers: dict[Path, list[int]] = {}
+        for episode in episodes_told(self.folder):
+            place = data_file(self.folder, episode).relative_to(self.folder)
+            numbers.setdefault(place, []).append(episode.number)
+        for place, own in numbers.items():
+            yield DataFile(place, self.folder, tuple(own))
+
+    def frames(self, file: DataFile, number: int) -> int:
+        """How many frames an episode has."""
+        pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
+
+        path = self.folder / file.place
+        with guarded(path, (pa.ArrowException,)):
+            source = pq.ParquetFile(path)
+            if EPISODE not in source.schema_arrow.names:
+                return int(source.metadata.num_rows)
+            numbers = source.read(columns=[EPISODE]).column(0).to_numpy()
+        return int(np.count_nonzero(numbers == number))
+
+    def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
+        """Refuse a file that has such columns already.
+
+        Raises:
+            LogError: If it has.
+        """
+        pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
+
+        path = self.folder / file.place
+        with guarded(path, (pa.ArrowException,)):
+            there = {*pq.read_schema(path).names, *info_of(self.folder).get("features", {})}
+        for column in columns:
+            if PREFIX + column.name in there:
+                raise LogError(
+                    f"{path}: has {PREFIX}{column.name} already; annotate the original dataset"
+                )
+
+    def write(
+        self, file: DataFile, columns: Sequence[ForceColumn], forces: Forces, target: Path
+    ) -> None:
+        """Write a data file with the columns behind its own; rows and row groups stay as they are.
+
+        Raises:
+            LogError: If an episode of the file has no forces, or another number of frames.
+        """
+        pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
+
+        path = self.folder / file.place
+        with guarded(path, (pa.ArrowException,)):
+            source = pq.ParquetFile(path)
+            numbers = None
+            if EPISODE in source.schema_arrow.names:
+                numbers = source.read(columns=[EPISODE]).column(0).to_numpy()
+        whole = whole_columns(path, numbers, source.metadata.num_rows, columns, forces)
+        added = [pa.field(PREFIX + c.name, kind_of(c.width)) for c in columns]
+        told = with_features(source.schema_arrow.metadata or {}, columns)
+        schema = pa.schema([*source.schema_arrow, *added], metadata=told)
+        codec = source.metadata.row_group(0).column(0).compression.lower()
+        codec = "none" if codec == "uncompressed" else codec
+        first = 0
+        with pq.ParquetWriter(target, schema, compression=codec) as writer:
+            for group in range(source.num_row_groups):
+                with guarded(path, (pa.ArrowException,)):
+                    table = source.read_row_group(group)
+                rows = slice(first, first + table.num_rows)
+                first = rows.stop
+                values = [as_column(each[rows]) for each in whole]
+                arrays = [*table.columns, *values]
+                writer.write_table(pa.table(arrays, schema=schema), row_group_size=len(table) or 1)
+
+    def finish(
+        self,
+        columns: Sequence[ForceColumn],
+        statistics: Mapping[int, Mapping[str, Statistics]],
+        copy: Path,
+    ) -> None:
+        """Write info.json with the new features, and their statistics wherever others stand."""
+        info = info_of(self.folder)
+        fps = {"fps": info["fps"]} if is_third(info) and "fps" in info else {}
+        features = info.setdefault("features", {})
+        for column in columns:
+            features[PREFIX + column.name] = {
+                "dtype": "float32",
+                "shape": [column.width],
+                "names": list(column.elements) or None,
+                **fps,
+                "info": dict(column.told),
+            }
+        write_json(copy / "meta" / "info.json", info)
+        if (self.folder / "meta" / "stats.json").is_file():
+            self._finish_stats(columns, statistics, copy)
+        for path in sorted((self.folder / "meta" / "episodes").rglob("*.parquet")):
+            self._finish_episodes(path, columns, statistics, copy)
+        lines = self.folder / "meta" / "episodes_stats.jsonl"
+        if lines.is_file():
+            self._finish_lines(lines, columns, statistics, copy)
+
+    def _finish_stats(
+        self,
+        columns: Sequence[ForceColumn],
+        statistics: Mapping[int, Mapping[str, Statistics]],
+        copy: Path,
+    ) -> None:
+        """Write stats.json, of the whole dataset."""
+        stats = json.loads(text_of(self.folder / "meta" / "stats.json"))
+        # Older ones have no quantiles.
+        keys = tuple(next(iter(stats.values()))) if stats else KEYS
+        for column in columns:
+            whole = pooled([of_episode[column.name] for of_episode in statistics.values()])
+            stats[PREFIX + column.name] = plain(whole, keys)
+        write_json(copy / "meta" / "stats.json", stats)
+
+    def _finish_episodes(
+        self,
+        path: Path,
+        columns: Sequence[ForceColumn],
+        statistics: Mapping[int, Mapping[str, Statistics]],
+        copy: Path,
+    ) -> None:
+        """Write a table of episodes with the statistics of the columns, where it has those."""
+        pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
+
+        with guarded(path, (pa.ArrowException,)):
+            source = pq.ParquetFile(path)
+            table = source.read()
+        parts = [name.split("/") for name in table.column_names if name.startswith("stats/")]
+        kinds = {part[-1]: table.schema.field("/".join(part)).type for part in parts[::-1]}
+        numbers = table.column(EPISODE).to_pylist()
+        for column in columns:
+            for key in (key for key in KEYS if key in kinds):
+                values = [statistics[number][column.name][key].tolist() for number in numbers]
+                kind = pa.list_(pa.int64() if key == "count" else pa.float64())
+                name = f"stats/{PREFIX}{column.name}/{key}"
+                table = table.append_column(name, pa.array(values, kind))
+        target = copy / path.relative_to(self.folder)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        codec = source.metadata.row_group(0).column(0).compression.lower()
+        pq.write_table(table, target, compression="none" if codec == "uncompressed" else codec)
+
+    def _finish_lines(
+        self,
+        path: Path,
+        columns: Sequence[ForceColumn],
+        statistics: Mapping[int, Mapping[str, Statistics]],
+        copy: Path,
+    ) -> None:
+        """Write episodes_stats.jsonl, the statistics of version 2.1."""
+        lines = []
+        for line in filter(str.strip, text_of(path).splitlines()):
+            told = json.loads(line)
+            keys = tuple(next(iter(told["stats"].values()))) if told["stats"] else KEYS
+            for column in columns:
+                own = statistics[int(told[EPISODE])][column.name]
+                told["stats"][PREFIX + column.name] = plain(own, keys)
+            lines.append(json.dumps(told, ensure_ascii=False) + "\n")
+        (copy / "meta" / path.name).write_text("".join(lines), encoding="utf-8")
+
+
+def is_third(info: Mapping[str, Any]) -> bool:
+    """Whether a description is of version 3."""
+    return str(info.get("codebase_version", "")).startswith("v3")
+
+
+def plain(statistics: Statistics, keys: Sequence[str]) -> dict[str, list[Any]]:
+    """Some statistics as JSON holds them."""
+    return {key: statistics[key].tolist() for key in keys if key in statistics}
+
+
+def write_json(path: Path, value: Any) -> None:  # noqa: ANN401 - what JSON holds
+    """Write a description as LeRobot writes it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(value, indent=4, ensure_ascii=False), encoding="utf-8")
+
+
+def kind_of(width: int) -> Any:  # noqa: ANN401 - a pyarrow type
+    """How a column is stored: single numbers, or lists of one length."""
+    pa = needed("pyarrow", DATASET)
+
+    return pa.float32() if width == 1 else pa.list_(pa.float32(), width)
+
+
+def as_column(values: Any) -> Any:  # noqa: ANN401 - float32 → pyarrow
+    """Values (N, k) as they are stored."""
+    pa = needed("pyarrow", DATASET)
+
+    flat = pa.array(np.ascontiguousarray(values).ravel())
+    width = values.shape[1]
+    return flat if width == 1 else pa.FixedSizeListArray.from_arrays(flat, type=kind_of(width))
+
+
+def whole_columns(
+    path: Path,
+    numbers: Any,  # noqa: ANN401 - one a row, or None
+    rows: int,
+    columns: Sequence[ForceColumn],
+    forces: Forces,
+) -> list[Any]:
+    """Every column over all rows of a file, whichever episode each row is of. (rows, k) each
+
+    Raises:
+        LogError: If an episode of the file has no forces, or another number of frames.
+    """
+    whole = [np.zeros((rows, column.width), np.float32) for column in columns]
+    done = 0
+    for number, own in forces.items():
+        place = np.arange(rows) if numbers is None else np.flatnonzero(numbers == number)
+        done += len(place)
+        for column, values in zip(columns, whole, strict=True):
+            if len(own[column.name]) != len(place):
+                raise LogError(
+                    f"{path}: episode {number} has {len(place)} rows, {len(own[column.name])} were "
+                    "read; it was edited in between"
+                )
+            values[place] = own[column.name]
+    if done != rows:
+        raise LogError(f"{path}: has rows of episodes that the table of episodes does not tell")
+    return whole
+
+
+def with_features(
+    metadata: Mapping[bytes, bytes], columns: Sequence[ForceColumn]
+) -> dict[bytes, bytes]:
+    """A schema's metadata with the columns among the features that the `datasets` library reads."""
+    told = dict(metadata)
+    try:
+        library = json.loads(told.get(METADATA, b"null"))
+        features = library["info"]["features"]
+        # Lists are called List since its version 4, and Sequence before.
+        lists = [f for f in features.values() if isinstance(f, dict) and "length" in f]
+    except (ValueError, TypeError, KeyError, AttributeError):
+        return told
+    number = {"dtype": "float32", "_type": "Value"}
+    kind = lists[0]["_type"] if lists else "Sequence"
+    for column in columns:
+        several = {"feature": number, "length": column.width, "_type": kind}
+        features[PREFIX + column.name] = number if column.width == 1 else several
+    return told | {METADATA: json.dumps(library).encode()}

@@ -1,0 +1,67 @@
+"""An estimate that starts at its first sample's static residual, not at zero."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vftcli.observers.observer import Observer
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.external_torque import ExternalTorque
+
+LEAD = 60.0
+"""For how many 1/ω_n of the slowest joint the arm is taken to have stood before a log."""
+
+LONGEST = 1 << 17
+"""Samples of that time at most."""
+
+SETTLED = 0.01
+"""Share of its start that an estimate has forgotten once it counts as settled."""
+
+
+def led(terms: DynamicsTerms, count: int) -> DynamicsTerms:
+    """The terms with their first sample before them, as often and at the median step."""
+    step = terms.clock.step
+    before = terms.t[0] - step * np.arange(count, 0, -1)
+    return DynamicsTerms(
+        t=np.concatenate([before, terms.t]),
+        p=np.concatenate([np.repeat(terms.p[:1], count, axis=0), terms.p]),
+        mu=np.concatenate([np.repeat(terms.mu[:1], count, axis=0), terms.mu]),
+    )
+
+
+def estimate_from_rest(observer: Observer, terms: DynamicsTerms) -> ExternalTorque:
+    """Run an observer as if the log's first sample had lasted for long: τ̂⁰ = −μ⁰ where unbiased.
+
+    An observer that starts at zero shows a log that begins in contact as a rise over some delays,
+    which nothing touched. With ṗ = μ + τ_ext, a first sample that lasts is explained by −μ⁰.
+    """
+    count = lead_samples(observer, terms.clock.step, terms.joints)
+    found = observer.estimate(led(terms, count))
+    return replace(
+        found,
+        t=terms.t,
+        tau=found.tau[count:],
+        sd=None if found.sd is None else found.sd[count:],
+    )
+
+
+def settling_samples(observer: Observer, step: float, joints: int) -> int:
+    """Samples after which `SETTLED` of where an estimate started is left, of the slowest joint.
+
+    Args:
+        observer: The observer.
+        step: Sample time. [s]
+        joints: Number of joints.
+    """
+    samples = 2 + lead_samples(observer, step, joints)
+    zero = np.zeros((samples, joints))
+    terms = DynamicsTerms(t=step * np.arange(float(samples)), p=zero, mu=zero - 1.0)
+    answer = observer.estimate(terms).tau
+    left = np.max(np.abs(answer - answer[-1]), axis=1)
+    return int(np.flatnonzero(left > SETTLED * np.max(np.abs(answer[-1])))[-1]) + 1
+
+
+def lead_samples(observer: Observer, step: float, joints: int) -> int:
+    """Samples in which an observer forgets all that was before. [s] → count"""
+    slowest = float(np.min(observer.tuning(step, joints).omega_n))
+    return min(LONGEST, max(1, int(np.ceil(LEAD / (slowest * step)))))

@@ -1,0 +1,218 @@
+"""BatchFolder: what many logs made, a file a log, and the tables that gather them.
+
+``rows/<key[:2]>/<key>.parquet`` is the last file that a log's result gets: where it is, the result
+is complete. ``logs/<key[:2]>/<key>/`` holds what else was made of the log.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vftcli.outputs.files import atomic, check_letters, put_text, table_file, unwritable
+from vftcli.outputs.log.run_record import to_json
+from vftcli.outputs.partial import check_writable, held
+from vftcli.outputs.seals import SEAL, digest
+from vftcli.signals.errors import OutputError
+
+if TYPE_CHECKING:
+    import polars as pl
+
+MARKER = "batch.json"
+"""What the rows of a folder were made with; the first file of a batch to come."""
+
+TABLE, FAILURES, PAGE = "batch.parquet", "failures.parquet", "index.html"
+
+GATHERED = (TABLE, FAILURES, PAGE, SEAL)
+"""Files that are made anew by every run."""
+
+PIECE = 500
+"""Logs whose rows are in memory at a time."""
+
+DONE, FAILED = ".parquet", ".failed.json"
+"""Endings of what a log leaves in ``rows/``."""
+
+
+class BatchFolder:
+    """The folder of a batch.
+
+    Args:
+        path: Where it is; nothing is made yet.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = Path(path)
+        self.rows = self.path / "rows"
+
+    def row_file(self, key: str, ending: str = DONE) -> Path:
+        """Where the rows of a log are, or why it failed."""
+        return self.rows / key[:2] / f"{key}{ending}"
+
+    def result(self, key: str) -> Path:
+        """Where what else is made of a log is."""
+        return self.path / self.place(key)
+
+    @staticmethod
+    def place(key: str) -> str:
+        """The same relative to the folder."""
+        return f"logs/{key[:2]}/{key}"
+
+    @contextmanager
+    def opened(self, options: str, record: Mapping[str, Any], *, force: bool) -> Iterator[None]:
+        """Make the folder, or take up the batch in it, for a block; nobody else does meanwhile.
+
+        Args:
+            options: Digest of the options.
+            record: What they are, for whoever reads the marker.
+            force: Whether a batch with other options is gone on with; its rows stay.
+
+        Raises:
+            OutputError: If it holds something else, is in use, or cannot be written.
+        """
+        try:
+            check_letters(self.path)
+            self._check(options, force=force)
+            self.rows.mkdir(parents=True, exist_ok=True)
+            check_writable(self.rows)
+            with held(self.rows, wait=False):
+                text = to_json({**record, "options_sha256": options})
+                self.put(MARKER, text.encode())
+                yield
+        except BlockingIOError:
+            raise OutputError(
+                f"another batch writes into {self.path}; wait for its end, or give another -o"
+            ) from None
+        except OSError as error:
+            raise unwritable(self.path, error) from None
+
+    def _check(self, options: str, *, force: bool) -> None:
+        """Raise an OutputError where the folder is another's."""
+        if not (self.path / MARKER).is_file():
+            there = [name for name in (*GATHERED, "rows", "logs") if (self.path / name).exists()]
+            if there and not force:
+                raise OutputError(
+                    f"{self.path} holds {there[0]}, which no batch wrote; give another -o, or "
+                    "--force to overwrite it"
+                )
+            return
+        try:
+            made_with = json.loads((self.path / MARKER).read_text("utf-8"))
+            same = made_with.get("options_sha256") == options
+            command = made_with.get("command", "")
+        except (ValueError, AttributeError):
+            same, command = False, ""
+        if not same and not force and self.keys():
+            raise OutputError(
+                f"{self.path} holds a batch of other options or another version ({command}); give "
+                "another -o, or --force: finished logs of those options are kept beside"
+            )
+
+    def keys(self, ending: str = DONE) -> set[str]:
+        """The keys of all logs that are done, or that failed."""
+        found = self.rows.glob(f"*/*{ending}") if self.rows.is_dir() else ()
+        return {path.name.removesuffix(ending) for path in found}
+
+    def put(self, name: str, content: bytes) -> None:
+        """Write a file, whole or not at all, over what an earlier run of the batch left.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        path = self.path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic(path, force=True) as temporary:
+            temporary.write_bytes(content)
+
+    def put_rows(self, key: str, rows: "pl.DataFrame") -> None:
+        """Write a log's rows: with them its result is complete.
+
+        Raises:
+            OutputError: If they cannot be written.
+        """
+        path = self.row_file(key)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic(path, force=True) as temporary, table_file(temporary) as file:
+            rows.write_parquet(file, compression="zstd", statistics=False)
+
+    def put_failure(self, key: str, record: Mapping[str, str]) -> None:
+        """Write why a log failed, so that the next run does not try it again unasked."""
+        name = self.row_file(key, FAILED).relative_to(self.path).as_posix()
+        self.put(name, json.dumps(dict(record), ensure_ascii=False).encode("utf-8", "replace"))
+
+    def failure(self, key: str) -> dict[str, str]:
+        """Why a log failed in this run or an earlier one.
+
+        Raises:
+            OSError: If it did not.
+        """
+        text = self.row_file(key, FAILED).read_text(encoding="utf-8")
+        return {str(name): str(value) for name, value in json.loads(text).items()}
+
+    def forget(self, key: str) -> None:
+        """Take away why a log failed."""
+        self.row_file(key, FAILED).unlink(missing_ok=True)
+
+    def gather(self, logs: "pl.DataFrame", schema: "Mapping[str, Any]") -> "Iterator[pl.DataFrame]":
+        """The rows of all logs, `PIECE` logs at a time, in the logs' order whatever ended first.
+
+        Args:
+            logs: ``log``, ``episode`` and ``key`` of every log that is done. Two logs of equal
+                bytes have one key, and the same rows.
+            schema: Columns of the rows.
+        """
+        import polars as pl
+
+        for part in logs.iter_slices(PIECE) if logs.height else (logs,):
+            files = [self.row_file(key) for key in part["key"].unique(maintain_order=True)]
+            rows = pl.read_parquet(files) if files else pl.DataFrame(schema=schema)
+            yield part.join(rows, on="key", how="left", maintain_order="left_right")
+
+    def put_gathered(
+        self,
+        tables: "Iterable[pl.DataFrame]",
+        failures: "pl.DataFrame",
+        page: Callable[[], str],
+        record: Mapping[str, Any],
+    ) -> None:
+        """Write the tables and the page, and at last their seal.
+
+        Args:
+            tables: Pieces of the one table, never all in memory.
+            failures: Why logs failed.
+            page: Makes the page, once every piece is written.
+            record: What else the seal holds.
+
+        Raises:
+            OutputError: If one cannot be written.
+        """
+        (self.path / SEAL).unlink(missing_ok=True)
+        for name, pieces in ((TABLE, tables), (FAILURES, (failures,))):
+            with atomic(self.path / name, force=True) as temporary:
+                put_pieces(temporary, pieces)
+        with atomic(self.path / PAGE, force=True) as temporary:
+            put_text(temporary, page())
+        files = {name: digest(self.path / name) for name in (TABLE, FAILURES, PAGE)}
+        with atomic(self.path / SEAL, force=True) as temporary:
+            put_text(temporary, to_json({**record, "files": files}))
+
+    def files_of(self, key: str) -> Sequence[Path]:
+        """Every file of a log's result, its rows last."""
+        found = sorted(path for path in self.result(key).rglob("*") if path.is_file())
+        return [*found, self.row_file(key)]
+
+
+def put_pieces(path: Path, pieces: "Iterable[pl.DataFrame]") -> None:
+    """Write one table of several pieces, a row group each; there is one at least."""
+    import polars as pl
+    from pyarrow.parquet import ParquetWriter
+
+    with ExitStack() as stack:
+        writer = None
+        for piece in pieces:
+            # What other programs read: text of the kind that Arrow has always had.
+            table = piece.to_arrow(compat_level=pl.CompatLevel.oldest())
+            if writer is None:
+                writer = ParquetWriter(path, table.schema, compression="zstd")
+                stack.enter_context(writer)
+            writer.write_table(table)

@@ -1,0 +1,49 @@
+"""What a user may choose of the files that are written of a log."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from vftcli.signals.errors import ParameterError
+
+FULL, LEVELS, NONE = "full", "levels", "none"
+"""How much of a log its recording holds: every sample, of a long one its levels, or no recording.
+
+Levels are the lowest and highest samples of many stretches, and every sample where contacts begin.
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputChoice:
+    """What is written of a log besides what always is.
+
+    Attributes:
+        extras: Names of `estimates.EXTRAS`.
+        rrd_detail: How much of the log its recording holds: `FULL`, `LEVELS` or `NONE`.
+    """
+
+    extras: tuple[str, ...] = ()
+    rrd_detail: str = LEVELS
+
+    @classmethod
+    def parsed(cls, *, extras: Sequence[str] = (), rrd_detail: str = LEVELS) -> "OutputChoice":
+        """The choice that a user's words state.
+
+        Raises:
+            ParameterError: If they are none of ours, or ask for a recording and for none.
+        """
+        if rrd_detail not in (FULL, LEVELS, NONE):
+            raise ParameterError(
+                f"--rrd-detail {rrd_detail} is none of {FULL}, {LEVELS} and {NONE}"
+            )
+        if rrd_detail == NONE and "rrd" in extras:
+            raise ParameterError("--rrd-detail none writes no recording; leave --rrd or it away")
+        return cls(extras=tuple(extras), rrd_detail=rrd_detail)
+
+    @property
+    def writes_recording(self) -> bool:
+        """Whether a report has its recording."""
+        return self.rrd_detail != NONE
+
+
+PLAIN = OutputChoice()
+"""What is written where nothing is asked for."""

@@ -1,0 +1,86 @@
+"""The page over a batch: one line a log, made from its table alone."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from vftcli.outputs.grid import DASH, Column, Grid, html, significant
+from vftcli.outputs.page.index_page import WORST_FIRST, IndexLine, overview
+from vftcli.outputs.page.shell import document, lead, section, soft, top
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+def render_batch(lines: Sequence[IndexLine], failures: "pl.DataFrame") -> str:
+    """The page over a batch.
+
+    Args:
+        lines: One a log, as `batch_lines` makes them.
+        failures: Logs that could not be done, with stage, error and line.
+    """
+    robots = sorted({line.robot for line in lines})
+    touched = sum(line.contacts not in {DASH, "0", "load"} for line in lines)
+    told = sum(line.contacts != DASH for line in lines)
+    title = f"{len(lines)} logs" + (f", {touched} of {told} touched." if told else ".")
+    count = failures.height
+    words = f"{count} log{'s' * (count > 1)} could not be analysed." if count else ""
+    grid = Grid(
+        columns=tuple(Column(head, words=True) for head in ("Log", "Stage", "Error", "Why")),
+        rows=tuple(failures.select("log", "stage", "error", "line").iter_rows()),
+    )
+    parts = (
+        top((f"{len(lines) + count} logs", ", ".join(robots)), title, lead(words)),
+        section("Not analysed", html(grid), str(count), opened=True) if count else "",
+        overview(lines),
+        soft(
+            f"{escape(WORST_FIRST)} A click on a head sorts by it. Every number is in "
+            "batch.parquet."
+        ),
+    )
+    return document(title, "".join(parts), scripts=["sort.js"])
+
+
+def batch_lines(table: "pl.DataFrame", pages: Mapping[str, str]) -> Iterator[IndexLine]:
+    """The line of every log.
+
+    Args:
+        table: All rows of some logs, as ``batch.parquet`` holds them.
+        pages: Label of a log → its own page, relative to the batch's.
+    """
+    import polars as pl
+
+    if table.is_empty():
+        return
+    means = (
+        table.filter(pl.col("joint").is_not_null() & pl.col("rmse_Nm").is_not_null())
+        .group_by("log", "observer", maintain_order=True)
+        .agg(pl.col("rmse_Nm").mean())
+        .sort("rmse_Nm", maintain_order=True)
+        .unique("log", keep="first", maintain_order=True)
+    )
+    best = {log: f"{significant(rmse)} N·m ({name})" for log, name, rmse in means.iter_rows()}
+    for row in table.unique("log", keep="first", maintain_order=True).iter_rows(named=True):
+        yield batch_line(row, pages.get(row["log"], ""), best.get(row["log"], DASH))
+
+
+def batch_line(row: Mapping[str, Any], page: str, error: str) -> IndexLine:
+    """One log's line, from the first of its rows."""
+    force, count = row["hardest_N"], row["contacts"]
+    hardest = DASH
+    if force is not None:
+        hardest = f"{force:.0f} ± {row['hardest_band_N']:.0f} N at {row['hardest_s']:.1f} s"
+        hardest = hardest if force > row["hardest_band_N"] else f"not told ({hardest})"
+    return IndexLine(
+        name=row["log"],
+        page=page,
+        robot=row["robot"],
+        duration=row["duration_s"],
+        contacts=DASH if count is None else "load" if row["load"] else str(count),
+        hardest=hardest,
+        force=force or 0.0,
+        least=row["told_N"],
+        error=error,
+        standing=row["health"],
+        words=row["reason"],
+    )

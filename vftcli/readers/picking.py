@@ -1,0 +1,188 @@
+"""Loading the picked columns of a table: scaled to SI units, with the stamps of their rows."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vftcli.readers.reader import RawLog, ReadChoice
+from vftcli.readers.table import WHOLE_ROWS, Column, LongTable, Pick, Picks, Table
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import LogError
+from vftcli.signals.series import median_step
+
+
+def picked(
+    table: Table,
+    picks: Picks,
+    request: ReadChoice,
+    *,
+    clock_name: str = "",
+    **more: Any,  # noqa: ANN401
+) -> RawLog:
+    """Load the picked columns of a table and scale them.
+
+    Args:
+        table: The table.
+        picks: What to load.
+        request: Signals nobody asked for are left unread.
+        clock_name: Which clock the stamps are from, in words.
+        more: Further fields of the RawLog.
+
+    Raises:
+        LogError: If the table has no clock, or no positions.
+    """
+    signals = tuple(p for p in picks.signals if request.wants(p.signal))
+    clock = picks.clock.cells[0] if picks.clock else None
+    last = {cell.column: pick.signal for pick in signals for cell in pick.cells}
+    kept = {*picks.constants, *(() if picks.origin is None else (picks.origin,))}
+    kept |= {cell.column for cell in picks.clock.cells} if picks.clock else set()
+    asked = sorted(kept.union(last)), clock.column if clock else None
+    blocks = None
+    if request.blocks and isinstance(table, LongTable) and table.rows > WHOLE_ROWS:
+        blocks = table.blocks(*asked)
+    loaded = table.load(*asked) if blocks is None else next(blocks)
+    stamps, tick, words = _stamps(table, picks, loaded, clock_name)
+    if picks.origin is not None and len(stamps):
+        more["origin"] = float(loaded[picks.origin][0]) * 1e-9 - float(stamps[0]) * tick
+    remarks = (*table.remarks, *(pick.remark for pick in signals if pick.remark))
+    wrench = next((pick for pick in signals if pick.signal == "wrench"), None)
+    more.setdefault("wrench_frame", wrench.frame if wrench else None)
+    constants, arrays = _last(loaded, picks), {}
+    for pick in signals:
+        arrays[pick.signal] = _stacked(pick, loaded)
+        # Of a long log the columns and what is picked of them have no room beside each other.
+        loaded = {c: x for c, x in loaded.items() if last.get(c) != pick.signal}
+    first = RawLog(
+        stamps=stamps,
+        tick=tick,
+        clock=words,
+        signals=arrays,
+        remarks=(*remarks, *more.pop("remarks", ())),
+        constants=constants,
+        **more,
+    )
+    return first if blocks is None else replace(first, rest=_rest(first, table, picks, blocks))
+
+
+def _rest(
+    first: RawLog, table: Table, picks: Picks, blocks: Iterator[dict[int, Column]]
+) -> Iterator[RawLog]:
+    """The blocks that follow the first, which says how their columns are to be taken."""
+    row = first.first_row + len(first.stamps)
+    for loaded in blocks:
+        stamps = _ticks(table, picks, loaded, row - first.first_row)
+        yield replace(
+            first,
+            stamps=stamps,
+            signals={
+                p.signal: _stacked(p, loaded) for p in picks.signals if p.signal in first.signals
+            },
+            constants=_last(loaded, picks),
+            first_row=row,
+        )
+        row += len(stamps)
+
+
+def _last(loaded: Mapping[int, Column], picks: Picks) -> tuple[float, ...]:
+    """The last values of a table's constants."""
+    columns = (loaded[c] for c in picks.constants)
+    return tuple(float(column[-1]) if len(column) else float("nan") for column in columns)
+
+
+def _stacked(pick: Pick, loaded: Mapping[int, Column]) -> Array:
+    """One signal's cells side by side, scaled. (T, n)"""
+    rows = len(loaded[pick.cells[0].column])
+    out = np.empty((rows, len(pick.cells)))
+    for j, cell in enumerate(pick.cells):
+        column = loaded[cell.column]
+        out[:, j] = column if cell.element is None else column[:, cell.element]
+    if pick.factor != 1.0:
+        out *= pick.factor
+        out += 0.0  # a turned zero is plain zero
+    return out
+
+
+def _stamps(
+    table: Table, picks: Picks, loaded: Mapping[int, Column], clock_name: str
+) -> tuple[Column, float, str]:
+    """The stamps, the length of their tick and which clock they are."""
+    stamps = _ticks(table, picks, loaded)
+    if picks.clock is None:
+        rate = picks.rate or 0.0
+        return stamps, 1 / rate, rate_words(rate)
+    cell = picks.clock.cells[0]
+    name = table.names[cell.column] if table.names else f"column {cell.column + 1}"
+    words = clock_name or f"column {name}" if table.names else name
+    if len(picks.clock.cells) == 2:
+        return stamps, 1e-9, words
+    if picks.clock.unit is not None:
+        return stamps, picks.clock.factor, f"{words} [{picks.clock.unit}]"
+    tick, unit = tick_of(stamps, name)
+    return stamps, tick, words if unit == "s" else f"{words}, taken as {unit}"
+
+
+def _ticks(table: Table, picks: Picks, loaded: Mapping[int, Column], before: int = 0) -> Column:
+    """The stamps of loaded rows, of which so many came before in the table. (T,)
+
+    Raises:
+        LogError: If there is no clock, or one whose sign is turned.
+    """
+    if picks.clock is None:
+        if picks.rate is None:
+            raise LogError(
+                f"{table.path}: no clock. Name its column with --columns (t=…, or t in file "
+                "order), or say the rate of a log without one: t@125Hz."
+            )
+        return np.arange(before, before + len(next(iter(loaded.values()))))
+    if picks.clock.factor < 0:
+        raise LogError(
+            f"{table.path}: --columns turns the sign of the clock; time cannot run back."
+        )
+    cell, *rest = picks.clock.cells
+    column = loaded[cell.column]
+    stamps: Column = column if cell.element is None else column[:, cell.element]
+    return _of_pair(table, stamps, loaded[rest[0].column]) if rest else stamps
+
+
+def rate_words(rate: float) -> str:
+    """What the clock of a table without one is, given its rate. [Hz]"""
+    return f"none: {rate:g} Hz as stated"
+
+
+def _of_pair(table: Table, seconds: Column, rest: Column) -> Column:
+    """Stamps of a column of whole seconds and one of the nanoseconds within them. (T,) [ns]
+
+    Raises:
+        LogError: If they are no such pair: seconds with a fraction, or a second too many.
+    """
+    whole = all(bool(np.all(np.mod(part, 1) == 0)) for part in (seconds, rest))
+    if not whole or not np.all((rest >= 0) & (rest < 1e9) & (np.abs(seconds) < 9e9)):
+        raise LogError(
+            f"{table.path}: the two columns of the clock are no whole seconds and the nanoseconds "
+            "within them. Name one column of time with --columns, as in t=…"
+        )
+    return seconds.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
+
+
+def tick_of(stamps: Column, name: str) -> tuple[float, str]:
+    """Length of a tick of unstated unit: from the name, else from the size of stamps and steps.
+
+    Whole numbers one apart are milliseconds of a 1 kHz log; epoch stamps tell by their size;
+    everything else is seconds.
+    """
+    units = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
+    if match := re.search(r"[_\[(.](ns|us|ms|s)[\])]?$", name.lower()):
+        return units[match[1]], match[1]
+    if len(stamps) == 0:
+        return 1.0, "s"
+    usual = abs(float(stamps[len(stamps) // 2]))  # the first may be garbage
+    # Counts since 1970 are near 1.7e18 ns, 1.7e15 µs and 1.7e12 ms.
+    for size, unit in ((1e17, "ns"), (1e14, "us"), (1e11, "ms")):
+        if size < usual < 1e20:
+            return units[unit], unit
+    step = median_step(stamps) if len(stamps) > 1 else 0.0
+    whole = stamps.dtype.kind in "iu" or bool(np.all(np.mod(stamps[:1000], 1) == 0))
+    return (1e-3, "ms") if whole and 0.8 <= step <= 1.2 else (1.0, "s")

@@ -1,0 +1,93 @@
+"""A log with its free runs laid under it: what differs between them, whatever is made of that."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from vftcli.repetition.drive_run import DriveRun
+from vftcli.repetition.pairing import Pairing, mean_of
+from vftcli.signals.arrays import Array, Mask
+
+STUCK = 0.3
+"""A stop of this length leaves the whole of the dry friction open, a shorter one its share. [s]"""
+
+REPEATED = 0.5
+"""Share of the stiction that cancels between two stops of the same length at the same place."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LaidOver:
+    """A log and its free runs, each sample of the log with its partners.
+
+    Every rung of the alignment ladder and every low-pass starts from these; each is made once.
+
+    Attributes:
+        motion: The log.
+        pairings: Its free runs.
+        found: What else was found of them, by what it is and the cutoff that it was found for.
+    """
+
+    motion: DriveRun
+    pairings: Sequence[Pairing]
+    found: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
+
+    def once(self, what: str, cutoff: float, find: Callable[[], Array]) -> Array:
+        """What was found before for a cutoff [Hz], or else is found now."""
+        if (what, cutoff) not in self.found:
+            self.found[what, cutoff] = find()
+        return self.found[what, cutoff]
+
+    @cached_property
+    def torque(self) -> Array:
+        """Torque difference, not corrected, not filtered; NaN without partner. (T, n) [N·m]"""
+        return mean_of(self.pairings, [p.free.torque for p in self.pairings]) - self.motion.torque
+
+    @cached_property
+    def change(self) -> Array:
+        """The model's torque of the motion difference. (T, n) [N·m]"""
+        return self.motion.model - mean_of(self.pairings, [p.free.model for p in self.pairings])
+
+    @cached_property
+    def momentum(self) -> Array:
+        """Difference of the momenta. (T, n) [kg·m²/s]"""
+        there = mean_of(self.pairings, [p.free.momentum for p in self.pairings])
+        return self.motion.momentum - there
+
+    @cached_property
+    def known(self) -> Mask:
+        """Samples that have a partner. (T,)"""
+        return np.asarray(np.isfinite(self.torque).all(axis=1))
+
+    @cached_property
+    def standing(self) -> Mask:
+        """Where a joint stands in the log or in any free run. (T, n)"""
+        found = self.motion.standing.copy()
+        for p in self.pairings:
+            found |= p.there(p.free.standing.astype(np.float64)) > 0.0
+        return found
+
+    @cached_property
+    def stopped(self) -> Array:
+        """Share of the dry friction a stop leaves open, in the log or a free run, 0 to 1. (T, n)"""
+        longest = self.motion.standstill_s.copy()
+        shortest = longest.copy()
+        for p in self.pairings:
+            there = np.nan_to_num(p.there(p.free.standstill_s))
+            np.maximum(longest, there, out=longest)
+            np.minimum(shortest, there, out=shortest)
+        alike = shortest / np.maximum(longest, 1e-9)
+        share = np.minimum(longest / STUCK, 1.0) * (1.0 - REPEATED * alike)
+        return np.asarray(np.maximum(share, self.standing))
+
+    @cached_property
+    def misfit(self) -> Array:
+        """How much of its torque's variation the model misses in the free run, at most 1. (n,)"""
+        missed = total = np.zeros(self.motion.torque.shape[1])
+        for p in self.pairings:
+            free = p.free
+            used = np.unique(np.searchsorted(free.t, p.times[p.known]).clip(0, len(free.t) - 1))
+            missed = missed + np.var(free.smooth_gap[used], axis=0)
+            total = total + np.var(free.smooth_model[used], axis=0)
+        return np.asarray(np.sqrt(np.minimum(missed / np.maximum(total, 1e-12), 1.0)))
