@@ -290,19 +290,12 @@ class FigureOptions(Bundle):
     """Figures for a paper."""
 
     GROUP = headings.WRITE
-
     figures: str | None = option(
         "--figures", "pdf|svg|png", "Also figures for a paper, one and two columns wide."
     )
 
     def form(self) -> str | None:
-        """What they are written as, None where none are asked for.
-
-        Raises:
-            VftError: If it is not one of the forms, or matplotlib is not installed.
-        """
-        if self.figures is None:
-            return None
+        """What they are written as, checked; None where none are asked for."""
         from vftcli.outputs.figures.paper import checked_form
 
         return checked_form(self.figures)
@@ -345,7 +338,6 @@ class AnywayOptions(Bundle):
     """Whether results are wanted that mean little."""
 
     GROUP = headings.LOG
-
     anyway: bool = flag(*ANYWAY, seldom=True)
 
 
