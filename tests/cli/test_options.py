@@ -29,7 +29,7 @@ READING = {
 
 OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
        ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
-       ("init", "--output"),
+       ("init", "--output"), ("compare", "--output"),
        ("annotate", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, what is written where, and --csv, which
@@ -68,6 +68,7 @@ BAD = {
     "--torque-sd": ("some", "--torque-sd"),
     "--derive": ("tau", "--derive 'tau'"),
     "--reference": ("magic", "no reference 'magic'"),
+    "--figures": ("gif", "--figures 'gif' is not pdf, svg or png"),
     "--config": ("nowhere.toml", "--config nowhere.toml: no such file"),
 }
 """Shared option → a value it does not take, and what the one line on it says."""
@@ -123,7 +124,8 @@ def test_every_shared_option_is_tried() -> None:
     """A new option of several commands needs its bad value here, or is one that takes all."""
     takes_all = {"--output", "--help", "--json", "--force", "--causal", "--wrench", "--as-printed",
                  "--sensor-weight", "--contacts", "--no-contacts", "--reference-columns",
-                 "--anyway", "--mcap", "--layouts", "--open", "--details", "--quiet"}  # fmt: skip
+                 "--anyway", "--mcap", "--layouts", "--open", "--details", "--quiet",
+                 "--latex"}  # fmt: skip
     count: dict[str, int] = {}
     for command in READING:
         for name in parameters(command):
@@ -155,7 +157,7 @@ def test_a_command_that_reads_a_log_reads_it_as_all_do(command: str) -> None:
 @pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
 def test_a_command_that_estimates_takes_all_that_can_be_asked(command: str) -> None:
     whole = {*BAD, "--causal", "--wrench", "--as-printed", "--sensor-weight"}
-    whole -= {"--reference", "--rrd-detail"}
+    whole -= {"--reference", "--figures", "--rrd-detail"}  # what is compared, shown, written
     assert set(parameters(command)) >= whole
 
 

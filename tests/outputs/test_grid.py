@@ -1,7 +1,11 @@
 import csv
 import io
 import json
+import shutil
+import subprocess
+from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import pytest
 
@@ -86,7 +90,12 @@ def test_a_table_without_headings_has_no_line_for_them() -> None:
 def test_units_stand_behind_headings_and_below_them_in_latex() -> None:
     grid = Grid(columns=(Column("who", words=True), Column("fx", "N·m")), rows=(("a", 1.0),))
     assert terminal(grid).startswith("who  fx [N·m]\n")
-    assert latex(grid).splitlines()[2:4] == [r"Who & fx \\", r" & [N\,m] \\"]
+    lines = latex(grid).splitlines()
+    above = lines.index(r"\toprule") + 1
+    assert lines[above : above + 2] == [
+        r"Who & \multicolumn{1}{c}{fx} \\",
+        r" & \multicolumn{1}{c}{[N\,m]} \\",
+    ]
 
 
 def test_markdown_escapes_every_text_and_bolds_the_best(grid: Grid) -> None:
@@ -102,11 +111,11 @@ def test_markdown_escapes_every_text_and_bolds_the_best(grid: Grid) -> None:
 
 def test_latex_escapes_every_text_and_bolds_the_best(grid: Grid) -> None:
     text = latex(grid)
-    assert text.splitlines()[0] == "% a_b.csv, RMSE"
-    assert r" & \multicolumn{2}{c}{RMSE [N\,m]} \\" in text
-    assert r"fdo & \textbf{0.550} & 12.3 \\" in text
+    assert r"\caption{a\_b.csv, RMSE in N\,m}" in text
+    assert r"\label{tab:a-b-csv}" in text
+    assert r"fdo & \textbf{0.550}\rlap{$^{*}$} & 12.3 \\" in text
     assert r"\&\_\%" in text
-    assert text.index(r"2.00 & -- \\") < text.rindex(r"\midrule") < text.index("floor")
+    assert text.index("2.00") < text.rindex(r"\cmidrule") < text.index("floor")
 
 
 def test_a_bound_is_one_number_in_latex() -> None:
@@ -114,9 +123,68 @@ def test_a_bound_is_one_number_in_latex() -> None:
     assert escape_latex("\\") == r"\textbackslash{}"
 
 
-def test_comments_of_latex_stay_on_their_line() -> None:
+def test_a_title_is_no_command_of_latex() -> None:
     grid = Grid(title="a\n\\input{b}", columns=(Column("c"),), rows=())
-    assert "\n\\input" not in latex(grid)
+    assert r"\input" not in latex(grid)
+
+
+def test_decimal_points_of_latex_stand_below_one_another() -> None:
+    numbers = ("5.66", "12.3", "110", "−0.5", "< 6", "–", "1 N")
+    grid = Grid(columns=(Column("c"),), rows=tuple((text,) for text in numbers))
+    body = latex(grid).split("\\midrule\n")[1].splitlines()[: len(numbers)]
+    assert body == [
+        r"5.66 \\",
+        r"12.3\phantom{0} \\",
+        r"110\phantom{.00} \\",
+        r"$-$0.5\phantom{0} \\",
+        r"$<$\,6\phantom{.00} \\",
+        r"-- \\",
+        r"1 N \\",
+    ]
+
+
+def test_a_table_too_wide_for_a_column_takes_both(grid: Grid) -> None:
+    """24 columns of five letters are 9.6 inches, two of them less than one."""
+    wide = Grid(columns=joint_columns(24), rows=(("1.234",) * 24,))
+    assert r"\begin{table*}" in latex(wide)
+    assert r"\begin{table}" in latex(grid)
+
+
+def test_several_logs_are_one_table_in_latex(grid: Grid) -> None:
+    other = replace(grid, title="b.csv", rows=(("gmo", 1.0, 2.0),), summaries=0, notes=("n",))
+    text = latex(grid, other)
+    assert text.count(r"\begin{tabular}") == text.count(r"\caption") == 1
+    assert r"\caption{RMSE in N\,m}" in text
+    assert r"\multicolumn{3}{l}{\textit{a\_b.csv}} \\" in text
+    assert text.index("b.csv}") < text.index("gmo") < text.index(r"\footnotesize n")
+
+
+def test_latex_takes_its_tables(grid: Grid, tmp_path: Path) -> None:
+    """Compiled in two columns as wide as the IEEE's; nothing sticks out of one."""
+    compiler = shutil.which("pdflatex")
+    found = shutil.which("kpsewhich")
+    if not compiler or not found or not run([found, "booktabs.sty"]).stdout:
+        pytest.skip("no LaTeX with booktabs is installed: tables are not compiled")
+    joints = replace(grid, columns=(Column("observer", words=True), *joint_columns(7)))
+    row = ("kfo-zoh", *(GridCell("12.34", best=True, mark="*"),) * 7)
+    tables = [
+        latex(grid, grid),
+        latex(replace(joints, rows=(row,) * 3, notes=("† rests", "*: at the floor"))),
+        latex(replace(joints, title="α − ξ ≤ τ", rows=((*row[:-1], "1234567890123"),))),
+    ]
+    above = (
+        r"\documentclass[twocolumn]{article}\usepackage{booktabs}\textwidth=7.16in\columnsep=.16in"
+    )
+    text = "\n".join([above, r"\begin{document}", *tables, r"\end{document}"])
+    (tmp_path / "tables.tex").write_text(text, encoding="utf-8")
+    run([compiler, "-interaction=nonstopmode", "-halt-on-error", "tables.tex"], tmp_path)
+    log = (tmp_path / "tables.log").read_text(encoding="latin-1")
+    assert (tmp_path / "tables.pdf").exists(), log[-2000:]
+    assert "Overfull" not in log
+
+
+def run(words: list[str], folder: Path | None = None) -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run(words, cwd=folder, capture_output=True, check=False, timeout=120)
 
 
 class Cells(HTMLParser):

@@ -39,7 +39,7 @@ def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -
     np.testing.assert_array_equal(halves["rts-auto"], 1.96 * band)
     found = worked_up.refinement
     assert found is not None
-    curve = tuning_chart(found, observer_lines(worked_up.estimates))
+    curve = tuning_chart(found.curves, observer_lines(worked_up.estimates))
     assert [s.name for s in curve.series] == ["kfo-auto", "rts-auto"]
     assert found.baseline.spectra is not None
     assert len(spectra_chart(found.baseline.spectra).series) == 2

@@ -8,7 +8,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.bundles import Bundle, flag, option, taken_apart
-from vftcli.cli.help import WRITE
+from vftcli.cli.help import OUTPUT, WRITE
 from vftcli.cli.log_options import Words
 
 if TYPE_CHECKING:
@@ -117,6 +117,21 @@ class ForceOptions(Bundle):
     )
 
 
+class LatexOption(Bundle):
+    """The tables for a paper."""
+
+    GROUP = OUTPUT
+
+    latex: bool = flag("--latex", "Print a LaTeX table (booktabs).", seldom=True)
+
+
+class ShownOptions(opt.FigureOptions):
+    """What is shown and drawn of the comparison."""
+
+    json: opt.Json = False
+    table: LatexOption
+
+
 @taken_apart
 def admit(
     controllers: ControllerOptions,
@@ -124,9 +139,9 @@ def admit(
     loop: LoopOptions,
     source: ForceOptions,
     analysis: opt.AnalysisOptions,
+    shown: ShownOptions,
     log: LogOrNone = None,
     output: Output = None,
-    json: opt.Json = False,
     force: opt.Force = False,
     show_made: opt.Open = False,
 ) -> None:
@@ -142,7 +157,7 @@ def admit(
     from vftcli.admittance.choice import ControlChoice, split_settings
     from vftcli.cli.console import command_line, say, say_left_out
     from vftcli.cli.opening import open_made
-    from vftcli.outputs.admittance.files import FILES, write_admittance
+    from vftcli.outputs.admittance.files import files_of_replay, write_admittance
     from vftcli.outputs.files import OutputFolder
     from vftcli.signals.packages import check_installed
 
@@ -153,10 +168,13 @@ def admit(
     control = ControlChoice.parsed(assignments=own, **controllers.words())
     observers = analysis.observers.changed(assignments=others)
     analysis = analysis.changed(observers=observers)
+    form = shown.form()
     if output is not None:
-        OutputFolder(output, force, FILES).check()
-    elif show_made:
-        raise typer.BadParameter("--open shows what -o DIR writes; give -o too")
+        OutputFolder(output, force, files_of_replay(form)).check()
+    elif show_made or form:
+        raise typer.BadParameter("--open and --figures are of what -o DIR writes; give -o too")
+    if shown.json and shown.table.latex:
+        raise typer.BadParameter("choose one of --json and --latex")
     recording, run = None, None
     examinations: tuple[Examination, ...] = ()
     if loop.closed_loop is not None:
@@ -165,7 +183,7 @@ def admit(
         result = released(release, analysis, control)
     else:
         result, recording, examinations = replayed(log, source, analysis, control)
-    show(result, run, json)
+    show(result, run, shown)
     if output is not None:
         write_admittance(
             output,
@@ -175,10 +193,11 @@ def admit(
             command=command_line(),
             force=force,
             examinations=examinations,
+            form=form,
         )
-        if not json:
+        if not (shown.json or shown.table.latex):
             say(f"wrote {output}: vftcli open {output}")
-        say_left_out(FILES)
+        say_left_out(files_of_replay(form))
         if show_made:
             open_made(output)
 
@@ -344,14 +363,22 @@ def looped(
     return result, run
 
 
-def show(result: "Replay", run: "ClosedLoop | None", json: bool) -> None:
+def show(result: "Replay", run: "ClosedLoop | None", shown: ShownOptions) -> None:
     """The comparison on stdout, remarks on stderr."""
     from vftcli.cli.console import detail, say
-    from vftcli.outputs.admittance.tables import comparison_text, latency_text, parameter_text
+    from vftcli.outputs.admittance.tables import (
+        comparison_text,
+        latency_text,
+        latex_text,
+        parameter_text,
+    )
     from vftcli.outputs.grid import json_rows
 
-    if json:
+    if shown.json:
         typer.echo(json_rows(result.rows).rstrip("\n"))
+        return
+    if shown.table.latex:
+        typer.echo(latex_text(result).rstrip("\n"))
         return
     say(f"{result.robot.title or result.robot.name}: {result.source}")
     say(parameter_text(result))

@@ -1,5 +1,6 @@
 """`vftcli bench`: Table II on this machine."""
 
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -45,13 +46,15 @@ def bench(measured: BenchOptions, json: opt.Json = False) -> None:
     if json:
         say_json(result)
         return
-    if measured.latex:
-        typer.echo(latex(bench_grid(result)), nl=False)
-        return
-    typer.echo(
+    title = (
         f"{result['robot']}, {measured.samples} samples, median of {measured.rounds} rounds, "
         f"NumPy with {result['simd']}"
     )
+    if measured.latex:
+        grid = replace(bench_grid(result), title=f"Computing time: {title}")
+        typer.echo(latex(grid), nl=False)
+        return
+    typer.echo(title)
     typer.echo(terminal(bench_grid(result)))
     ratios = result["ratios"]
     typer.echo(

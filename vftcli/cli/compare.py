@@ -1,12 +1,18 @@
 """`vftcli compare`: errors of the observers against a reference."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, flag, taken_apart
+from vftcli.cli.bundles import Bundle, flag, option, taken_apart
 from vftcli.cli.help import COMPARE, OUTPUT
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from vftcli.outputs.files import OutputFolder
 
 MORE = "Intervals, lags and significance: --details"
 """What the tables on the terminal leave out."""
@@ -35,12 +41,51 @@ class TableOptions(Bundle):
         return asked[0] if asked else "terminal"
 
 
+class DrawnErrors(opt.FigureOptions):
+    """The figure of the errors, and where it goes."""
+
+    output: Path | None = option("-o/--output", "DIR", "Folder for --figures.")
+    force: opt.Force = False
+
+    def folder(self) -> "OutputFolder | None":
+        """Where the figure goes, None where none is asked for.
+
+        Raises:
+            typer.BadParameter: If only one of --figures and -o is given.
+            VftError: If figures cannot be drawn, or the folder cannot be written.
+        """
+        form = self.form()
+        if (form is None) != (self.output is None):
+            raise typer.BadParameter("--figures and -o DIR need each other: tables go to stdout")
+        if self.output is None:
+            return None
+        from vftcli.outputs.figures.paper import figure_files
+        from vftcli.outputs.files import OutputFolder
+        from vftcli.outputs.log.figures import ERROR_FIGURES
+
+        folder = OutputFolder(self.output, self.force, figure_files(form, ERROR_FIGURES))
+        folder.check()
+        return folder
+
+    def write(self, errors: "pl.DataFrame") -> None:
+        """Draw the errors, if that is asked for, and say where."""
+        if (figures := self.folder()) is not None:
+            from vftcli.cli.console import say
+            from vftcli.outputs.figures.paper import write_figures
+            from vftcli.outputs.log.figures import error_figures
+
+            with figures as folder:
+                write_figures(folder, error_figures(errors), str(self.figures))
+            say(f"wrote {self.output}: figures/errors-single.{self.figures}, errors-double")
+
+
 @taken_apart
 def compare(
     logs: opt.Logs,
     reference: opt.RequiredReferenceOptions,
     analysis: opt.AnalysisOptions,
     table: TableOptions,
+    drawn: DrawnErrors,
     significance: Annotated[
         bool,
         typer.Option(
@@ -66,12 +111,8 @@ def compare(
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
 
-    show = {
-        "json": tables.to_json,
-        "csv": tables.to_csv,
-        "markdown": tables.to_markdown,
-        "latex": tables.to_latex,
-    }
+    if drawn.folder() is not None and significance:
+        raise typer.BadParameter("--figures draws the errors; leave --significance away")
     library = Library(logs)
     choice = for_comparison(analysis.choice(library, reference))
     left_out, analyses = LeftOut(library, logs), []
@@ -101,10 +142,11 @@ def compare(
         if a.reference is not None
     ]
     together = pl.concat([*errors, evaluate_pooled(members)], how="diagonal")
+    drawn.write(together)
     rows, bounds = tables.marked(together, analyses), paper_bounds(analyses)
     if table.form == "terminal":
         text = tables.to_terminal(rows, bounds, every=analysis.talk.details)
         typer.echo(text if analysis.talk.details else f"{text}{MORE}")
     else:
-        typer.echo(show[table.form](rows, bounds))
+        typer.echo(tables.FORMS[table.form](rows, bounds))
     left_out.end(len(errors))

@@ -101,10 +101,9 @@ def identify_robot(
     asked: TaskOptions,
     validation: ValidationOptions,
     free: WithoutLoad,
+    made: opt.MadeOptions,
     anyway: opt.AnywayOptions,
     talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
-    json: opt.Json = False,
-    force: opt.Force = False,
     show: opt.Open = False,
 ) -> None:
     """Make a robot file from logs: friction, inertias, payload.
@@ -126,12 +125,13 @@ def identify_robot(
     from vftcli.cli.opening import open_made
     from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.identification.files import beside, write_identification
+    from vftcli.outputs.identification.files import beside, files_beside, write_identification
     from vftcli.outputs.identification.tables import tables_text
     from vftcli.readers.library import Library
 
     task = asked.task(output.stem, friction=robot.friction != "none")
-    OutputFolder(output.parent, force, [file.name for file in beside(output).values()]).check()
+    form = made.form()
+    OutputFolder(output.parent, made.force, files_beside(output, form)).check()
     choice, chosen = reading.choice(), robot.choice()
     # An episode is one of LOG's; the others are logs of their own.
     held_out_choice = reading.changed(interval=validation.interval, episode=None).choice()
@@ -156,13 +156,15 @@ def identify_robot(
         say_recording(recording)
         examiner.examine(recording, profile)
     found = identify(train, profile, task, held_out, unloaded[0] if unloaded else None)
-    record = write_identification(output, found, examiner.examinations, command_line(), force)
+    record = write_identification(
+        output, found, examiner.examinations, command_line(), made.force, form
+    )
     say_robots(examiner.robots)
     for remark in found.remarks:
         detail(f"note: {remark}")
     files = list(beside(output).values())
     say(f"wrote {', '.join(str(file) for file in files if file.exists())}")
     say_left_out(files)
-    typer.echo(record.rstrip("\n") if json else tables_text(found))
+    typer.echo(record.rstrip("\n") if made.json else tables_text(found))
     if show:
         open_made(output.with_suffix(".html"))

@@ -286,6 +286,28 @@ class ExtraOptions(Bundle):
         return OutputChoice.parsed(extras=extras, rrd_detail=self.rrd_detail)
 
 
+class FigureOptions(Bundle):
+    """Figures for a paper."""
+
+    GROUP = headings.WRITE
+    figures: str | None = option(
+        "--figures", "pdf|svg|png", "Also figures for a paper, one and two columns wide."
+    )
+
+    def form(self) -> str | None:
+        """What they are written as, checked; None where none are asked for."""
+        from vftcli.outputs.figures.paper import checked_form
+
+        return checked_form(self.figures)
+
+
+class MadeOptions(FigureOptions):
+    """What is made: figures too, JSON in place of words, over what is there."""
+
+    json: Json = False
+    force: Force = False
+
+
 class NamedReferenceOptions(Bundle):
     """What is taken for true where nothing else is asked of it."""
 
@@ -316,7 +338,6 @@ class AnywayOptions(Bundle):
     """Whether results are wanted that mean little."""
 
     GROUP = headings.LOG
-
     anyway: bool = flag(*ANYWAY, seldom=True)
 
 

@@ -25,6 +25,7 @@ def report(
     reference: opt.ReferenceOptions,
     analysis: opt.AnalysisOptions,
     also: opt.ExtraOptions,
+    drawn: opt.FigureOptions,
     published: Annotated[
         str | None,
         typer.Option(
@@ -56,8 +57,8 @@ def report(
     from vftcli.readers.table import JacobianError
 
     library = Library(logs)
-    written = also.choice()
-    names = report_files([library.label(log) for log in logs], written.extras)
+    written, form = also.choice(), drawn.form()
+    names = report_files([library.label(log) for log in logs], written.extras, form)
     OutputFolder(output, force, names).check()
     choice = analysis.choice(library, reference, on_screen=not json)
     if published is not None:
@@ -74,10 +75,12 @@ def report(
     choice.progress("writing", WRITING, 1.0)
     command, failed = command_line(), left_out.reasons
     if len(analyses) + len(failed) == 1:
-        record = write_report(output, analyses[0], command=command, force=force, choice=written)
+        record = write_report(
+            output, analyses[0], command=command, force=force, choice=written, form=form
+        )
     else:
         record = write_reports(
-            output, analyses, command=command, force=force, choice=written, failed=failed
+            output, analyses, command=command, force=force, choice=written, form=form, failed=failed
         )
     say_left_out(FILES)
     if json:
@@ -131,6 +134,7 @@ def show_report(
 
     several = len(analyses) + len(failed) > 1
     screen, names = canvas(), SUMMARY_FILES if several else (*FILES, *extra_files(extras))
+    names = (*names, "figures/")
     below = written_lines(output, names, screen, "vftcli open", several=several)
     if several:
         show(logs_screen(analyses, screen, failed, below, every=details))

@@ -24,6 +24,7 @@ def tune_gains(
     robot: RobotOptions,
     free: opt.FreeOptions,
     bias: opt.BiasOptions,
+    made: opt.MadeOptions,
     anyway: opt.AnywayOptions,
     talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
     goal: Annotated[
@@ -42,8 +43,6 @@ def tune_gains(
             help="Torque that raises an alarm [N·m], one or one a joint.",
         ),
     ] = None,
-    json: opt.Json = False,
-    force: opt.Force = False,
 ) -> None:
     """Find gains on a log for a stated goal, for --gains.
 
@@ -54,7 +53,8 @@ def tune_gains(
     from vftcli.cli.console import command_line, detail, health_of, say, say_json, say_recording
     from vftcli.observers.choice import LOG_GAINS, ObserverChoice
     from vftcli.outputs.examination import health_record, overridden_lines
-    from vftcli.outputs.files import check_file, write_text
+    from vftcli.outputs.figures.tuned import write_tuned
+    from vftcli.outputs.files import check_file
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
     from vftcli.outputs.log.run_record import jsonable
@@ -62,11 +62,11 @@ def tune_gains(
     from vftcli.readers.library import Library
     from vftcli.refinement.tuning import bounds_reached, parse_goal, tune_all
     from vftcli.repetition.free_run import Models
-    from vftcli.robots.writing import lines_of
     from vftcli.signals.errors import ParameterError
 
     wanted = parse_goal(goal, threshold)
-    check_file(output, force)
+    form = made.form()
+    check_file(output, made.force)
     library = Library([log])
     choice = AnalysisChoice(
         read=reading.choice(),
@@ -88,11 +88,9 @@ def tune_gains(
     notes = [str(remark) for remark in (*found.remarks, *reached)]
     doubts = overridden_lines(examinations)
     heading = [*doubts, command_line(), f"goal: {goal}", f"robot: {arm.name}", *notes]
-    comments = "".join(f"# {line}\n" for line in heading)
-    gains = {"observers": {line.section: dict(line.gains) for line in tuned}}
-    write_text(output, comments + "".join(lines_of(gains)), force)
-    if json:
-        rows = [jsonable({**line._asdict()}) for line in tuned]
+    write_tuned(output, heading, found.spectra, tuned, force=made.force, form=form)
+    if made.json:
+        rows = [jsonable(line.record) for line in tuned]
         health = jsonable(health_record(examinations))
         say_json({"goal": goal, "examination": health, "notes": notes, "observers": rows})
         return

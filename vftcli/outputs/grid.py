@@ -8,8 +8,9 @@ whose values are not rounded, are written by `csv_rows` and `json_rows`.
 import csv
 import io
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from html import escape
 from typing import Any, NamedTuple
 
@@ -19,6 +20,15 @@ from vftcli.signals.letters import printable
 
 DASH = "–"
 """What stands where nothing is known."""
+
+NUMBER = re.compile(r"(?:< )?[-−]?\d+(\.\d+)?")
+"""A number or a bound, and its decimals with their point."""
+
+DECIMALS = "." + 20 * "0"
+"""What stands, unseen, where a number has fewer decimals than others of its column."""
+
+COLUMN_WIDTH, LETTER_WIDTH, COLUMN_GAP = 3.5, 0.058, 0.111
+"""Width of a column of the IEEE, of a letter and of the gap between two columns. [in]"""
 
 LATEX_LETTERS = {
     "\\": r"\textbackslash{}",
@@ -32,7 +42,18 @@ LATEX_LETTERS = {
     "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}",
     "–": "--",
-    "†": r"\dag",
+    "†": r"$\dagger$",
+    "−": "$-$",
+    "α": r"$\alpha$",
+    "ξ": r"$\xi$",
+    "µ": r"$\mu$",
+    "τ": r"$\tau$",
+    "σ": r"$\sigma$",
+    "ω": r"$\omega$",
+    "×": r"$\times$",
+    "≤": r"$\leq$",
+    "≥": r"$\geq$",
+    "→": r"$\rightarrow$",
     "<": r"$<$",
     "·": r"\,",
 }
@@ -129,7 +150,7 @@ class Grid:
         summaries: How many rows at the end sum up those above, below a rule.
         marked: Whether numbers may bear a mark: the terminal then keeps a place for it, so that
             digits stand below digits.
-        notes: Lines on what the marks mean, comments in LaTeX.
+        notes: Lines on what the marks mean, footnotes in LaTeX.
         swatches: Whether the page shows the colour of the observer that heads a row.
     """
 
@@ -206,35 +227,86 @@ def markdown(grid: Grid) -> str:
     return "".join(f"{line}\n" for line in (*above, *lines))
 
 
-def latex(grid: Grid) -> str:
-    r"""A table as a ``tabular`` of the package booktabs, its title as a comment above."""
-    comments = [", ".join(text for text in (grid.title, grid.quantity) if text), *grid.notes]
-    count = sum(not column.words for column in grid.columns)
-    # Booktabs has no vertical rules; words to the left, numbers to the right.
-    spec = "".join("l" if column.words else "r" for column in grid.columns)
-    heads = [column.symbol or escape_latex(column.head) for column in grid.columns]
-    heads[0] = heads[0][:1].upper() + heads[0][1:]
-    parts = [printable(f"% {text}") for text in comments if text]
-    parts += [rf"\begin{{tabular}}{{{spec}}}", r"\toprule"]
-    if grid.unit:
-        unit = escape_latex(grid.unit)
-        spanning = rf"\multicolumn{{{count}}}{{c}}{{{grid.quantity} [{unit}]}}"
-        parts.append(latex_line(["", spanning]))
-    parts.append(latex_line(heads))
-    if any(column.unit for column in grid.columns):
-        units = [f"[{escape_latex(c.unit)}]" if c.unit else "" for c in grid.columns]
-        parts.append(latex_line(units))
-    rows = [
-        latex_line([bold(escape_latex(c.text), c.best, r"\textbf{{{}}}") for c in row])
-        for row in grid.cells
-    ]
-    if grid.summaries:
-        rows.insert(-grid.summaries, r"\midrule")
-    parts += [r"\midrule", *rows, r"\bottomrule", r"\end{tabular}"]
+def latex(*grids: Grid) -> str:
+    r"""Tables of the same columns as one ``table``, or ``table*``, of the package booktabs.
+
+    Caption, label and footnotes stand inside; decimal points stand below one another without a
+    further package. Of several grids each has its title above its rows.
+    """
+    first = grids[0]
+    caption = (replace(first, title="") if len(grids) > 1 else first).caption or first.title
+    rows = [row for grid in grids for row in grid.cells]
+    texts = list(zip(*(latex_cells(texts) for texts in zip(*rows, strict=True)), strict=True))
+    wide = latex_width(first.columns, rows) > COLUMN_WIDTH
+    place = "table*" if wide else "table"
+    spec = "".join("l" if column.words else "r" for column in first.columns)
+    parts = [rf"\begin{{{place}}}[tb]", r"\centering", rf"\caption{{{escape_latex(caption)}}}"]
+    parts += [rf"\label{{tab:{slug(first.title or caption)}}}", r"\footnotesize"]
+    parts += [r"\setlength{\tabcolsep}{4pt}", rf"\begin{{tabular}}{{{spec}}}", r"\toprule"]
+    parts += latex_heads(first.columns)
+    for grid in grids:
+        own, texts = texts[: len(grid.rows)], texts[len(grid.rows) :]
+        parts.append(r"\midrule")
+        if len(grids) > 1:
+            title = rf"\textit{{{escape_latex(grid.title)}}}"
+            parts.append(latex_line([rf"\multicolumn{{{len(spec)}}}{{l}}{{{title}}}"]))
+        lines = [latex_line(row) for row in own]
+        if grid.summaries:
+            lines.insert(-grid.summaries, rf"\cmidrule{{1-{len(spec)}}}")
+        parts += lines
+    parts += [r"\bottomrule", r"\end{tabular}"]
+    notes = [escape_latex(note) for note in dict.fromkeys(n for grid in grids for n in grid.notes)]
+    if notes:
+        below = r" \\ ".join(notes)
+        parts.append(rf"\\[2pt] \parbox{{\linewidth}}{{\footnotesize {below}}}")
+    parts.append(rf"\end{{{place}}}")
     return "".join(f"{line}\n" for line in parts)
 
 
-def latex_line(texts: Sequence[str]) -> str:
+def latex_heads(columns: Sequence[Column]) -> list[str]:
+    """Headings in the middle of their columns, and below them the units that they have."""
+    heads = [column.symbol or escape_latex(column.head) for column in columns]
+    heads[0] = heads[0][:1].upper() + heads[0][1:]
+    units = [f"[{escape_latex(column.unit)}]" if column.unit else "" for column in columns]
+    lines = [heads, units] if any(units) else [heads]
+    return [
+        latex_line(
+            text if column.words or not text else rf"\multicolumn{{1}}{{c}}{{{text}}}"
+            for text, column in zip(line, columns, strict=True)
+        )
+        for line in lines
+    ]
+
+
+def latex_cells(column: Sequence[GridCell]) -> list[str]:
+    """The entries of a column; numbers with room for the decimals that others have more."""
+    numbers = [NUMBER.fullmatch(cell.text) for cell in column]
+    most = max((len(found[1] or "") for found in numbers if found), default=0)
+    texts = []
+    for cell, found in zip(column, numbers, strict=True):
+        text = bold(escape_latex(cell.text), cell.best, r"\textbf{{{}}}")
+        text += rf"\rlap{{$^{{{cell.mark}}}$}}" if cell.mark else ""
+        # The point counts among the decimals.
+        missing = DECIMALS[len(found[1] or "") : most] if found else ""
+        texts.append(text + (rf"\phantom{{{missing}}}" if missing else ""))
+    return texts
+
+
+def latex_width(columns: Sequence[Column], rows: Sequence[Sequence[GridCell]]) -> float:
+    """About how wide a table is in footnotes' type. [in]"""
+    widths = [
+        max([0 if c.symbol else len(c.head), *(len(row[k].text) for row in rows)])
+        for k, c in enumerate(columns)
+    ]
+    return LETTER_WIDTH * sum(widths) + COLUMN_GAP * len(columns)
+
+
+def slug(title: str) -> str:
+    """A title as a label of LaTeX: small letters, digits and dashes."""
+    return re.sub("[^a-z0-9]+", "-", title.lower())[:40].strip("-") or "results"
+
+
+def latex_line(texts: Iterable[str]) -> str:
     """Entries as one row of a LaTeX tabular."""
     return rf"{' & '.join(texts)} \\"
 
@@ -292,8 +364,11 @@ def escape_markdown(text: str) -> str:
 
 def escape_latex(text: str) -> str:
     """Text that LaTeX prints as it is."""
+    text = printable(text)
+    if text.startswith("-") and NUMBER.fullmatch(text):
+        text = f"−{text[1:]}"
     # A blank behind the sign of a bound is a thin one: "< 6" is one number.
-    text = "".join(LATEX_LETTERS.get(letter, letter) for letter in printable(text))
+    text = "".join(LATEX_LETTERS.get(letter, letter) for letter in text)
     return text.replace("$<$ ", r"$<$\,")
 
 

@@ -36,7 +36,11 @@ DASHED = ("kfo-zoh", "rts-auto")
 
 def colours_of(estimates: Sequence[ExternalTorque]) -> dict[str, str]:
     """One colour for each estimate's name; two get the same only when there are no more."""
-    names = [estimate.name for estimate in estimates]
+    return colours_of_names([estimate.name for estimate in estimates])
+
+
+def colours_of_names(names: Sequence[str]) -> dict[str, str]:
+    """The same of the names alone."""
     taken = {COLOURS[name] for name in names if name in COLOURS}
     # An estimate without a colour of its own does not get one that another has.
     free = [colour for colour in SPARE if colour not in taken] or list(SPARE)

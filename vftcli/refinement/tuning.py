@@ -7,8 +7,10 @@ import numpy as np
 
 from vftcli.observers import FilteredDynamicsObserver, MomentumObserver, Observer, Setup
 from vftcli.observers.auto_tuning import (
+    Curve,
     Kind,
     bound_remarks,
+    error_curve,
     expected_error,
     kalman_filter,
     kalman_smoother,
@@ -54,6 +56,7 @@ class Tuned(NamedTuple):
         delay: Lag behind a slow ramp. (n,) [s]
         rmse: Expected error. (n,) [N·m]
         alarms: Expected false alarms an hour beyond the goal's threshold; None without one. (n,)
+        running: The observer with these gains.
     """
 
     observer: str
@@ -63,6 +66,12 @@ class Tuned(NamedTuple):
     delay: Array
     rmse: Array
     alarms: Array | None = None
+    running: Observer | None = None
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Everything but the observer itself, for machines."""
+        return {key: value for key, value in self._asdict().items() if key != "running"}
 
 
 def parse_goal(text: str, threshold: str | None = None) -> TuningGoal:
@@ -147,9 +156,20 @@ def tune_all(spectra: Spectra, goal: TuningGoal) -> tuple[Tuned, ...]:
                 delay=np.asarray(observer.tuning(spectra.step, spectra.joints).delay),
                 rmse=np.sqrt(spectra.missed(response) + spectra.passed(response)),
                 alarms=None if threshold is None else alarms(response, spectra, threshold),
+                running=observer,
             )
         )
     return tuple(tuned)
+
+
+def tuning_curves(spectra: Spectra) -> dict[str, Curve]:
+    """Observer → its expected error over its rate; one curve for both first-order observers."""
+    kinds: dict[str, Kind] = {
+        "fdo, gmo": momentum,
+        "kfo-zoh": kalman_filter,
+        "kfo-rts": kalman_smoother,
+    }
+    return {name: error_curve(kind, spectra) for name, kind in kinds.items()}
 
 
 def gains_of(spectra: Spectra) -> Gains:

@@ -18,6 +18,7 @@ PACKAGES = {
     "h5py": ("h5py", "pip install 'vftcli[hdf5]'"),
     "xacro": ("xacro", "pip install 'vftcli[xacro]'"),
     "xacrodoc": ("xacrodoc", "pip install 'vftcli[xacro]'"),
+    "matplotlib": ("matplotlib", "pip install 'vftcli[figures]'"),
 }
 """Module → the package that holds it, and how to install it."""
 

@@ -144,14 +144,26 @@ def test_markdown_marks_the_best_and_escapes(errors: pl.DataFrame) -> None:
 
 def test_latex(errors: pl.DataFrame) -> None:
     text = tables.to_latex(errors.with_columns(observer=pl.col("observer") + "_%&"))
-    assert text.startswith("% a_b.csv")
+    assert r"\caption{a\_b.csv against two-cycle, 100 samples, RMSE in N\,m}" in text
     assert r"\begin{tabular}{lrrr}" in text
-    assert r"RMSE [N\,m]" in text
-    assert r"fdo\_\%\& & \textbf{0.550} & \textbf{12.3} & 6.45 \\" in text
+    assert (
+        r"fdo\_\%\& & \textbf{0.550}\rlap{$^{*}$} & \textbf{12.3}\phantom{0} & 6.45\phantom{0} \\"
+    ) in text
     assert text.index(r"\toprule") < text.index(r"\midrule") < text.index(r"\bottomrule")
     assert r"floor & 0.500 & 1.00 & 0.750 \\" in text
+    assert text.index("floor: RMSE that") < text.index(r"\end{table}")
 
 
-def test_latex_comment_stays_one_line(errors: pl.DataFrame) -> None:
+def test_logs_share_a_latex_table_and_a_dagger_goes_with_its_log(errors: pl.DataFrame) -> None:
+    other = errors.with_columns(recording=pl.lit("b.csv"), reference_trusted=pl.col("joint") != 2)
+    text = tables.to_latex(pl.concat([errors, other]))
+    assert text.count(r"\begin{table}") == 1
+    assert r"\textit{b.csv against two-cycle, 100 samples, J2$\dagger$}" in text
+    assert r"\multicolumn{1}{c}{$J_{2}$}" in text
+    alone = tables.to_latex(other)
+    assert r"\multicolumn{1}{c}{$J_{2}$$^\dagger$}" in alone
+
+
+def test_a_name_is_no_command_of_latex(errors: pl.DataFrame) -> None:
     text = tables.to_latex(errors.with_columns(recording=pl.lit("a\n\\input{b}")))
-    assert "\n\\input" not in text
+    assert r"\input" not in text

@@ -12,10 +12,12 @@ from vftcli.admittance.parameters import AXES, PER_AXIS
 from vftcli.admittance.replay import Replay
 from vftcli.admittance.stability import Verdict
 from vftcli.doctor.examination import Examination
+from vftcli.outputs.admittance.figures import REPLAY_FIGURES, replay_figures
 from vftcli.outputs.admittance.page import render_admittance
 from vftcli.outputs.admittance.recording import padded, write_ghosts
 from vftcli.outputs.admittance.tables import comparison_csv, latency_rows
 from vftcli.outputs.examination import health_record
+from vftcli.outputs.figures.paper import figure_files, write_figures
 from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.grid import json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
@@ -40,6 +42,11 @@ CONVENTIONS = {
     "row": "a deviation follows from the force of the row before it",
     "units": "s, m, rad, N, N·m, J",
 }
+
+
+def files_of_replay(form: str | None) -> list[str]:
+    """Every file that a replay's folder may hold; `form` is what figures are written as."""
+    return [*FILES, *figure_files(form, REPLAY_FIGURES)]
 
 
 def motion_table(replay: Replay) -> pl.DataFrame:
@@ -134,8 +141,9 @@ def write_admittance(
     command: str = "",
     force: bool = False,
     examinations: Sequence[Examination] = (),
+    form: str | None = None,
 ) -> None:
-    """Write the folder of a replay, all or nothing.
+    """Write the folder of a replay, all or nothing; figures in a form, or none.
 
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
@@ -149,11 +157,13 @@ def write_admittance(
         "comparison.csv": comparison_csv(replay.rows),
         "comparison.json": json_rows(replay.rows),
     }
-    with OutputFolder(path, force, FILES) as folder:
+    with OutputFolder(path, force, files_of_replay(form)) as folder:
         for name, text in texts.items():
             folder.write(name, text)
         with table_file(folder / "motion.parquet") as file:
             motion_table(replay).write_parquet(file, compression="zstd")
         if installed("rerun"):
             write_ghosts(folder / "recording.rrd", replay, title)
+        if form is not None:
+            write_figures(folder, replay_figures(replay, run), form)
         seal(folder, SEAL, record)

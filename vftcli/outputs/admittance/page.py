@@ -170,7 +170,7 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
     true = () if run is None else (ChartLine("true force", padded(run.truth), dash="2 2"),)
     force = (
         *true,
-        ChartLine("force", padded(replay.wrench), "#8a929a"),
+        ChartLine("force", padded(replay.wrench), "#8a929a", "1.5 2"),
         ChartLine("force that enters the law", padded(replay.phases.force), SPARE[1]),
     )
     limit = np.where(np.isfinite(p.speed_limit), p.speed_limit, np.nan)

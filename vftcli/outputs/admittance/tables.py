@@ -1,6 +1,7 @@
 """Tables and lines on an admittance replay: the comparison, latencies, parameters."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from vftcli.admittance.closed_loop import ClosedLoop
 from vftcli.admittance.latency import latencies
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.grid import Column, Grid, csv_rows, terminal
+from vftcli.outputs.grid import Column, Grid, csv_rows, latex, terminal
 from vftcli.signals.arrays import Array
 
 
@@ -24,18 +25,24 @@ COLUMNS = {
     "xi": Column("ξ", form=number_form(".3g")),
     "axis": Column("axis"),
     "drag": Column("drag"),
-    "start_s": Column("start [s]", form=number_form(".3f")),
-    "release_s": Column("release [s]", form=number_form(".3f")),
-    "peak": Column("peak [m, rad]", form=number_form(".4f")),
-    "time_to_peak_s": Column("to peak [s]", form=number_form(".3f")),
-    "peak_advance_s": Column("advance [s]", form=number_form(".3f")),
-    "overshoot": Column("overshoot [%]", form=lambda share: number_form(".1f")(100.0 * share)),
-    "return_10_s": Column("back to 10 % [s]", form=number_form(".3f")),
-    "return_2_s": Column("back to 2 % [s]", form=number_form(".3f")),
-    "idle_s": Column("idle [s]", form=number_form(".3f")),
-    "work_J": Column("work [J]", form=number_form(".3f")),
+    "start_s": Column("start", "s", number_form(".3f")),
+    "release_s": Column("release", "s", number_form(".3f")),
+    "peak": Column("peak", "m, rad", number_form(".4f")),
+    "time_to_peak_s": Column("to peak", "s", number_form(".3f")),
+    "peak_advance_s": Column("advance", "s", number_form(".3f")),
+    "overshoot": Column("overshoot", "%", lambda share: number_form(".1f")(100.0 * share)),
+    "return_10_s": Column("back to 10 %", "s", number_form(".3f"), symbol="$t_{10}$"),
+    "return_2_s": Column("back to 2 %", "s", number_form(".3f"), symbol="$t_2$"),
+    "idle_s": Column("idle", "s", number_form(".3f")),
+    "work_J": Column("work", "J", number_form(".3f")),
 }
 """Key of a row → its column."""
+
+
+RETURNS = (
+    "t10, t2: from the release until the deviation stays within 10 % and 2 % of its value there"
+)
+"""What the headings of the LaTeX table mean."""
 
 
 def comparison_csv(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -154,10 +161,19 @@ def parameter_grid(replay: Replay) -> Grid:
         bound = f"{limit:g} {speed}" if np.isfinite(limit) else "none"
         tail = (f"{p.threshold[k]:g} {force}", bound)
         rows.append((axis, *numbers, f"{p.damping_ratio[k]:.3g}", *tail))
-    heads = ("M_d", "B_d", "K_d", "α", "ξ", "F_tsd", "Ẋ_tsd")
+    heads = {
+        **{f"{letter}_d": f"${letter}_d$" for letter in "MBK"},
+        "α": "",
+        "ξ": "",
+        "F_tsd": r"$F_\mathrm{tsd}$",
+        "Ẋ_tsd": r"$\dot X_\mathrm{tsd}$",
+    }
     return Grid(
         title=f"Values used; {p.source or 'the command line'}",
-        columns=(Column("coordinates", words=True), *(Column(h, form="g") for h in heads)),
+        columns=(
+            Column("coordinates", words=True),
+            *(Column(h, form="g", symbol=s) for h, s in heads.items()),
+        ),
         rows=tuple(rows),
     )
 
@@ -186,3 +202,12 @@ def stability_grid(replay: Replay) -> Grid:
         rows=tuple(rows),
         swatches=True,
     )
+
+
+def latex_text(replay: Replay) -> str:
+    """The parameters (Tables III and IV of the paper) and the comparison as LaTeX tables."""
+    grids = [parameter_grid(replay)]
+    if replay.rows:
+        found = comparison_grid(replay.rows, title="The same force through every controller")
+        grids.append(replace(found, notes=(RETURNS,)))
+    return "\n".join(latex(grid) for grid in grids)

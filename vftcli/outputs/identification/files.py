@@ -7,7 +7,9 @@ from typing import Any
 from vftcli.doctor.examination import Examination
 from vftcli.identification.result import Identification
 from vftcli.outputs.examination import health_record, overridden_lines
+from vftcli.outputs.figures.paper import figure_files, write_figures
 from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.identification.figures import IDENTIFICATION_FIGURES, identification_figures
 from vftcli.outputs.identification.page import render_identification
 from vftcli.outputs.identification.recording import write_identification_rrd
 from vftcli.outputs.log.run_record import (
@@ -41,12 +43,24 @@ def beside(path: Path) -> dict[str, Path]:
     }
 
 
+def files_beside(path: Path, form: str | None) -> list[str]:
+    """Names of all files that go with a robot file; `form` is what figures are written as."""
+    figures = figure_files(form, IDENTIFICATION_FIGURES, f"{path.stem}-")
+    return [*(file.name for file in beside(path).values()), *figures]
+
+
 def write_identification(
-    path: Path, found: Identification, logs: Sequence[Examination], command: str, force: bool
+    path: Path,
+    found: Identification,
+    logs: Sequence[Examination],
+    command: str,
+    force: bool,
+    form: str | None = None,
 ) -> str:
     """Write all files or none; those of an earlier run stay as they were if one fails.
 
-    `logs` are the examinations of all that were read, also of those that no fit used.
+    `logs` are the examinations of all that were read, also of those that no fit used; `form` is
+    what figures are written as, None for no figures.
 
     Returns:
         The text of `run.json`.
@@ -66,11 +80,13 @@ def write_identification(
         "html": render_identification(found, record, logs),
         "toml": robot_toml(found.robot, heading),
     }
-    with OutputFolder(path.parent, force, names.values()) as folder:
+    with OutputFolder(path.parent, force, files_beside(path, form)) as folder:
         if installed("rerun"):
             write_identification_rrd(folder / names["rrd"], found)
         for kind, text in texts.items():
             folder.write(names[kind], text)
+        if form is not None:
+            write_figures(folder, identification_figures(found), form, f"{path.stem}-")
         return seal(folder, names["run"], record)
 
 

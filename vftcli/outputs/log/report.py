@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.contacts import contacts_csv, contacts_record
+from vftcli.outputs.figures.paper import figure_files, write_figures
 from vftcli.outputs.files import OutputFolder, numbered
 from vftcli.outputs.log import tables
 from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
+from vftcli.outputs.log.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
 from vftcli.outputs.log.rerun_recording import write_rrd
 from vftcli.outputs.log.run_record import jsonable, run_record, seal, versions
 from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds
@@ -48,17 +50,25 @@ def places_of(labels: Sequence[str]) -> list[str]:
     return numbered(Path(label).stem or "log" for label in labels)
 
 
-def report_files(labels: Sequence[str], extras: Sequence[str] = ()) -> list[str]:
-    """Names of all files that a report of logs with these labels may hold, with these extras."""
+def report_files(
+    labels: Sequence[str], extras: Sequence[str] = (), form: str | None = None
+) -> list[str]:
+    """Names of all files that a report of logs with these labels may hold, with these extras.
+
+    `form` is what figures are written as, None without any.
+    """
     if len(labels) == 1:
-        return [*FILES, *extra_files(extras)]
-    return files_of_several(labels, extras)
+        return [*FILES, *extra_files(extras), *figure_files(form, LOG_FIGURES)]
+    return files_of_several(labels, extras, form)
 
 
-def files_of_several(labels: Sequence[str], extras: Sequence[str] = ()) -> list[str]:
+def files_of_several(
+    labels: Sequence[str], extras: Sequence[str] = (), form: str | None = None
+) -> list[str]:
     """Those of a report with a sub-folder a log, even where one log alone could be analysed."""
-    own = [*FILES, *extra_files(extras)]
-    return [*SUMMARY_FILES, *(f"{place}/{name}" for place in places_of(labels) for name in own)]
+    own = [*FILES, *extra_files(extras), *figure_files(form, LOG_FIGURES)]
+    above = [*SUMMARY_FILES, *figure_files(form, ERROR_FIGURES)]
+    return [*above, *(f"{place}/{name}" for place in places_of(labels) for name in own)]
 
 
 def write_report(
@@ -68,8 +78,9 @@ def write_report(
     command: str,
     force: bool = False,
     choice: OutputChoice = PLAIN,
+    form: str | None = None,
 ) -> str:
-    """Write the report of one log, all files or none.
+    """Write the report of one log, all files or none; figures in a form, or none.
 
     Returns:
         The text of `run.json`.
@@ -77,9 +88,9 @@ def write_report(
     Raises:
         OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
-    names = report_files([analysis.recording.name], choice.extras)
+    names = report_files([analysis.recording.name], choice.extras, form)
     with OutputFolder(path, force, names) as folder:
-        return fill(folder, "", analysis, command, choice)
+        return fill(folder, "", analysis, command, choice, form)
 
 
 def write_reports(
@@ -89,6 +100,7 @@ def write_reports(
     command: str,
     force: bool = False,
     choice: OutputChoice = PLAIN,
+    form: str | None = None,
     failed: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Write one sub-folder a log, and above them an index, all errors in one, and run.json.
@@ -99,6 +111,7 @@ def write_reports(
         command: The command line as the user typed it.
         force: Whether files that are there may be replaced.
         choice: What else is written of each log.
+        form: What figures are written as, None for no figures.
         failed: Why each of the other logs could not be, by its label.
 
     Returns:
@@ -111,9 +124,9 @@ def write_reports(
 
     labels = [a.recording.name for a in analyses]
     places = places_of(labels)
-    with OutputFolder(path, force, files_of_several(labels, choice.extras)) as folder:
+    with OutputFolder(path, force, files_of_several(labels, choice.extras, form)) as folder:
         records = [
-            fill(folder, f"{place}/", analysis, command, choice)
+            fill(folder, f"{place}/", analysis, command, choice, form)
             for place, analysis in steps(list(zip(places, analyses, strict=True)))
         ]
         pages = list(zip(places, analyses, strict=True))
@@ -122,6 +135,8 @@ def write_reports(
         together = pl.concat(found, how="diagonal") if found else None
         put_errors(folder, "", together, analyses)
         put_contacts(folder, "", analyses, several=True)
+        if form is not None and together is not None:
+            write_figures(folder, error_figures(together), form)
         logs = dict(zip(places, labels, strict=True))
         seal(
             folder,
@@ -132,7 +147,12 @@ def write_reports(
 
 
 def fill(
-    folder: OutputFolder, place: str, analysis: Analysis, command: str, choice: OutputChoice
+    folder: OutputFolder,
+    place: str,
+    analysis: Analysis,
+    command: str,
+    choice: OutputChoice,
+    form: str | None = None,
 ) -> str:
     """Write one log's files; return the text of its `run.json`."""
     record = run_record(analysis, command)
@@ -150,6 +170,8 @@ def fill(
     put_errors(folder, place, analysis.errors, [analysis])
     put_contacts(folder, place, [analysis])
     write_extras(folder, place, analysis, choice)
+    if form is not None:
+        write_figures(folder, log_figures(analysis), form, f"{place}figures/")
     return seal(folder, f"{place}{SEAL}", record)
 
 

@@ -12,7 +12,7 @@ from vftcli.signals.arrays import Array, Mask
 AT_FLOOR = 1.2
 """An RMSE within this factor of the reference's floor cannot be told from the reference's own."""
 
-DAGGER, LATEX_DAGGER = "†", r"\dag"
+DAGGER, LATEX_DAGGER = "†", r"$^\dagger$"
 RESTS = "the joint rests most of the time; the reference keeps its stiction: do not trust it"
 
 ON_PAGE = '<span class="mark">at the floor</span>'
@@ -152,7 +152,7 @@ def rmse_grid(table: Block) -> Grid:
         rows=tuple(rows),
         summaries=int(table.has_floor),
         marked=True,
-        notes=(f"{LATEX_DAGGER}: {RESTS}",) if table.untrusted else (),
+        notes=tuple(marks_in_words([table]).splitlines()),
         swatches=True,
     )
 

@@ -1,5 +1,7 @@
 """Tables of errors: all grids of a run for people, tidy rows for machines."""
 
+from dataclasses import replace
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
@@ -19,6 +21,7 @@ from vftcli.outputs.grid import (
 )
 from vftcli.outputs.log.rmse_tables import (
     DAGGER,
+    LATEX_DAGGER,
     RESTS,
     blocks,
     detail_grids,
@@ -102,10 +105,32 @@ def to_markdown(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
 
 
 def to_latex(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
-    """The RMSE tables as LaTeX tabulars (needs ``booktabs``), best value of each joint bold."""
+    """The RMSE as LaTeX tables (needs ``booktabs``), best value of each joint bold.
+
+    Logs of arms with as many joints share a table.
+    """
     doubts = "".join(f"% {printable(line)}\n" for line in doubts_of(errors))
-    grids = [*map(rmse_grid, blocks(errors)), *axis_grids(errors, bounds)]
-    return doubts + "\n".join(map(latex, grids))
+    arms = groupby(blocks(errors), key=lambda table: table.joints)
+    found = [alike([rmse_grid(table) for table in tables]) for _, tables in arms]
+    if axes := list(axis_grids(errors, bounds)):
+        found.append(axes)
+    return doubts + "\n".join(latex(*grids) for grids in found)
+
+
+def alike(grids: "Sequence[Grid]") -> "Sequence[Grid]":
+    """Tables of several logs with the same heads: a log's dagger moves from them to its title."""
+    if len(grids) == 1:
+        return grids
+    found = []
+    for grid in grids:
+        doubtful = [column.head for column in grid.columns if DAGGER in column.head]
+        title = f"{grid.title}{', ' * bool(doubtful)}{', '.join(doubtful)}"
+        plain = tuple(
+            c._replace(head=c.head.replace(DAGGER, ""), symbol=c.symbol.replace(LATEX_DAGGER, ""))
+            for c in grid.columns
+        )
+        found.append(replace(grid, title=title, columns=plain))
+    return found
 
 
 def to_json(errors: pl.DataFrame, _bounds: PaperBounds | None = None) -> str:
@@ -116,6 +141,10 @@ def to_json(errors: pl.DataFrame, _bounds: PaperBounds | None = None) -> str:
 def to_csv(errors: pl.DataFrame, _bounds: PaperBounds | None = None) -> str:
     """The tidy table as CSV; what is not known is empty."""
     return csv_rows(errors.to_dicts(), errors.columns)
+
+
+FORMS = {"json": to_json, "csv": to_csv, "markdown": to_markdown, "latex": to_latex}
+"""Name of a form → the text of the errors table in it."""
 
 
 def pairs_grid(rows: pl.DataFrame) -> Grid:

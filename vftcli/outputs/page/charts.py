@@ -14,7 +14,7 @@ import numpy as np
 from vftcli.outputs.decimation import decimated
 from vftcli.outputs.page import figures
 from vftcli.outputs.page.figures import Box, Scales, Span
-from vftcli.outputs.palette import colours_of
+from vftcli.outputs.palette import colours_of_names
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 
@@ -100,7 +100,12 @@ class Chart(NamedTuple):
 
 def observer_lines(estimates: Sequence[ExternalTorque]) -> dict[str, LineStyle]:
     """Colour and dash of every observer: the first has a line without gaps."""
-    colours = colours_of(estimates)
+    return lines_of_names([estimate.name for estimate in estimates])
+
+
+def lines_of_names(names: Sequence[str]) -> dict[str, LineStyle]:
+    """The same of the names alone."""
+    colours = colours_of_names(names)
     dashes = ("", *DASHES)
     return {
         name: (colour, dashes[k % len(dashes)]) for k, (name, colour) in enumerate(colours.items())

@@ -6,6 +6,7 @@ from html import escape
 import numpy as np
 
 from vftcli.analysis import Analysis
+from vftcli.observers.auto_tuning import Curve
 from vftcli.observers.spectra import Spectra
 from vftcli.outputs.grid import Column, Entry, Grid, html, joint_columns
 from vftcli.outputs.page.charts import Chart, ChartLine, LineStyle, multiples, observer_lines
@@ -34,7 +35,7 @@ def refinement_section(analysis: Analysis) -> str:
     if (spectra := found.baseline.spectra) is not None:
         charts.append(spectra_chart(spectra))
     if found.curves:
-        charts.append(tuning_chart(found, observer_lines(analysis.estimates)))
+        charts.append(tuning_chart(found.curves, observer_lines(analysis.estimates)))
     drawn = "".join(f"<h3>{escape(c.title)}</h3>{multiples(c)}" for c in charts)
     return section("What the complete log tells", shown + drawn, name="complete-log")
 
@@ -103,11 +104,11 @@ def spectra_chart(found: Spectra) -> Chart:
     )
 
 
-def tuning_chart(found: Refinement, styles: Mapping[str, LineStyle]) -> Chart:
+def tuning_chart(curves: Mapping[str, Curve], styles: Mapping[str, LineStyle]) -> Chart:
     """What was minimised for every observer that the log tuned."""
     lines = tuple(
         ChartLine(name, curve.rmse, *styles[name], x=curve.omega_n / (2.0 * np.pi))
-        for name, curve in found.curves.items()
+        for name, curve in curves.items()
     )
     values = lines[0].values
     x = [line.x for line in lines if line.x is not None]

@@ -1,0 +1,192 @@
+"""What a figure for a paper looks like, and its files: widths, type, one and the same bytes.
+
+Nothing here loads matplotlib before a figure is drawn; it is an extra (``vftcli[figures]``).
+"""
+
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import product
+from typing import TYPE_CHECKING, NamedTuple
+
+from vftcli import __version__
+from vftcli.outputs.files import OutputFolder
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.letters import printable
+from vftcli.signals.packages import check_installed
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.figure import Figure
+
+FORMS = ("pdf", "svg", "png")
+"""What a figure may be written as."""
+
+WIDTHS = {"single": 3.5, "double": 7.16}
+"""One and two columns of the IEEE's journals. [in]"""
+
+RESOLUTION = 600
+"""Of PNG: what the IEEE asks of drawings in black and white. [dots/in]"""
+
+STYLE = {
+    "font.family": ["STIXGeneral", "DejaVu Sans"],
+    "font.size": 8.0,
+    "axes.labelsize": 8.0,
+    "axes.titlesize": 8.0,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "legend.fontsize": 7.0,
+    "text.parse_math": False,
+    "axes.linewidth": 0.5,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.major.width": 0.5,
+    "ytick.major.width": 0.5,
+    "xtick.minor.width": 0.3,
+    "ytick.minor.width": 0.3,
+    "lines.linewidth": 0.8,
+    "legend.frameon": False,
+    "legend.handlelength": 2.4,
+    "legend.columnspacing": 1.2,
+    "legend.labelspacing": 0.3,
+    "figure.constrained_layout.h_pad": 0.02,
+    "figure.constrained_layout.w_pad": 0.02,
+    "figure.constrained_layout.hspace": 0.03,
+    "figure.constrained_layout.wspace": 0.03,
+    "pdf.fonttype": 42,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "vftcli",
+}
+"""Times-like type that matplotlib brings along, so that the bytes are the same on every machine.
+
+PDF embeds it as TrueType; SVG holds its letters as paths, which need no font. A dollar sign in a
+log's name is a dollar sign.
+"""
+
+LETTER, SAMPLE, LINE = 0.043, 0.41, 0.15
+"""Width of a letter in a legend, of a line's sample beside it, and height of its lines. [in]"""
+
+LONGEST = 44
+"""Letters of a name in a figure; the end of a longer one is cut off."""
+
+
+class Drawing(NamedTuple):
+    """A figure that can be drawn in both widths.
+
+    Attributes:
+        title: What it shows, with sign and frame, as its file says.
+        draw: Its width [in] → the figure; called where the style of a paper holds.
+    """
+
+    title: str
+    draw: "Callable[[float], Figure]"
+
+
+def checked_form(form: str | None) -> str | None:
+    """What figures shall be written as; None where none are asked for.
+
+    Raises:
+        ParameterError: If it is none of `FORMS`.
+        PackageError: If matplotlib is not installed.
+    """
+    if form is None:
+        return None
+    if form not in FORMS:
+        raise ParameterError(f"--figures {form!r} is not {', '.join(FORMS[:-1])} or {FORMS[-1]}")
+    check_installed("matplotlib", "--figures")
+    return form
+
+
+def figure_files(form: str | None, names: Sequence[str], before: str = "figures/") -> list[str]:
+    """The files of these figures in both widths; none where no form is asked for."""
+    if form is None:
+        return []
+    return [f"{before}{name}-{width}.{form}" for name, width in product(names, WIDTHS)]
+
+
+def write_figures(
+    folder: OutputFolder,
+    drawings: Mapping[str, Drawing],
+    form: str,
+    before: str = "figures/",
+) -> None:
+    """Write figures in both widths.
+
+    Args:
+        folder: Where.
+        drawings: Name → the figure.
+        form: One of `FORMS`.
+        before: What stands before the name of each file.
+    """
+    for name, drawing in drawings.items():
+        for width, inches in WIDTHS.items():
+            with paper_style():
+                drawn = drawing.draw(inches)
+                drawn.savefig(
+                    folder / f"{before}{name}-{width}.{form}",
+                    format=form,
+                    dpi=RESOLUTION,
+                    metadata=metadata(form, drawing.title),
+                )
+
+
+@contextmanager
+def paper_style() -> Iterator[None]:
+    """Let matplotlib draw as a paper asks, whatever its user's own settings are."""
+    from matplotlib import style
+
+    with style.context(["default", STYLE]), warnings.catch_warnings():
+        # A log's name may hold letters that no font of a paper has.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        yield
+
+
+def metadata(form: str, title: str) -> dict[str, str | None]:
+    """What a file says of itself: no date and no machine, so that its bytes stay the same."""
+    said: dict[str, str | None] = {"Title": printable(title)}
+    own: dict[str, dict[str, str | None]] = {
+        "pdf": {"Creator": f"vftcli {__version__}", "CreationDate": None},
+        "svg": {"Creator": f"vftcli {__version__}", "Date": None},
+        "png": {"Software": f"vftcli {__version__}"},
+    }
+    return said | own[form]
+
+
+def sheet(width: float, cells: int, columns: int, height: float, above: float) -> "Figure":
+    """An empty figure.
+
+    Args:
+        width: Its width. [in]
+        cells: How many plots it will have.
+        columns: Plots beside one another.
+        height: Of one row of them. [in]
+        above: Room above them, for the legend. [in]
+    """
+    from matplotlib.figure import Figure
+
+    rows = -(-cells // columns)
+    return Figure(figsize=(width, rows * height + above + 0.22), layout="constrained")
+
+
+def legend_room(width: float, labels: Sequence[str]) -> tuple[int, float]:
+    """How many columns a legend has above a figure, and its height. [in]"""
+    if not labels:
+        return 1, 0.0
+    widest = SAMPLE + LETTER * max(map(len, labels))
+    rows = -(-len(labels) // max(int(width / widest), 1))
+    # As many columns as rows of about one length need.
+    return -(-len(labels) // rows), LINE * rows + 0.05
+
+
+def add_legend(figure: "Figure", handles: "Mapping[str, Artist]", columns: int) -> None:
+    """One legend above all plots, where there is more than one thing to name."""
+    if handles:
+        figure.legend(
+            list(handles.values()), list(handles), loc="outside upper center", ncols=columns
+        )
+
+
+def shortened(name: str) -> str:
+    """A name as a figure has room for it."""
+    text = printable(name)
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"

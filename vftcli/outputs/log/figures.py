@@ -1,0 +1,221 @@
+"""The figures of one log: torque, errors, wrench, spectra, tuning and responses."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vftcli.analysis import Analysis
+from vftcli.observers.observer import Observer
+from vftcli.observers.spectra import Spectra
+from vftcli.observers.table import BEST
+from vftcli.outputs.figures.dots import DotPlot, DotRow, dot_figure
+from vftcli.outputs.figures.lines import NARROW, line_figure, plots_of
+from vftcli.outputs.figures.paper import Drawing
+from vftcli.outputs.log.rmse_tables import block, logs_of
+from vftcli.outputs.page.charts import INK, Chart, ChartLine, lines_of_names
+from vftcli.outputs.page.refinement_part import spectra_chart, tuning_chart
+from vftcli.outputs.page.torque_part import (
+    LOWEST,
+    QUIETEST,
+    legend_name,
+    response_charts,
+    torque_chart,
+)
+from vftcli.outputs.page.wrench_part import wrench_chart
+from vftcli.outputs.palette import colours_of_names
+
+if TYPE_CHECKING:
+    import polars as pl
+    from matplotlib.figure import Figure
+
+    from vftcli.observers.auto_tuning import Curve
+    from vftcli.signals.arrays import Array
+
+LOG_FIGURES = ("torque", "errors", "wrench", "spectra", "tuning", "responses")
+"""Every figure that a log may have."""
+
+ERROR_FIGURES = ("errors",)
+"""The figure of a table of errors."""
+
+MOST = 8
+"""Logs that one figure of errors shows; of more, only what stands for all of them."""
+
+BROKEN = ("1.5 2", "8 2 1.5 2", "4 2", "8 2 1.5 2 1.5 2", "12 4", "")
+"""Dashes of responses, which are black: the spectra beside them have colours."""
+
+
+def log_figures(analysis: Analysis) -> dict[str, Drawing]:
+    """Every figure that a log has something to show in."""
+    found = {"torque": torque_drawing(analysis)}
+    if analysis.errors is not None:
+        found |= error_figures(analysis.errors)
+    if (drawn := wrench_drawing(analysis)) is not None:
+        found["wrench"] = drawn
+    if (refined := analysis.refinement) is not None:
+        if (spectra := refined.baseline.spectra) is not None:
+            # The |H| of one observer: those of all are a figure of their own.
+            lead = next((o for o in analysis.observers if o.name == BEST), analysis.observers[0])
+            found["spectra"] = spectra_drawing(spectra, {lead.name: lead})
+        if refined.curves:
+            found["tuning"] = tuning_drawing(refined.curves)
+    found["responses"] = Drawing(
+        "Gain, phase and delay of the observers, joint 1",
+        partial(responses, response_charts(analysis)),
+    )
+    return found
+
+
+def torque_drawing(analysis: Analysis, names: Sequence[str] = ()) -> Drawing:
+    """External torque with the reference.
+
+    Args:
+        analysis: What is shown.
+        names: The observers that are drawn; ``best`` with its band, or all where it did not run.
+    """
+    chart = drawn_lines(analysis, torque_chart(analysis), names)
+    return Drawing(
+        f"{analysis.recording.name}: external torque on the robot about each joint's axis",
+        partial(line_figure, plots=plots_of(chart), numbers=contact_numbers(analysis)),
+    )
+
+
+def wrench_drawing(analysis: Analysis, names: Sequence[str] = ()) -> Drawing | None:
+    """The wrench axis by axis with the contacts, None without one; as `torque_drawing`."""
+    chart = wrench_chart(analysis)
+    if chart is None:
+        return None
+    chart = drawn_lines(analysis, chart, names)
+    return Drawing(
+        f"{analysis.recording.name}: force and moment on the robot, {chart.title}",
+        partial(wrench_figure, chart, contact_numbers(analysis)),
+    )
+
+
+def wrench_figure(chart: Chart, numbers: Mapping[int, float], width: float) -> "Figure":
+    """Forces above moments, or in one column's width beside them."""
+    order = range(6) if width > NARROW else (0, 3, 1, 4, 2, 5)
+    return line_figure(width, plots_of(chart, only=order), numbers=numbers)
+
+
+def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str]) -> Chart:
+    """The chart with the lines of these observers and the reference; a band only of one alone."""
+    estimated = [line.name for line in analysis.estimates]
+    wanted = names or ([BEST] if BEST in estimated else estimated)
+    # Of a file only that it is one: its path has no room.
+    plain = (
+        {}
+        if analysis.reference is None
+        else {
+            legend_name(
+                analysis, "reference"
+            ): f"reference ({analysis.reference.name.split(':')[0]})"
+        }
+    )
+    own = [line.name for line in chart.series if line.name in wanted]
+    series = tuple(
+        line._replace(
+            name=plain.get(line.name, line.name),
+            shown=True,
+            half=line.half if len(own) == 1 else None,
+        )
+        for line in chart.series
+        if line.name in own or line.name not in estimated
+    )
+    return chart._replace(series=series)
+
+
+def contact_numbers(analysis: Analysis) -> dict[int, float]:
+    """Number of every contact → the middle of it. [s]"""
+    found = analysis.contacts.contacts if analysis.contacts is not None else ()
+    return {c.number: 0.5 * (c.start + c.stop) for c in found if not c.is_load}
+
+
+def error_drawing(errors: "pl.DataFrame") -> Drawing | None:
+    """RMSE with its interval, joint by joint and observer by observer, a plot a log.
+
+    None where no joint has an error, or where more than `MOST` logs have no rows that stand for
+    all of them.
+    """
+    from vftcli.evaluation.pooling import POOLED
+
+    groups = list(logs_of(errors, "joint"))
+    if len(groups) > MOST:
+        groups = [rows for rows in groups if rows["recording"][0] == POOLED]
+    plots = [error_plot(rows) for rows in groups]
+    if not 0 < len(plots) <= MOST:
+        return None
+    paints = colours_of_names(list(dict.fromkeys(r.name for plot in plots for r in plot.rows)))
+    return Drawing(
+        "RMSE of the external torque with its 95 % interval",
+        partial(dot_figure, plots=plots, paints=paints, label="RMSE (N·m)"),
+    )
+
+
+def error_figures(errors: "pl.DataFrame") -> dict[str, Drawing]:
+    """The figure of a table of errors, as `error_drawing` makes it."""
+    drawn = error_drawing(errors)
+    return {} if drawn is None else {"errors": drawn}
+
+
+def error_plot(rows: "pl.DataFrame") -> DotPlot:
+    """The rows of one log and reference as dots."""
+    import polars as pl
+
+    found = block(rows)
+    low, high = (
+        block(rows.with_columns(rmse_Nm=pl.col(end))).rmse
+        for end in ("rmse_low_Nm", "rmse_high_Nm")
+    )
+    dots = zip(found.observers, found.rmse, low, high, strict=True)
+    title = f"{found.recording}, {found.reference}"
+    return DotPlot(title, found.joint_heads, [DotRow(*row) for row in dots], found.floor)
+
+
+def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Drawing:
+    """Spectra of the free and the loaded part, and over them |H| of these observers."""
+    chart = spectra_chart(spectra)
+    frequency = spectra.frequency[1:]
+    lines = []
+    for k, (name, observer) in enumerate(observers.items()):
+        response = observer.frequency_response(frequency, spectra.step, spectra.joints)
+        gain = 20.0 * np.log10(np.maximum(np.abs(response), QUIETEST))
+        gain = np.broadcast_to(gain, (len(frequency), spectra.joints))
+        lines.append(ChartLine(f"|H| of {name}", gain, INK, BROKEN[k % len(BROKEN)]))
+    over = chart._replace(key="gain", title="|H|", series=tuple(lines), lowest=LOWEST)
+    return Drawing(f"{chart.title}, and |H|", partial(spectra_figure, chart, over))
+
+
+def spectra_figure(chart: Chart, over: Chart, width: float) -> "Figure":
+    """The spectra with what their decibels are of."""
+    figure = line_figure(width, plots_of(chart, over))
+    figure.supylabel("Power density (dB of 1 (N·m)²/Hz)", fontsize=8.0)
+    return figure
+
+
+def tuning_drawing(
+    curves: "Mapping[str, Curve]",
+    chosen: "Mapping[str, tuple[Array, Array]] | None" = None,
+) -> Drawing:
+    """Expected error over the natural frequency, and what was chosen.
+
+    Args:
+        curves: Observer → what was minimised.
+        chosen: Observer → its rates [rad/s] and expected errors [N·m]; None for each curve's least.
+            2 × (n,)
+    """
+    if chosen is None:
+        chosen = {name: (curve.best, curve.least) for name, curve in curves.items()}
+    chart = tuning_chart(curves, lines_of_names(list(curves)))
+    marks = {name: (rate / (2.0 * np.pi), least) for name, (rate, least) in chosen.items()}
+    plots = plots_of(chart)
+    below = "Natural frequency (Hz)"
+    return Drawing(chart.title, partial(line_figure, plots=plots, marks=marks, below=below))
+
+
+def responses(charts: Sequence[Chart], width: float) -> "Figure":
+    """Gain, phase and delay, one below the other in one column, side by side in two."""
+    plots = [plot for chart in charts for plot in plots_of(chart)]
+    columns = len(plots) if width > NARROW else 1
+    return line_figure(width, plots, columns=columns)
