@@ -201,6 +201,7 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
         MissingSignalError: If velocities, or both currents and torques, are missing.
         RobotError: If the number of joints differs.
     """
+    check_joints(recording, robot)
     return RunningTerms(robot, literal=literal).next(recording)
 
 
