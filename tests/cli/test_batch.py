@@ -85,6 +85,20 @@ def test_a_second_run_does_what_is_left(run, folder: Path, tmp_path: Path) -> No
     assert failures.select("log", "stage", "error").rows() == [("empty.csv", "reading", "LogError")]
 
 
+def test_a_failure_stands_for_every_log_of_equal_bytes_and_names_it_once(
+    run, folder: Path, tmp_path: Path
+) -> None:
+    """Here the second is found after the first has failed."""
+    for name in ("bad.csv", "worse.csv"):
+        (folder / name).write_text("a,b,c\n1,2,3\n4,5,6\n")
+    code, _, err = run("batch", folder, *HERE, "-o", tmp_path / "out")
+    assert code == 3
+    assert "5 logs: 3 done now, 0 before, 2 failed" in err
+    failures = pl.read_parquet(tmp_path / "out" / "failures.parquet")
+    assert failures["log"].to_list() == ["bad.csv", "worse.csv"]
+    assert all(line.startswith("no joint positions") for line in failures["line"])
+
+
 def test_what_failed_is_tried_again_on_request(run, folder: Path, tmp_path: Path) -> None:
     out, gone = tmp_path / "out", folder / "gone.csv"
     words = ("batch", folder / "b" / "log.csv", gone, *HERE, "-o", out)

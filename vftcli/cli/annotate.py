@@ -110,7 +110,8 @@ def told_lines(record: "Mapping[str, Any]", asked: "ForceChoice") -> list[str]:
         f"{sum(done.values())} episodes ({count}), {frames} frames, {record['robot']['name']}, "
         f"{asked.observer}, {kind}",
         *(
-            f"  {name}: {column['units']}, {column['frame']}"
+            f"  {name}: "
+            + (column["sign"] if column["units"] == "1" else f"{column['units']}, {column['frame']}")
             for name, column in record["columns"].items()
         ),
         f"  the first {delay} frames of an episode still show where the observer started",

@@ -149,7 +149,7 @@ def batch(
     if failures.height > MOST_TOLD:
         say(f"… {failures.height - MOST_TOLD} more in failures.parquet")
     say(
-        f"{count.logs} logs: {count.done} done now, {count.before} before, {count.failed} failed; "
+        f"{count.logs} log{'s' * (count.logs != 1)}: {count.done} done now, {count.before} before, {count.failed} failed; "
         f"{output / 'index.html'}, {output / 'batch.parquet'}"
     )
     if count.failed:
