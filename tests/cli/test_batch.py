@@ -180,5 +180,13 @@ def test_an_address_that_does_not_answer_is_one_line(run, tmp_path: Path) -> Non
     assert "no Dask scheduler answers at tcp://127.0.0.1:1 within 10 s" in err
 
 
+@pytest.mark.parametrize("do", ["estimate", "contacts"])
+def test_a_reference_that_nothing_is_compared_with_is_left_out(run, tmp_path: Path, do) -> None:
+    """The log has no sensor: as a reference it would be refused."""
+    words = ("--do", do, *ONE, "--workers", "0", "--reference", "sensor", "-o", tmp_path / "out")
+    code, _, err = run("batch", CIRCLE, *words)
+    assert (code, "--reference is left out" in err) == (0, True)
+
+
 def test_the_time_that_is_left_is_short() -> None:
     assert [duration(s) for s in (12.0, 600.0, 7200.0)] == ["12 s", "10 min", "2.0 h"]
