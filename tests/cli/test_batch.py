@@ -85,6 +85,20 @@ def test_a_second_run_does_what_is_left(run, folder: Path, tmp_path: Path) -> No
     assert failures.select("log", "stage", "error").rows() == [("empty.csv", "reading", "LogError")]
 
 
+def test_a_failure_stands_for_every_log_of_equal_bytes_and_names_it_once(
+    run, folder: Path, tmp_path: Path
+) -> None:
+    """Here the second is found after the first has failed."""
+    for name in ("bad.csv", "worse.csv"):
+        (folder / name).write_text("a,b,c\n1,2,3\n4,5,6\n")
+    code, _, err = run("batch", folder, *HERE, "-o", tmp_path / "out")
+    assert code == 3
+    assert "5 logs: 3 done now, 0 before, 2 failed" in err
+    failures = pl.read_parquet(tmp_path / "out" / "failures.parquet")
+    assert failures["log"].to_list() == ["bad.csv", "worse.csv"]
+    assert all(line.startswith("no joint positions") for line in failures["line"])
+
+
 def test_what_failed_is_tried_again_on_request(run, folder: Path, tmp_path: Path) -> None:
     out, gone = tmp_path / "out", folder / "gone.csv"
     words = ("batch", folder / "b" / "log.csv", gone, *HERE, "-o", out)
@@ -164,6 +178,14 @@ def test_an_address_that_does_not_answer_is_one_line(run, tmp_path: Path) -> Non
     code, _, err = run("batch", CIRCLE, "--do", "estimate", *ONE, *address, "-o", tmp_path / "out")
     assert code == 1
     assert "no Dask scheduler answers at tcp://127.0.0.1:1 within 10 s" in err
+
+
+@pytest.mark.parametrize("do", ["estimate", "contacts"])
+def test_a_reference_that_nothing_is_compared_with_is_left_out(run, tmp_path: Path, do) -> None:
+    """The log has no sensor: as a reference it would be refused."""
+    words = ("--do", do, *ONE, "--workers", "0", "--reference", "sensor", "-o", tmp_path / "out")
+    code, _, err = run("batch", CIRCLE, *words)
+    assert (code, "--reference is left out" in err) == (0, True)
 
 
 def test_the_time_that_is_left_is_short() -> None:

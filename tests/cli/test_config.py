@@ -124,6 +124,12 @@ def test_what_is_wrong_with_a_file_is_said_in_one_line(
     assert not (here / "out").exists()
 
 
+def test_a_file_in_another_encoding_is_refused_in_words(run, here: Path) -> None:
+    (here / "odd.toml").write_bytes("robot = 'ur5'".encode("utf-16"))
+    code, _, err = run("report", LOG, "-o", "out", "--config", "odd.toml")
+    assert (code, err) == (1, "error: --config odd.toml: not a text in UTF-8\n")
+
+
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("name", ["nowhere.toml", ".", os.devnull, str(LOG)])
 def test_what_is_no_such_file_is_refused(run, name: str) -> None:

@@ -30,7 +30,7 @@ def dataset(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("copy", "words"),
     [
-        ("set", "is .*set; give another -o"),
+        ("set", "are the same folder; give another -o"),
         ("set/copy", "one inside the other"),
         (".", "one inside the other"),
     ],

@@ -73,6 +73,14 @@ def test_a_bag_is_one_log() -> None:
     assert len(entry.files) > 1
 
 
+def test_bags_in_a_folder_without_their_list_are_logs_each(tmp_path: Path) -> None:
+    (bag,) = (FIXTURES / "panda_bag").glob("*.mcap")
+    for name in ("monday.mcap", "tuesday.mcap"):
+        shutil.copy(bag, tmp_path / name)
+    shutil.copy(CIRCLE, tmp_path)
+    assert names(found(tmp_path)) == ["monday.mcap", "tuesday.mcap", "ur5_circle.csv"]
+
+
 @pytest.mark.parametrize(
     ("name", "episodes"),
     [("lerobot_v3_effort", [0, 1, 2]), ("lerobot_v21_effort", [0, 1]), ("droid_raw", [None, None])],

@@ -115,7 +115,7 @@ class _Run:
             try:
                 content = content_digest(entry.files)
             except OSError as error:
-                line = f"{entry.path}: cannot be read ({error.strerror})"
+                line = f"cannot be read ({error.strerror})"
                 self.failures[number] = Failure("finding", type(error).__name__, line)
                 continue
             key = self.keys[number] = key_of(content, self.options, entry.episode)
@@ -212,6 +212,8 @@ class _Run:
             self.folder.forget(task.key)
             self.done.add(task.key)
             return
+        for name in (f"{task.path}: ", f"{task.label}: "):  # it is told with the log's name
+            failure = failure._replace(line=failure.line.removeprefix(name))
         for number in [n for n, key in self.keys.items() if key == task.key]:
             self.failures[number] = failure
         # A log that vanished, or changed, may be there again: that is no property of its bytes.
@@ -233,6 +235,9 @@ class _Run:
         import polars as pl
 
         there = self.folder.keys()
+        # Logs of equal bytes that were found after one of them had failed.
+        ended = {self.keys[n]: f for n, f in self.failures.items() if n in self.keys}
+        self.failures |= {n: ended[key] for n, key in self.keys.items() if key in ended}
         finished = [n for n, key in sorted(self.keys.items()) if key in there]
         logs = pl.DataFrame(
             {

@@ -100,19 +100,24 @@ def annotate_dataset(
     say(f"wrote {output}")
 
 
+def meaning(column: "Mapping[str, str]") -> str:
+    """What a column's numbers are: unit and axes of a force, else what 1 and 0 say."""
+    if column["units"] == "1":
+        return column["sign"]
+    return f"{column['units']}, {column['frame']}"
+
+
 def told_lines(record: "Mapping[str, Any]", asked: "ForceChoice") -> list[str]:
     """What was written, and what a user of it should know."""
     done, frames = record["status"], sum(one.get("frames", 0) for one in record["episodes"])
     count = ", ".join(f"{n} {status}" for status, n in done.items())
     kind = "causal" if record["causal"] else "NOT causal: it looks ahead, no policy can run on it"
-    delay = record["transient_frames"]
+    delay, episodes = record["transient_frames"], sum(done.values())
     lines = [
-        f"{sum(done.values())} episodes ({count}), {frames} frames, {record['robot']['name']}, "
+        f"{episodes} episode{'s' * (episodes != 1)} ({count}), {frames} frames, "
+        f"{record['robot']['name']}, "
         f"{asked.observer}, {kind}",
-        *(
-            f"  {name}: {column['units']}, {column['frame']}"
-            for name, column in record["columns"].items()
-        ),
+        *(f"  {name}: {meaning(column)}" for name, column in record["columns"].items()),
         f"  the first {delay} frames of an episode still show where the observer started",
     ]
     clocks = dict.fromkeys(one["clock"] for one in record["episodes"] if "clock" in one)

@@ -24,6 +24,9 @@ Places = Annotated[
 EVERY = 2.0
 """How often a line of progress is printed where nobody watches. [s]"""
 
+WITHOUT_REFERENCE = ("estimate", "contacts")
+"""What is asked of logs without comparing them with anything."""
+
 SOME_FAILED = 3
 """Exit code where some logs failed, and others did not."""
 
@@ -49,6 +52,7 @@ class WorkerOptions(ChoiceBundle["WorkersChoice"]):
     ship: bool = flag(
         "--ship",
         "Send the logs to its workers. For those that do not see the files, at most 64 MB.",
+        seldom=True,
     )
     worker_memory: float | None = option(
         "--worker-memory",
@@ -116,6 +120,9 @@ def batch(
     choice = analysis.choice(Library(), reference)
     if do == "compare" and choice.reference is None:
         raise ParameterError("--do compare needs --reference: two-cycle, sensor, vendor, zero, …")
+    if do in WITHOUT_REFERENCE and choice.reference is not None:
+        say(f"note: --do {do} compares with nothing: --reference is left out")
+        choice = replace(choice, reference=None)
     narrowed = {"estimate": for_estimates, "compare": for_comparison}
     choice = narrowed[do](choice) if do in narrowed else choice
     # These are of each worker.
@@ -148,8 +155,9 @@ def batch(
         say(f"error: {name}: {reason}")
     if failures.height > MOST_TOLD:
         say(f"… {failures.height - MOST_TOLD} more in failures.parquet")
+    logs_told = f"{count.logs} log{'s' * (count.logs != 1)}"
     say(
-        f"{count.logs} logs: {count.done} done now, {count.before} before, {count.failed} failed; "
+        f"{logs_told}: {count.done} done now, {count.before} before, {count.failed} failed; "
         f"{output / 'index.html'}, {output / 'batch.parquet'}"
     )
     if count.failed:

@@ -224,7 +224,9 @@ def tables_of(path: Path) -> dict[str, Any]:
         raise ParameterError(f"--config {path}: too large for a file of options")
     try:
         return toml_tables(content.decode("utf-8-sig"))
-    except (ParameterError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError:
+        raise ParameterError(f"--config {path}: not a text in UTF-8") from None
+    except ParameterError as error:
         raise ParameterError(f"--config {path}: {error}") from None
 
 

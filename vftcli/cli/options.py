@@ -89,8 +89,8 @@ class ObserverOptions(ChoiceBundle["ObserverChoice"]):
     observer: Words = option(
         "--observer",
         "NAME",
-        "Which observers (repeatable; default: five). Default: best fdo gmo kfo-fe kfo-zoh; of "
-        "admit: kfo-fe.",
+        "Which observers, repeatable. Default: best fdo gmo kfo-fe kfo-zoh; of admit: "
+        "kfo-fe; of annotate: kfo-zoh.",
     )
     causal: bool = flag(
         "--causal", "Only what could run online. It leaves out best, and smoothers."

@@ -38,8 +38,10 @@ def check_copy(dataset: Path, copy: Path, *, force: bool) -> None:
     """
     source, target = dataset.resolve(), copy.resolve()
     if source == target or source in target.parents or target in source.parents:
-        where = "is" if source == target else "and the dataset are one inside the other:"
-        raise OutputError(f"{copy} {where} {dataset}; give another -o, outside of the dataset")
+        told = "are the same folder" if source == target else "are one inside the other"
+        raise OutputError(
+            f"-o {copy} and the dataset {dataset} {told}; give another -o, outside of the dataset"
+        )
     if copy.is_symlink() or (copy.exists() and not copy.is_dir()):
         raise OutputError(f"{copy} is no folder; -o needs the name of a new one")
     if copy.exists() and any(copy.iterdir()):

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers import lerobot, recognise
+from vftcli.readers.bags.formats import ROS2
 from vftcli.readers.droid import DROID, TRAJECTORY
 from vftcli.readers.estimates import stored_observers
 from vftcli.readers.library import absolute
@@ -23,6 +24,8 @@ BATCH = "batch.json"
 RECORD = "run.json"
 """The file that lists what a command of ours wrote beside it; beside other files its ending."""
 
+METADATA = "metadata.yaml"
+"""The file that lists the pieces of a bag of ROS 2."""
 
 NUMBER = re.compile(rb"(?:^|[\s,;])[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?(?=$|[\s,;])")
 FEWEST = 3
@@ -106,7 +109,7 @@ class LogCollection:
             return
         try:
             reader = recognise(folder, self._choice)
-            if reader is not DROID:  # its files are logs themselves
+            if reader is not DROID and not is_several_bags(folder, reader):
                 yield from self._episodes(folder, reader)
                 return
         except LogError:
@@ -138,6 +141,14 @@ class LogCollection:
         if reader.general and not holds_numbers(open_log(path)):
             return False  # prose reads as a table of one column
         return not stored_observers(path)
+
+
+def is_several_bags(folder: Path, reader: Reader) -> bool:
+    """Whether a folder that reads as a bag holds files that are logs themselves.
+
+    Recorders write metadata.yaml beside the pieces of one recording.
+    """
+    return reader is ROS2 and not (folder / METADATA).is_file()
 
 
 def holds_numbers(file: LogFile) -> bool:

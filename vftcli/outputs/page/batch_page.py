@@ -4,9 +4,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from vftcli.outputs.grid import DASH, Column, Grid, html, significant
+from vftcli.outputs.grid import DASH, Column, Grid, GridCell, html, significant
 from vftcli.outputs.page.index_page import WORST_FIRST, IndexLine, overview
 from vftcli.outputs.page.shell import document, lead, section, soft, top
+from vftcli.signals.letters import printable
 
 if TYPE_CHECKING:
     import polars as pl
@@ -27,7 +28,10 @@ def render_batch(lines: Sequence[IndexLine], failures: "pl.DataFrame") -> str:
     words = f"{count} log{'s' * (count > 1)} could not be analysed." if count else ""
     grid = Grid(
         columns=tuple(Column(head, words=True) for head in ("Log", "Stage", "Error", "Why")),
-        rows=tuple(failures.select("log", "stage", "error", "line").iter_rows()),
+        rows=tuple(
+            (*where, GridCell(line, html=f'<span class="wrapped">{escape(printable(line))}</span>'))
+            for *where, line in failures.select("log", "stage", "error", "line").iter_rows()
+        ),
     )
     parts = (
         top((f"{len(lines) + count} logs", ", ".join(robots)), title, lead(words)),
