@@ -37,6 +37,11 @@ JOINT_SIGNALS = tuple(name for name in MEANINGS if name != "wrench")
 EFFORTS = ("current", "torque", "torque_without_gravity")
 """Those that say what the drives do; a log has one of them or several."""
 
+EXAMINED = frozenset(
+    ("dq", *EFFORTS, "target_dq", "target_current", "target_torque", "tau_ext", "temperature")
+)
+"""Signals that an examination looks at beside time and positions."""
+
 
 class Awaited:
     """A field that may be given as a function; it is called when the field is first read.
