@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from vftcli.doctor import Examiner, examine
-from vftcli.doctor.examiner import EXAMINED
 from vftcli.observers import BEST, PAPER, KalmanObserver
 from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
@@ -25,7 +24,7 @@ from vftcli.readers import read
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array
-from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.recording import EFFORTS, EXAMINED, Recording
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
 from vftcli.yardsticks import analytic_script, literal_script, rnea_loop

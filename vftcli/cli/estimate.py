@@ -42,10 +42,10 @@ def estimate(
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5 -o out
     """
     from vftcli.cli.background import Background
-    from vftcli.doctor.examiner import EXAMINED
     from vftcli.readers.estimates import refuse_estimates
     from vftcli.readers.library import Library
     from vftcli.signals.packages import check_installed
+    from vftcli.signals.recording import EXAMINED
 
     written = also.choice(csv=csv, rrd=rrd or show)
     if "rrd" in written.extras:

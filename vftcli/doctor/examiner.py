@@ -14,13 +14,8 @@ from vftcli.robots.pairing import paired
 from vftcli.robots.robot import Robot
 from vftcli.robots.winding import unwound
 from vftcli.signals.errors import ExaminationError, RobotError
-from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
-
-EXAMINED = frozenset(
-    ("dq", *EFFORTS, "target_dq", "target_current", "target_torque", "tau_ext", "temperature")
-)
-"""Signals that an examination looks at beside time and positions."""
 
 
 class Correction(NamedTuple):

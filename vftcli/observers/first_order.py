@@ -71,22 +71,36 @@ def run_first_order(
     for first in range(0, terms.samples, PIECE):
         span = slice(first, first + PIECE)
         dt = terms.dt[span]
-        decay, gain = coefficients(dt, rate)
-        x = gain * d[span]
-        where = (dt * rate > 2.0) & (dt > GAP * terms.clock.step) & (nominal <= 2.0)
+        fold = Fold.of(len(dt))
+        decay, gain = coefficients(fold.fold(dt), rate)
+        x = fold.fold(d[span])
+        x *= gain
+        # A few steps, if any.
+        late = np.flatnonzero(dt[:, 0] > GAP * terms.clock.step)
+        where = (dt[late] * rate > 2.0) & (nominal <= 2.0)
         if where.any():
-            decay[where], x[where] = 0.0, 0.0 if afresh is None else afresh[span][where]
-            rows = where.any(axis=1)
-            gaps, longest = gaps + int(np.sum(rows)), max(longest, float(np.max(dt[rows])))
-        tau[span] = scalar_recursion(decay, x, before[0])
+            samples, joints = late[where.nonzero()[0]], where.nonzero()[1]
+            at = samples % fold.length, samples // fold.length, joints
+            decay[at], x[at] = 0.0, 0.0 if afresh is None else afresh[span][samples, joints]
+            rows = np.unique(samples)
+            gaps, longest = gaps + len(rows), max(longest, float(np.max(dt[rows])))
+        tau[span] = scalar_recursion(decay, x, before[0], fold)
         before = tau[span][-1:]
     return tau, FirstOrderState(before, gaps, longest)
 
 
-def scalar_recursion(decay: Array, x: Array, before: Array) -> Array:
-    """Run y_t = decay_t y_{t−1} + x_t from `before` (n,), blocks of samples side by side. (N, n)"""
-    fold = Fold.of(len(x))
-    decay, y = fold.fold(decay), fold.fold(x)
+def scalar_recursion(decay: Array, y: Array, before: Array, fold: Fold) -> Array:
+    """Run y_t = decay_t y_{t−1} + x_t from `before` (n,), blocks of samples side by side.
+
+    Args:
+        decay: What stays of the sample before. (length, blocks, n)
+        y: x, which is overwritten. (length, blocks, n)
+        before: The state before the first sample. (n,)
+        fold: The layout.
+
+    Returns:
+        The samples in their order. (N, n)
+    """
     reach = decay[0].copy()
     for i in range(1, len(y)):
         y[i] += decay[i] * y[i - 1]
@@ -102,7 +116,7 @@ def scalar_recursion(decay: Array, x: Array, before: Array) -> Array:
 
 
 def coefficients(dt: Array, rate: Array) -> tuple[Array, Array]:
-    """How much of the estimate stays, and the gain on d, for sample times (N, 1). (N, n) each"""
+    """How much of the estimate stays, and the gain on d, for sample times (…, 1). (…, n) each"""
     a = 0.5 * dt * rate
     return (1.0 - a) / (1.0 + a), rate / (1.0 + a)
 

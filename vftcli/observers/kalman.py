@@ -99,9 +99,13 @@ class KalmanObserver(Shown):
 
     def model(self, step: Array | float, joints: int) -> Discrete:
         """The discrete model at one sample time, or one a sample as a column (T, 1). [s]"""
+        return self._model_of(self.densities(joints), step)
+
+    def _model_of(self, densities: Densities, step: Array | float) -> Discrete:
+        """The discrete model of some joints."""
         convention = "literal" if self.as_printed else self.noise_convention
         step = np.asarray(step, dtype=np.float64)
-        return discretise(self.discretisation, convention, step, self.densities(joints))
+        return discretise(self.discretisation, convention, step, densities)
 
     def steady(self, step: float, joints: int) -> Steady:
         """Stationary gains and prior at a sample time. [s]"""
@@ -145,15 +149,29 @@ class KalmanObserver(Shown):
             first = update(self.first_prior(settled), self.model(dt[:1], n).r[0]).posterior
             state = KalmanState(np.zeros((2, n)), first)
             tau[0], sd[0] = 0.0, np.sqrt(first.p22)
-        error, entering = state
+        error, densities = state.error, self.densities(n)
+        # Joints with the same numbers have the same gains: one of each kind is computed.
+        numbers = np.stack([*densities, *state.posterior])
+        _, kept, kind = np.unique(numbers, axis=1, return_index=True, return_inverse=True)
+        kind = kind.ravel()
+        densities = Densities(*(x[kept] for x in densities))
+        guess, entering = (
+            Covariance(*(p[kept] for p in each))
+            for each in (settled.gains.posterior, state.posterior)
+        )
         for span in spans(samples, begins=begins):
             fold = Fold.of(span.stop - span.start)
-            model = self.model(fold.fold(dt[span]), n)
-            gains = settle(model, entering, settled.gains.posterior)
+            # What is one for all joints is written out: loops over a few joints each are slow.
+            model = self._model_of(densities, fold.fold(dt[span]))
+            model = Discrete(*map(np.ascontiguousarray, model))
+            gains = settle(model, entering, guess)
             entering = last_covariance(gains, fold)
-            answer, error = filter_blocks(model, gains, fold.fold(d[span]), error, fold)
-            tau[span], sd[span] = fold.unfold(answer), fold.unfold(np.sqrt(gains.posterior.p22))
-        return tau, sd, KalmanState(error, entering)
+            entries = (model.a12, model.a22, gains.l2, 1.0 - gains.l1)
+            a12, a22, l2, rest = (x.take(kind, axis=-1) for x in entries)
+            answer, error = filter_blocks(a12, a22, l2, rest, fold.fold(d[span]), error, fold)
+            tau[span] = fold.unfold(answer)
+            sd[span] = fold.unfold(np.sqrt(gains.posterior.p22))[:, kind]
+        return tau, sd, KalmanState(error, Covariance(*(p[kind] for p in entering)))
 
     def unexplained(self, terms: DynamicsTerms) -> Array:
         """The filter's input pᵗ − pᵗ⁻¹ − Ts·u: `DynamicsTerms.d`, or with u = μᵗ (40). (T, n)"""

@@ -1,10 +1,9 @@
 """Linear recursions along time, without a Python loop over samples and without losing exactness.
 
-Every observer here is y_t = F_t y_{t−1} + x_t with a small state for each joint; F_t may change
-with the sample time. The log is cut into blocks that are run side by side, each from zero; the
-states at the blocks' ends obey the same kind of recursion, once a block, and their effect is added
-back. That is the same sum in another order, so it agrees with a sample-by-sample loop to rounding,
-for constant and changing F alike.
+y_t = F_t y_{t−1} + x_t with a small state for each joint, where F_t changes with the sample time.
+The log is cut into blocks that are run side by side, each from zero; the states at the blocks' ends
+obey the same kind of recursion, once a block, and their effect is added back. That is the same sum
+in another order, so it agrees with a sample-by-sample loop to rounding.
 """
 
 import numpy as np
@@ -26,8 +25,7 @@ def recursion(F: Array, x: Array, start: Array) -> Array:
     """Run y_t = F_t y_{t−1} + x_t from y_{−1} = `start`, in pieces that carry their state.
 
     Args:
-        F: Transition of an m-state filter for each of n joints, constant (m, m, n) or one a
-            sample (T, m, m, n).
+        F: Transitions of an m-state filter for each of n joints. (T, m, m, n)
         x: Input. (T, m, n)
         start: State before the first sample. (m, n)
 
@@ -37,7 +35,7 @@ def recursion(F: Array, x: Array, start: Array) -> Array:
     y = np.empty_like(x)
     for first in range(0, len(x), PIECE):
         span = slice(first, first + PIECE)
-        y[span] = blockwise(F if F.ndim == 3 else F[span], x[span], start)
+        y[span] = blockwise(F[span], x[span], start)
         start = y[min(span.stop, len(x)) - 1]
     return y
 
@@ -52,18 +50,12 @@ def blockwise(F: Array, x: Array, start: Array) -> Array:
     if samples <= FEW:
         return stepwise(F, x, start)
     blocks = -(-samples // BLOCK)
-    y = by_position(x, blocks)
-    constant = F.ndim == 3
-    steps = F[None, ..., None] if constant else by_position(F, blocks)
-    reach = np.empty((BLOCK, m, m, n, 1 if constant else blocks))
-    reach[0] = steps[0]
+    y, reach = by_position(x, blocks), by_position(F, blocks)
     room = np.empty((n, blocks))
     for i in range(1, BLOCK):
-        step = steps[0 if constant else i]
-        add_product(step, y[i - 1], y[i], room)
-        reach[i] = transition_product(step, reach[i - 1])
-    ends_reach = reach[-1, ..., 0] if constant else np.moveaxis(reach[-1], -1, 0)
-    ends = blockwise(ends_reach, np.moveaxis(y[-1], -1, 0), start)
+        add_product(reach[i], y[i - 1], y[i], room)
+        reach[i] = transition_product(reach[i], reach[i - 1])
+    ends = blockwise(np.moveaxis(reach[-1], -1, 0), np.moveaxis(y[-1], -1, 0), start)
     entering = np.ascontiguousarray(np.concatenate([start[None], ends[:-1]]).transpose(1, 2, 0))
     for i in range(BLOCK):
         add_product(reach[i], entering, y[i], room)
@@ -83,7 +75,7 @@ def stepwise(F: Array, x: Array, start: Array) -> Array:
     y = x.copy()
     state, room = start, np.empty(x.shape[2])
     for k in range(len(y)):
-        add_product(F if F.ndim == 3 else F[k], state, y[k], room)
+        add_product(F[k], state, y[k], room)
         state = y[k]
     return y
 

@@ -59,9 +59,15 @@ class Fold(NamedTuple):
 
     def fold(self, x: Array) -> Array:
         """Samples in blocks: (N, k) → (length, blocks, k)."""
-        short = self.length * self.blocks - self.samples
-        padded = np.concatenate([x, np.repeat(x[-1:], short, axis=0)]) if short else x
-        return np.ascontiguousarray(padded.reshape(self.blocks, self.length, -1).swapaxes(0, 1))
+        out = np.empty((self.length, self.blocks, x.shape[1]))
+        whole = self.samples // self.length
+        for row, column in zip(np.moveaxis(out, -1, 0), x.T, strict=True):
+            row[:, :whole] = column[: whole * self.length].reshape(whole, self.length).T
+            if whole < self.blocks:
+                rest = column[whole * self.length :]
+                row[:, -1] = rest[-1]
+                row[: len(rest), -1] = rest
+        return out
 
     def unfold(self, y: Array) -> Array:
         """Samples in their order: (length, blocks, n) → (N, n), columns whole."""
@@ -216,13 +222,15 @@ def run_blocks(model: Discrete, starts: Covariance) -> Gains:
 
 
 def filter_blocks(
-    model: Discrete, gains: Gains, d: Array, error: Array, fold: Fold
+    a12: Array, a22: Array, l2: Array, rest: Array, d: Array, error: Array, fold: Fold
 ) -> tuple[Array, Array]:
     """Run `error_filter` over one piece, everything in blocks.
 
     Args:
-        model: The models of its samples. (length, blocks, n) each
-        gains: Their gains. (length, blocks, n) each
+        a12: A₁₂ of its samples. (length, blocks, n)
+        a22: A₂₂. (length, blocks, n)
+        l2: L₂. (length, blocks, n)
+        rest: 1 − L₁. (length, blocks, n)
         d: The input. (length, blocks, n)
         error: e and τ̂ after the sample before the piece. (2, n)
         fold: The layout.
@@ -230,7 +238,6 @@ def filter_blocks(
     Returns:
         τ̂ (length, blocks, n), and e and τ̂ after the last sample (2, n).
     """
-    a12, a22, l2, rest = model.a12, model.a22, gains.l2, 1.0 - gains.l1
     # From zero, and from (1, 0) and (0, 1) without input: what each block makes of its start.
     e, tau = np.zeros((2, 3, *d.shape[1:]))
     e[1], tau[2] = 1.0, 1.0

@@ -61,7 +61,8 @@ def coulomb_viscous(
     if np.any(stribeck):
         dry = dry + stribeck * np.exp(-((dq / stribeck_velocity) ** 2))
     torque *= dry
-    torque += viscous * dq
+    if np.any(viscous):
+        torque += viscous * dq
     if np.any(quadratic):
         torque += quadratic * dq * np.abs(dq)
     if np.any(offset):
@@ -145,11 +146,13 @@ def bent_line(
     """
     slopes = np.diff(torques, axis=0) / np.diff(speeds, axis=0)
     # sign(v) max(|v| − v_k, 0) is v − clip(v, ±v_k), and the changes add up to the last slope.
-    torque = coulomb_viscous(dq, torques[0], slopes[-1], **others)
-    for k, change in enumerate(np.diff(slopes, axis=0, prepend=0.0)):
-        within: Array = np.clip(dq, -speeds[k], speeds[k])
-        within *= change
-        torque -= within
+    torque = coulomb_viscous(dq, torques[0], **others)
+    part: Array = dq * slopes[-1]
+    torque += part
+    for speed, change in zip(speeds, np.diff(slopes, axis=0, prepend=0.0), strict=False):
+        np.clip(dq, -speed, speed, out=part)
+        part *= change
+        torque -= part
     return torque
 
 
@@ -196,7 +199,7 @@ def friction_torque(
     Raises:
         ParameterError: If a model's name is unknown.
     """
-    torque = np.zeros_like(dq)
+    torque = np.zeros(dq.shape[::-1]).T
     groups: dict[tuple[str, int], list[int]] = {}
     for j, joint in enumerate(friction):
         if joint.model != "none":

@@ -44,6 +44,11 @@ COLUMN_NAMES = {"torque": "tau"}
 EFFORTS = ("current", "torque", "torque_without_gravity")
 """Those that say what the drives do; a log has one of them or several."""
 
+EXAMINED = frozenset(
+    ("dq", *EFFORTS, "target_dq", "target_current", "target_torque", "tau_ext", "temperature")
+)
+"""Signals that an examination looks at beside time and positions."""
+
 
 Change = Callable[["Recording"], "Recording"]
 """What is done to one block of a long log after another."""
