@@ -8,6 +8,7 @@ import numpy as np
 
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
+from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 
@@ -43,6 +44,13 @@ class ModelledRun:
         from vftcli.repetition.drive_run import drive_run_of
 
         return drive_run_of(self.recording, self.robot, self.terms)
+
+    @cached_property
+    def rests(self) -> Mask:
+        """Where a joint rests. (T, n)"""
+        from vftcli.repetition.standstill import resting
+
+        return resting(self.recording.t, self.recording.require("dq"))
 
     def with_terms(self, terms: DynamicsTerms) -> "ModelledRun":
         """The same recording with other terms than the model's own."""
