@@ -22,6 +22,9 @@ EXAMINED = frozenset(
 )
 """Signals that an examination looks at beside time and positions."""
 
+ONLY_EXAMINED = frozenset(("target_q", "target_dq", "target_current", "target_torque"))
+"""Signals that nothing but an examination looks at."""
+
 
 class Correction(NamedTuple):
     """What puts an effort right that is not what it is called.

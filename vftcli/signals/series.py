@@ -97,3 +97,11 @@ def bridge_unknown(t: Array, x: Array) -> Array:
         known = np.isfinite(column)
         columns.append(np.interp(t, t[known], column[known]) if known.any() else np.zeros(len(t)))
     return np.column_stack(columns)
+
+
+def white_noise(x: Array) -> Array:
+    """Standard deviation of the white part of each column, from second differences. (n,)"""
+    if len(x) < 3:
+        return np.full(x.shape[1], np.nan)
+    curvature = (column[:-2] - 2.0 * column[1:-1] + column[2:] for column in x.T)
+    return np.asarray(np.sqrt([np.mean(bend**2) / 6.0 for bend in curvature]))
