@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vftcli.doctor.examiner import ONLY_EXAMINED, Examiner
+from vftcli.doctor.examiner import Examiner, let_go_of_examined
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.table import BEST, NOT_SHOWN
 from vftcli.readers.estimates import refuse_estimates
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from vftcli.virtual_sensor.choice import WrenchChoice
     from vftcli.virtual_sensor.detection import ToldContacts
     from vftcli.virtual_sensor.smoother.observer_wrench import Gate
-
 
 WRITING = 0.7  # share of a log's work that is done before its files are written
 
@@ -219,18 +218,15 @@ def analyse(
     motion = read(recording, robot, choice, models or Models())
     examinations = examine(motion, choice)
     if choice.spares_memory:
-        recording.let_go(ONLY_EXAMINED)
+        let_go_of_examined(recording, robot)
     tell(f"{name}: running observers", 0.15, 0.3)
     baseline = model(motion, choice)
     analysis = replace(observe(motion, baseline, choice), examinations=examinations)
     analysis = refine(analysis, baseline, choice)
-    analysis = find_contacts(analysis, choice)
-    analysis = sense(analysis, choice)
+    analysis = sense(find_contacts(analysis, choice), choice)
     tell(f"{name}: comparing", 0.5, WRITING)
     motion.log.spare()
-    analysis = judge(analysis, choice)
-    motion.log.spare()
-    return analysis
+    return judge(analysis, choice)
 
 
 def read(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Models) -> FreeMotion:
