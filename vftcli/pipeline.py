@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vftcli.doctor.examiner import Examiner
+from vftcli.doctor.examiner import Examiner, let_go_of_examined
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.table import BEST, NOT_SHOWN
 from vftcli.readers.estimates import refuse_estimates
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from vftcli.virtual_sensor.detection import ToldContacts
     from vftcli.virtual_sensor.smoother.observer_wrench import Gate
 
-
 WRITING = 0.7  # share of a log's work that is done before its files are written
 
 
@@ -52,6 +51,7 @@ class AnalysisChoice:
         contacts: Whether what touched the arm is listed, where the complete log may be used.
         library: Where the logs of the command are read, each once.
         examiner: Who examines them, each once, and says whether results mean anything.
+        spares_memory: Whether what only the examination looks at of a log is let go after it.
         progress: Told what is being done, and from which share of a log's work to which.
     """
 
@@ -65,6 +65,7 @@ class AnalysisChoice:
     contacts: bool = True
     library: Library = field(default_factory=Library, repr=False, compare=False)
     examiner: Examiner = field(default_factory=Examiner, repr=False, compare=False)
+    spares_memory: bool = False
     progress: Callable[[str, float, float], None] = field(
         default=no_stage, repr=False, compare=False
     )
@@ -216,13 +217,15 @@ def analyse(
     tell(f"{name}: examining", 0.05, 0.15)
     motion = read(recording, robot, choice, models or Models())
     examinations = examine(motion, choice)
+    if choice.spares_memory:
+        let_go_of_examined(recording, robot)
     tell(f"{name}: running observers", 0.15, 0.3)
     baseline = model(motion, choice)
     analysis = replace(observe(motion, baseline, choice), examinations=examinations)
     analysis = refine(analysis, baseline, choice)
-    analysis = find_contacts(analysis, choice)
-    analysis = sense(analysis, choice)
+    analysis = sense(find_contacts(analysis, choice), choice)
     tell(f"{name}: comparing", 0.5, WRITING)
+    motion.log.spare()
     return judge(analysis, choice)
 
 

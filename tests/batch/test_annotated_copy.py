@@ -18,11 +18,11 @@ from vftcli.batch.annotation import ForceChoice
 from vftcli.batch.choice import WorkersChoice
 from vftcli.datasets.copying import partial_of
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import silent
 from vftcli.readers import recognise
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import LogError, ParameterError, VftError
+from vftcli.signals.progress import no_stage
 from vftcli.virtual_sensor.choice import WrenchChoice
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "panda_episodes"
@@ -35,7 +35,14 @@ def made(
 ) -> dict[str, Any]:
     here = WorkersChoice(workers=workers)
     return annotate(
-        path, copy, asked or ForceChoice(), CopyChoice(**how), here, "x", silent, silent
+        path,
+        copy,
+        asked or ForceChoice(),
+        CopyChoice(**how),
+        here,
+        "x",
+        lambda _words: None,
+        no_stage,
     )
 
 

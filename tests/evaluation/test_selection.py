@@ -11,10 +11,12 @@ from vftcli.evaluation.selection import (
     facts,
     mean_rmse,
     step_response,
-    white_noise,
 )
 from vftcli.observers import KalmanObserver, MomentumObserver
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots import load_robot
 from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.recording import Recording
 
 STEP = 0.002
 
@@ -23,6 +25,12 @@ def terms(sigma: float = 0.3) -> DynamicsTerms:
     rng = np.random.default_rng(0)
     t = STEP * np.arange(4000)
     return DynamicsTerms(t=t, p=np.zeros((4000, 2)), mu=sigma * rng.standard_normal((4000, 2)))
+
+
+def run_of(terms: DynamicsTerms) -> ModelledRun:
+    """A recording whose terms these are."""
+    recording = Recording(t=terms.t, q=np.zeros_like(terms.p))
+    return ModelledRun(recording=recording, robot=load_robot("ur5")).with_terms(terms)
 
 
 @pytest.mark.parametrize("gain", [5.0, 20.0])
@@ -35,7 +43,7 @@ def test_a_first_order_filter_reaches_nine_tenths_at_its_time(gain: float) -> No
 def test_noise_is_that_of_the_estimate() -> None:
     """The computed noise floor against what the observer really makes of white noise in μ."""
     log, observer = terms(), MomentumObserver(gain=20.0)
-    found = facts([observer], {"gmo": observer.tuning(STEP, 2)}, log, None)[0]
+    found = facts([observer], {"gmo": observer.tuning(STEP, 2)}, run_of(log), None)[0]
     shown = float(np.mean(observer.estimate(log).tau[500:].std(axis=0)))
     # 3500 samples with a memory of 50: some 70 independent pieces tell a deviation to 10 %.
     assert found.noise == pytest.approx(shown, rel=0.15)
@@ -46,7 +54,7 @@ def test_noise_is_that_of_the_estimate() -> None:
 def test_advice_names_the_fastest_and_the_quietest() -> None:
     observers = [MomentumObserver(gain=50.0), KalmanObserver(q_tau_diag=50.0)]
     tunings = {o.name: o.tuning(STEP, 2) for o in observers}
-    detection, response, estimation = advice(facts(observers, tunings, terms(), None))
+    detection, response, estimation = advice(facts(observers, tunings, run_of(terms()), None))
     assert detection.best == ("gmo",)
     assert response.best == ("kfo-fe",)
     assert estimation.best == ()  # no reference, no errors
@@ -78,7 +86,7 @@ def test_what_passes_is_noise_above_a_persons_contacts() -> None:
     """A first-order low-pass of 50 1/s passes more of what lies above 5 Hz than one of 5 1/s."""
     observers = [MomentumObserver(gain=50.0), MomentumObserver(gain=5.0)]
     fast, slow = (
-        facts([o], {"gmo": o.tuning(STEP, 2)}, terms(), None)[0].passed for o in observers
+        facts([o], {"gmo": o.tuning(STEP, 2)}, run_of(terms()), None)[0].passed for o in observers
     )
     f = np.linspace(0.0, 250.0, 513)[1:]  # up to half the sample rate of 2 ms
     for gain, passed in ((50.0, fast), (5.0, slow)):
@@ -87,20 +95,12 @@ def test_what_passes_is_noise_above_a_persons_contacts() -> None:
         assert passed == pytest.approx(np.sqrt(np.mean(size**2)), rel=0.05)
 
 
-def test_white_noise_of_a_ramp_is_that_of_its_second_differences() -> None:
-    rng = np.random.default_rng(2)
-    x = 3.0 * np.arange(20_000)[:, None] + 0.7 * rng.standard_normal((20_000, 1))
-    # A standard deviation of 20 000 samples, to 1/√(2·20 000), three times that for what overlaps.
-    assert white_noise(x)[0] == pytest.approx(0.7, rel=0.02)
-    assert np.isnan(white_noise(x[:2])[0])
-
-
 def test_the_slowest_joint_decides_and_noise_is_the_joints_mean() -> None:
     """Joints of 50 and 5 1/s against observers that have one of them on both joints."""
     found = []
     for gain in ([50.0, 5.0], 50.0, 5.0):
         observer = MomentumObserver(gain=np.array(gain))
-        found += facts([observer], {"gmo": observer.tuning(STEP, 2)}, same_on_both(), None)
+        found += facts([observer], {"gmo": observer.tuning(STEP, 2)}, run_of(same_on_both()), None)
     both, fast, slow = found
     assert both.response == slow.response > fast.response
     assert both.delay == slow.delay > fast.delay

@@ -10,7 +10,7 @@ from vftcli.observers import MomentumObserver
 from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.readers import read
 from vftcli.refinement.band import band_remarks, with_band
-from vftcli.refinement.baseline import Baseline, baseline_of, free_reading, rests_in
+from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.refinement.whole_log import WholeLogBias
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion
@@ -51,7 +51,7 @@ def test_a_correction_adds_its_own_variance(found: Baseline) -> None:
 def test_rest_and_motion_have_bands_of_their_own(found: Baseline) -> None:
     """Every sample of a joint has one of two values, by whether it rests."""
     reading = free_reading(found, GMO, GMO.estimate(found.terms))
-    sd, rests = with_band(found, reading).error_sd, rests_in(found.motion.log)
+    sd, rests = with_band(found, reading).error_sd, found.motion.log.rests
     for j in range(6):
         for where in (rests[:, j], ~rests[:, j]):
             assert len(np.unique(sd[where, j])) <= 1
@@ -77,7 +77,7 @@ def test_the_resting_joint_is_named(found: Baseline) -> None:
 def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found: Baseline) -> None:
     reading = free_reading(found, GMO, GMO.estimate(found.terms))
     quiet = np.arange(found.terms.samples) % 7 == 0
-    rests = rests_in(found.motion.log)
+    rests = found.motion.log.rests
     tau = reading.estimate.tau[quiet]
     fitted = with_band(found, reading._replace(samples=tau, resting=rests[quiet])).error_sd
     stated = with_band(found, reading).error_sd

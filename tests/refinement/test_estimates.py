@@ -13,7 +13,6 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
-from vftcli.refinement.baseline import rests_in
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
@@ -93,7 +92,7 @@ def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
         response = observer.frequency_response(spectra.frequency, spectra.step, 6)
         lag = np.sum(np.abs(1 - response) ** 2 * spectra.external, axis=0) * spectra.width
         own = found.baseline.part.own
-        rests = rests_in(found.baseline.motion.log)
+        rests = found.baseline.motion.log.rests
         friction = dry_friction(worked_up.robot.friction, 6)
         j, moves = MOVING - 1, ~rests & own[:, None]
         free = np.array([np.mean(estimate.tau[moves[:, k], k] ** 2) for k in j])

@@ -61,7 +61,7 @@ def test_coloured_noise_is_measured_where_it_is_quiet(memory: float, share: floa
     contact = np.where(np.sin(2 * np.pi * 0.25 * T) > 0.0, 30.0 * np.sin(2 * np.pi * T) ** 2, 0.0)
     x = coloured(memory, 4) + load + contact[:, None]
     left = float(np.sqrt(np.mean(low_pass(T, coloured(memory, 4), 12.0) ** 2)))
-    quiet = noise_when_quiet(T, x, MOVING, STEP, 12.0)[0]
+    quiet = noise_when_quiet(T, low_pass(T, x, 12.0), MOVING, STEP, 12.0)[0]
     assert share * left < quiet < 1.15 * left
     # taken to be white, the band about the cutoff says less than half of that at .1 s
     assert noise_of(T, x, MOVING, STEP, 12.0)[0] < quiet

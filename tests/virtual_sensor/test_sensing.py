@@ -135,8 +135,8 @@ def test_masked_samples_are_counted() -> None:
     assert ("pose-hides-wrench" in codes) == bool(found.masked.any())
     (wrench,) = found.wrenches
     hidden = replace(wrench, masked=np.arange(len(wrench.t)) < 100)
-    (remark,) = mask_remark(hidden)
+    (remark,) = mask_remark(hidden.masked, wrench.sigma_min)
     assert remark.values["masked"] == 100
     assert remark.values["share"] == pytest.approx(100 / len(wrench.t))
     assert remark.values["sigma_min_m"] == pytest.approx(np.min(wrench.sigma_min))
-    assert mask_remark(replace(wrench, masked=np.zeros(len(wrench.t), dtype=bool))) == ()
+    assert mask_remark(np.zeros(len(wrench.t), dtype=bool), wrench.sigma_min) == ()

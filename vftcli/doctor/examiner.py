@@ -17,6 +17,11 @@ from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 
+ONLY_EXAMINED = frozenset(
+    ("target_q", "target_dq", "target_current", "target_torque", "temperature")
+)
+"""Signals that nothing but an examination looks at; temperatures where no friction follows them."""
+
 
 class Correction(NamedTuple):
     """What puts an effort right that is not what it is called.
@@ -162,3 +167,9 @@ def refuse(name: str, findings: Iterable[Remark]) -> None:
     others = list(dict.fromkeys(other.name for other in found[1:]))
     more = f" Also: {', '.join(others)}." if others else ""
     raise ExaminationError(f"{name}: {found[0]}{more} With --anyway it goes on all the same.")
+
+
+def let_go_of_examined(recording: Recording, robot: Robot) -> None:
+    """Give back the memory of what nothing but the examination of a log looks at."""
+    warmed = any(joint.temperature for joint in robot.friction)
+    recording.let_go(ONLY_EXAMINED - {"temperature"} if warmed else ONLY_EXAMINED)

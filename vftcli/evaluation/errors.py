@@ -148,8 +148,11 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
     for j in steps(range(reference.joints if estimates else 0)):
         x, y = np.column_stack([e.tau[:, j] for e in estimates]), reference.tau[:, j]
         known = comparable(x, y)
-        x, y = x[known], y[known]
-        squares = np.nan_to_num((x - y[:, None]) ** 2)
+        if not known.all():
+            x, y = x[known], y[known]
+        squares = x - y[:, None]
+        squares *= squares
+        np.nan_to_num(squares, copy=False)
         draws = resample(squares) if len(squares) else Resampled(np.ones((1, len(names))), 0)
         yield Scored(
             names=names,

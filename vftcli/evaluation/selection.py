@@ -7,6 +7,7 @@ import numpy as np
 import polars as pl
 
 from vftcli.observers.observer import Observer, Tuning
+from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.series import median_step
@@ -63,7 +64,7 @@ class Advice(NamedTuple):
 def facts(
     observers: Sequence[Observer],
     tunings: Mapping[str, Tuning],
-    terms: DynamicsTerms,
+    run: ModelledRun,
     errors: pl.DataFrame | None,
 ) -> tuple[Facts, ...]:
     """The facts of every observer that has a response of its own.
@@ -71,13 +72,12 @@ def facts(
     Args:
         observers: The observers that ran.
         tunings: What their gains mean, by name.
-        terms: The log's p and μ; the noise is that of μ.
+        run: The log; the noise is that of its μ.
         errors: The tidy error table, or None.
     """
-    noise = white_noise(terms.mu)
-    step = median_step(terms.t)
+    step = median_step(run.recording.t)
     return tuple(
-        facts_of(observer, tunings[observer.name], terms, noise, step, errors)
+        facts_of(observer, tunings[observer.name], run.noise, step, errors)
         for observer in observers
         if observer.name in tunings
     )
@@ -86,32 +86,22 @@ def facts(
 def facts_of(
     observer: Observer,
     tuning: Tuning,
-    terms: DynamicsTerms,
     noise: Array,
     step: float,
     errors: pl.DataFrame | None,
 ) -> Facts:
     """One observer's facts."""
     frequency = np.linspace(0.0, 0.5 / step, 513)[1:]
-    gain = np.abs(observer.frequency_response(frequency, step, terms.joints)) ** 2
+    gain = np.abs(observer.frequency_response(frequency, step, len(noise))) ** 2
     return Facts(
         name=observer.name,
-        response=float(np.max(step_response(observer, step, terms.joints))),
+        response=float(np.max(step_response(observer, step, len(noise)))),
         delay=float(np.max(tuning.delay)),
         noise=float(np.mean(noise * np.sqrt(gain.mean(axis=0)))),
         passed=float(np.mean(np.sqrt(gain[frequency > FAST].mean(axis=0)))),
         rmse=mean_rmse(observer.name, errors),
         parameter_count=tuning.parameter_count,
     )
-
-
-def white_noise(x: Array) -> Array:
-    """Standard deviation of the white part of each column, from second differences. (n,)"""
-    if len(x) < 3:
-        return np.full(x.shape[1], np.nan)
-    curvature = x[:-2] - 2.0 * x[1:-1] + x[2:]
-    noise: Array = np.sqrt(np.mean(curvature**2, axis=0) / 6.0)
-    return noise
 
 
 def step_response(observer: Observer, step: float, joints: int) -> Array:

@@ -322,7 +322,8 @@ def resting(recording: Recording) -> Mask:
     """The joints that rest in most of a log. (n,)"""
     if recording.dq is None:
         return np.zeros(recording.joints, dtype=bool)
-    return np.asarray(np.mean(np.abs(recording.dq) < STILL, axis=0) > FULL_OF_REST)
+    shares = [np.mean(np.abs(speed) < STILL) for speed in recording.dq.T]
+    return np.asarray(np.array(shares) > FULL_OF_REST)
 
 
 def joint_words(joints: Sequence[int]) -> str:

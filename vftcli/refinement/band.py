@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.observers.error_band import ENOUGH, FreeError, error_band, free_error
-from vftcli.refinement.baseline import Baseline, FreeReading, rests_in
+from vftcli.refinement.baseline import Baseline, FreeReading
 from vftcli.refinement.whole_log import WholeLogBias
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.arrays import handed_over
@@ -29,7 +29,7 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
         return estimate
     free = known_error(found, reading)
     response = reading.observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
-    sd = error_band(free, spectra.missed(response), rests_in(run), found.correction_sd)
+    sd = error_band(free, spectra.missed(response), run.rests, found.correction_sd)
     return replace(estimate, error_sd=handed_over(sd), moving=~found.standing)
 
 
@@ -65,7 +65,7 @@ def read_where_free(found: Baseline, reading: FreeReading, off: WholeLogBias) ->
         tau = tau - off.load
     elif found.load is not None:
         tau = tau - found.load.torque(run)
-    return reading._replace(samples=tau[off.free], resting=rests_in(run)[off.free])
+    return reading._replace(samples=tau[off.free], resting=run.rests[off.free])
 
 
 def band_remarks(found: Baseline) -> tuple[Remark, ...]:

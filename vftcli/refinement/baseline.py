@@ -14,7 +14,7 @@ from vftcli.repetition.free_load import FreeLoad, free_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.repetition.pairing import mean_of
-from vftcli.repetition.standstill import resting, standing
+from vftcli.repetition.standstill import standing
 from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask
@@ -260,7 +260,7 @@ def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) 
         carried = [found.load.torque(piece.run) for piece in found.pieces]
         read = [tau - load for tau, load in zip(read, carried, strict=True)]
     inside = [tau[piece.inside] for tau, piece in zip(read, found.pieces, strict=True)]
-    rests = [rests_in(piece.run)[piece.inside] for piece in found.pieces]
+    rests = [piece.run.rests[piece.inside] for piece in found.pieces]
     none = (0, estimate.joints)
     return FreeReading(
         observer,
@@ -269,8 +269,3 @@ def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) 
         samples=np.concatenate([np.zeros(none), *inside]),
         resting=np.concatenate([np.zeros(none, dtype=bool), *rests]),
     )
-
-
-def rests_in(run: ModelledRun) -> Mask:
-    """Where a joint of a recording rests. (T, n)"""
-    return resting(run.recording.t, run.recording.require("dq"))

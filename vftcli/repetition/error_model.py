@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.repetition.drive_run import band
 from vftcli.repetition.laid_over import LaidOver
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, at, empty_series
 from vftcli.signals.filters import band_pass, low_pass, noise_passed
 
 LEAST_BAND = 12.0
@@ -92,7 +92,9 @@ class ErrorModel(NamedTuple):
         return np.where(np.any(standing, axis=0), rms(self.sd[self.known], standing), np.nan)
 
 
-def error_model(laid: LaidOver, *, corrected: bool, cutoff: float | None) -> ErrorModel:
+def error_model(
+    laid: LaidOver, signal: Array, smooth: Array, *, corrected: bool, cutoff: float | None
+) -> ErrorModel:
     """Estimate the error of a difference.
 
     Its square is the sum of
@@ -107,33 +109,33 @@ def error_model(laid: LaidOver, *, corrected: bool, cutoff: float | None) -> Err
 
     Args:
         laid: The log over its free runs.
+        signal: The difference where it is known. (S, n) [N·m]
+        smooth: The same behind its low-pass. (S, n) [N·m]
         corrected: Whether the difference is corrected by the model's torque.
         cutoff: Cutoff of its low-pass, None without. [Hz]
     """
     motion, known = laid.motion, laid.known
     t, step = motion.t[known], motion.step
     moving = ~laid.standing[known]
-    modelled = laid.change[known]
-    signal = laid.torque[known]
-    if corrected:
-        signal += modelled
     noise = noise_of(t, signal, moving, step, cutoff)
-    noise = np.maximum(noise, noise_when_quiet(t, signal, moving, step, cutoff))
+    noise = np.maximum(noise, noise_when_quiet(t, smooth, moving, step, cutoff))
     low = band(step, cutoff)[0]
-    motion_error = laid.once("motion", low, lambda: local_rms(low_pass(t, modelled, low), step))
-    if corrected:
-        motion_error = motion_error * np.maximum(LEAST_SHARE, laid.misfit)
-    else:
+    motion_error = laid.once(
+        "motion", low, lambda: local_rms(low_pass(t, at(known, laid.change), low), step)
+    )
+    missed, own = np.maximum(LEAST_SHARE, laid.misfit), np.zeros(len(noise))
+    if not corrected:
         # The model's torque differentiates momenta: their noise is no difference of the motions.
-        momentum = laid.momentum[known]
-        own = laid.once("slope", low, lambda: slope_noise(t, momentum, moving, step, low))
-        motion_error = less_noise(motion_error, own)
-    share = ANYWHERE * laid.stopped
-    share[laid.standing.all(axis=1)] = AT_REST
-    stuck = motion.coulomb * share[known]
-    square = noise**2 + motion_error**2 + stuck**2
-    sd = np.full(share.shape, np.nan)
-    sd[known] = np.sqrt(square)
+        missed = np.ones(len(noise))
+        own = laid.once(
+            "slope", low, lambda: slope_noise(t, at(known, laid.momentum), moving, step, low)
+        )
+    at_rest = laid.standing.all(axis=1)
+    sd = np.full_like(laid.stopped, np.nan)
+    for j, stopped in enumerate(laid.stopped.T):
+        left = less_noise(motion_error[:, j] * missed[j], own[j])
+        stuck = motion.coulomb[j] * np.where(at_rest, AT_REST, ANYWHERE * stopped)[known]
+        sd[known, j] = np.sqrt(noise[j] ** 2 + left**2 + stuck**2)
     return ErrorModel(sd, laid.standing)
 
 
@@ -168,7 +170,7 @@ def noise_when_quiet(t: Array, x: Array, moving: Mask, step: float, cutoff: floa
 
     Args:
         t: Clock of the paired samples. (S,) [s]
-        x: The difference. (S, n) [N·m]
+        x: The difference behind its low-pass. (S, n) [N·m]
         moving: Whether the joint moves. (S, n)
         step: Sample time. [s]
         cutoff: Cutoff of its low-pass, None without. [Hz]
@@ -178,8 +180,7 @@ def noise_when_quiet(t: Array, x: Array, moving: Mask, step: float, cutoff: floa
     found = np.zeros(x.shape[1])
     if size < 8 or count < LEAST_PIECES:
         return found
-    smooth = x if cutoff is None else low_pass(t, x, cutoff)
-    left = off_line(smooth, size)
+    left = off_line(x, size)
     moves = moving[: count * size].reshape(count, size, -1).mean(axis=1) > 0.5
     whole = t[size - 1 : count * size : size] - t[: count * size : size] < 1.5 * PIECE
     for j in range(x.shape[1]):
@@ -226,15 +227,18 @@ def white(x: Array, moving: Mask) -> Array:
 
 def rms(x: Array, where: Mask) -> Array:
     """Root mean square of each column over the chosen samples, over all if none is. (n,)"""
-    where = np.where(np.any(where, axis=0), where, True)
-    square = np.sum(np.where(where, x**2, 0.0), axis=0) / np.sum(where, axis=0)
-    return np.asarray(np.sqrt(square))
+    # Column by column: whole copies of a long log take longer than the sums.
+    chosen = (c[w] if w.any() else c for c, w in zip(x.T, where.T, strict=True))
+    return np.asarray(np.sqrt([np.dot(column, column) / len(column) for column in chosen]))
 
 
 def local_rms(x: Array, step: float) -> Array:
     """Root mean square over a tenth of a second around each sample. (T, n)"""
     width = max(1, round(0.05 / step))
-    total = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(x**2, axis=0)])
     here = np.arange(len(x))
     first, last = np.maximum(here - width, 0), np.minimum(here + width + 1, len(x))
-    return np.asarray(np.sqrt((total[last] - total[first]) / (last - first)[:, None]))
+    out, total = empty_series(*x.shape), np.zeros(len(x) + 1)
+    for column, mean in zip(x.T, out.T, strict=True):
+        np.cumsum(column**2, out=total[1:])
+        np.sqrt((total[last] - total[first]) / (last - first), out=mean)
+    return out

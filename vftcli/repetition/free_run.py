@@ -9,8 +9,10 @@ import numpy as np
 from vftcli.robots.drive import check_joints
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import white_noise
 from vftcli.signals.shown import Shown
 
 # A plain estimate has no free run: what lays one under a log is loaded when it is asked for.
@@ -18,6 +20,9 @@ if TYPE_CHECKING:
     from vftcli.repetition.alignment import Alignment
     from vftcli.repetition.drive_run import DriveRun
     from vftcli.repetition.pairing import Pairing
+
+LONG = 1 << 17
+"""Samples from which on a recording's terms do not stay in memory beside its results."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -45,6 +50,28 @@ class ModelledRun(Shown):
         from vftcli.repetition.drive_run import drive_run_of
 
         return drive_run_of(self.recording, self.robot, self.terms)
+
+    @cached_property
+    def noise(self) -> Array:
+        """Standard deviation of the white part of μ. (n,) [N·m]"""
+        return white_noise(self.terms.mu)
+
+    def spare(self) -> None:
+        """Of a long recording give back the terms: they are evaluated anew if they are asked for.
+
+        That takes less time than a pass of the observers, and all of a log's results have no room
+        beside them.
+        """
+        if self.recording.samples > LONG and "terms" in self.__dict__:
+            _ = self.noise
+            del self.__dict__["terms"]
+
+    @cached_property
+    def rests(self) -> Mask:
+        """Where a joint rests. (T, n)"""
+        from vftcli.repetition.standstill import resting
+
+        return resting(self.recording.t, self.recording.require("dq"))
 
     def with_terms(self, terms: DynamicsTerms) -> "ModelledRun":
         """The same recording with other terms than the model's own."""

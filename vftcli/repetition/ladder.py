@@ -9,7 +9,7 @@ from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.error_model import ErrorModel, error_model
 from vftcli.repetition.laid_over import LaidOver
 from vftcli.repetition.pairing import Pairing, by_phase
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, at
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
 from vftcli.signals.remarks import Remark, fact
@@ -123,12 +123,15 @@ def difference(laid: LaidOver, name: str, cutoff: float | None) -> Difference:
             "run; record a longer one, or choose other free cycles with --free-cycles"
         )
     corrected = RUNGS[name].corrected
-    wanted = laid.torque[known]
+    signal = at(known, laid.torque)
     if corrected:
-        wanted += laid.change[known]
-    tau = np.full(motion.torque.shape, np.nan)
-    tau[known] = wanted if cutoff is None else low_pass(motion.t[known], wanted, cutoff)
-    return Difference(name, cutoff, tau, error_model(laid, corrected=corrected, cutoff=cutoff))
+        signal += at(known, laid.change)
+    smooth = signal if cutoff is None else low_pass(motion.t[known], signal, cutoff)
+    tau = np.full_like(laid.torque, np.nan)
+    for column, found in zip(tau.T, smooth.T, strict=True):
+        column[known] = found
+    error = error_model(laid, signal, smooth, corrected=corrected, cutoff=cutoff)
+    return Difference(name, cutoff, tau, error)
 
 
 class Climbed(NamedTuple):

@@ -105,6 +105,8 @@ def by_phase(motion: DriveRun, pairing: Pairing) -> Pairing:
 
 def mean_of(pairings: Sequence[Pairing], signals: Sequence[Array]) -> Array:
     """Mean over free runs of a signal at the paired instants, over those that are known. (T, n)"""
+    if len(pairings) == 1:
+        return pairings[0].there(signals[0])
     count = np.zeros(len(pairings[0].times), dtype=np.intp)[:, None]
     total: Array = np.zeros(1)
     for p, x in zip(pairings, signals, strict=True):

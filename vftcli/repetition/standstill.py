@@ -59,8 +59,10 @@ def resting(t: Array, dq: Array) -> Mask:
         t: Clock. (T,) [s]
         dq: Joint velocities. (T, n) [rad/s]
     """
-    slow = np.concatenate([np.zeros((1, dq.shape[1]), dtype=np.intp), np.abs(dq) < STILL])
-    count = np.cumsum(slow, axis=0)
     first = np.searchsorted(t, t - AROUND, side="left")
     last = np.searchsorted(t, t + AROUND, side="right")
-    return np.asarray(2 * (count[last] - count[first]) > (last - first)[:, None])
+    rests, count = np.zeros(dq.shape, dtype=bool), np.zeros(len(t) + 1, dtype=np.intp)
+    for j, speed in enumerate(dq.T):
+        np.cumsum(np.abs(speed) < STILL, out=count[1:])
+        rests[:, j] = 2 * (count[last] - count[first]) > last - first
+    return rests

@@ -88,6 +88,19 @@ def empty_series(samples: int, columns: int) -> Array:
     return np.empty((columns, samples)).T
 
 
+def at(chosen: Mask, x: Array) -> Array:
+    """The chosen samples of a series, its columns contiguous. (S, n)
+
+    Args:
+        chosen: Which samples. (T,)
+        x: The series. (T, n)
+    """
+    out = empty_series(int(np.count_nonzero(chosen)), x.shape[1])
+    for column, values in zip(out.T, x.T, strict=True):
+        np.compress(chosen, values, out=column)
+    return out
+
+
 def check_clock(t: Array, what: str) -> None:
     """Raise unless `t` is one-dimensional, finite and strictly increasing.
 

@@ -118,9 +118,9 @@ def power_of_two(count: int) -> int:
 
 def centred(signals: Array, known: Mask) -> Array:
     """Signals without their mean over the known samples, zero elsewhere. (m, T)"""
-    filled = np.where(known, signals, 0.0)
-    mean = filled.sum(axis=1, keepdims=True) / max(np.count_nonzero(known), 1)
-    centre: Array = np.where(known, filled - mean, 0.0)
+    centre: Array = np.where(known, signals, 0.0)
+    centre -= centre.sum(axis=1, keepdims=True) / max(np.count_nonzero(known), 1)
+    centre[:, ~known] = 0.0
     return centre
 
 

@@ -1,12 +1,12 @@
 """Recording: one log, in SI units, on one strictly increasing clock."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_clock, check_series, check_shape, seal
+from vftcli.signals.arrays import Array, check_clock, check_series, check_shape, handed_over, seal
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
 from vftcli.signals.remarks import fact
 from vftcli.signals.series import median_step
@@ -245,6 +245,16 @@ class Recording(Shown):
                 f"{derive}."
             )
         return value
+
+    def let_go(self, names: Iterable[str]) -> None:
+        """Give back the memory of signals that nobody will read again; they read as unknown then.
+
+        Only for a recording that its owner read itself and shares with no one who may ask for them.
+        """
+        unknown = np.broadcast_to(handed_over(np.full(1, np.nan)), self.q.shape)
+        for name in names:
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, unknown)
 
     def with_effort(
         self, kind: str, *, source: str | None = None, factor: float = 1.0

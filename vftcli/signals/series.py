@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array, Mask, is_uniform, median
+from vftcli.signals.arrays import Array, Mask, empty_series, is_uniform, median
 from vftcli.signals.errors import ClockError
 
 
@@ -80,8 +80,10 @@ def resample_columns(at: Array, t: Array, x: Array, outside: float | None = None
         x: Columns. (T, n)
         outside: Value before the first and after the last known time; None holds the end values.
     """
-    columns = [np.interp(at, t, column, left=outside, right=outside) for column in x.T]
-    return np.column_stack(columns) if columns else np.zeros((len(at), 0))
+    out = empty_series(len(at), x.shape[1])
+    for column, known in zip(out.T, x.T, strict=True):
+        column[:] = np.interp(at, t, known, left=outside, right=outside)
+    return out
 
 
 def bridge_unknown(t: Array, x: Array) -> Array:
@@ -95,3 +97,11 @@ def bridge_unknown(t: Array, x: Array) -> Array:
         known = np.isfinite(column)
         columns.append(np.interp(t, t[known], column[known]) if known.any() else np.zeros(len(t)))
     return np.column_stack(columns)
+
+
+def white_noise(x: Array) -> Array:
+    """Standard deviation of the white part of each column, from second differences. (n,)"""
+    if len(x) < 3:
+        return np.full(x.shape[1], np.nan)
+    curvature = (column[:-2] - 2.0 * column[1:-1] + column[2:] for column in x.T)
+    return np.asarray(np.sqrt([np.mean(bend**2) / 6.0 for bend in curvature]))

@@ -5,14 +5,22 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.outputs.believability import Ground
 from vftcli.outputs.page import index_page
-from vftcli.outputs.page.index_page import headline, index_row, link, rank, render_index
+from vftcli.outputs.page.index_page import (
+    headline,
+    index_line,
+    index_row,
+    link,
+    page_in,
+    rank,
+    render_index,
+)
 
 
 def test_the_index_links_every_report(pushed: Analysis, without_reference: Analysis) -> None:
     html = render_index([("a b", pushed), ('"><script>', without_reference)])
     assert 'href="a%20b/index.html"' in html
     assert 'href="%22%3E%3Cscript%3E/index.html"' in html
-    assert "<script" not in html
+    assert '"><script>/' not in html
     assert "RMSE in N·m" in html
 
 
@@ -24,21 +32,27 @@ def test_a_log_that_is_left_out_is_named(pushed: Analysis) -> None:
 
 def test_a_line_says_how_many_how_hard_and_how_sound(pushed: Analysis) -> None:
     sound = Ground(standing="good", subject="clock", sentence="no gap")
-    log, robot, span, contacts, hardest, least, error, state = index_row("a", pushed, sound)
+    log, robot, span, contacts, hardest, least, error, state = index_row(
+        index_line("a", pushed, sound)
+    )
     assert (log.text, robot, span) == ("ur5_circle.csv", "ur5", "20.0 s")
     assert (contacts, hardest, least) == ("12", "91 ± 7 N at 11.3 s", "4 N")
     assert error == "0.395 N·m (best)"
     assert state.text == "✓ sound"
     bad = Ground(standing="bad", subject="load", sentence="heavy <b>")
-    assert "load: heavy &lt;b&gt;" in index_row("a", pushed, bad)[-1].html
-    assert index_row("a", replace(pushed, contacts=None, errors=None), bad)[3:7] == ("–",) * 4
+    assert "load: heavy &lt;b&gt;" in index_row(index_line("a", pushed, bad))[-1].html
+    assert (
+        index_row(index_line("a", replace(pushed, contacts=None, errors=None), bad))[3:7]
+        == ("–",) * 4
+    )
 
 
 def test_the_worst_comes_first(pushed: Analysis, monkeypatch: pytest.MonkeyPatch) -> None:
     bare = replace(pushed, contacts=None)
     good, bad = (Ground(standing=s, subject="s", sentence="x") for s in ("good", "bad"))
     lines = [("a", bare, good), ("b", pushed, good), ("c", bare, bad)]
-    assert [line[0] for line in sorted(lines, key=rank)] == ["c", "b", "a"]
+    worst = sorted((index_line(*line) for line in lines), key=rank)
+    assert [line.page for line in worst] == ["c/index.html", "b/index.html", "a/index.html"]
     found = iter([good, bad])
     monkeypatch.setattr(index_page, "health", lambda _: next(found))
     html = render_index([("first", pushed), ("second", bare)])
@@ -63,4 +77,4 @@ def test_the_headline_counts_logs(pushed: Analysis) -> None:
 
 
 def test_a_link_may_hold_any_letter() -> None:
-    assert link("a b", "<i>") == '<a href="a%20b/index.html">&lt;i&gt;</a>'
+    assert link(page_in("a b"), "<i>") == '<a href="a%20b/index.html">&lt;i&gt;</a>'

@@ -21,8 +21,7 @@ HEADS = (
 
 def selection_guide(analysis: Analysis) -> str:
     """Which observer for what, by what was computed on this log."""
-    terms = analysis.motion.log.terms
-    found = facts(analysis.observers, analysis.tunings, terms, analysis.errors)
+    found = facts(analysis.observers, analysis.tunings, analysis.motion.log, analysis.errors)
     if not found:
         return ""
     computed = Grid(
