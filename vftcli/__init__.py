@@ -27,6 +27,8 @@ What a command's further options say is a choice of each room::
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from vftcli.signals.version import VERSION
+
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.evaluation import evaluate, rmse
@@ -55,7 +57,7 @@ if TYPE_CHECKING:
     from vftcli.signals.recording import Recording
     from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 
-__version__ = "0.1.0"
+__version__ = VERSION
 
 HOMES = {
     "Analysis": "analysis",

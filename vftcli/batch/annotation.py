@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-import vftcli
 from vftcli.analysis import Analysis
 from vftcli.batch.engine import begin
 from vftcli.datasets.copying import put_rows, stored_rows
@@ -25,6 +24,7 @@ from vftcli.robots.choice import RobotChoice
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import LogError, MissingSignalError, ParameterError, VftError
 from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.version import VERSION
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.frames import FRAMES
@@ -95,7 +95,7 @@ class ForceChoice:
 
     def key(self, robot_file: str) -> str:
         """What the columns depend on beside the episode: this, the robot file and the program."""
-        return f"{self!r} {robot_file} {vftcli.__version__}"
+        return f"{self!r} {robot_file} {VERSION}"
 
     def analysis(self, number: int, library: Library, examiner: Examiner) -> AnalysisChoice:
         """The same as what is asked of a log."""
@@ -277,7 +277,7 @@ def force_columns(
     made = {
         "observer": choice.observer,
         "causal": online,
-        "version": f"vftcli {vftcli.__version__}",
+        "version": f"vftcli {VERSION}",
     }
     joint = {"units": "N·m", "frame": "joint axes", "sign": SIGN, **made}
     flag = {"units": "1", "frame": "none", "sign": "1 where told, 0 where filled with 0", **made}

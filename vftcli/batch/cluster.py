@@ -21,6 +21,7 @@ from vftcli.batch.outcome import (
     failure_of,
     perform_all,
 )
+from vftcli.signals.version import VERSION
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -189,15 +190,13 @@ def packages_here() -> dict[str, str | None]:
     import platform
     from importlib.metadata import PackageNotFoundError, version
 
-    import vftcli
-
     found: dict[str, str | None] = {"python": platform.python_version()}
     for name in PACKAGES:
         try:
             found[name] = version(name)
         except PackageNotFoundError:
             found[name] = None
-    return {**found, "vftcli": vftcli.__version__}
+    return {**found, "vftcli": VERSION}
 
 
 def check_sight(client: "Client", seen: Sequence[str]) -> None:

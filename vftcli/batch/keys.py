@@ -12,9 +12,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import vftcli
 from vftcli.outputs.seals import digest
 from vftcli.readers.opening import files_of
+from vftcli.signals.version import VERSION
 
 FILE = "file:"
 """What goes before the path in the name of a reference."""
@@ -50,7 +50,7 @@ def options_digest(options: Any) -> str:  # noqa: ANN401 - choices of every room
         OSError: If such a file is not there.
     """
     named = with_files(options, lambda path: Path(digest_of(path)))
-    return sha256(json.dumps([vftcli.__version__, plain(named)], sort_keys=True))
+    return sha256(json.dumps([VERSION, plain(named)], sort_keys=True))
 
 
 def key_of(content: str, options: str, part: object = None) -> str:

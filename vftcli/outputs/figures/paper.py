@@ -9,11 +9,11 @@ from contextlib import contextmanager
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
-from vftcli import __version__
 from vftcli.outputs.files import OutputFolder
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.letters import printable
 from vftcli.signals.packages import check_installed
+from vftcli.signals.version import VERSION
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -145,9 +145,9 @@ def metadata(form: str, title: str) -> dict[str, str | None]:
     """What a file says of itself: no date and no machine, so that its bytes stay the same."""
     said: dict[str, str | None] = {"Title": printable(title)}
     own: dict[str, dict[str, str | None]] = {
-        "pdf": {"Creator": f"vftcli {__version__}", "CreationDate": None},
-        "svg": {"Creator": f"vftcli {__version__}", "Date": None},
-        "png": {"Software": f"vftcli {__version__}"},
+        "pdf": {"Creator": f"vftcli {VERSION}", "CreationDate": None},
+        "svg": {"Creator": f"vftcli {VERSION}", "Date": None},
+        "png": {"Software": f"vftcli {VERSION}"},
     }
     return said | own[form]
 

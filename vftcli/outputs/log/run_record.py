@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-import vftcli
 from vftcli.analysis import Analysis
 from vftcli.observers.auto_tuning import AutoTuned
 from vftcli.observers.observer import Observer, Tuning
@@ -20,10 +19,12 @@ from vftcli.observers.table import BEST
 from vftcli.outputs.contacts import contacts_record
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.files import OutputFolder
+from vftcli.robots import PROFILES
 from vftcli.robots.robot import Robot
 from vftcli.signals.letters import whole
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
+from vftcli.signals.version import VERSION
 
 CONVENTIONS = {
     "sign": "tau_ext is the torque the environment exerts ON the robot: "
@@ -139,7 +140,7 @@ def versions() -> dict[str, str]:
     A package that was not imported had no part in the numbers, and looking its version up would
     cost more than they did.
     """
-    found = {"vftcli": vftcli.__version__, "python": platform.python_version()}
+    found = {"vftcli": VERSION, "python": platform.python_version()}
     for package, module in PACKAGES.items():
         if (loaded := sys.modules.get(module)) is not None:
             found[package] = str(getattr(loaded, "__version__", "unknown"))
@@ -179,7 +180,7 @@ def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
 def robot_record(robot: Robot) -> dict[str, Any]:
     """Which robot it was taken to be. A built-in profile is told by its name, not its path."""
     # Its path would be another on every machine; name and digest say as much.
-    built_in = robot.path is not None and Path(vftcli.__file__).parent in robot.path.parents
+    built_in = robot.path in PROFILES.values()
     return {
         "name": robot.name,
         "title": robot.title,
