@@ -7,6 +7,8 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+pytestmark = pytest.mark.statistical  # long: CI does the same in an environment without the three
+
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 
 FEW = "--robot", "ur5", "--interval", "0:6"
