@@ -217,8 +217,6 @@ def analyse(
     tell(f"{name}: examining", 0.05, 0.15)
     motion = read(recording, robot, choice, models or Models())
     examinations = examine(motion, choice)
-    if choice.spares_memory:
-        let_go_of_examined(recording, robot)
     tell(f"{name}: running observers", 0.15, 0.3)
     baseline = model(motion, choice)
     analysis = replace(observe(motion, baseline, choice), examinations=examinations)
@@ -251,7 +249,9 @@ def examine(motion: FreeMotion, choice: AnalysisChoice) -> tuple["Examination", 
         ExaminationError: If a finding makes every result meaningless.
     """
     runs = [motion.log, *(free.run for free in (*motion.runs, motion.zero) if free is not None)]
-    found = (choice.examiner.examine(run.recording, run.robot) for run in runs)
+    found = [choice.examiner.examine(run.recording, run.robot) for run in runs]
+    if choice.spares_memory:
+        let_go_of_examined(motion.log.recording, motion.log.robot)
     return tuple(dict.fromkeys(found))
 
 
