@@ -41,6 +41,7 @@ ORDER = (
     "yardsticks",
     "benchmark",
     "cli",
+    "__main__",
 )
 """Rooms, lowest floor first: a room knows those before it."""
 

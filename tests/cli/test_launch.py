@@ -14,7 +14,7 @@ PROGRAM = "import sys; sys.argv[0] = 'vftcli'; from vftcli.cli import launch; la
 
 def launched(*words: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-c", PROGRAM, *map(str, words)],
+        [sys.executable, "-m", "vftcli", *map(str, words)],
         capture_output=True,
         text=True,
         check=False,
@@ -25,7 +25,9 @@ def launched(*words: object) -> subprocess.CompletedProcess[str]:
     ("words", "code"), [(("robots",), 0), (("robots", "nobody"), 1), (("estimate",), 2)]
 )
 def test_exit_codes(words: tuple[str, ...], code: int) -> None:
-    assert launched(*words).returncode == code
+    done = launched(*words)
+    assert done.returncode == code
+    assert "__main__" not in done.stderr  # the program is called by its name
 
 
 def test_long_output_arrives_whole_through_a_pipe() -> None:
