@@ -118,7 +118,10 @@ def scalar_recursion(decay: Array, y: Array, before: Array, fold: Fold) -> Array
 def coefficients(dt: Array, rate: Array) -> tuple[Array, Array]:
     """How much of the estimate stays, and the gain on d. Like `dt` and `rate` together"""
     a = 0.5 * dt * rate
-    return (1.0 - a) / (1.0 + a), rate / (1.0 + a)
+    whole = 1.0 + a
+    np.subtract(1.0, a, out=a)
+    a /= whole
+    return a, rate / whole
 
 
 def first_order_tuning(rate: Array, step: float, parameter_count: int) -> Tuning:

@@ -163,7 +163,7 @@ class KalmanObserver(Shown):
             fold = Fold.of(span.stop - span.start)
             # What is one for all joints is written out: rows of one size need no iterator.
             model = self._model_of(densities, fold.fold(dt[span]))
-            model = Discrete(*map(np.ascontiguousarray, model))
+            model = Discrete(model.step, *map(np.ascontiguousarray, model[1:]))
             gains = settle(model, entering, guess)
             entering = last_covariance(gains, fold)
             answer, error = filter_blocks(model, gains, kind, fold.fold(d[span]), error, fold)

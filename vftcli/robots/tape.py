@@ -174,8 +174,8 @@ class Program:
                 for work, a, b, out in self._operations
             ]
             self._samples = samples
-        for k, value in self._constants.items():
-            self._memory[k] = value
+            for k, value in self._constants.items():
+                self._memory[k] = value
         return self._memory[self._inputs, :samples], self._memory[: self._inputs.start, :samples]
 
     def run(self) -> None:
