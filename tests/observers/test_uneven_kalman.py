@@ -92,7 +92,7 @@ def test_folding_is_undone(samples: int) -> None:
     fold = Fold.of(samples)
     folded = fold.fold(x)
     np.testing.assert_array_equal(fold.unfold(folded), x)
-    np.testing.assert_array_equal(folded[fold.last, -1], x[-1])
+    np.testing.assert_array_equal(folded[fold.last, :, -1], x[-1])
 
 
 def test_pieces_end_at_the_same_samples_wherever_a_block_begins() -> None:

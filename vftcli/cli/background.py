@@ -2,6 +2,8 @@
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
 from typing import Generic, TypeVar
 
 Result = TypeVar("Result")
@@ -33,3 +35,10 @@ class Background(Generic[Result]):
         if self._error is not None:
             raise self._error
         return self._made[0]
+
+
+def load(*modules: str) -> None:
+    """Load what a command needs later, while something else takes its time; what is there of it."""
+    for name in modules:
+        with suppress(ImportError):
+            import_module(name)

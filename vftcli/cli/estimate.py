@@ -41,7 +41,7 @@ def estimate(
 
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5 -o out
     """
-    from vftcli.cli.background import Background
+    from vftcli.cli.background import Background, load
     from vftcli.readers.estimates import refuse_estimates
     from vftcli.readers.library import Library
     from vftcli.signals.packages import check_installed
@@ -70,6 +70,8 @@ def estimate(
     from vftcli.outputs.log.estimates import estimate_files
     from vftcli.readers.table import JacobianError
 
+    load("vftcli.streaming", "vftcli.robots.profile", "numpy.ma", "numpy.fft")
+    load("vftcli.outputs.screen", "pyarrow")
     OutputFolder(output, force, estimate_files(written.extras)).check()
     choice = for_estimates(analysis.choice(library))
     try:

@@ -72,7 +72,7 @@ def run_first_order(
         span = slice(first, first + PIECE)
         dt = terms.dt[span]
         fold = Fold.of(len(dt))
-        decay, gain = coefficients(fold.fold(dt), rate)
+        decay, gain = coefficients(fold.fold(dt), rate[:, None])
         x = fold.fold(d[span])
         x *= gain
         # A few steps, if any.
@@ -80,7 +80,7 @@ def run_first_order(
         where = (dt[late] * rate > 2.0) & (nominal <= 2.0)
         if where.any():
             samples, joints = late[where.nonzero()[0]], where.nonzero()[1]
-            at = samples % fold.length, samples // fold.length, joints
+            at = samples % fold.length, joints, samples // fold.length
             decay[at], x[at] = 0.0, 0.0 if afresh is None else afresh[span][samples, joints]
             rows = np.unique(samples)
             gaps, longest = gaps + len(rows), max(longest, float(np.max(dt[rows])))
@@ -93,8 +93,8 @@ def scalar_recursion(decay: Array, y: Array, before: Array, fold: Fold) -> Array
     """Run y_t = decay_t y_{t−1} + x_t from `before` (n,), blocks of samples side by side.
 
     Args:
-        decay: What stays of the sample before. (length, blocks, n)
-        y: x, which is overwritten. (length, blocks, n)
+        decay: What stays of the sample before. (length, n, blocks)
+        y: x, which is overwritten. (length, n, blocks)
         before: The state before the first sample. (n,)
         fold: The layout.
 
@@ -106,19 +106,22 @@ def scalar_recursion(decay: Array, y: Array, before: Array, fold: Fold) -> Array
         y[i] += decay[i] * y[i - 1]
         reach *= decay[i]
     ends = y[-1].copy()
-    ends[0] += reach[0] * before
-    sum_varying(ends[None], reach[None, None])
-    entering = np.concatenate([before[None], ends[:-1]])
+    ends[:, 0] += reach[:, 0] * before
+    sum_varying(ends[None], reach[None, None], np.arange(len(before)))
+    entering = np.concatenate([before[:, None], ends[:, :-1]], axis=1)
     for i in range(len(y)):
-        entering = decay[i] * entering
+        entering *= decay[i]
         y[i] += entering
     return fold.unfold(y)
 
 
 def coefficients(dt: Array, rate: Array) -> tuple[Array, Array]:
-    """How much of the estimate stays, and the gain on d, for sample times (…, 1). (…, n) each"""
+    """How much of the estimate stays, and the gain on d. Like `dt` and `rate` together"""
     a = 0.5 * dt * rate
-    return (1.0 - a) / (1.0 + a), rate / (1.0 + a)
+    whole = 1.0 + a
+    np.subtract(1.0, a, out=a)
+    a /= whole
+    return a, rate / whole
 
 
 def first_order_tuning(rate: Array, step: float, parameter_count: int) -> Tuning:

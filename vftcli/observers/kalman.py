@@ -121,10 +121,10 @@ class KalmanObserver(Shown):
         """Run over a block of a log from where the block before ended; None where it begins."""
         check_terms(terms)
         n, clock = terms.joints, terms.clock
-        settled = self.steady(clock.step, n)
-        d = self.unexplained(terms)
+        densities, d = self.densities(n), self.unexplained(terms)
+        model = self._model_of(densities, clock.step)
+        settled = steady(model, densities.decay)
         if clock.uniform and self.initial_covariance is None:
-            model = self.model(clock.step, n)
             F, g = error_filter(settled.gains, model.a12, model.a22)
             start = np.zeros((2, n)) if state is None else state.error
             tau, end = steady_filter(F, g, d, start, wanted=second_entry(n))
@@ -154,23 +154,21 @@ class KalmanObserver(Shown):
         numbers = np.stack([*densities, *state.posterior])
         _, kept, kind = np.unique(numbers, axis=1, return_index=True, return_inverse=True)
         kind = kind.ravel()
-        densities = Densities(*(x[kept] for x in densities))
+        densities = Densities(*(x[kept, None] for x in densities))
         guess, entering = (
             Covariance(*(p[kept] for p in each))
             for each in (settled.gains.posterior, state.posterior)
         )
         for span in spans(samples, begins=begins):
             fold = Fold.of(span.stop - span.start)
-            # What is one for all joints is written out: loops over a few joints each are slow.
+            # What is one for all joints is written out: rows of one size need no iterator.
             model = self._model_of(densities, fold.fold(dt[span]))
-            model = Discrete(*map(np.ascontiguousarray, model))
+            model = Discrete(model.step, *map(np.ascontiguousarray, model[1:]))
             gains = settle(model, entering, guess)
             entering = last_covariance(gains, fold)
-            entries = (model.a12, model.a22, gains.l2, 1.0 - gains.l1)
-            a12, a22, l2, rest = (x.take(kind, axis=-1) for x in entries)
-            answer, error = filter_blocks(a12, a22, l2, rest, fold.fold(d[span]), error, fold)
+            answer, error = filter_blocks(model, gains, kind, fold.fold(d[span]), error, fold)
             tau[span] = fold.unfold(answer)
-            sd[span] = fold.unfold(np.sqrt(gains.posterior.p22))[:, kind]
+            sd.T[:, span] = fold.unfold(np.sqrt(gains.posterior.p22)).T[kind]
         return tau, sd, KalmanState(error, Covariance(*(p[kind] for p in entering)))
 
     def unexplained(self, terms: DynamicsTerms) -> Array:

@@ -79,7 +79,9 @@ def zero_order_hold(step: Array, d: Densities) -> Discrete:
         q12 = 0.5 * step * q22
         q11 = step * (d.q_p + q12 / 1.5)
         held = np.broadcast_to(step, shape)
-        return Discrete(held, held, np.ones(shape), q11, q12, q22, np.broadcast_to(d.r, shape))
+        return Discrete(
+            held, held, np.broadcast_to(1.0, shape), q11, q12, q22, np.broadcast_to(d.r, shape)
+        )
     step, a = np.broadcast_to(step, shape), np.broadcast_to(d.decay, shape)
     x = a * step
     some = np.where(x > 0.0, a, 1.0)

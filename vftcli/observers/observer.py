@@ -71,7 +71,7 @@ def per_joint(value: Array | float, joints: int) -> Array:
     if found.size != 1 and found.shape != (joints,):
         told = f"an observer's parameter has shape {found.shape}"
         raise ShapeError(f"{told}; expected one number, or one a joint: ({joints},)")
-    return np.array(np.broadcast_to(found.ravel(), (joints,)))
+    return np.full(joints, found.ravel())
 
 
 def numbers_of(value: ArrayLike, name: str, observer: str) -> Array:

@@ -24,7 +24,7 @@ from vftcli.observers.kalman_gains import Covariance, Gains, update
 from vftcli.observers.kalman_model import Discrete
 from vftcli.observers.recursion import PIECE
 from vftcli.observers.steady_filter import FORGOTTEN
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Indices
 
 LENGTH = 64
 """Samples in a block at most: the Python loops have this length."""
@@ -34,7 +34,7 @@ SETTLED = 1e-15
 
 
 class Fold(NamedTuple):
-    """A piece of a log laid out as position in block × block × joint.
+    """A piece of a log laid out as position in block × joint × block.
 
     Attributes:
         length: Samples in a block; the last one is filled up with its last sample.
@@ -58,20 +58,19 @@ class Fold(NamedTuple):
         return (self.samples - 1) % self.length
 
     def fold(self, x: Array) -> Array:
-        """Samples in blocks: (N, k) → (length, blocks, k)."""
-        out = np.empty((self.length, self.blocks, x.shape[1]))
-        whole = self.samples // self.length
-        for row, column in zip(np.moveaxis(out, -1, 0), x.T, strict=True):
-            row[:, :whole] = column[: whole * self.length].reshape(whole, self.length).T
-            if whole < self.blocks:
-                rest = column[whole * self.length :]
-                row[:, -1] = rest[-1]
-                row[: len(rest), -1] = rest
+        """Samples in blocks: (N, k) → (length, k, blocks)."""
+        k, whole = x.shape[1], self.samples // self.length
+        out, covered = np.empty((self.length, k, self.blocks)), whole * self.length
+        out[..., :whole] = x[:covered].T.reshape(k, whole, self.length).transpose(2, 0, 1)
+        if whole < self.blocks:
+            rest = x[covered:]
+            out[..., -1] = rest[-1]
+            out[: len(rest), :, -1] = rest
         return out
 
     def unfold(self, y: Array) -> Array:
-        """Samples in their order: (length, blocks, n) → (N, n), columns whole."""
-        return y.transpose(2, 1, 0).reshape(y.shape[2], -1)[:, : self.samples].T
+        """Samples in their order: (length, n, blocks) → (N, n), columns whole."""
+        return y.transpose(1, 2, 0).reshape(y.shape[1], -1)[:, : self.samples].T
 
 
 def spans(samples: int, *, begins: bool) -> list[slice]:
@@ -107,21 +106,21 @@ def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gain
 
 def last_covariance(gains: Gains, fold: Fold) -> Covariance:
     """Covariance after a piece's last sample. (n,) each"""
-    return Covariance(*(p[fold.last, -1] for p in gains.posterior))
+    return Covariance(*(p[fold.last, :, -1] for p in gains.posterior))
 
 
 def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
-    """Gains of one piece, everything in blocks. (length, blocks, n) each
+    """Gains of one piece, everything in blocks. (length, n, blocks) each
 
     Args:
-        model: The models of its samples. (length, blocks, n) each
+        model: The models of its samples. (length, n, blocks) each
         entering: Covariance after the sample before the piece. (n,)
         guess: Where blocks start before they know better. (n,)
     """
-    blocks = model.r.shape[1]
-    starts = Covariance(*(np.tile(p, (blocks, 1)) for p in guess))
+    blocks = model.r.shape[2]
+    starts = Covariance(*(np.repeat(p[:, None], blocks, axis=1) for p in guess))
     for start, value in zip(starts, entering, strict=True):
-        start[0] = value
+        start[:, 0] = value
     if blocks > 1:
         response = respond(model, starts)
         guessed = Covariance(*(p.copy() for p in starts))
@@ -130,17 +129,17 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
             ends = response.of(Covariance(*(p - g for p, g in zip(starts, guessed, strict=True))))
             change = 0.0
             for start, end in zip(starts, ends, strict=True):
-                new, old = end[:-1], start[1:]
+                new, old = end[:, :-1], start[:, 1:]
                 scale = np.maximum(np.abs(new), np.finfo(float).tiny)
                 change = max(change, float(np.max(np.abs(new - old) / scale)))
-                start[1:] = new
+                start[:, 1:] = new
             if change <= SETTLED:
                 break
     return run_blocks(model, starts)
 
 
 class Response(NamedTuple):
-    """What blocks make of the covariance that they start from. (blocks, n) each
+    """What blocks make of the covariance that they start from. (n, blocks) each
 
     Attributes:
         end: Posterior at the end, from the start that was tried.
@@ -206,7 +205,7 @@ def predict(p11: Array, p12: Array, p22: Array, model: Discrete, i: int) -> Cova
 
 
 def run_blocks(model: Discrete, starts: Covariance) -> Gains:
-    """The covariance recursion of all blocks side by side. (length, blocks, n) each"""
+    """The covariance recursion of all blocks side by side. (length, n, blocks) each"""
     (p11, p12, p22), r = starts, model.r
     l1, l2, torque = np.empty((3, *r.shape))
     for i in range(len(r)):
@@ -221,51 +220,74 @@ def run_blocks(model: Discrete, starts: Covariance) -> Gains:
     return Gains(l1, l2, Covariance(r * l1, r * l2, torque))
 
 
+class Filter(NamedTuple):
+    """The entries of `error_filter` along one piece. (length, n, blocks) each"""
+
+    a12: Array
+    a22: Array
+    l2: Array
+    rest: Array
+
+    def step(self, i: int, e: Array, tau: Array, d: Array | float) -> tuple[Array, Array]:
+        """What e and τ̂ of all blocks are after the sample at position i."""
+        x = e - self.a12[i] * tau
+        x += d
+        tau = self.a22[i] * tau
+        tau += self.l2[i] * x
+        x *= self.rest[i]
+        return x, tau
+
+
 def filter_blocks(
-    a12: Array, a22: Array, l2: Array, rest: Array, d: Array, error: Array, fold: Fold
+    model: Discrete, gains: Gains, kind: Indices, d: Array, error: Array, fold: Fold
 ) -> tuple[Array, Array]:
     """Run `error_filter` over one piece, everything in blocks.
 
     Args:
-        a12: A₁₂ of its samples. (length, blocks, n)
-        a22: A₂₂. (length, blocks, n)
-        l2: L₂. (length, blocks, n)
-        rest: 1 − L₁. (length, blocks, n)
-        d: The input. (length, blocks, n)
+        model: The models of its samples, of each kind of joint. (length, kinds, blocks) each
+        gains: Their gains.
+        kind: Which of them each joint is. (n,)
+        d: The input. (length, n, blocks)
         error: e and τ̂ after the sample before the piece. (2, n)
         fold: The layout.
 
     Returns:
-        τ̂ (length, blocks, n), and e and τ̂ after the last sample (2, n).
+        τ̂ (length, n, blocks), and e and τ̂ after the last sample (2, n).
     """
-    # From zero, and from (1, 0) and (0, 1) without input: what each block makes of its start.
-    e, tau = np.zeros((2, 3, *d.shape[1:]))
-    e[1], tau[2] = 1.0, 1.0
+    of_kind = Filter(model.a12, model.a22, gains.l2, 1.0 - gains.l1)
+    of_joint = Filter(*(x.take(kind, axis=1) for x in of_kind))
+    # From (1, 0) and (0, 1) without input, and from zero: what each block makes of its start.
+    shape = of_kind.rest.shape[1:]
+    start = np.zeros((2, 2, *shape))
+    start[0, 0] = start[1, 1] = 1.0
+    (e, tau), (forced_e, forced_tau) = start, np.zeros((2, *d.shape[1:]))
     for i in range(len(d)):
-        x = e - a12[i] * tau
-        x[0] += d[i]
-        tau = a22[i] * tau + l2[i] * x
-        e = rest[i] * x
-    ends = np.stack([e, tau])
-    forced, phi = ends[:, 0], ends[:, 1:]
-    forced[:, 0] += np.einsum("abn,bn->an", phi[:, :, 0], error)
-    sum_varying(forced, phi)
-    e, tau = np.concatenate([error[:, None], forced[:, :-1]], axis=1)
+        e, tau = of_kind.step(i, e, tau, 0.0)
+        forced_e, forced_tau = of_joint.step(i, forced_e, forced_tau, d[i])
+    forced, phi = np.stack([forced_e, forced_tau]), np.stack([e, tau])
+    forced[..., 0] += np.einsum("abn,bn->an", phi[:, :, kind, 0], error)
+    sum_varying(forced, phi, kind)
+    e, tau = np.concatenate([error[..., None], forced[..., :-1]], axis=2)
     answer = np.empty_like(d)
     for i in range(len(d)):
-        x = e - a12[i] * tau + d[i]
-        tau = np.add(a22[i] * tau, l2[i] * x, out=answer[i])
-        e = rest[i] * x
+        e, tau = of_joint.step(i, e, tau, d[i])
+        answer[i] = tau
         if i == fold.last:
-            end = np.stack([e[-1], tau[-1]])
+            end = np.stack([e[:, -1], tau[:, -1]])
     return answer, end
 
 
-def sum_varying(x: Array, phi: Array) -> None:
-    """Run x_b ← x_b + Φ_b x_{b−1} over all blocks in place by doubling: (m, B, n), (m, m, B, n)."""
+def sum_varying(x: Array, phi: Array, kind: Indices) -> None:
+    """Run x_b ← x_b + Φ_b x_{b−1} over all blocks in place, by doubling.
+
+    Args:
+        x: What each block adds, then the sums. (m, n, blocks)
+        phi: Transitions of each kind of joint, overwritten. (m, m, kinds, blocks)
+        kind: Which of them each joint has. (n,)
+    """
     apart = 1
-    while apart < x.shape[1] and np.max(np.abs(phi[:, :, apart:])) > FORGOTTEN:
-        near = phi[:, :, apart:]
-        x[:, apart:] += np.sum(near * x[None, :, :-apart], axis=1)
-        near[:] = np.sum(near[:, :, None] * phi[None, :, :, :-apart], axis=1)
+    while apart < x.shape[2] and np.max(np.abs(phi[..., apart:])) > FORGOTTEN:
+        near = phi[..., apart:]
+        x[..., apart:] += np.sum(near[:, :, kind] * x[None, ..., :-apart], axis=1)
+        near[:] = np.sum(near[:, :, None] * phi[None, ..., :-apart], axis=1)
         apart *= 2

@@ -8,13 +8,14 @@ sliding. All but a constant offset follows the joint's temperature where the rob
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from vftcli.robots.robot import JointFriction
 from vftcli.robots.temperature import friction_factor
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, Where, warning
 
@@ -27,14 +28,14 @@ SMOOTHING = 0.01
 
 def coulomb_viscous(
     dq: Array,
-    coulomb: Array | float,
-    viscous: Array | float = 0.0,
-    quadratic: Array | float = 0.0,
-    offset: Array | float = 0.0,
-    smoothing: Array | float = SMOOTHING,
-    load_coulomb: Array | float = 0.0,
-    stribeck: Array | float = 0.0,
-    stribeck_velocity: Array | float = 1.0,
+    coulomb: float,
+    viscous: float = 0.0,
+    quadratic: float = 0.0,
+    offset: float = 0.0,
+    smoothing: float = SMOOTHING,
+    load_coulomb: float = 0.0,
+    stribeck: float = 0.0,
+    stribeck_velocity: float = 1.0,
     load: Array | None = None,
 ) -> Array:
     """Coulomb, viscous and signed quadratic friction with an offset. Like `dq` [N·m]
@@ -53,27 +54,29 @@ def coulomb_viscous(
         stribeck_velocity: Velocity v_s over which it fades. [rad/s]
         load: Torque the gear carries: the joint's gravity torque; None for none. Like `dq` [N·m]
     """
-    torque: Array = dq / smoothing
+    torque: Array = dq * (1.0 / smoothing)
     np.tanh(torque, out=torque)
-    dry = coulomb
-    if load is not None and np.any(load_coulomb):
-        dry = dry + load_coulomb * np.abs(load)
-    if np.any(stribeck):
+    dry: Array | float = coulomb
+    if load is not None and load_coulomb:
+        dry = np.abs(load)
+        dry *= load_coulomb
+        dry += coulomb
+    if stribeck:
         dry = dry + stribeck * np.exp(-((dq / stribeck_velocity) ** 2))
     torque *= dry
-    if np.any(viscous):
+    if viscous:
         torque += viscous * dq
-    if np.any(quadratic):
+    if quadratic:
         torque += quadratic * dq * np.abs(dq)
-    if np.any(offset):
+    if offset:
         torque += offset
     return torque
 
 
 def coulomb_logarithmic(
     dq: Array,
-    logarithmic: Array | float,
-    logarithmic_velocity: Array | float,
+    logarithmic: float,
+    logarithmic_velocity: float,
     **others: Any,  # noqa: ANN401
 ) -> Array:
     """Coulomb friction and a logarithmic rise, which never turns down. Like `dq` [N·m]
@@ -99,9 +102,7 @@ def coulomb_logarithmic(
     return rise
 
 
-def sigmoid(
-    dq: Array, amplitude: Array | float, slope: Array | float, shift: Array | float
-) -> Array:
+def sigmoid(dq: Array, amplitude: float, slope: float, shift: float) -> Array:
     """Sigmoid friction, zero at rest. Like `dq` [N·m]
 
     f = A/(1 + exp(−s(q̇ + v₀))) − A/(1 + exp(−s v₀))
@@ -126,8 +127,8 @@ def sigmoid(
 
 def bent_line(
     dq: Array,
-    speeds: Array | Sequence[float],
-    torques: Array | Sequence[float],
+    speeds: Sequence[float],
+    torques: Sequence[float],
     **others: Any,  # noqa: ANN401
 ) -> Array:
     """A line through points (v_k, f_k), as UR controllers feed friction forward. Like `dq` [N·m]
@@ -140,18 +141,21 @@ def bent_line(
 
     Args:
         dq: Joint velocities. (T,) or (T, n) [rad/s]
-        speeds: Speeds v_k, rising, at least two; one column a joint. (K,) or (K, n) [rad/s]
-        torques: Friction f_k there. (K,) or (K, n) [N·m]
+        speeds: Speeds v_k, rising, at least two. (K,) [rad/s]
+        torques: Friction f_k there. (K,) [N·m]
         others: Parameters of `coulomb_viscous`.
     """
-    slopes = np.diff(torques, axis=0) / np.diff(speeds, axis=0)
+    slopes = [
+        (f - before) / (v - slower)
+        for (slower, v), (before, f) in zip(pairwise(speeds), pairwise(torques), strict=True)
+    ]
     # sign(v) max(|v| − v_k, 0) is v − clip(v, ±v_k), and the changes add up to the last slope.
     torque = coulomb_viscous(dq, torques[0], **others)
     part: Array = dq * slopes[-1]
     torque += part
-    for speed, change in zip(speeds, np.diff(slopes, axis=0, prepend=0.0), strict=False):
+    for speed, slope, before in zip(speeds, slopes, [0.0, *slopes], strict=False):
         np.clip(dq, -speed, speed, out=part)
-        part *= change
+        part *= slope - before
         torque -= part
     return torque
 
@@ -169,10 +173,6 @@ MODELS: dict[str, Callable[..., Array]] = {
 """Name in a robot file → function of velocity and the file's parameters."""
 
 
-LEFT_OUT = {"smoothing": SMOOTHING, "stribeck_velocity": 1.0}
-"""What a key means that a joint leaves out and another of the same model has; else zero."""
-
-
 def friction_torque(
     friction: Sequence[JointFriction],
     dq: Array,
@@ -183,8 +183,8 @@ def friction_torque(
 ) -> Array:
     """Friction torque of every joint at every sample, opposing motion when subtracted. (T, n) [N·m]
 
-    Joints that share a model are evaluated together. Along a motion, `RunningFriction` follows the
-    presliding state.
+    Joint by joint, so that a chunk of one stays in the cache. Along a motion, `RunningFriction`
+    follows the presliding state.
 
     Args:
         friction: One model a joint; empty for a frictionless arm.
@@ -199,25 +199,13 @@ def friction_torque(
     Raises:
         ParameterError: If a model's name is unknown.
     """
-    torque = np.zeros(dq.shape[::-1]).T
-    groups: dict[tuple[str, int], list[int]] = {}
+    torque = empty_series(*dq.shape)
+    if not friction:
+        torque[:] = 0.0
     for j, joint in enumerate(friction):
-        if joint.model != "none":
-            groups.setdefault((joint.model, len(joint.speeds)), []).append(j)
-    for (model, _), joints in groups.items():
-        check_known(model, MODELS, f"no friction model {model!r}")
-        values = model_values([friction[j] for j in joints])
-        every = len(joints) == dq.shape[1]
-        if load is not None and "load_coulomb" in values:
-            values["load"] = load if every else load[:, joints]
-        part = MODELS[model](dq if every else dq[:, joints], **values)
-        if every:
-            torque = part
-        else:
-            torque[:, joints] = part
-    if deflection is not None:
-        for j in presliding_joints(friction)[0]:
-            torque[:, j] += friction[j].parameters["presliding"] * deflection[:, j]
+        torque[:, j] = joint_friction(joint, dq[:, j], None if load is None else load[:, j])
+        if deflection is not None and (a := joint.parameters.get("presliding", 0.0)) > 0.0:
+            torque[:, j] += a * deflection[:, j]
     if temperature is not None and (factor := friction_factor(friction, temperature)) is not None:
         offset = np.array([joint.parameters.get("offset", 0.0) for joint in friction])
         torque -= offset
@@ -226,21 +214,17 @@ def friction_torque(
     return torque
 
 
-def model_values(friction: Sequence[JointFriction]) -> dict[str, Any]:
-    """The numbers of joints that share a model, as its function takes them: an array each. (m,)
-
-    Args:
-        friction: The joints' models.
-    """
-    keys = {key for joint in friction for key in joint.parameters} - set(PRESLIDING)
-    values: dict[str, Any] = {
-        key: np.array([joint.parameters.get(key, LEFT_OUT.get(key, 0.0)) for joint in friction])
-        for key in sorted(keys)
-    }
-    if friction[0].speeds:
-        values["speeds"] = np.array([joint.speeds for joint in friction]).T
-        values["torques"] = np.array([joint.torques for joint in friction]).T
-    return values
+def joint_friction(joint: JointFriction, dq: Array, load: Array | None) -> Array | float:
+    """What one joint's model makes of its velocities and its load. (T,) [N·m]"""
+    if joint.model == "none":
+        return 0.0
+    check_known(joint.model, MODELS, f"no friction model {joint.model!r}")
+    values: dict[str, Any] = {k: v for k, v in joint.parameters.items() if k not in PRESLIDING}
+    if joint.speeds:
+        values |= {"speeds": joint.speeds, "torques": joint.torques}
+    if load is not None and "load_coulomb" in values:
+        values["load"] = load
+    return MODELS[joint.model](dq, **values)
 
 
 def presliding_joints(friction: Sequence[JointFriction]) -> tuple[list[int], Array]:

@@ -31,7 +31,7 @@ from vftcli.robots.tape import NOTHING, ZERO, Program, Tape, Value, Vector, cons
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.pose import skew
 
-CHUNK = 6144
+CHUNK = 4096
 """Samples worked on at a time: small enough that a chunk's rows stay in the cache, large enough
 that calling an operation costs little beside it."""
 

@@ -174,8 +174,8 @@ class Program:
                 for work, a, b, out in self._operations
             ]
             self._samples = samples
-        for k, value in self._constants.items():
-            self._memory[k] = value
+            for k, value in self._constants.items():
+                self._memory[k] = value
         return self._memory[self._inputs, :samples], self._memory[: self._inputs.start, :samples]
 
     def run(self) -> None:
@@ -221,19 +221,22 @@ def in_few_rows(
     The outputs stand first, in their order, then the inputs.
     """
     last = {row: k for k, op in enumerate(operations) for row in op.reads}
-    place = {row: len(outputs) + row for row in range(inputs)}
-    place |= {row: k for k, row in enumerate(outputs) if row is not None}
+    place = {row: row for row in range(inputs)}
     free: list[int] = []
-    rows, planned = len(outputs) + inputs, []
+    rows = inputs
     for k, operation in enumerate(operations):
-        work, a, b, out = operation
-        operands = (place[a], place[b] if isinstance(b, int) else b)
-        # An operation may write where it reads.
+        # An operation may write where it reads; an output not where an input stands.
         free += [place[row] for row in operation.reads if last[row] == k and row not in outputs]
-        if out not in place:
-            if not free:
-                free.append(rows)
-                rows += 1
-            place[out] = free.pop()
-        planned.append(Operation(work, *operands, place[out]))
-    return planned, rows
+        kept = [row for row in free if row >= inputs or operation.out not in outputs]
+        if kept:
+            free.remove(kept[-1])
+        place[operation.out] = kept[-1] if kept else rows
+        rows = max(rows, place[operation.out] + 1)
+    first = [rows + k if row is None else place[row] for k, row in enumerate(outputs)]
+    rest = set(range(rows)).difference(first, range(inputs))
+    moved = {row: k for k, row in enumerate([*first, *range(inputs), *rest])}
+    place = {row: moved[at] for row, at in place.items()}
+    return [
+        Operation(work, place[a], place[b] if isinstance(b, int) else b, place[out])
+        for work, a, b, out in operations
+    ], len(moved)

@@ -197,6 +197,8 @@ def write_extras(
     folder: OutputFolder, place: str, analysis: Analysis, choice: OutputChoice
 ) -> None:
     """Write what was asked for besides, below a place of a folder."""
+    if not choice.extras:
+        return  # without loading what writes them: a third of the modules of a command
     from vftcli.outputs.log.layouts import foxglove_layout, plotjuggler_layout
     from vftcli.outputs.log.mcap_output import write_mcap
     from vftcli.outputs.log.rerun_recording import write_rrd
