@@ -55,6 +55,8 @@ def truth() -> Robot:
             "stribeck": true.friction.stribeck * coulomb,
             "stribeck_velocity": true.friction.stribeck_velocity,
             "smoothing": 0.003,
+            "presliding": float(true.friction.presliding[j]),
+            "presliding_length": float(true.friction.presliding_length[j]),
         }
         torques = tuple(coulomb + np.concatenate([[0.0], np.cumsum(rises)]))
         friction.append(replace(joint, parameters=parameters, torques=torques))
