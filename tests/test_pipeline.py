@@ -135,7 +135,7 @@ def asked(name: str, *free: Path, zero: Path | None = None, **more: object) -> A
         ("compare LOAD --reference two-cycle --free FREE --free MORE", 3, 3, 2),
         ("compare LOAD MORE --reference two-cycle --free FREE", 3, 3, 2),
         ("compare LOAD --reference TRUTH --zero FREE", 2, 2, 1),
-        ("compare LOAD --reference two-cycle --remove-bias free-cycle", 1, 1, 0),
+        ("compare LOAD --reference two-cycle --remove-bias free-cycle --free-cycles 1", 1, 1, 0),
         ("estimate LOAD --free FREE -o OUT", 2, 2, 1),
         ("report LOAD --reference two-cycle --free FREE -o OUT", 2, 2, 1),
         ("tune LOAD --free FREE -o OUT.toml", 2, 2, 1),

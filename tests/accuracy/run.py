@@ -50,6 +50,8 @@ def main() -> None:
     parser.add_argument("--oracle", action="store_true", help="the best fixed gains too")
     parser.add_argument("--best", action="store_true", help="the pipeline's observer `best` too")
     parser.add_argument("--length", type=float, default=10.0, help="of the pieces [s]")
+    stated = list(scenarios.STICKS)
+    parser.add_argument("--set", action="append", default=stated, help="of the simulated arms")
     chosen = parser.parse_args()
     lines = defaultdict(list)
     for group in chosen.groups:
@@ -75,7 +77,7 @@ def cases_of(group: str, chosen):
     """The logs of a group."""
     logs = Path(os.environ.get("VFT_LOGS", ""))
     if group in scenarios.SIMULATED:
-        return scenarios.simulated_cases(group)
+        return scenarios.simulated_cases(group, chosen.set)
     if group == "bullet":
         return scenarios.bullet_cases(logs)
     if group == "pieces":

@@ -28,13 +28,16 @@ COLUMNS = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 BULLET = "t=t,q=q{i},dq=dq{i},-tau=tau{i}"
 TRUTH = "t=t,q=q{i},dq=dq{i},-tau=tau{i},-tau_ext=tau_ext{i}"
 
+STICKS = ("friction.presliding=0",)
+"""The joints that the bars were set for."""
+
 SIMULATED = {
-    "circle": ("ur5-circle", None, (1, 2, 3, 4)),
-    "table1": ("ur5-table1", None, (1, 2, 3, 4)),
-    "drag": ("ur5-drag", "0:2", (1, 2, 3)),
-    "panda-bearing": ("panda-bearing", "0:4", (1, 2, 3)),
+    "circle": ("ur5-circle", (), None, (1, 2, 3, 4)),
+    "table1": ("ur5-table1", ("contacts.hand.force=[10,136]",), None, (1, 2, 3, 4)),
+    "drag": ("ur5-drag", (), "0:2", (1, 2, 3)),
+    "panda-bearing": ("panda-bearing", (), "0:4", (1, 2, 3)),
 }
-"""Name → the built-in scenario, its free part if one is stated, and the seeds."""
+"""Name → the built-in scenario, its settings and free part if any are stated, and the seeds."""
 
 STEADY = (
     ((0, 0, -20), 0.0, None),
@@ -136,11 +139,11 @@ def torque_at_joint(force, recording, robot, joint):
     return torque
 
 
-def simulated_cases(name) -> Iterator[Case]:
+def simulated_cases(name, more=STICKS) -> Iterator[Case]:
     """A built-in scenario with several seeds; the estimators know the profile."""
-    scenario, part, seeds = SIMULATED[name]
+    scenario, settings, part, seeds = SIMULATED[name]
     for seed in seeds:
-        run = simulate(load_scenario(scenario, ()), seed)
+        run = simulate(load_scenario(scenario, [*settings, *more]), seed)
         free = FreeChoice() if part is None else FreeChoice.parsed(free_part=part)
         recording = run.recording
         truth = run.truth.tau_ext[np.unique(run.measured.rows)]

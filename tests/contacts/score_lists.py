@@ -1,6 +1,9 @@
 """Score lists of contacts, and the wrench beside them, on simulated arms, as a user would get them.
 
 Example: python tests/contacts/score_lists.py --seeds 61,62,63 ur5-circle ur5-table1 taps
+
+The bars were set for arms that stick, and for taps of up to 136 N: `--set friction.presliding=0.65`
+takes the built-in scenarios' joints, `--set contacts.hand.force=[10,122]` ur5-table1's taps.
 """
 
 import argparse
@@ -24,13 +27,14 @@ from vftcli.repetition.choice import FreeChoice
 from vftcli.signals.arrays import Array, Mask
 from vftcli.simulation import load_scenario, simulate
 
+STICKS = ("friction.presliding=0",)
 TAPS = ("contacts.hand.style=taps",)
 KNOCKS = (*TAPS, "contacts.hand.length=[0.04,0.12]")
 FOREARM = ("contacts.hand.link=3", "contacts.hand.point=[-0.2,0,0]")
 UPPER = ("contacts.hand.link=2", "contacts.hand.point=[-0.2,0,0]")
 SCENARIOS = {
     "ur5-circle": ("ur5-circle", (), "0.3:4"),
-    "ur5-table1": ("ur5-table1", (), "0.3:4"),
+    "ur5-table1": ("ur5-table1", ("contacts.hand.force=[10,136]",), "0.3:4"),
     "taps": ("ur5-circle", TAPS, "0.3:4"),
     "panda-bearing": ("panda-bearing", ("sensing.rate=100",), "0.3:3.9"),
     "ur5-sensor": ("ur5-sensor", (), "0.3:3"),
@@ -66,20 +70,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scenario", nargs="*", default=["ur5-circle", "ur5-table1", "taps"])
     parser.add_argument("--seeds", default="61,62,63")
+    parser.add_argument("--set", action="append", default=list(STICKS), help="of the scenario")
     parser.add_argument("--details", action="store_true", help="print every row too")
     chosen = parser.parse_args()
     for name in chosen.scenario:
-        logs = [scored(name, int(seed)) for seed in chosen.seeds.split(",")]
+        logs = [scored(name, int(seed), chosen.set) for seed in chosen.seeds.split(",")]
         if chosen.details:
             print(*(text for log in logs for text in details(log.list)), sep="\n")
         part = name if name in {"forearm", "upper arm"} else "wrist"
         print(name, line(figures(logs, part)), flush=True)
 
 
-def scored(name: str, seed: int) -> LogScore:
+def scored(name: str, seed: int, more: Sequence[str] = STICKS) -> LogScore:
     """Simulate a scenario, analyse it as `estimate` does, and hold it against the truth."""
     scenario, settings, free = SCENARIOS[name]
-    made = simulate(load_scenario(scenario, list(settings)), seed)
+    made = simulate(load_scenario(scenario, [*settings, *more]), seed)
     rows = np.unique(np.array(made.measured.rows))
     # A hand on a link has a wrench of its own, about its point.
     hand = made.truth.contacts.get("hand", made.truth.wrench)

@@ -183,7 +183,8 @@ def test_blocks_of_a_very_long_log_are_longer() -> None:
 def test_a_circle_under_pushes_reads_its_truth() -> None:
     """Simulated UR5 with errors of its model, noise from the free 3.7 s before the first push.
 
-    Measured 3.8 2.7 1.6 N and .96 .59 .11 N·m rms; the bands hold .99 and more on every axis.
+    Measured 3.9 3.2 1.5 N and .62 .44 .14 N·m rms, of joints that give before they slide (the bars
+    are a fifth above); the bands hold .93 and more on every axis.
     """
     path = FIXTURES / "ur5_circle.csv"
     recording, robot = Library([path]).open(path, ReadChoice()), load_robot("ur5")
@@ -193,7 +194,7 @@ def test_a_circle_under_pushes_reads_its_truth() -> None:
     table = pl.read_parquet(f"{path}.truth.parquet")
     truth = table.select([f"wrench/{axis}" for axis in AXES]).to_numpy()
     error = moved.values - truth
-    assert np.all(np.sqrt(np.mean(error**2, axis=0)) <= [4.6, 3.2, 2.0, 1.2, 0.8, 0.2])
+    assert np.all(np.sqrt(np.mean(error**2, axis=0)) <= [4.6, 3.9, 1.8, 0.75, 0.55, 0.2])
     assert np.all(np.mean(np.abs(error) <= 1.96 * moved.sd, axis=0) >= 0.93)
 
 
