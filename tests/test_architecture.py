@@ -38,8 +38,7 @@ ORDER = (
     "proposal",
     "batch",
     "notebook",
-    "yardsticks",
-    "benchmark",
+    "reproduction",
     "cli",
 )
 """Rooms, lowest floor first: a room knows those before it."""

@@ -27,7 +27,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.recording import EFFORTS, EXAMINED, Recording
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
-from vftcli.yardsticks import analytic_script, literal_script, rnea_loop
+from vftcli.reproduction.yardsticks import analytic_script, literal_script, rnea_loop
 
 SAMPLES = 30_060
 """Samples of the paper's Table II."""
