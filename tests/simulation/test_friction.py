@@ -44,6 +44,18 @@ def test_the_stribeck_peak_fades_over_its_velocity():
     np.testing.assert_allclose(friction.dry(np.full(6, -0.5)), coulomb, rtol=1e-12)
 
 
+def test_a_joint_that_gives_has_dry_friction_that_fades_and_one_that_does_not_sticks():
+    """Of alternate joints; the slope against central differences."""
+    friction = true_friction(load_robot("ur5"), FrictionSpec(presliding=0.6))
+    friction = replace(friction, presliding=friction.presliding * [1, 0, 1, 0, 1, 0])
+    dry, dq, h = friction.dry(np.zeros(6)), np.linspace(-0.004, 0.006, 6), 1e-7
+    torque, slope, sticking = friction.creep(dq, dry)
+    np.testing.assert_array_equal(sticking, dry * [0, 1, 0, 1, 0, 1])
+    np.testing.assert_allclose(torque, (dry - sticking) * np.tanh(dq / 0.003), rtol=1e-12)
+    difference = (friction.creep(dq + h, dry)[0] - friction.creep(dq - h, dry)[0]) / (2 * h)
+    np.testing.assert_allclose(slope, difference, atol=1e-4)
+
+
 def test_a_share_of_the_sigmoid_can_stick():
     robot = load_robot("panda")
     whole, part = (true_friction(robot, FrictionSpec(sticking=s)) for s in (0.0, 0.4))

@@ -64,7 +64,9 @@ class Plant:
         self.centre = self.q.copy()
         self.friction = np.zeros_like(self.q)
         self.external = np.zeros_like(self.q)
-        self.signs = np.where(friction.coulomb > 0.0, np.sign(self.v), 1.0)
+        self.gives = bool(friction.presliding.any())
+        sticks = (friction.coulomb > 0.0) & (friction.presliding == 0.0)
+        self.signs = np.where(sticks, np.sign(self.v), 1.0)
 
     def advance(self, tau: Array, external: External | None = None) -> None:
         """Move one step on under drive torques `tau` (n,) [N·m] and the contacts' torque."""
@@ -88,16 +90,18 @@ class Plant:
         M = pin.crba(model, data, q_mid)
         true = self.true_friction
         smooth, slope = true.smooth(self.v)
-        smooth = smooth + self.presliding(q_mid)
+        load = pin.computeGeneralizedGravity(model, data, q_mid) if true.is_loaded else None
+        dry = true.dry(self.v, load)
+        if self.gives:
+            creeping, steep, dry = true.creep(self.v, dry)
+            smooth, slope = smooth + creeping + self.presliding(q_mid), slope + steep
         torque = tau - bias - smooth
         if external is not None:
             pin.computeJointJacobians(model, data, q_mid)
             self.external = external(model, data, v_mid)
             torque = torque + self.external
         M.flat[:: len(slope) + 1] += 0.5 * h * slope
-        load = pin.computeGeneralizedGravity(model, data, q_mid) if true.is_loaded else None
-        limit = h * true.dry(self.v, load)
-        after, impulse, self.signs = slide_or_stick(M, h * torque, self.v, limit, self.signs)
+        after, impulse, self.signs = slide_or_stick(M, h * torque, self.v, h * dry, self.signs)
         self.friction = smooth + 0.5 * slope * (after - self.v) + impulse / h
         self.q_mid, self.v_mid = q_mid, v_mid
         return after
