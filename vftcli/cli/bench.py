@@ -30,10 +30,10 @@ def bench(measured: BenchOptions, json: opt.Json = False) -> None:
 
     Example: vftcli bench --rounds 3
     """
-    from vftcli.reproduction.benchmark import benchmark, memory_per_sample
     from vftcli.cli.console import say_json
     from vftcli.outputs.grid import latex, terminal
     from vftcli.outputs.listings import bench_grid
+    from vftcli.reproduction.benchmark import benchmark, memory_per_sample
     from vftcli.signals.packages import check_installed
 
     check_installed("pinocchio", "vftcli bench")

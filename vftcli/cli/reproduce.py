@@ -43,9 +43,9 @@ def reproduce(
     from vftcli.cli.console import command_line, say, show, stages
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.grid import terminal
+    from vftcli.reproduction.jobs import gather, jobs_of, run_jobs
     from vftcli.reproduction.page import files_of, overview, write_reproduction
     from vftcli.reproduction.papers import paper_of
-    from vftcli.reproduction.run import gather, jobs_of, run_jobs
     from vftcli.signals.packages import check_installed
 
     check_installed("pinocchio", "vftcli reproduce")

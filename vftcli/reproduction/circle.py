@@ -12,21 +12,19 @@ from vftcli.outputs.page.torque_part import torque_chart
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_run import Models
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, FLOOR, Measured, Values
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, FLOOR, Measured, Values
 from vftcli.robots import load_robot
 from vftcli.simulation import load_scenario, simulate
 
 SCENARIO = "ur5-table1"
 
-DISCRETE, EQUAL = "R discrete", "at 1.59 Hz"
-"""R and Q_p read as covariances of samples; every observer moved to FDO's bandwidth, 10 rad/s."""
+EQUAL = "at 1.59 Hz"
+"""Every observer moved to FDO's bandwidth, 10 rad/s."""
 
 VARIANTS = {
     AS_PRINTED: ObserverChoice(names=PAPER, as_printed=True),
     CORRECTED: ObserverChoice(names=PAPER),
-    DISCRETE: ObserverChoice.parsed(
-        observer=PAPER, assignments=["kfo.noise_convention=discrete"]
-    ),
+    DISCRETE: ObserverChoice.parsed(observer=PAPER, assignments=["kfo.noise_convention=discrete"]),
     EQUAL: ObserverChoice.parsed(observer=PAPER, match="bandwidth=1.59"),
 }
 """Variant → its observers."""
@@ -94,5 +92,7 @@ def add_facts(values: Values, variant: str, made: Analysis) -> None:
 def traces(made: Analysis) -> Chart:
     """Every observer's torque over the reference."""
     chart = torque_chart(made)
-    shown = tuple(replaced._replace(shown=True, leads=False) for replaced in chart.series)
-    return chart._replace(key="fig3", title="External torque: observers and reference", series=shown)
+    # Four bands would hide one another.
+    lines = tuple(line._replace(shown=True, leads=False, half=None) for line in chart.series)
+    title = "External torque: observers and reference"
+    return chart._replace(key="fig3", title=title, series=lines)

@@ -8,24 +8,20 @@ import numpy as np
 from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.closed_loop import UNLOADED, ClosedLoop, run_closed_loop
 from vftcli.admittance.latency import Latency, latencies
-from vftcli.admittance.parameters import AXES
 from vftcli.admittance.metrics import releases_of, rows_of
 from vftcli.admittance.motion import release
+from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay, replay, settling
+from vftcli.admittance.stability import UnstableError
 from vftcli.observers import KalmanObserver
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.admittance.page import charts as replay_charts
-from vftcli.outputs.admittance.recording import padded
 from vftcli.outputs.page.charts import Chart, ChartLine
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, Measured, Values
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, Measured, Values
 from vftcli.robots import load_robot
-from vftcli.admittance.stability import UnstableError
 from vftcli.signals.remarks import fact
 from vftcli.simulation import load_scenario
 from vftcli.simulation.sensing import log_rate
-
-DISCRETE = "R discrete"
-"""R and Q_p read as covariances of samples."""
 
 CONVENTIONS = {AS_PRINTED: "literal", CORRECTED: "density", DISCRETE: "discrete"}
 """Variant → how the sensor's Kalman filter reads R and Q_p."""
@@ -59,7 +55,7 @@ def closed_loop(scenario: str, figures: tuple[str, str], seed: int) -> Measured:
         add_latencies(values, variant, held)
         add_returns(values, variant, found, held)
         if variant == CORRECTED:
-            axes = range(0, 3) if all(one.axis < 3 for one in held) else range(3, 6)
+            axes = range(3) if all(one.axis < 3 for one in held) else range(3, 6)
             charts[figures[0]] = loop_chart(figures[0], run, found, axes)
             charts[figures[1]] = deviation_chart(figures[1], found, axes)
     return Measured(values, charts)
@@ -142,7 +138,9 @@ def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
     return float(t[start + int(np.argmax(outward <= 0.0))] - t[start])
 
 
-def released(robot: str, axis: int, deviation: float, alphas: Sequence[float], _seed: int) -> Measured:
+def released(
+    robot: str, axis: int, deviation: float, alphas: Sequence[float], _seed: int
+) -> Measured:
     """Parameters of the robot's table, and how it returns from rest by the law alone.
 
     Args:

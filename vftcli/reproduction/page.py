@@ -14,11 +14,17 @@ from vftcli.outputs.log.run_record import seal, versions
 from vftcli.outputs.page.charts import large, multiples
 from vftcli.outputs.page.shell import bullets, document, lead, section, soft, top
 from vftcli.outputs.seals import SEAL
-from vftcli.reproduction.paper import CORRECTED, FLOOR, Line, Paper, Shown
-from vftcli.reproduction.run import Job
+from vftcli.reproduction.jobs import Job
+from vftcli.reproduction.paper import FLOOR, Line, Paper, Shown
 
 PAGE, TEXT = "index.html", "reproduction.md"
 """The page, and the same in Markdown."""
+
+RATIOS = (
+    "Ours / print: the median of the lines that print a number, in brackets the range, of the "
+    "column that stands behind it."
+)
+"""What the overview compares."""
 
 
 def files_of(paper: Paper, names: Sequence[str], form: str | None) -> list[str]:
@@ -34,13 +40,13 @@ def spread(values: Sequence[float | None]) -> str:
         return DASH
     text = signed(float(np.mean(known)))
     if len(known) > 1 and signed(min(known)) != signed(max(known)):
-        text += f" ({signed(min(known))} to {signed(max(known))})"
+        text += f" ({signed(min(known))} … {signed(max(known))})"
     return text if len(known) == len(values) else f"{text}, {len(known)} of {len(values)}"
 
 
 def signed(value: float) -> str:
-    """Three significant digits, no more than four decimals, with a true minus sign."""
-    text = significant(value) if abs(value) >= 1e-4 else "0"
+    """Three significant digits, a whole number as it is, with a true minus sign."""
+    text = f"{value:.0f}" if value == round(value) else significant(value)
     return text.replace("-", "−")
 
 
@@ -65,16 +71,17 @@ def item_grid(shown: Shown) -> Grid:
 
 def beside_print(shown: Shown) -> str:
     """Ours over the print, the median of the lines that print a number, and its range."""
+    kind = shown.item.nearest
     ratios = [
         ratio
         for line in shown.item.lines
-        if (ratio := ratio_of(shown.values.get(line.key, {}).get(CORRECTED, []), line)) is not None
+        if (ratio := ratio_of(shown.values.get(line.key, {}).get(kind, []), line)) is not None
     ]
     if not ratios:
         return DASH
     low, high = significant(min(ratios), 2), significant(max(ratios), 2)
     text = significant(float(np.median(ratios)), 2)
-    return text if low == high else f"{text} ({low} to {high})"
+    return text if low == high else f"{text} ({low} … {high})"
 
 
 def ratio_of(values: Sequence[float | None], line: Line) -> float | None:
@@ -91,20 +98,25 @@ def overview(found: Mapping[str, Shown]) -> Grid:
         Column("item", words=True),
         Column("what it shows", words=True),
         Column("ours / print"),
+        Column("ours", words=True),
         Column("reproduced", words=True),
     )
     rows = [
         (
-            GridCell(
-                shown.item.label, html=f'<a href="#{name}">{escape(shown.item.label)}</a>'
-            ),
-            shown.item.title,
-            beside_print(shown),
-            "; ".join(shown.failures) or shown.item.verdict,
+            GridCell(shown.item.label, html=f'<a href="#{name}">{escape(shown.item.label)}</a>'),
+            wrapped(shown.item.title),
+            (ratio := beside_print(shown)),
+            DASH if ratio == DASH else shown.item.nearest,
+            wrapped("; ".join(shown.failures) or shown.item.verdict),
         )
         for name, shown in found.items()
     ]
     return Grid(columns=columns, rows=tuple(rows))
+
+
+def wrapped(text: str) -> GridCell:
+    """Words that the page may break."""
+    return GridCell(text, html=f'<div class="words">{escape(text)}</div>')
 
 
 def seeds_line(jobs: Sequence[Job], paper: Paper) -> tuple[str, ...]:
@@ -129,8 +141,7 @@ def render_page(paper: Paper, found: Mapping[str, Shown], jobs: Sequence[Job]) -
             lead(f"{paper.title}.") + lead(*paper.setting),
         ),
         html(overview(found)),
-        soft("Ours over the print: the corrected formulas, median of the lines that print a number, "
-             "in brackets the range."),
+        soft(RATIOS),
         *(item_section(name, shown) for name, shown in found.items()),
         "<h2>What was run</h2>",
         bullets(seeds_line(jobs, paper)),
@@ -165,8 +176,7 @@ def render_markdown(paper: Paper, found: Mapping[str, Shown], jobs: Sequence[Job
         "\n".join(paper.setting) + "\n",
         f"Made by `vftcli reproduce {paper.name} -o DIR`.\n",
         markdown(overview(found)),
-        "Ours / print: the corrected formulas, median of the lines that print a number, in brackets "
-        "the range.\n",
+        f"{RATIOS}\n",
     ]
     for shown in found.values():
         item = shown.item

@@ -11,8 +11,9 @@ from typing import NamedTuple
 from vftcli.outputs.page.charts import Chart
 from vftcli.signals.errors import ParameterError
 
-AS_PRINTED, CORRECTED, FLOOR = "as printed", "corrected", "floor"
-"""Variants of a value: by the printed formulas, by the corrected ones, the reference's own error."""
+AS_PRINTED, CORRECTED, DISCRETE, FLOOR = "as printed", "corrected", "R discrete", "floor"
+"""Variants of a value: by the printed formulas; by the corrected ones; these with R and Q_p read as
+covariances of samples; the reference's own error."""
 
 Values = dict[str, dict[str, float | None]]
 """Key of a line → variant → value, None where it did not happen."""
@@ -84,6 +85,7 @@ class Item:
         experiments: Those that it shows; none for a picture.
         lines: Its table.
         variants: Columns of ours between the print and the floor.
+        nearest: The column of ours that is set beside the print in the overview.
         drawn: Whether it has traces.
     """
 
@@ -94,6 +96,7 @@ class Item:
     experiments: tuple[str, ...] = ()
     lines: tuple[Line, ...] = ()
     variants: tuple[str, ...] = (AS_PRINTED, CORRECTED)
+    nearest: str = CORRECTED
     drawn: bool = False
 
 

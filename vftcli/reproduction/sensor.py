@@ -16,7 +16,7 @@ from vftcli.outputs.page.wrench_part import wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.repetition.free_run import Models
 from vftcli.reproduction.control import deviation_chart
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, FLOOR, Measured, Values
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, FLOOR, Measured, Values
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array, Mask
@@ -33,6 +33,9 @@ VARIANTS = {
     CORRECTED: ObserverChoice(names=KFO),
 }
 """Variant → its observer."""
+
+FAST = ObserverChoice.parsed(observer=KFO, assignments=["kfo.noise_convention=discrete"])
+"""The same, R and Q_p read as covariances of samples."""
 
 ZEROED = "zero removed"
 """Corrected, and the mean of an unloaded span taken off."""
@@ -60,6 +63,7 @@ def dragged_sensor(seed: int) -> Measured:
     asked = {
         **{name: (chosen, ZeroChoice()) for name, chosen in VARIANTS.items()},
         ZEROED: (VARIANTS[CORRECTED], zero),
+        DISCRETE: (FAST, ZeroChoice()),
     }
     values: Values = {}
     models, charts = Models(), {}
@@ -80,10 +84,6 @@ def dragged_sensor(seed: int) -> Measured:
             for axis, error in zip(AXES, sensor_error(run, made), strict=True):
                 values[axis][FLOOR] = error
             charts["fig4"] = beside_sensor(made)
-    for unit, axes in (("force", AXES[:3]), ("moment", AXES[3:])):
-        for variant in (*asked, FLOOR):
-            worst = max(float(values[axis][variant] or np.nan) for axis in axes)
-            values.setdefault(f"worst/{unit}", {})[variant] = worst
     return Measured(values, charts)
 
 
@@ -185,19 +185,19 @@ def replay_bearing(wrench: Wrench, made: Analysis, period: float | None = None) 
 
 
 def add_motion(values: Values, variant: str, found: Replay) -> None:
-    """How soon the arm is back after the bearing is let go, and how far knocks move it."""
-    t = found.motion.t
-    late = (t > PHASES["knocked"][0]) & (t < PHASES["knocked"][1])
+    """How soon the arm is back from where it was guided, what is left, how far knocks move it."""
+    t, (start, stop) = found.motion.t, PHASES["knocked"]
     for n, controller in enumerate(found.controllers):
-        x = found.motion.x[:, n, :3]
-        away = np.linalg.norm(x, axis=1)
-        released = float(t[np.flatnonzero(np.any(found.phases.dragged[:, :3], axis=1) & (t[1:] < 20.0))[-1]])
-        peak = float(np.max(away[t <= released + 2.0]))
-        after = t[(t > released) & (away > 0.1 * peak) & (t < 23.5)]
-        back = float(after[-1] - released) if len(after) and after[-1] < 23.4 else None
-        values.setdefault(f"back/{controller.kind}", {})[variant] = back
-        moved = np.ptp(x[late], axis=0)
-        values.setdefault(f"knocked/{controller.kind}", {})[variant] = 1e3 * float(np.max(moved))
+        own = [row for row in found.rows if row["controller"] == controller.kind]
+        guided = next(row for row in own if row["axis"] == "x")
+        before = found.motion.x[t <= start, n, :3][-1]
+        moved = np.linalg.norm(found.motion.x[(t > start) & (t < stop), n, :3] - before, axis=1)
+        for key, value in (
+            ("back", guided["return_10_s"]),
+            ("left", 1e3 * float(np.linalg.norm(before))),
+            ("knocked", 1e3 * float(moved.max())),
+        ):
+            values.setdefault(f"{key}/{controller.kind}", {})[variant] = value
 
 
 def beside_vendor(wrench: Wrench, vendor: Wrench) -> Chart:
@@ -208,4 +208,6 @@ def beside_vendor(wrench: Wrench, vendor: Wrench) -> Chart:
     )
     units = ("N",) * 3 + ("N·m",) * 3
     families = (1, 1, 1, 2, 2, 2)
-    return Chart("fig12", "Virtual sensor and libfranka, base axes", units, AXES, wrench.t, lines, families)
+    return Chart(
+        "fig12", "Virtual sensor and libfranka, base axes", units, AXES, wrench.t, lines, families
+    )

@@ -1,5 +1,6 @@
 """Table II: what an observation costs, by the paper's own way and by this program's."""
 
+from collections.abc import Callable
 from functools import partial
 
 from vftcli.observers import PAPER, KalmanObserver
@@ -50,11 +51,13 @@ def timed() -> Timings:
     kalman = KalmanObserver(discretisation="zoh", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
     dense = partial(dense_kalman_loop, short.p, short.mu, step, kalman)
     built, _ = ObserverChoice(names=PAPER).build(robot, step)
-    work = {f"{CORRECTED} {o.name}": partial(o.estimate, terms) for o in built}
+    work: dict[str, Callable[[], object]] = {
+        f"{CORRECTED} {o.name}": partial(o.estimate, terms) for o in built
+    }
     work[f"{CORRECTED} dynamics"] = partial(dynamics_terms, log, robot)
     # Both first-order observers run in one loop: each is half of it.
     both = partial(first_order_loops, short.p, short.mu, step)
-    scripts = {
+    scripts: dict[str, tuple[Callable[[], object], float]] = {
         f"{AS_PRINTED} dynamics": (partial(literal_momentum_terms, robot.model, q, dq), 1.0),
         f"{AS_PRINTED} fdo": (both, 0.5),
         f"{AS_PRINTED} gmo": (both, 0.5),
