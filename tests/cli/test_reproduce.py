@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from vftcli.cli import app
 from vftcli.reproduction import jobs, papers
-from vftcli.reproduction.paper import Experiment, Item, Line, Paper
+from vftcli.reproduction.paper import Experiment, Paper, PaperItem, PrintedLine
 from vftcli.signals.errors import ParameterError
 
 
@@ -34,15 +34,15 @@ def test_an_experiment_that_fails_is_a_row_and_exit_code_one(
     def fail(seed: int):
         raise ParameterError(f"nothing moved with {seed}")
 
-    item = Item(
+    item = PaperItem(
         label="Table I",
         title="t",
         why="w.",
         verdict="no",
         experiments=("e",),
-        lines=(Line("k", "l"),),
+        lines=(PrintedLine("k", "l"),),
     )
-    drawn = Item(label="Fig. 1", title="t", why="w.", verdict="a picture")
+    drawn = PaperItem(label="Fig. 1", title="t", why="w.", verdict="a picture")
     items = {"table1": item, "fig1": drawn}
     paper = Paper(
         name="p",

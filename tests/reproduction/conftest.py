@@ -10,23 +10,23 @@ from vftcli.reproduction.paper import (
     CORRECTED,
     FLOOR,
     Experiment,
-    Item,
-    Line,
-    Measured,
     Paper,
+    PaperItem,
+    PrintedLine,
+    RunResult,
 )
 from vftcli.signals.errors import ParameterError
 
 
-def measure(seed: int) -> Measured:
+def measure(seed: int) -> RunResult:
     t = np.linspace(0.0, 1.0, 50)
     line = ChartLine("ours", np.column_stack([np.sin(t), np.cos(t)]))
     chart = Chart("fig1", "Two panels", ("N", "N"), ("x", "y"), t, (line,))
     known = {AS_PRINTED: 3.0, CORRECTED: 2.0 + seed, FLOOR: 0.5}
-    return Measured({"a": known, "b": {CORRECTED: None if seed > 1 else -1.0}}, {"fig1": chart})
+    return RunResult({"a": known, "b": {CORRECTED: None if seed > 1 else -1.0}}, {"fig1": chart})
 
 
-def fail(seed: int) -> Measured:
+def fail(seed: int) -> RunResult:
     raise ParameterError(f"nothing moved with {seed}")
 
 
@@ -40,23 +40,23 @@ PAPER = Paper(
         "timed": Experiment("what takes the time", measure, (0,), alone=True),
     },
     items={
-        "fig1": Item(
+        "fig1": PaperItem(
             label="Fig. 1",
             title="A <figure>",
             why="Because.",
             verdict="in size",
             experiments=("works",),
-            lines=(Line("a", "alpha", "N", "2"), Line("b", "beta", "", "-1")),
+            lines=(PrintedLine("a", "alpha", "N", "2"), PrintedLine("b", "beta", "", "-1")),
             drawn=True,
         ),
-        "fig2": Item(label="Fig. 2", title="Another", why="A sketch.", verdict="a picture"),
-        "fig3": Item(
+        "fig2": PaperItem(label="Fig. 2", title="Another", why="A sketch.", verdict="a picture"),
+        "fig3": PaperItem(
             label="Fig. 3",
             title="Half of it",
             why="Why not.",
             verdict="no",
             experiments=("timed", "fails"),
-            lines=(Line("a", "alpha", "N"),),
+            lines=(PrintedLine("a", "alpha", "N"),),
         ),
     },
     setting=("It is set.",),

@@ -1,7 +1,7 @@
 """Each experiment runs once a seed, whoever shows it; what fails is a line."""
 
 from vftcli.reproduction.jobs import Job, gather, jobs_of, run_jobs
-from vftcli.reproduction.paper import CORRECTED, Measured
+from vftcli.reproduction.paper import CORRECTED, RunResult
 from vftcli.reproduction.papers import PAPERS
 
 HUANG = PAPERS["huang2025"]
@@ -35,7 +35,7 @@ def test_what_fails_is_a_line_and_the_rest_is_there(cheap) -> None:
     )
     assert found["fig3"].values["a"][CORRECTED] == [2.0]
     assert found["fig2"].values == {}
-    assert isinstance(results[jobs[1]], Measured)
+    assert isinstance(results[jobs[1]], RunResult)
     assert not results[jobs[1]].charts  # only the first seed's traces are shown
 
 

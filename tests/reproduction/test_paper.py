@@ -2,7 +2,7 @@
 
 import pytest
 
-from vftcli.reproduction.paper import Line
+from vftcli.reproduction.paper import PrintedLine
 from vftcli.reproduction.papers import PAPERS, paper_of
 from vftcli.signals.errors import ParameterError
 
@@ -10,9 +10,9 @@ HUANG = PAPERS["huang2025"]
 
 
 def test_a_bound_is_no_number() -> None:
-    assert Line("k", "label", "N", "9.66").number == 9.66
-    assert Line("k", "label", "N", "< 6").number is None
-    assert Line("k", "label").number is None
+    assert PrintedLine("k", "label", "N", "9.66").number == 9.66
+    assert PrintedLine("k", "label", "N", "< 6").number is None
+    assert PrintedLine("k", "label").number is None
 
 
 def test_items_come_in_the_papers_order() -> None:

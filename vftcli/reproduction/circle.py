@@ -12,7 +12,7 @@ from vftcli.outputs.page.torque_part import torque_chart
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_run import Models
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, FLOOR, Measured, Values
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, FLOOR, RunResult, Values
 from vftcli.robots import load_robot
 from vftcli.simulation import load_scenario, simulate
 
@@ -36,7 +36,7 @@ FREE = 4.0
 """Length of the free cycle, and from when on its estimates are judged. [s]"""
 
 
-def tapped_circle(seed: int) -> Measured:
+def tapped_circle(seed: int) -> RunResult:
     """Errors joint by joint, lags, what the free cycle reads, and the guidelines' facts."""
     recording = simulate(load_scenario(SCENARIO, ()), seed).recording
     robot, models = load_robot("ur5"), Models()
@@ -54,7 +54,7 @@ def tapped_circle(seed: int) -> Measured:
         add_facts(values, variant, made)
         if variant == CORRECTED:
             charts["fig3"] = traces(made)
-    return Measured(values, charts)
+    return RunResult(values, charts)
 
 
 def add_errors(values: Values, variant: str, made: Analysis) -> None:

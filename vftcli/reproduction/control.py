@@ -17,7 +17,7 @@ from vftcli.observers import KalmanObserver
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.admittance.page import charts as replay_charts
 from vftcli.outputs.page.charts import Chart, ChartLine
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, Measured, Values
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, RunResult, Values
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact
 from vftcli.simulation import load_scenario
@@ -36,7 +36,7 @@ HOLD = 2.5
 """A drag of a contact begins within this time of its force. [s]"""
 
 
-def closed_loop(scenario: str, figures: tuple[str, str], seed: int) -> Measured:
+def closed_loop(scenario: str, figures: tuple[str, str], seed: int) -> RunResult:
     """Latencies of a controller in the loop, and its force through controllers of every α.
 
     Args:
@@ -58,7 +58,7 @@ def closed_loop(scenario: str, figures: tuple[str, str], seed: int) -> Measured:
             axes = range(3) if all(one.axis < 3 for one in held) else range(3, 6)
             charts[figures[0]] = loop_chart(figures[0], run, found, axes)
             charts[figures[1]] = deviation_chart(figures[1], found, axes)
-    return Measured(values, charts)
+    return RunResult(values, charts)
 
 
 drag = partial(closed_loop, "ur5-drag", ("fig6", "fig7"))
@@ -140,7 +140,7 @@ def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
 
 def released(
     robot: str, axis: int, deviation: float, alphas: Sequence[float], _seed: int
-) -> Measured:
+) -> RunResult:
     """Parameters of the robot's table, and how it returns from rest by the law alone.
 
     Args:
@@ -172,7 +172,7 @@ def released(
                     line[CORRECTED] = float(getattr(parameters, key)[k])
             for k, name in enumerate(AXES):
                 values.setdefault(f"xi/{name}", {})[CORRECTED] = float(parameters.damping_ratio[k])
-    return Measured(values)
+    return RunResult(values)
 
 
 def loop_chart(key: str, run: ClosedLoop, found: Replay, axes: Sequence[int]) -> Chart:

@@ -10,7 +10,15 @@ from vftcli.evaluation.print_table import TABLE_1
 from vftcli.observers import PAPER
 from vftcli.reproduction import circle, control, sensor
 from vftcli.reproduction.benchmark import PAPER_TABLE_2
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, Experiment, Item, Line, Paper
+from vftcli.reproduction.paper import (
+    AS_PRINTED,
+    CORRECTED,
+    DISCRETE,
+    Experiment,
+    Paper,
+    PaperItem,
+    PrintedLine,
+)
 from vftcli.reproduction.timing import computing_time
 from vftcli.signals.wrench import AXES
 
@@ -45,23 +53,25 @@ EXPERIMENTS = {
 }
 
 
-def each(key: str, label: str, unit: str = "", printed: tuple[str, ...] = ()) -> tuple[Line, ...]:
-    """A line for every observer."""
+def each(
+    key: str, label: str, unit: str = "", printed: tuple[str, ...] = ()
+) -> tuple[PrintedLine, ...]:
+    """A line for every observer; what counts beside the print has no unit."""
     numbers = printed or ("",) * len(PAPER)
     return tuple(
-        Line(f"{key}/{name}", f"{NAMES[name]}: {label}", unit, number)
+        PrintedLine(f"{key}/{name}", f"{NAMES[name]}: {label}", unit, number, not unit)
         for name, number in zip(PAPER, numbers, strict=True)
     )
 
 
-def picture(label: str, title: str, why: str) -> Item:
+def picture(label: str, title: str, why: str) -> PaperItem:
     """An item that holds no numbers."""
-    return Item(label=label, title=title, why=why, verdict="a picture")
+    return PaperItem(label=label, title=title, why=why, verdict="a picture")
 
 
 def parameters(
     rows: dict[str, tuple[str, ...]], axes: tuple[str, ...] = ("x", "z", "rx")
-) -> tuple[Line, ...]:
+) -> tuple[PrintedLine, ...]:
     """The lines of Table III or IV: printed numbers of these axes, those of the robot's file."""
     units = {
         "mass": ("kg", "kg·m²"),
@@ -73,7 +83,7 @@ def parameters(
     words = {"mass": "M_d", "damping": "B_d", "stiffness": "K_d", "alpha": "α"}
     words |= {"threshold": "F_tsd", "speed_limit": "speed limit", "xi": "ξ"}
     return tuple(
-        Line(
+        PrintedLine(
             f"{key}/{axis}",
             f"{words[key]}, {axis}",
             units.get(key, ("", ""))[axis.startswith("r")],
@@ -84,11 +94,11 @@ def parameters(
     )
 
 
-def returns(alphas: tuple[str, ...]) -> tuple[Line, ...]:
+def returns(alphas: tuple[str, ...]) -> tuple[PrintedLine, ...]:
     """How a release from rest returns."""
     named = {"traditional": "traditional", **{alpha: f"α {alpha}" for alpha in alphas}}
     return tuple(
-        Line(f"{key}/{name}", f"{words}: {label}", unit)
+        PrintedLine(f"{key}/{name}", f"{words}: {label}", unit)
         for key, words, unit in (
             ("return_10_s", "back to 10 %", "s"),
             ("return_2_s", "back to 2 %", "s"),
@@ -98,10 +108,12 @@ def returns(alphas: tuple[str, ...]) -> tuple[Line, ...]:
     )
 
 
-def latency_lines(motion: tuple[str, str], withdrawal: tuple[str, str]) -> tuple[Line, ...]:
+def latency_lines(motion: tuple[str, str], withdrawal: tuple[str, str]) -> tuple[PrintedLine, ...]:
     """Latencies of both contacts."""
     return tuple(
-        Line(f"{key}/{k}", f"{words}, phase {'I' * k}", "s", numbers[k - 1] if numbers else "")
+        PrintedLine(
+            f"{key}/{k}", f"{words}, phase {'I' * k}", "s", numbers[k - 1] if numbers else ""
+        )
         for key, words, numbers in (
             ("detection", "true force over the threshold to estimate over it", ()),
             ("motion", "force to motion (5 mm, 0.02 rad)", motion),
@@ -111,11 +123,11 @@ def latency_lines(motion: tuple[str, str], withdrawal: tuple[str, str]) -> tuple
     )
 
 
-def comparison_lines(advance: str) -> tuple[Line, ...]:
+def comparison_lines(advance: str) -> tuple[PrintedLine, ...]:
     """Figs. 7 and 10: α against traditional on one force record."""
     alphas = [f"{alpha:g}" for alpha in control.ALPHAS]
     lines = [
-        Line(f"{key}/{alpha}/{k}", f"{words}, α {alpha}, phase {'I' * k}", "s", number)
+        PrintedLine(f"{key}/{alpha}/{k}", f"{words}, α {alpha}, phase {'I' * k}", "s", number)
         for key, words, wanted, number in (
             ("peak", "peak of the whole drag earlier by", ["1.9"], advance),
             ("turn", "turn after the last release earlier by", ["1.9"], advance),
@@ -125,7 +137,7 @@ def comparison_lines(advance: str) -> tuple[Line, ...]:
         for k in (1, 2)
     ]
     before = [
-        Line(f"back/traditional/{k}", f"back to 10 %, traditional, phase {'I' * k}", "s")
+        PrintedLine(f"back/traditional/{k}", f"back to 10 %, traditional, phase {'I' * k}", "s")
         for k in (1, 2)
     ]
     return (*lines, *before)
@@ -134,23 +146,24 @@ def comparison_lines(advance: str) -> tuple[Line, ...]:
 SEVERAL = (AS_PRINTED, CORRECTED, DISCRETE)
 
 ITEMS = {
-    "table1": Item(
+    "table1": PaperItem(
         label="Table I",
         title="RMSE of the observers on the tapped circle",
         verdict="in size; KFO wins with R discrete only",
-        why="The pushes of the print are not known, those here are chosen near its level; FDO and "
-        "GMO of equal gain are one filter, so their printed difference on J4 to J6 is not the "
-        "method's, and KFO wins J1 to J3 only if R and Q_p are read as covariances of samples.",
+        why="The pushes behind the print are not known, those here are chosen near its level; "
+        "FDO and GMO of equal gain are one filter, so the print's difference on J4 to J6 "
+        "is not the method's, and KFO wins J1 to J3 only where R and Q_p are read as "
+        "covariances of samples.",
         experiments=("circle",),
         nearest=DISCRETE,
         variants=(AS_PRINTED, CORRECTED, DISCRETE, circle.EQUAL),
         lines=tuple(
-            Line(f"{name}/{j}", f"{NAMES[name]}, J{j}", "N·m", f"{number:.4f}")
+            PrintedLine(f"{name}/{j}", f"{NAMES[name]}, J{j}", "N·m", f"{number:.4f}")
             for name, numbers in TABLE_1.rmse.items()
             for j, number in enumerate(numbers, start=1)
         ),
     ),
-    "table2": Item(
+    "table2": PaperItem(
         label="Table II",
         title="Computing time of 30 060 observations of a UR5",
         verdict="yes, the ratios",
@@ -161,18 +174,18 @@ ITEMS = {
         nearest=AS_PRINTED,
         lines=(
             *each("seconds", "time", "s", tuple(f"{PAPER_TABLE_2[n]:g}" for n in PAPER)),
-            Line("zoh/fdo", "KFO-ZOH over FDO", "", f"{58.3627 / 10.8690:.2f}"),
-            Line("zoh/kfo-fe", "KFO-ZOH over KFO-FE", "", f"{58.3627 / 17.5776:.2f}"),
+            PrintedLine("zoh/fdo", "KFO-ZOH over FDO", "", f"{58.3627 / 10.8690:.2f}"),
+            PrintedLine("zoh/kfo-fe", "KFO-ZOH over KFO-FE", "", f"{58.3627 / 17.5776:.2f}"),
         ),
     ),
-    "guidelines": Item(
+    "guidelines": PaperItem(
         label="Guidelines",
         title="Which observer for what (Sec. IV-A)",
         verdict="partly: they turn with the gains",
         nearest=AS_PRINTED,
-        why="Which observer is fast or accurate is decided by the gains and by how R is read: the "
-        "paper's advice on FDO and GMO for collisions holds with the densities and turns round "
-        "with covariances of samples, and at equal bandwidth all four come close.",
+        why="Gains decide: with densities FDO sees a step soonest and errs least, with "
+        "covariances of samples KFO does both and lets most noise pass; at one bandwidth "
+        "FDO and GMO are one filter, and KFO, of second order, lags and errs more.",
         experiments=("circle", "time"),
         variants=(AS_PRINTED, CORRECTED, DISCRETE, circle.EQUAL),
         lines=(
@@ -188,7 +201,7 @@ ITEMS = {
     "fig2": picture(
         "Fig. 2", "Free cycle and tapped cycle", "Photographs; the scenario of Table I is theirs."
     ),
-    "fig3": Item(
+    "fig3": PaperItem(
         label="Fig. 3",
         title="Torque of the observers over the current difference",
         verdict="in kind",
@@ -203,28 +216,28 @@ ITEMS = {
         ),
         drawn=True,
     ),
-    "fig4": Item(
+    "fig4": PaperItem(
         label="Fig. 4",
         title="Virtual against real sensor, UR5, flange axes: RMSE",
-        verdict="see the bounds",
-        why="The print gives bounds, < 6 N and < 0.65 N·m; what is left here is stiction of joints "
-        "that stand still, the error of the profile, and the sensor's own weight, which the print "
-        "blames too.",
+        verdict="partly: not every axis within the bound",
+        why="What is left is stiction of joints that stand still and the error of the profile, "
+        "largest where a force is told by one joint alone; the print blames the sensor's "
+        "own weight too, which a zero does not take off in every pose.",
         experiments=("sensor",),
         variants=(AS_PRINTED, CORRECTED, sensor.ZEROED, DISCRETE),
         lines=tuple(
-            Line(axis, axis, *(("N", "< 6") if k < 3 else ("N·m", "< 0.65")))
+            PrintedLine(axis, axis, *(("N", "< 6") if k < 3 else ("N·m", "< 0.65")))
             for k, axis in enumerate(AXES)
         ),
         drawn=True,
     ),
-    "table3": Item(
+    "table3": PaperItem(
         label="Table III",
         title="Parameters for the UR5, and a release from 0.3 m",
         verdict="yes, the parameters",
-        why="ξ and a speed limit in rotation are not printed: ξ is that of B_d, and without the "
-        "limit a release runs away; no times are printed for it. They go with 1/α, without a "
-        "break at 1.6.",
+        why="ξ and a speed limit in rotation are not printed (ξ is that of B_d; without the "
+        "limit a release runs away), and no time is; the printed law and the corrected one "
+        "are the same here, times go with 1/α, without a break at 1.6.",
         experiments=("release-ur5",),
         variants=(CORRECTED, XI_1),
         lines=(
@@ -244,55 +257,56 @@ ITEMS = {
         ),
     ),
     "fig5": picture("Fig. 5", "The UR5 dragged by hand", "Photographs."),
-    "fig6": Item(
+    "fig6": PaperItem(
         label="Fig. 6",
         title="Position control in the loop: latencies",
         verdict="reproduced in size",
-        why="The sensor's delay is the loop's, and how R and Q_p are read decides it: as printed "
-        "the loop is twice as slow as the print says, with densities it is at the print. A motion "
-        "that begins while the arm still drifts is left out (–).",
+        why="How R and Q_p are read decides the sensor's delay, and that is the loop's: as "
+        "printed the loop is twice as slow as the print says, with densities it is at the "
+        "print; a motion that begins while the arm still drifts is left out (–).",
         experiments=("drag",),
         variants=SEVERAL,
         lines=latency_lines(("0.24", "0.28"), ("0.26", "0.12")),
         drawn=True,
     ),
-    "fig7": Item(
+    "fig7": PaperItem(
         label="Fig. 7",
         title="One force record, traditional and α 1 to 1.9",
         verdict="no: not like for like",
-        why="After one and the same release the variable controller turns round a fraction of the "
-        "printed 0.64 s earlier; the whole drag's peak comes earlier by that or more only where "
-        "the record dips below the threshold during the drag, which lets the variable controller "
-        "return meanwhile. The time back goes with 1/α and does not stop falling at 1.6.",
+        why="All controllers see the same record, and of it what is above the threshold; after "
+        "the last release α 1.9 turns round a quarter of the printed 0.64 s earlier, and "
+        "the whole drag's peak comes as much or more earlier only where the record dips "
+        "below the threshold meanwhile, which lets the variable controller return; time "
+        "back goes with 1/α beyond 1.6 too.",
         experiments=("drag",),
         variants=SEVERAL,
         lines=comparison_lines("0.64"),
         drawn=True,
     ),
     "fig8": picture("Fig. 8", "The UR5 twisted by hand", "Photographs."),
-    "fig9": Item(
+    "fig9": PaperItem(
         label="Fig. 9",
         title="Orientation control in the loop: latencies",
         verdict="reproduced in size",
-        why="As for Fig. 6: as printed two to three times the print, with densities somewhat above "
-        "it, with covariances of samples below.",
+        why="As for Fig. 6: as printed four times the print, with densities a third above it, "
+        "with covariances of samples half of it.",
         experiments=("twist",),
         variants=SEVERAL,
         lines=latency_lines(("0.16", "0.16"), ("0.16", "0.12")),
         drawn=True,
     ),
-    "fig10": Item(
+    "fig10": PaperItem(
         label="Fig. 10",
         title="One moment record, traditional and α 1 to 1.9",
         verdict="no: not like for like",
-        why="As for Fig. 7: after the same release the turn comes a fraction of the printed 0.32 s "
-        "earlier; a larger advance of the whole drag comes from dips of the record.",
+        why="As for Fig. 7: after the last release the turn comes at most 0.13 s earlier, not "
+        "0.32 s; a larger advance of the whole drag's peak comes from dips of the record.",
         experiments=("twist",),
         variants=SEVERAL,
         lines=comparison_lines("0.32"),
         drawn=True,
     ),
-    "table4": Item(
+    "table4": PaperItem(
         label="Table IV",
         title="Parameters for the Panda, and a release from 0.2 m",
         verdict="yes, the parameters",
@@ -315,7 +329,7 @@ ITEMS = {
         ),
     ),
     "fig11": picture("Fig. 11", "Equipment for the Panda, bearing assembly", "Photographs."),
-    "fig12": Item(
+    "fig12": PaperItem(
         label="Fig. 12",
         title="Virtual sensor and libfranka, Panda with bearing",
         verdict="reproduced",
@@ -325,19 +339,21 @@ ITEMS = {
         experiments=("bearing",),
         lines=(
             *(
-                Line(f"drift/{axis}", f"zero drift, {axis}", "N" if k < 3 else "N·m", DRIFT[k])
+                PrintedLine(
+                    f"drift/{axis}", f"zero drift, {axis}", "N" if k < 3 else "N·m", DRIFT[k], False
+                )
                 for k, axis in enumerate(AXES)
             ),
-            Line("weight/raw", "bearing, drift in it (9.2 N)", "N", "10.5"),
-            Line("weight/zeroed", "bearing, drift removed (9.2 N)", "N", "9.66"),
-            Line("error/guided", "error of the force, guided", "N"),
-            Line("error/pressed", "error of the force, pressed", "N"),
-            Line("error/knocked", "error of the force, knocked", "N"),
-            Line("agreement", "correlation with libfranka, F_z", ""),
+            PrintedLine("weight/raw", "bearing, drift in it (9.2 N)", "N", "10.5"),
+            PrintedLine("weight/zeroed", "bearing, drift removed (9.2 N)", "N", "9.66"),
+            PrintedLine("error/guided", "error of the force, guided", "N"),
+            PrintedLine("error/pressed", "error of the force, pressed", "N"),
+            PrintedLine("error/knocked", "error of the force, knocked", "N"),
+            PrintedLine("agreement", "correlation with libfranka, F_z", ""),
         ),
         drawn=True,
     ),
-    "fig13": Item(
+    "fig13": PaperItem(
         label="Fig. 13",
         title="The Panda's motion, variable and traditional",
         verdict="reproduced in kind",
@@ -348,11 +364,13 @@ ITEMS = {
         experiments=("bearing",),
         variants=(AS_PRINTED, CORRECTED, "control at 1 ms"),
         lines=(
-            Line("back/variable", "x back to 10 % after guiding, α 6", "s"),
-            Line("back/traditional", "x back to 10 % after guiding, traditional", "s"),
-            Line("left/variable", "away from the start before the knocks, α 6", "mm"),
-            Line("left/traditional", "away from the start before the knocks, traditional", "mm"),
-            Line("knocked/variable", "moved while knocked, α 6", "mm"),
+            PrintedLine("back/variable", "x back to 10 % after guiding, α 6", "s"),
+            PrintedLine("back/traditional", "x back to 10 % after guiding, traditional", "s"),
+            PrintedLine("left/variable", "away from the start before the knocks, α 6", "mm"),
+            PrintedLine(
+                "left/traditional", "away from the start before the knocks, traditional", "mm"
+            ),
+            PrintedLine("knocked/variable", "moved while knocked, α 6", "mm"),
         ),
         drawn=True,
     ),

@@ -14,7 +14,7 @@ from dataclasses import replace
 from itertools import chain
 from typing import NamedTuple
 
-from vftcli.reproduction.paper import Item, Measured, Paper, Shown
+from vftcli.reproduction.paper import Paper, PaperItem, RunResult, ShownItem
 from vftcli.reproduction.papers import paper_of
 from vftcli.signals.errors import VftError
 
@@ -39,7 +39,7 @@ class Job(NamedTuple):
 Told = Callable[[int, int, str], None]
 """Told how many jobs are done, how many there are, and which one ended."""
 
-Result = Measured | str
+Result = RunResult | str
 """What a job gave, or the one line on why it failed."""
 
 
@@ -117,16 +117,16 @@ def pooled(jobs: Sequence[Job], count: int) -> Iterator[tuple[Job, Result]]:
         pool.shutdown(cancel_futures=True)
 
 
-def gather(paper: Paper, names: Sequence[str], results: dict[Job, Result]) -> dict[str, Shown]:
+def gather(paper: Paper, names: Sequence[str], results: dict[Job, Result]) -> dict[str, ShownItem]:
     """What each item shows of the results."""
     return {name: shown(name, paper.items[name], results) for name in names}
 
 
-def shown(name: str, item: Item, results: dict[Job, Result]) -> Shown:
+def shown(name: str, item: PaperItem, results: dict[Job, Result]) -> ShownItem:
     """One item with its values, a list over the seeds for each."""
     values: dict[str, dict[str, list[float | None]]] = {}
     own = {job: r for job, r in results.items() if job.experiment in item.experiments}
-    made = [r for r in own.values() if isinstance(r, Measured)]
+    made = [r for r in own.values() if isinstance(r, RunResult)]
     keys = {line.key for line in item.lines}
     for one in made:
         for key in keys & one.values.keys():
@@ -134,4 +134,4 @@ def shown(name: str, item: Item, results: dict[Job, Result]) -> Shown:
                 values.setdefault(key, {}).setdefault(variant, []).append(value)
     charts = [one.charts[name] for one in made if name in one.charts]
     failures = tuple(r for r in own.values() if isinstance(r, str))
-    return Shown(item, values, charts[0] if charts else None, failures)
+    return ShownItem(item, values, charts[0] if charts else None, failures)

@@ -15,7 +15,7 @@ from vftcli.outputs.page.charts import large, multiples
 from vftcli.outputs.page.shell import bullets, document, lead, section, soft, top
 from vftcli.outputs.seals import SEAL
 from vftcli.reproduction.jobs import Job
-from vftcli.reproduction.paper import FLOOR, Line, Paper, Shown
+from vftcli.reproduction.paper import FLOOR, Paper, PrintedLine, ShownItem
 
 PAGE, TEXT = "index.html", "reproduction.md"
 """The page, and the same in Markdown."""
@@ -50,7 +50,7 @@ def signed(value: float) -> str:
     return text.replace("-", "−")
 
 
-def item_grid(shown: Shown) -> Grid:
+def item_grid(shown: ShownItem) -> Grid:
     """What is printed, ours in every variant, and the floor, where there is one."""
     item, values = shown.item, shown.values
     floors = any(FLOOR in values.get(line.key, {}) for line in item.lines)
@@ -69,7 +69,7 @@ def item_grid(shown: Shown) -> Grid:
     return Grid(columns=tuple(Column(h, words=h in words) for h in heads), rows=tuple(rows))
 
 
-def beside_print(shown: Shown) -> str:
+def beside_print(shown: ShownItem) -> str:
     """Ours over the print, the median of the lines that print a number, and its range."""
     kind = shown.item.nearest
     ratios = [
@@ -84,15 +84,15 @@ def beside_print(shown: Shown) -> str:
     return text if low == high else f"{text} ({low} … {high})"
 
 
-def ratio_of(values: Sequence[float | None], line: Line) -> float | None:
+def ratio_of(values: Sequence[float | None], line: PrintedLine) -> float | None:
     """Mean of ours over what is printed, None where either is missing."""
     known = [value for value in values if value is not None]
-    if not known or not line.number:
+    if not (known and line.number and line.compared):
         return None
     return float(np.mean(known)) / line.number
 
 
-def overview(found: Mapping[str, Shown]) -> Grid:
+def overview(found: Mapping[str, ShownItem]) -> Grid:
     """Every item in a row: what it shows, ours over the print, and what came of it."""
     columns = (
         Column("item", words=True),
@@ -131,7 +131,7 @@ def seeds_line(jobs: Sequence[Job], paper: Paper) -> tuple[str, ...]:
     )
 
 
-def render_page(paper: Paper, found: Mapping[str, Shown], jobs: Sequence[Job]) -> str:
+def render_page(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job]) -> str:
     """The page: self-contained, nothing is loaded from anywhere."""
     charts = [shown.chart for shown in found.values() if shown.chart is not None]
     parts = [
@@ -149,7 +149,7 @@ def render_page(paper: Paper, found: Mapping[str, Shown], jobs: Sequence[Job]) -
     return document(f"{paper.name}, reproduced", "".join(parts), charts)
 
 
-def item_section(name: str, shown: Shown) -> str:
+def item_section(name: str, shown: ShownItem) -> str:
     """One table or figure: the reason first, then numbers and traces."""
     item = shown.item
     parts = [f'<h2 id="{name}">{escape(item.label)}: {escape(item.title)}</h2>']
@@ -168,7 +168,7 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def render_markdown(paper: Paper, found: Mapping[str, Shown], jobs: Sequence[Job]) -> str:
+def render_markdown(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job]) -> str:
     """The same in Markdown."""
     parts = [
         f"# {paper.name}, reproduced\n",
@@ -190,7 +190,7 @@ def render_markdown(paper: Paper, found: Mapping[str, Shown], jobs: Sequence[Job
     return "\n".join(parts)
 
 
-def drawings(found: Mapping[str, Shown]) -> dict[str, Drawing]:
+def drawings(found: Mapping[str, ShownItem]) -> dict[str, Drawing]:
     """The traces as figures for a paper."""
     return {
         name: Drawing(
@@ -205,7 +205,7 @@ def drawings(found: Mapping[str, Shown]) -> dict[str, Drawing]:
 def write_reproduction(
     folder: OutputFolder,
     paper: Paper,
-    found: Mapping[str, Shown],
+    found: Mapping[str, ShownItem],
     jobs: Sequence[Job],
     command: str,
     form: str | None = None,

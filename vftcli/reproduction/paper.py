@@ -20,7 +20,7 @@ Values = dict[str, dict[str, float | None]]
 
 
 @dataclass(frozen=True)
-class Measured:
+class RunResult:
     """What one run of an experiment gave.
 
     Attributes:
@@ -44,12 +44,12 @@ class Experiment:
     """
 
     title: str
-    work: Callable[[int], Measured]
+    work: Callable[[int], RunResult]
     seeds: tuple[int, ...] = (1, 2, 3, 4, 5)
     alone: bool = False
 
 
-class Line(NamedTuple):
+class PrintedLine(NamedTuple):
     """One line of an item's table.
 
     Attributes:
@@ -57,12 +57,15 @@ class Line(NamedTuple):
         label: What it is.
         unit: Its unit, "" for none.
         printed: What the paper prints, "" for nothing.
+        compared: Whether ours over the print says anything: not where it is another machine's time
+            or another arm's error.
     """
 
     key: str
     label: str
     unit: str = ""
     printed: str = ""
+    compared: bool = True
 
     @property
     def number(self) -> float | None:
@@ -74,7 +77,7 @@ class Line(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Item:
+class PaperItem:
     """A table or a figure of the paper, or what it concludes.
 
     Attributes:
@@ -94,7 +97,7 @@ class Item:
     why: str
     verdict: str
     experiments: tuple[str, ...] = ()
-    lines: tuple[Line, ...] = ()
+    lines: tuple[PrintedLine, ...] = ()
     variants: tuple[str, ...] = (AS_PRINTED, CORRECTED)
     nearest: str = CORRECTED
     drawn: bool = False
@@ -117,7 +120,7 @@ class Paper:
     title: str
     doi: str
     experiments: Mapping[str, Experiment]
-    items: Mapping[str, Item]
+    items: Mapping[str, PaperItem]
     setting: tuple[str, ...]
 
     def chosen(self, only: str | None) -> tuple[str, ...]:
@@ -140,7 +143,7 @@ class Paper:
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownItem:
     """An item with what its experiments gave.
 
     Attributes:
@@ -150,7 +153,7 @@ class Shown:
         failures: One line for each run that failed.
     """
 
-    item: Item
+    item: PaperItem
     values: Mapping[str, Mapping[str, Sequence[float | None]]]
     chart: Chart | None
     failures: tuple[str, ...]

@@ -16,7 +16,7 @@ from vftcli.outputs.page.wrench_part import wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.repetition.free_run import Models
 from vftcli.reproduction.control import deviation_chart
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, FLOOR, Measured, Values
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, FLOOR, RunResult, Values
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array, Mask
@@ -56,7 +56,7 @@ SAMPLED = 0.001
 """The Panda's sampling interval: the control period that no thread of its own would need. [s]"""
 
 
-def dragged_sensor(seed: int) -> Measured:
+def dragged_sensor(seed: int) -> RunResult:
     """RMSE of the virtual sensor against the real one, axis by axis, in flange axes."""
     run = simulate(load_scenario("ur5-sensor", ()), seed)
     zero = ZeroChoice(spans=(UNLOADED["ur5"],))
@@ -84,7 +84,7 @@ def dragged_sensor(seed: int) -> Measured:
             for axis, error in zip(AXES, sensor_error(run, made), strict=True):
                 values[axis][FLOOR] = error
             charts["fig4"] = beside_sensor(made)
-    return Measured(values, charts)
+    return RunResult(values, charts)
 
 
 def sensor_error(run: Simulation, made: Analysis) -> Array:
@@ -106,7 +106,7 @@ def beside_sensor(made: Analysis) -> Chart:
     return chart._replace(key="fig4", title="Virtual and real sensor, flange axes")
 
 
-def assembled_bearing(seed: int) -> Measured:
+def assembled_bearing(seed: int) -> RunResult:
     """Zero drift, the bearing's weight, errors by phase, and what the controllers make of it."""
     run = simulate(load_scenario("panda-bearing", ()), seed)
     recording, robot, models = run.recording, load_robot("panda"), Models()
@@ -130,7 +130,7 @@ def assembled_bearing(seed: int) -> Measured:
             add_motion(values, "control at 1 ms", replay_bearing(zeroed, made, SAMPLED))
             charts["fig12"] = beside_vendor(zeroed, vendor)
             charts["fig13"] = deviation_chart("fig13", controlled, range(6))
-    return Measured(values, charts)
+    return RunResult(values, charts)
 
 
 def within(wrench: Wrench, span: tuple[float, float]) -> Mask:

@@ -12,7 +12,7 @@ from vftcli.reproduction.benchmark import (
     circle,
     one_core,
 )
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, Measured, Values
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, RunResult, Values
 from vftcli.reproduction.yardsticks import dense_kalman_loop, first_order_loops
 from vftcli.robots import load_robot
 from vftcli.robots.literal import literal_momentum_terms
@@ -25,7 +25,7 @@ RATIOS = {"fdo": "zoh/fdo", "kfo-fe": "zoh/kfo-fe"}
 """Observer → key of how much more the zero-order hold costs."""
 
 
-def computing_time(_seed: int) -> Measured:
+def computing_time(_seed: int) -> RunResult:
     """Seconds for the paper's samples by observer, dynamics in each, and the printed ratios."""
     with one_core():
         timings = timed()
@@ -38,7 +38,7 @@ def computing_time(_seed: int) -> Measured:
             values.setdefault(f"cost/{name}", {})[variant] = 1e6 * cost[name] / SAMPLES
         for name, key in RATIOS.items():
             values.setdefault(key, {})[variant] = cost["kfo-zoh"] / cost[name]
-    return Measured(values)
+    return RunResult(values)
 
 
 def timed() -> Timings:
