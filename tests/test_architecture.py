@@ -38,8 +38,7 @@ ORDER = (
     "proposal",
     "batch",
     "notebook",
-    "yardsticks",
-    "benchmark",
+    "reproduction",
     "cli",
     "__main__",
 )

@@ -30,10 +30,10 @@ def bench(measured: BenchOptions, json: opt.Json = False) -> None:
 
     Example: vftcli bench --rounds 3
     """
-    from vftcli.benchmark import benchmark, memory_per_sample
     from vftcli.cli.console import say_json
     from vftcli.outputs.grid import latex, terminal
     from vftcli.outputs.listings import bench_grid
+    from vftcli.reproduction.benchmark import benchmark, memory_per_sample
     from vftcli.signals.packages import check_installed
 
     check_installed("pinocchio", "vftcli bench")
@@ -92,7 +92,7 @@ def examined(measured: BenchOptions) -> dict[str, float]:
     """What the examination costs, the long log written into a folder that is removed again."""
     import polars as pl
 
-    from vftcli.benchmark import examination_costs, wide_table
+    from vftcli.reproduction.benchmark import examination_costs, wide_table
     from vftcli.robots import load_robot
 
     with TemporaryDirectory() as folder:

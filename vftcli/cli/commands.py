@@ -98,6 +98,11 @@ COMMANDS = {
         "Simulate an experiment: the log, and the truth beside it.",
         STUDY,
     ),
+    "reproduce": ListedCommand(
+        "reproduce:reproduce",
+        "Run a paper's experiments again, beside what it prints.",
+        STUDY,
+    ),
     "bench": ListedCommand(
         "bench:bench",
         "Time the observers, and scripts that do the same.",

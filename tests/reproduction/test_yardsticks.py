@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from vftcli.benchmark import circle
 from vftcli.observers import KalmanObserver, MomentumObserver
-from vftcli.robots import load_robot
-from vftcli.robots.terms import dynamics_terms
-from vftcli.yardsticks import (
+from vftcli.reproduction.benchmark import circle
+from vftcli.reproduction.yardsticks import (
     dense_kalman_loop,
     first_order_loops,
     held_matrices,
     taylor_exponential,
 )
+from vftcli.robots import load_robot
+from vftcli.robots.terms import dynamics_terms
 
 UR5 = load_robot("ur5")
 LOG = circle(UR5, 400)

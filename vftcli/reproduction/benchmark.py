@@ -21,13 +21,13 @@ from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Part, Spectra, spectra_of
 from vftcli.readers import read
+from vftcli.reproduction.yardsticks import analytic_script, literal_script, rnea_loop
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import EFFORTS, EXAMINED, Recording
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
-from vftcli.yardsticks import analytic_script, literal_script, rnea_loop
 
 SAMPLES = 30_060
 """Samples of the paper's Table II."""

@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.benchmark import (
+from vftcli.reproduction.benchmark import (
     Timings,
     benchmark,
     circle,

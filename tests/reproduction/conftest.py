@@ -1,0 +1,70 @@
+"""A paper whose experiments take no time: one that measures, and one that fails."""
+
+import numpy as np
+import pytest
+
+from vftcli.outputs.page.charts import Chart, ChartLine
+from vftcli.reproduction import papers
+from vftcli.reproduction.paper import (
+    AS_PRINTED,
+    CORRECTED,
+    FLOOR,
+    Experiment,
+    Paper,
+    PaperItem,
+    PrintedLine,
+    RunResult,
+)
+from vftcli.signals.errors import ParameterError
+
+
+def measure(seed: int) -> RunResult:
+    t = np.linspace(0.0, 1.0, 50)
+    line = ChartLine("ours", np.column_stack([np.sin(t), np.cos(t)]))
+    chart = Chart("fig1", "Two panels", ("N", "N"), ("x", "y"), t, (line,))
+    known = {AS_PRINTED: 3.0, CORRECTED: 2.0 + seed, FLOOR: 0.5}
+    return RunResult({"a": known, "b": {CORRECTED: None if seed > 1 else -1.0}}, {"fig1": chart})
+
+
+def fail(seed: int) -> RunResult:
+    raise ParameterError(f"nothing moved with {seed}")
+
+
+PAPER = Paper(
+    name="cheap",
+    title="A paper",
+    doi="10.1/1",
+    experiments={
+        "works": Experiment("what works", measure, (1, 2, 3)),
+        "fails": Experiment("what fails", fail, (1, 2)),
+        "timed": Experiment("what takes the time", measure, (0,), alone=True),
+    },
+    items={
+        "fig1": PaperItem(
+            label="Fig. 1",
+            title="A <figure>",
+            why="Because.",
+            verdict="in size",
+            experiments=("works",),
+            lines=(PrintedLine("a", "alpha", "N", "2"), PrintedLine("b", "beta", "", "-1")),
+            drawn=True,
+        ),
+        "fig2": PaperItem(label="Fig. 2", title="Another", why="A sketch.", verdict="a picture"),
+        "fig3": PaperItem(
+            label="Fig. 3",
+            title="Half of it",
+            why="Why not.",
+            verdict="no",
+            experiments=("timed", "fails"),
+            lines=(PrintedLine("a", "alpha", "N"),),
+        ),
+    },
+    setting=("It is set.",),
+)
+
+
+@pytest.fixture
+def cheap(monkeypatch: pytest.MonkeyPatch) -> Paper:
+    """That paper, among those there are."""
+    monkeypatch.setitem(papers.PAPERS, PAPER.name, PAPER)
+    return PAPER

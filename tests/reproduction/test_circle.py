@@ -1,0 +1,66 @@
+"""docs/reproduction.md is what the code gives: Table I anew, the rest under `statistical`."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from vftcli.reproduction.huang2025 import HUANG2025, ITEMS
+from vftcli.reproduction.jobs import gather, jobs_of, run_jobs
+from vftcli.reproduction.page import item_grid, spread
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "reproduction.md"
+
+TIMED = re.compile(r"time\b|KFO-ZOH over")
+"""Lines that tell how fast this machine is."""
+
+
+def documented(name: str) -> dict[str, list[str]]:
+    """Label of a line → what the document's table of an item has of ours."""
+    text = DOCUMENT.read_text("utf-8").split(f"## {ITEMS[name].label}: ")[1].split("\n## ")[0]
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    return {row[0].replace("\\", ""): row[3:] for row in rows[2:]}
+
+
+def computed(names: tuple[str, ...], *, fast: bool):
+    jobs = jobs_of(HUANG2025, names, fast)
+    return gather(HUANG2025, names, run_jobs(jobs, lambda *_: None, workers=2))
+
+
+def ends(text: str) -> tuple[float, float]:
+    """The range that stands in an entry."""
+    numbers = [float(x.replace("−", "-")) for x in re.findall(r"[-−]?\d+\.?\d*", text)]
+    return (numbers[1], numbers[2]) if "…" in text else (numbers[0], numbers[0])
+
+
+def test_items_without_a_seed_are_the_documents_digit_by_digit() -> None:
+    for name, shown in computed(("table3", "table4"), fast=True).items():
+        rows = {row[0].text: [cell.text for cell in row[3:]] for row in item_grid(shown).cells}
+        assert rows == documented(name)
+
+
+def test_table_one_of_the_first_seed_lies_in_the_documents_range() -> None:
+    """The range holds every seed's value, rounded to three digits: half of the last is let pass."""
+    (shown,) = computed(("table1",), fast=True).values()
+    document = documented("table1")
+    for line in shown.item.lines:
+        for kind, text in zip((*shown.item.variants, "floor"), document[line.label], strict=True):
+            low, high = ends(text)
+            assert low * 0.995 <= shown.values[line.key][kind][0] <= high * 1.005, line.label
+
+
+@pytest.mark.statistical
+def test_the_whole_document_is_what_the_code_gives() -> None:
+    """Same seeds, same code: the printed digits, but for what tells the machine's speed."""
+    for name, shown in computed(tuple(HUANG2025.items), fast=False).items():
+        if not shown.item.lines:
+            continue
+        document = documented(name)
+        for row in item_grid(shown).cells:
+            if not TIMED.search(row[0].text):
+                assert [cell.text for cell in row[3:]] == document[row[0].text], (name, row[0])
+
+
+def test_an_entry_of_the_document_reads_back() -> None:
+    assert ends(spread([1.0, 2.0, 4.5])) == (1.0, 4.5)
+    assert ends(spread([-0.25])) == (-0.25, -0.25)

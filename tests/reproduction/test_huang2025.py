@@ -1,0 +1,40 @@
+"""The declared paper is whole: every table and figure, every experiment, every printed number."""
+
+from vftcli.evaluation.print_table import TABLE_1
+from vftcli.reproduction.huang2025 import EXPERIMENTS, ITEMS
+
+
+def test_no_table_and_no_figure_is_missing() -> None:
+    """Four tables and thirteen figures in print, and the guidelines of Sec. IV-A."""
+    wanted = {f"table{k}" for k in range(1, 5)} | {f"fig{k}" for k in range(1, 14)}
+    assert set(ITEMS) == wanted | {"guidelines"}
+    pictures = {name for name, item in ITEMS.items() if item.verdict == "a picture"}
+    assert pictures == {"fig1", "fig2", "fig5", "fig8", "fig11"}
+    for name, item in ITEMS.items():
+        assert item.why.endswith("."), name
+        assert bool(item.experiments) == bool(item.lines) == (name not in pictures), name
+
+
+def test_every_experiment_is_shown_and_every_item_has_its_own() -> None:
+    shown = {name for item in ITEMS.values() for name in item.experiments}
+    assert shown == set(EXPERIMENTS)
+
+
+def test_table_one_prints_what_the_published_table_does() -> None:
+    printed = {line.key: line.number for line in ITEMS["table1"].lines}
+    assert len(printed) == 24
+    assert printed["kfo-zoh/6"] == TABLE_1.rmse["kfo-zoh"][5] == 0.9440
+
+
+def test_the_printed_ratios_are_those_of_the_printed_times() -> None:
+    """58.3627 s over 10.8690 s and over 17.5776 s, Table II."""
+    printed = {line.key: line.number for line in ITEMS["table2"].lines}
+    assert printed["zoh/fdo"] == 5.37
+    assert printed["zoh/kfo-fe"] == 3.32
+
+
+def test_keys_stand_once_in_an_item() -> None:
+    for name, item in ITEMS.items():
+        keys = [line.key for line in item.lines]
+        assert len(keys) == len(set(keys)), name
+        assert item.nearest in item.variants, name

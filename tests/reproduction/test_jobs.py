@@ -1,0 +1,51 @@
+"""Each experiment runs once a seed, whoever shows it; what fails is a line."""
+
+from vftcli.reproduction.jobs import Job, gather, jobs_of, run_jobs
+from vftcli.reproduction.paper import CORRECTED, RunResult
+from vftcli.reproduction.papers import PAPERS
+
+HUANG = PAPERS["huang2025"]
+
+
+def test_items_share_their_runs() -> None:
+    """Table I, Fig. 3 and the guidelines are one circle a seed, the guidelines time too."""
+    jobs = jobs_of(HUANG, ("table1", "fig3", "guidelines"), fast=False)
+    assert [job.experiment for job in jobs] == ["circle"] * 5 + ["time"]
+    assert [job.seed for job in jobs[:5]] == list(HUANG.experiments["circle"].seeds)
+
+
+def test_fast_takes_the_first_seed_of_each() -> None:
+    jobs = jobs_of(HUANG, tuple(HUANG.items), fast=True)
+    assert len(jobs) == len(HUANG.experiments)
+    assert jobs_of(HUANG, ("fig1",), fast=True) == []
+
+
+def test_what_fails_is_a_line_and_the_rest_is_there(cheap) -> None:
+    jobs, told = jobs_of(cheap, tuple(cheap.items), fast=False), []
+    results = run_jobs(jobs, lambda *words: told.append(words), workers=1)
+    assert list(results) == jobs
+    assert told[-1] == (6, 6, "timed, seed 0")  # what takes the time has the machine for itself
+    found = gather(cheap, tuple(cheap.items), results)
+    assert found["fig1"].values["a"][CORRECTED] == [3.0, 4.0, 5.0]
+    assert found["fig1"].values["b"][CORRECTED] == [-1.0, None, None]
+    assert found["fig1"].chart is not None
+    assert found["fig3"].failures == (
+        "what fails, seed 1: nothing moved with 1",
+        "what fails, seed 2: nothing moved with 2",
+    )
+    assert found["fig3"].values["a"][CORRECTED] == [2.0]
+    assert found["fig2"].values == {}
+    assert isinstance(results[jobs[1]], RunResult)
+    assert not results[jobs[1]].charts  # only the first seed's traces are shown
+
+
+def test_numbers_do_not_depend_on_how_many_run_at_once() -> None:
+    jobs = [Job("huang2025", name, 0) for name in ("release-ur5", "release-panda")]
+
+    def nobody(done: int, of: int, what: str) -> None:
+        pass
+
+    one, two = (run_jobs(jobs, nobody, workers=count) for count in (1, 2))
+    assert list(one) == list(two)
+    for job in jobs:
+        assert one[job].values == two[job].values

@@ -1,0 +1,1 @@
+"""A paper's experiments run again on simulated equivalents, beside what is printed."""

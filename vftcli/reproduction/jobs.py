@@ -1,0 +1,137 @@
+"""Running a paper's experiments: each once a seed, two at a time, whichever items show them.
+
+A run has its own seed and nothing in common with another, so that the numbers do not depend on
+how many run beside one another.
+"""
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from itertools import chain
+from typing import NamedTuple
+
+from vftcli.reproduction.paper import Paper, PaperItem, RunResult, ShownItem
+from vftcli.reproduction.papers import paper_of
+from vftcli.signals.errors import VftError
+
+MOST_WORKERS = 2
+"""Processes beside one another: what a full run was measured with."""
+
+
+class Job(NamedTuple):
+    """One experiment with one seed.
+
+    Attributes:
+        paper: Name of the paper.
+        experiment: Name of the experiment.
+        seed: Of everything drawn.
+    """
+
+    paper: str
+    experiment: str
+    seed: int
+
+
+Told = Callable[[int, int, str], None]
+"""Told how many jobs are done, how many there are, and which one ended."""
+
+Result = RunResult | str
+"""What a job gave, or the one line on why it failed."""
+
+
+def jobs_of(paper: Paper, names: Sequence[str], fast: bool) -> list[Job]:
+    """Every experiment that these items show, once a seed; only the first seed if `fast`."""
+    wanted = dict.fromkeys(e for name in names for e in paper.items[name].experiments)
+    return [
+        Job(paper.name, name, seed)
+        for name in wanted
+        for seed in paper.experiments[name].seeds[: 1 if fast else None]
+    ]
+
+
+def perform(job: Job) -> Result:
+    """Run a job; what it cannot do is one line."""
+    experiment = paper_of(job.paper).experiments[job.experiment]
+    try:
+        made = experiment.work(job.seed)
+    except (VftError, ArithmeticError) as error:
+        return f"{experiment.title}, seed {job.seed}: {error}"
+    # Traces are those of the first seed: the others' would only be carried about.
+    return made if job.seed == experiment.seeds[0] else replace(made, charts={})
+
+
+def cores() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def end_with_terminal() -> None:
+    """Let a worker end without a word when Ctrl-C ends the command."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def run_jobs(jobs: Sequence[Job], tell: Told, workers: int | None = None) -> dict[Job, Result]:
+    """Run jobs, those that take the time last and by themselves.
+
+    Args:
+        jobs: They.
+        tell: Who is told of each that ended.
+        workers: Processes at most; None for as many as there are cores, `MOST_WORKERS` at most.
+    """
+    alone = [job for job in jobs if paper_of(job.paper).experiments[job.experiment].alone]
+    beside = [job for job in jobs if job not in alone]
+    count = min(workers or min(cores(), MOST_WORKERS), len(beside))
+    found: dict[Job, Result] = {}
+    for job, result in chain(pooled(beside, count), ((job, perform(job)) for job in alone)):
+        found[job] = result
+        tell(len(found), len(jobs), f"{job.experiment}, seed {job.seed}")
+    return {job: found[job] for job in jobs}
+
+
+def pooled(jobs: Sequence[Job], count: int) -> Iterator[tuple[Job, Result]]:
+    """Jobs in the order in which they end, in so many processes; in this one if that is one."""
+    if count <= 1:
+        yield from ((job, perform(job)) for job in jobs)
+        return
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(count, context, initializer=end_with_terminal)
+    try:
+        futures: dict[Future[Result], Job] = {pool.submit(perform, job): job for job in jobs}
+        for future in as_completed(futures):
+            job = futures[future]
+            try:
+                yield job, future.result()
+            except BrokenProcessPool:
+                yield job, f"{job.experiment}, seed {job.seed}: its process was ended"
+    except BaseException:
+        for child in multiprocessing.active_children():
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def gather(paper: Paper, names: Sequence[str], results: dict[Job, Result]) -> dict[str, ShownItem]:
+    """What each item shows of the results."""
+    return {name: shown(name, paper.items[name], results) for name in names}
+
+
+def shown(name: str, item: PaperItem, results: dict[Job, Result]) -> ShownItem:
+    """One item with its values, a list over the seeds for each."""
+    values: dict[str, dict[str, list[float | None]]] = {}
+    own = {job: r for job, r in results.items() if job.experiment in item.experiments}
+    made = [r for r in own.values() if isinstance(r, RunResult)]
+    keys = {line.key for line in item.lines}
+    for one in made:
+        for key in keys & one.values.keys():
+            for variant, value in one.values[key].items():
+                values.setdefault(key, {}).setdefault(variant, []).append(value)
+    charts = [one.charts[name] for one in made if name in one.charts]
+    failures = tuple(r for r in own.values() if isinstance(r, str))
+    return ShownItem(item, values, charts[0] if charts else None, failures)

@@ -1,0 +1,226 @@
+"""How a reproduction is shown: one page and one Markdown of the same tables, and figures."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from html import escape
+
+import numpy as np
+
+from vftcli.outputs.figures.lines import line_figure, plots_of
+from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
+from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.grid import DASH, Column, Grid, GridCell, html, markdown, significant
+from vftcli.outputs.log.run_record import seal, versions
+from vftcli.outputs.page.charts import large, multiples
+from vftcli.outputs.page.shell import bullets, document, lead, section, soft, top
+from vftcli.outputs.seals import SEAL
+from vftcli.reproduction.jobs import Job
+from vftcli.reproduction.paper import FLOOR, Paper, PrintedLine, ShownItem
+
+PAGE, TEXT = "index.html", "reproduction.md"
+"""The page, and the same in Markdown."""
+
+RATIOS = (
+    "Ours / print: the median of the lines that print a number, in brackets the range, of the "
+    "column that stands behind it."
+)
+"""What the overview compares."""
+
+
+def files_of(paper: Paper, names: Sequence[str], form: str | None) -> list[str]:
+    """Every file that a folder of these items may hold; `form` is what figures are written as."""
+    drawn = [name for name in names if paper.items[name].drawn]
+    return [PAGE, TEXT, SEAL, *figure_files(form, drawn)]
+
+
+def spread(values: Sequence[float | None]) -> str:
+    """The mean over the seeds and its range, and of how many seeds where not all tell one."""
+    known = [value for value in values if value is not None and np.isfinite(value)]
+    if not known:
+        return DASH
+    text = signed(float(np.mean(known)))
+    if len(known) > 1 and signed(min(known)) != signed(max(known)):
+        text += f" ({signed(min(known))} … {signed(max(known))})"
+    return text if len(known) == len(values) else f"{text}, {len(known)} of {len(values)}"
+
+
+def signed(value: float) -> str:
+    """Three significant digits, a whole number as it is, with a true minus sign."""
+    text = f"{value:.0f}" if value == round(value) else significant(value)
+    return text.replace("-", "−")
+
+
+def item_grid(shown: ShownItem) -> Grid:
+    """What is printed, ours in every variant, and the floor, where there is one."""
+    item, values = shown.item, shown.values
+    floors = any(FLOOR in values.get(line.key, {}) for line in item.lines)
+    kinds = (*item.variants, *([FLOOR] if floors else []))
+    heads = ("what", "unit", "printed", *kinds)
+    rows = [
+        (
+            line.label,
+            line.unit or DASH,
+            line.printed.replace("-", "−") or DASH,
+            *(spread(values.get(line.key, {}).get(kind, [])) for kind in kinds),
+        )
+        for line in item.lines
+    ]
+    words = {"what", "unit"}
+    return Grid(columns=tuple(Column(h, words=h in words) for h in heads), rows=tuple(rows))
+
+
+def beside_print(shown: ShownItem) -> str:
+    """Ours over the print, the median of the lines that print a number, and its range."""
+    kind = shown.item.nearest
+    ratios = [
+        ratio
+        for line in shown.item.lines
+        if (ratio := ratio_of(shown.values.get(line.key, {}).get(kind, []), line)) is not None
+    ]
+    if not ratios:
+        return DASH
+    low, high = significant(min(ratios), 2), significant(max(ratios), 2)
+    text = significant(float(np.median(ratios)), 2)
+    return text if low == high else f"{text} ({low} … {high})"
+
+
+def ratio_of(values: Sequence[float | None], line: PrintedLine) -> float | None:
+    """Mean of ours over what is printed, None where either is missing."""
+    known = [value for value in values if value is not None]
+    if not (known and line.number and line.compared):
+        return None
+    return float(np.mean(known)) / line.number
+
+
+def overview(found: Mapping[str, ShownItem]) -> Grid:
+    """Every item in a row: what it shows, ours over the print, and what came of it."""
+    columns = (
+        Column("item", words=True),
+        Column("what it shows", words=True),
+        Column("ours / print"),
+        Column("ours", words=True),
+        Column("reproduced", words=True),
+    )
+    rows = [
+        (
+            GridCell(shown.item.label, html=f'<a href="#{name}">{escape(shown.item.label)}</a>'),
+            wrapped(shown.item.title),
+            (ratio := beside_print(shown)),
+            DASH if ratio == DASH else shown.item.nearest,
+            wrapped("; ".join(shown.failures) or shown.item.verdict),
+        )
+        for name, shown in found.items()
+    ]
+    return Grid(columns=columns, rows=tuple(rows))
+
+
+def wrapped(text: str) -> GridCell:
+    """Words that the page may break."""
+    return GridCell(text, html=f'<div class="words">{escape(text)}</div>')
+
+
+def seeds_line(jobs: Sequence[Job], paper: Paper) -> tuple[str, ...]:
+    """Which experiment ran with which seeds."""
+    seeds: dict[str, list[int]] = {}
+    for job in jobs:
+        seeds.setdefault(job.experiment, []).append(job.seed)
+    return tuple(
+        paper.experiments[name].title
+        + (f": seed{'s' * (len(own) > 1)} {', '.join(map(str, own))}" if own != [0] else "")
+        for name, own in seeds.items()
+    )
+
+
+def render_page(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job]) -> str:
+    """The page: self-contained, nothing is loaded from anywhere."""
+    charts = [shown.chart for shown in found.values() if shown.chart is not None]
+    parts = [
+        top(
+            (paper.name, f"doi {paper.doi}"),
+            "The paper, run again",
+            lead(f"{paper.title}.") + lead(*paper.setting),
+        ),
+        html(overview(found)),
+        soft(RATIOS),
+        *(item_section(name, shown) for name, shown in found.items()),
+        "<h2>What was run</h2>",
+        bullets(seeds_line(jobs, paper)),
+    ]
+    return document(f"{paper.name}, reproduced", "".join(parts), charts)
+
+
+def item_section(name: str, shown: ShownItem) -> str:
+    """One table or figure: the reason first, then numbers and traces."""
+    item = shown.item
+    parts = [f'<h2 id="{name}">{escape(item.label)}: {escape(item.title)}</h2>']
+    parts += [f'<p class="alarm">{escape(line)}</p>' for line in shown.failures]
+    parts.append(f"<p><strong>{escape(capital(item.verdict))}.</strong> {escape(item.why)}</p>")
+    if item.lines:
+        parts.append(html(item_grid(shown)))
+    if shown.chart is not None:
+        drawn = multiples(shown.chart) + large(shown.chart)
+        parts.append(section("Traces", drawn, shown.chart.title, opened=True))
+    return "".join(parts)
+
+
+def capital(text: str) -> str:
+    """A sentence's first letter made large."""
+    return text[:1].upper() + text[1:]
+
+
+def render_markdown(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job]) -> str:
+    """The same in Markdown."""
+    parts = [
+        f"# {paper.name}, reproduced\n",
+        f"{paper.title}. doi {paper.doi}.\n",
+        "\n".join(paper.setting) + "\n",
+        f"Made by `vftcli reproduce {paper.name} -o DIR`.\n",
+        markdown(overview(found)),
+        f"{RATIOS}\n",
+    ]
+    for shown in found.values():
+        item = shown.item
+        parts.append(f"## {item.label}: {item.title}\n")
+        parts += [f"**Failed:** {line}\n" for line in shown.failures]
+        parts.append(f"**{capital(item.verdict)}.** {item.why}\n")
+        if item.lines:
+            parts.append(markdown(item_grid(shown)))
+    parts.append("## What was run\n")
+    parts.append("".join(f"- {line}\n" for line in seeds_line(jobs, paper)))
+    return "\n".join(parts)
+
+
+def drawings(found: Mapping[str, ShownItem]) -> dict[str, Drawing]:
+    """The traces as figures for a paper."""
+    return {
+        name: Drawing(
+            f"{shown.item.label}: {shown.item.title}",
+            partial(line_figure, plots=plots_of(shown.chart)),
+        )
+        for name, shown in found.items()
+        if shown.chart is not None
+    }
+
+
+def write_reproduction(
+    folder: OutputFolder,
+    paper: Paper,
+    found: Mapping[str, ShownItem],
+    jobs: Sequence[Job],
+    command: str,
+    form: str | None = None,
+) -> None:
+    """Write page, Markdown, figures where a form is asked for, and the seal."""
+    folder.write(PAGE, render_page(paper, found, jobs))
+    folder.write(TEXT, render_markdown(paper, found, jobs))
+    if form is not None:
+        write_figures(folder, drawings(found), form)
+    record = {
+        "command": command,
+        "versions": versions(),
+        "paper": paper.name,
+        "runs": [{"experiment": job.experiment, "seed": job.seed} for job in jobs],
+        "values": {name: shown.values for name, shown in found.items()},
+        "failures": {name: shown.failures for name, shown in found.items() if shown.failures},
+    }
+    seal(folder, SEAL, record)
