@@ -93,6 +93,25 @@ def test_a_log_that_lacks_a_part_is_refused(tmp_path: Path, lost: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("column", "value", "told"),
+    [
+        ("jacobian_4_2", 1e200, "jacobian cell 31 is 1e[+]200 in sample 8"),  # its square: infinite
+        ("tau_ext_3", -1e200, "tau_ext of joint 4 is -1e[+]200 in sample 8"),
+        ("fy", float("nan"), "wrench axis 2 is nan in sample 8"),
+    ],
+)
+def test_a_value_that_nobody_measured_is_refused_in_one_line(
+    tmp_path: Path, column: str, value: float, told: str
+) -> None:
+    path = made_log(tmp_path)
+    table = pl.read_csv(path).with_row_index()
+    put = pl.when(pl.col("index") == 7).then(value).otherwise(pl.col(column))
+    table.with_columns(put.alias(column)).drop("index").write_csv(path)
+    with pytest.raises(LogError, match=told):
+        opened(path)
+
+
+@pytest.mark.parametrize(
     ("name", "forces"),
     [
         # rms and zero-mean rms as measured outside of this code with the pseudo-inverse of J;

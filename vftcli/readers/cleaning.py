@@ -30,6 +30,9 @@ ABSURD_STAMP = 1e19
 ABSURD = 1e9
 """Values as large as this are no measurement in any unit; anywhere in a log they are refused."""
 
+COLUMN = {"wrench": "axis", "jacobian": "cell"}
+"""What a column of a signal is that is none of a joint."""
+
 SHORTEST_STEP, LONGEST_LOG = 1e-7, 1e11
 """No robot is sampled ten million times a second, nor for three thousand years. [s]"""
 
@@ -210,7 +213,7 @@ def refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
                 "or NaN. Leave the signal out (with _ in --columns), or record it."
             )
         raise LogError(
-            f"{path}: {name} {'axis' if name == 'wrench' else 'of joint'} {column + 1} is "
+            f"{path}: {name} {COLUMN.get(name, 'of joint')} {column + 1} is "
             f"{value[row, column]:.6g} in sample {raw.first_row + row} (t = "
             f"{seconds(raw)[row]:.6g} s), {lost} such in all. Nothing is filled in: cut the rows "
             "out, or leave the signal out with _ in --columns."
