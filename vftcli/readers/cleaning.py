@@ -67,15 +67,8 @@ def cleaned(
         LogError: If a signal holds NaN or infinity, or its unit cannot be radians.
         ClockError: If the clock is not finite, runs backwards, or holds no samples.
     """
-    if len(raw.stamps) == 0:
-        raise ClockError(f"{path}: no samples; the log holds a header only.")
     rows = len(raw.stamps) + (0 if raw.unknown is None else len(raw.unknown))
-    if raw.segment is not None:
-        raw = segment_of(raw, raw.segment, path)
-    raw = without_leading_garbage(without_empty_joints(raw))
-    refuse_unknown_numbers(raw, path)
-    refuse_backward_steps(raw, path)
-    refuse_standing_clock(raw, path)
+    raw = measured(raw, path)
     fresh = without_repeats(raw, path)
     if raw.degrees_possible:
         refuse_degrees(fresh, path)
@@ -89,6 +82,24 @@ def cleaned(
         remarks=(*fresh.remarks, *gaps_in(t)),
     )
     return recording_of(raw, t, fresh.signals, source)
+
+
+def measured(raw: RawLog, path: Path) -> RawLog:
+    """Samples that a robot may have given: of the segment that is asked for, without garbage.
+
+    Raises:
+        LogError: If a signal holds a value that nobody measured.
+        ClockError: If there is none, or the clock is none of a robot's log.
+    """
+    if len(raw.stamps) == 0:
+        raise ClockError(f"{path}: no samples; the log holds a header only.")
+    if raw.segment is not None:
+        raw = segment_of(raw, raw.segment, path)
+    raw = without_leading_garbage(without_empty_joints(raw))
+    refuse_unknown_numbers(raw, path)
+    refuse_backward_steps(raw, path)
+    refuse_standing_clock(raw, path)
+    return raw
 
 
 def source_of(
@@ -140,8 +151,8 @@ def first_nanosecond(raw: RawLog) -> int | None:
 
 def without_empty_joints(raw: RawLog) -> RawLog:
     """Leave out named joints of which a signal is NaN throughout, as a gripper's effort is."""
-    names, width = raw.joint_names, raw.signals["q"].shape[1]
-    if len(names) != width:
+    names, width = raw.joint_names, len(raw.joint_names)
+    if "q" not in raw.signals or raw.signals["q"].shape[1] != width:
         return raw
     empty = np.zeros(width, dtype=bool)
     joints = [name for name, v in raw.signals.items() if name != "wrench" and v.shape[1] == width]

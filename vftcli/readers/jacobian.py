@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.readers.cleaning import refuse_unknown_numbers
+from vftcli.readers.cleaning import measured, seconds, without_repeats
 from vftcli.readers.opening import Digest
 from vftcli.readers.picking import picked
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.table import JACOBIAN, Cell, JacobianError, Pick, Picks
-from vftcli.signals.arrays import Array, check_clock
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.remarks import Remark
 
@@ -56,7 +56,7 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
     Raises:
         LogError: If it lacks a signal, a value is none that was measured, or its Jacobian is none
             of an arm of six joints or more.
-        ClockError: If its clock does not increase, or no sample is in the interval.
+        ClockError: If its clock is none of a robot's log, or no sample is in the interval.
     """
     table, digest = found.table, Digest((path,))
     digest.start()
@@ -69,10 +69,8 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
         )
     signals["jacobian"] = Pick(signal="jacobian", cells=cells)
     picks = Picks(signals=tuple(signals.values()), clock=found.picks.clock, rate=found.picks.rate)
-    raw = picked(table, picks, ReadChoice())
-    t = np.asarray((raw.stamps - raw.stamps[0]) * raw.tick, dtype=np.float64)
-    check_clock(t, str(path))
-    refuse_unknown_numbers(raw, path)
+    raw = without_repeats(measured(picked(table, picks, ReadChoice()), path), path)
+    t = seconds(raw)
     start, stop = choice.interval or (-np.inf, np.inf)
     inside = (t >= start) & (t <= stop)
     if np.count_nonzero(inside) < 2:
