@@ -3,11 +3,13 @@
 import math
 import os
 import signal
+import time
 
 import pytest
 
 from vftcli.batch.choice import WorkersChoice
-from vftcli.batch.engine import Failure, Outcome, begin, run_tasks
+from vftcli.batch.cluster import REPLACED, Workers
+from vftcli.batch.engine import EngineError, Failure, Outcome, begin, run_tasks
 from vftcli.batch.outcome import failure_of, perform
 
 HERE = WorkersChoice(workers=0)
@@ -72,3 +74,39 @@ def test_workers_are_processes_with_one_thread_a_library() -> None:
         (name, "1") for name in names
     )
     assert all(f":{os.getpid()}" not in (o.effort.place if o.effort else "") for o in ended)
+
+
+class Losing:
+    """A client of a cluster of two workers that loses them: what `Workers` sees of one."""
+
+    def __init__(self, *, own: bool) -> None:
+        self.there, self.specified = 2, [0, 1]
+        self.cluster = self if own else None
+
+    worker_spec = property(lambda self: self.specified)
+
+    def nthreads(self) -> dict[int, int]:
+        return dict.fromkeys(range(self.there), 1)
+
+    def scale(self, size: int) -> None:
+        self.specified = list(range(size))
+
+
+@pytest.mark.parametrize(("own", "started"), [(True, REPLACED), (False, 0)])
+def test_workers_that_stay_away_are_replaced_so_often_and_only_on_this_machine(
+    monkeypatch: pytest.MonkeyPatch, own: bool, started: int
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    client = Losing(own=own)
+    workers = Workers(client)  # type: ignore[arg-type]
+    client.there = 1
+    for now[0] in range(0, 600, 5):
+        workers.look()
+    assert len(client.specified) == 2 + started
+    client.there = 0
+    for now[0] in range(600, 650, 5):
+        workers.look()
+    now[0] = 655
+    with pytest.raises(EngineError, match="no worker is left for 60 s"):
+        workers.look()

@@ -162,6 +162,8 @@ def test_an_episode_is_a_log(run, samples: Path, tmp_path: Path) -> None:
         ((CIRCLE, "--do", "compare"), "--reference"),
         ((CIRCLE, "--do", "dance"), "estimate, compare, report, contacts"),
         ((CIRCLE, "--do", "estimate", "--ship"), "--scheduler"),
+        ((CIRCLE, "--do", "estimate", "--robot", "ur55"), "ur55"),
+        ((CIRCLE, "--do", "estimate", "--robot", "ur5", "--payload", "cup"), "cup"),
     ],
 )
 def test_what_cannot_be_done_is_one_line(run, tmp_path: Path, words, told: str) -> None:
@@ -170,6 +172,22 @@ def test_what_cannot_be_done_is_one_line(run, tmp_path: Path, words, told: str) 
     assert told in err
     assert err.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_what_describes_logs_is_passed_over_and_said_once(
+    run, folder: Path, tmp_path: Path
+) -> None:
+    described = folder / "a" / "meta.json"
+    described.write_text('{"operator": "x", "gains": [1, 2, 3]}')
+    shutil.copy(described, folder / "b")
+    (folder / "a" / "log.csv.scenario.toml").write_text("seed = 1\n")
+    code, _, err = run("batch", folder, *HERE, "-o", tmp_path / "out")
+    assert code == 0
+    told = "note: 3 files are not logs: log.csv.scenario.toml, meta.json, meta.json\n"
+    assert err.count("not logs") == err.count(told) == 1
+    code, _, err = run("batch", described, *HERE, "-o", tmp_path / "named")
+    assert code == 1
+    assert "error: meta.json: no joint positions (q) among gains" in err
 
 
 @pytest.mark.statistical

@@ -13,7 +13,13 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.readers.table import JacobianError
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import flange_jacobian
-from vftcli.signals.errors import LogError, MissingSignalError, ParameterError, ReferenceTorqueError
+from vftcli.signals.errors import (
+    ClockError,
+    LogError,
+    MissingSignalError,
+    ParameterError,
+    ReferenceTorqueError,
+)
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 
 TURNED = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
@@ -90,6 +96,37 @@ def test_what_takes_positions_or_a_sensor_is_refused(tmp_path: Path) -> None:
 def test_a_log_that_lacks_a_part_is_refused(tmp_path: Path, lost: str) -> None:
     with pytest.raises(LogError, match="Jacobian"):
         opened(made_log(tmp_path, lost=lost))
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "told"),
+    [
+        (
+            "jacobian_4_2",
+            1e200,
+            "jacobian cell 31 is 1e[+]200 in sample 201",
+        ),  # its square: infinite
+        ("tau_ext_3", -1e200, "tau_ext of joint 4 is -1e[+]200 in sample 201"),
+        ("fy", float("nan"), "wrench axis 2 is nan in sample 201"),
+        ("timestamp", 1e300, "time runs backwards"),
+    ],
+)
+def test_a_value_that_nobody_measured_is_refused_in_one_line(
+    tmp_path: Path, column: str, value: float, told: str
+) -> None:
+    path = made_log(tmp_path)
+    table = pl.read_csv(path).with_row_index()
+    put = pl.when(pl.col("index") == 200).then(value).otherwise(pl.col(column))
+    table.with_columns(put.alias(column)).drop("index").write_csv(path)
+    with pytest.raises((ClockError, LogError), match=told):
+        opened(path)
+
+
+def test_a_header_alone_is_refused(tmp_path: Path) -> None:
+    path = made_log(tmp_path)
+    path.write_text(path.read_text().split("\n")[0] + "\n")
+    with pytest.raises(ClockError, match="no samples"):
+        opened(path)
 
 
 @pytest.mark.parametrize(

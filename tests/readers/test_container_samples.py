@@ -1,8 +1,6 @@
-"""The samples of containers: what `expected.json` says of each, and those of the data sets."""
+"""The samples of data sets, and a container of two arms; all others are in test_reach."""
 
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,85 +9,12 @@ from vftcli.doctor import examine
 from vftcli.readers import ReadChoice, read, read_first_recording
 from vftcli.readers.library import Library
 from vftcli.robots import load_robot
-from vftcli.signals.errors import LogError, UnknownFormatError
-from vftcli.signals.recording import Recording
-
-FORMATS = {
-    "ur5_v5.mat": "mat", "ur5_v5_struct.mat": "mat", "ur5_v73.mat": "mat", "ur5.feather": "arrow",
-    "ur5_stream.arrows": "arrow", "panda.jsonl": "json", "panda_py.json": "json",
-    "frankapy.json": "json",
-}  # fmt: skip
-NEED_H5PY = {"ur5_v73.mat"}
-
-ROUNDED = 2e-9
-"""The samples' digits: the first and last values are told to nine decimals."""
 
 
-@pytest.fixture(scope="module")
-def expected(samples: Path) -> dict[str, Any]:
-    """What is expected of each sample."""
-    path = samples / "reach" / "expected.json"
-    if not path.is_file():
-        pytest.skip("the samples of containers are not beside VFT_LOGS")
-    told: dict[str, Any] = json.loads(path.read_text("utf-8"))
-    return told
-
-
-def check(recording: Recording, told: dict[str, Any]) -> None:
-    """The first and last values are those that are told."""
-    np.testing.assert_allclose(recording.t[[0, -1]], told["t"], rtol=0, atol=1e-9)
-    for signal in ("q", "dq", "current", "torque", "tau_ext"):
-        if signal in told:
-            rows = getattr(recording, signal)[[0, -1]]
-            wanted = [told[signal]["first"], told[signal]["last"]]
-            np.testing.assert_allclose(rows, wanted, rtol=0, atol=ROUNDED)
-
-
-@pytest.mark.parametrize("name", FORMATS)
-def test_a_sample_is_read_as_expected(name: str, samples: Path, expected: dict[str, Any]) -> None:
-    if name in NEED_H5PY:
-        pytest.importorskip("h5py", reason="h5py, the extra hdf5, is not installed")
-    recording, told = read(samples / "reach" / name), expected[name]
-    assert recording.source.format == FORMATS[name]
-    assert (recording.samples, recording.joints) == (told["samples"], told["joints"])
-    assert 1 / recording.median_step == pytest.approx(told["rate_hz"], rel=1e-6)
-    assert set(recording.signals) == set(told["signals"])
-    check(recording, told)
-    if "transposed" in told.get("must", ""):
-        assert any(remark.code == "signals-turned" for remark in recording.source.remarks)
-
-
-def test_a_workbook_is_refused_with_the_remedy(samples: Path, expected: dict[str, Any]) -> None:
-    assert "save the sheet as CSV" in expected["ur5.xlsx"]["must"]
-    with pytest.raises(UnknownFormatError, match="save the sheet as CSV"):
-        read(samples / "reach" / "ur5.xlsx")
-
-
-def test_aloha_has_two_arms(samples: Path, expected: dict[str, Any]) -> None:
+def test_of_two_arms_the_first_is_described(samples: Path) -> None:
     pytest.importorskip("h5py", reason="h5py, the extra hdf5, is not installed")
-    path, told = samples / "reach" / "aloha_episode_0.hdf5", expected["aloha_episode_0.hdf5"]
-    with pytest.raises(LogError, match="columns 0-5, right: columns 7-12"):
-        read(path)
-    for arm in ("left", "right"):
-        recording = read(path, arm=arm)
-        assert (recording.samples, recording.joints) == (told["samples"], told["joints"])
-        check(recording, told[arm])
-        assert recording.current is not None
-        efforts = [told[arm]["effort"]["first"], told[arm]["effort"]["last"]]
-        np.testing.assert_allclose(1e3 * recording.current[[0, -1]], efforts, rtol=1e-9)
-    assert "arm-side-taken" in {remark.code for remark in read_first_recording(path).source.remarks}
-
-
-def test_robomimic_has_episodes(samples: Path, expected: dict[str, Any]) -> None:
-    pytest.importorskip("h5py", reason="h5py, the extra hdf5, is not installed")
-    path, told = samples / "reach" / "robomimic_low_dim.hdf5", expected["robomimic_low_dim.hdf5"]
-    for episode in (0, 1):
-        recording = read(path, episode=episode)
-        assert recording.samples == told["samples"][episode]
-        assert (recording.joints, recording.robot_hint) == (told["joints"], "panda")
-        assert set(recording.signals) == set(told["signals"])
-        check(recording, told[f"demo_{episode}"])
-    assert str(read(path).source.remarks[0]) == "episode 0 of 2: --episode K|all"
+    recording = read_first_recording(samples / "reach" / "aloha_episode_0.hdf5")
+    assert "arm-side-taken" in {remark.code for remark in recording.source.remarks}
 
 
 EPISODES = (700, 600, 650)

@@ -10,8 +10,8 @@ from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_load import free_load, weigh
-from vftcli.repetition.free_motion import FreeMotion
+from vftcli.repetition.free_load import columns, free_load, weigh
+from vftcli.repetition.free_motion import FreeMotion, FreePiece
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
 from vftcli.robots.regressor import load_regressor
@@ -82,3 +82,19 @@ def test_the_fit_finds_the_weights_of_its_own_columns() -> None:
     np.testing.assert_allclose(found.left, 0.1, rtol=0.15)
     # nine samples count as one: sd = .1·√(9/800)
     np.testing.assert_allclose(found.sd, 0.1 * np.sqrt(9 / 800), rtol=0.2)
+
+
+def test_what_lies_far_from_a_piece_is_not_heard(
+    log: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13 of signals up to 100 N·m, forward and back."""
+    piece = FreePiece(
+        run=ModelledRun(recording=log, robot=ROBOT), inside=(log.t > 8) & (log.t < 9), pairings=()
+    )
+    near = columns(piece)
+    monkeypatch.setattr("vftcli.repetition.free_load.HEARD", 100.0)
+    whole = columns(piece)
+    assert near is not None
+    assert whole is not None
+    for found, expected in zip(near, whole, strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-9)

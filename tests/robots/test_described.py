@@ -1,6 +1,5 @@
 """Robots from descriptions: the TOML beside them, and what is said of their inertia."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -194,27 +193,6 @@ def test_the_arm_that_was_found_is_what_is_written(tmp_path: Path) -> None:
     # rpy and back: rounding
     expected = inverse_dynamics(found, q, v, a)
     np.testing.assert_allclose(inverse_dynamics(again, q, v, a), expected, atol=1e-11)
-
-
-def test_the_sample_with_a_gripper_is_what_it_should_be(samples: Path) -> None:
-    """Masses and gravity torque stand beside the sample, to 1e-6 N·m."""
-    folder = samples / "reach"
-    expected = json.loads((folder / "expected.json").read_text(encoding="utf-8"))
-    of_urdf, of_mjcf = expected["arm_with_gripper.urdf"], expected["arm.mjcf.xml"]
-    found = load_robot(folder / "arm_with_gripper.urdf")
-    values = said(found, "arm-and-locked-taken").values
-    assert list(found.chain.names) == of_urdf["joints"]
-    assert sorted(values["locked"]) == sorted(of_urdf["locked"])
-    assert values["flange"] == of_urdf["flange"]
-    np.testing.assert_allclose(found.chain.mass, of_urdf["link_masses"], rtol=1e-12)
-    q = np.array([of_urdf["gravity_torque"]["q"]])
-    gravity = momentum_terms(found.chain, q, np.zeros((1, 6))).gravity[0]
-    np.testing.assert_allclose(gravity, of_urdf["gravity_torque"]["N·m"], atol=1e-6)
-    again = load_robot(folder / "arm.mjcf.xml")
-    assert again.remarks[0].values["flange"] == of_mjcf["flange"]
-    motion = of_mjcf["inverse_dynamics"]
-    torque = inverse_dynamics(again, *(np.array(motion[key]) for key in ("q", "v", "a")))
-    np.testing.assert_allclose(torque, motion["N·m"], atol=1e-6)
 
 
 @pytest.mark.parametrize(

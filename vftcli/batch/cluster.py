@@ -4,8 +4,10 @@ import hashlib
 import logging
 import os
 import signal
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import cache
 from itertools import count, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from vftcli.batch.choice import MEMORY, MOST_WORKERS, WorkersChoice
 from vftcli.batch.outcome import (
     KILLED,
+    Effort,
     EngineError,
     Failure,
     Outcome,
@@ -29,11 +32,20 @@ if TYPE_CHECKING:
 ANSWER = 10.0
 """A scheduler has to answer within this time, and to have a worker. [s]"""
 
+SETTLED = 0.5
+"""A worker's nanny knows of it so long after it takes its first task. [s]"""
+
 LOOK = 5.0
 """How often the workers are counted while nothing ends. [s]"""
 
+SHORT = 15.0
+"""A cluster of this machine that lacks workers for so long is given others. [s]"""
+
 WITHOUT = 60.0
 """A cluster that has no worker for so long is given up. [s]"""
+
+REPLACED = 10
+"""How often a cluster of this machine is given other workers."""
 
 DEATHS = 3
 """A task that ended its worker so often is not done again."""
@@ -240,11 +252,11 @@ def outcomes(
     """
     sent: dict[Future[Any], Sequence[Task]] = {}
     waiting, again, number = iter(groups), list[Sequence[Task]](), count()
-    most = 2 * sum(client.nthreads().values()) + 2
+    most, workers = 2 * sum(client.nthreads().values()) + 2, Workers(client)
 
     def send(group: Sequence[Task]) -> None:
         key = f"vftcli-{os.getpid()}-{next(number)}"
-        sent[client.submit(perform_all, work, group, key=key, pure=False, retries=0)] = group
+        sent[client.submit(perform_there, work, group, key=key, pure=False, retries=0)] = group
 
     try:
         while True:
@@ -256,7 +268,7 @@ def outcomes(
                 send(again.pop())
             if not sent:
                 return
-            for future in first_done(client, list(sent)):
+            for future in first_done(list(sent), workers):
                 group, ended = sent.pop(future), result_of(future)
                 if ended is None:
                     sent[future] = group  # its worker died with the result: it is done again
@@ -269,6 +281,24 @@ def outcomes(
             client.cancel(list(sent))
 
 
+def perform_there(
+    work: Work[Task], tasks: Sequence[Task]
+) -> list[tuple[Any, Failure | None, Effort]]:
+    """Do the work on each task of a group; this is what runs in a worker."""
+    settle()
+    return perform_all(work, tasks)
+
+
+@cache
+def settle() -> None:
+    """Once in a worker, wait for its nanny.
+
+    Dask sends tasks before the nanny has looked, which it does every 50 ms, whether the process
+    started; one that ends before is not started again.
+    """
+    time.sleep(SETTLED)
+
+
 def told(group: Sequence[Task], ended: "list[Any] | Failure") -> Iterator[Outcome[Task]]:
     """The outcomes of a group's tasks; only one of a single task can have ended its worker."""
     if isinstance(ended, Failure):
@@ -278,7 +308,45 @@ def told(group: Sequence[Task], ended: "list[Any] | Failure") -> Iterator[Outcom
         yield Outcome(task, *each)
 
 
-def first_done(client: "Client", futures: "list[Future[Any]]") -> "list[Future[Any]]":
+class Workers:
+    """Sees that a cluster has workers; on this machine as many as it began with.
+
+    A worker that dies before its nanny knows of its start is not started again by Dask.
+
+    Args:
+        client: Who is connected to the cluster.
+    """
+
+    def __init__(self, client: "Client") -> None:
+        self._client, self._wanted = client, len(client.nthreads())
+        self._left = 0 if client.cluster is None else REPLACED
+        self._looked = self._enough = self._some = time.monotonic()
+
+    def look(self) -> None:
+        """Count them, but not more often than every `LOOK`, and start those that are missing.
+
+        Raises:
+            EngineError: If there has been none for `WITHOUT`.
+        """
+        now = time.monotonic()
+        if now - self._looked < LOOK:
+            return
+        self._looked, there = now, len(self._client.nthreads())
+        self._some = now if there else self._some
+        if there >= self._wanted:
+            self._enough = now
+        elif self._left and now - self._enough >= SHORT:
+            cluster: Any = self._client.cluster
+            cluster.scale(len(cluster.worker_spec) + self._wanted - there)
+            self._left, self._enough = self._left - 1, now
+        if now - self._some >= WITHOUT:
+            raise EngineError(
+                f"no worker is left for {WITHOUT:g} s; what is done is kept: run the command again "
+                "when there are some"
+            )
+
+
+def first_done(futures: "list[Future[Any]]", workers: Workers) -> "list[Future[Any]]":
     """Wait until any of these ended, and return those that did.
 
     Raises:
@@ -288,24 +356,17 @@ def first_done(client: "Client", futures: "list[Future[Any]]") -> "list[Future[A
 
     from distributed import wait
 
-    idle = 0.0
     while True:
         try:
-            done = list(wait(futures, timeout=LOOK, return_when="FIRST_COMPLETED").done)
+            workers.look()
+            return list(wait(futures, timeout=LOOK, return_when="FIRST_COMPLETED").done)
         except TimeoutError:
-            idle = 0.0 if client.nthreads() else idle + LOOK
-            if idle >= WITHOUT:
-                raise EngineError(
-                    f"no worker is left for {WITHOUT:g} s; what is done is kept: run the command "
-                    "again when there are some"
-                ) from None
+            continue
         except (CancelledError, OSError):
             raise EngineError(
                 "the connection to the scheduler is lost; what is done is kept: run the command "
                 "again"
             ) from None
-        else:
-            return done
 
 
 def result_of(future: "Future[Any]") -> "list[Any] | Failure | None":
@@ -315,7 +376,9 @@ def result_of(future: "Future[Any]") -> "list[Any] | Failure | None":
     if future.status not in {"finished", "error"}:
         return None
     try:
-        made: list[Any] = future.result()
+        made: list[Any] = future.result(timeout=LOOK)
+    except TimeoutError:
+        return None  # it died with its worker, and there is none to make it again
     except KilledWorker:
         why = f"its worker died {DEATHS} times: memory, or a crash of a library"
         return Failure("working", KILLED, why)

@@ -109,7 +109,7 @@ def batch(
     from vftcli.batch.kinds import for_comparison, for_estimates
     from vftcli.batch.log_work import LogJob
     from vftcli.batch.run import BatchPlan, run_batch
-    from vftcli.cli.console import command_line, detail, say
+    from vftcli.cli.console import command_line, say
     from vftcli.cli.progress import STAGES
     from vftcli.doctor.examiner import Examiner
     from vftcli.readers.collection import LogCollection
@@ -118,6 +118,7 @@ def batch(
     from vftcli.signals.progress import no_stage
 
     choice = analysis.choice(Library(), reference)
+    choice.robot.check()
     if do == "compare" and choice.reference is None:
         raise ParameterError("--do compare needs --reference: two-cycle, sensor, vendor, zero, …")
     if do in WITHOUT_REFERENCE and choice.reference is not None:
@@ -131,8 +132,7 @@ def batch(
     engine = workers.choice()
     collection = LogCollection(choice.read, output)
     found = list(collection.find(logs))[: resume.limit]
-    if collection.passed:
-        detail(f"note: {len(collection.passed)} files of the folders are no logs")
+    say_passed([path.name for path in collection.passed])
     if not found:
         raise LogError(
             f"no log in {', '.join(map(str, logs[:3]))}; give files, folders or patterns of logs"
@@ -166,6 +166,17 @@ def batch(
 
 MOST_TOLD = 10
 """Failures that are printed."""
+
+
+def say_passed(names: list[str]) -> None:
+    """Say which files of the folders are no logs."""
+    from vftcli.cli.console import say
+
+    if not names:
+        return
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    told = "1 file is not a log" if len(names) == 1 else f"{len(names)} files are not logs"
+    say(f"note: {told}: {', '.join(sorted(names)[:3])}{more}")
 
 
 def progress_line() -> "Callable[[BatchCount], None]":

@@ -15,7 +15,7 @@ from vftcli.readers.parts import episode_of
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, check_npy_header, from_table, numpy_array
-from vftcli.signals.errors import LogError
+from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.remarks import Remark
 
 SKILL = "skill_state_dict"
@@ -97,7 +97,8 @@ def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
     """The arrays of a dictionary of arrays or of lists of equally long arrays.
 
     Raises:
-        LogError: If nothing in it is an array of numbers.
+        NoLogError: If nothing in it is an array of numbers.
+        LogError: If its rows differ in length.
     """
     arrays = {}
     for name, value in log.items():
@@ -111,7 +112,7 @@ def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
         if array.dtype.kind in "fiub":
             arrays[str(name)] = array
     if not arrays:
-        raise LogError(f"{file.path}: holds no arrays of numbers, so no log.")
+        raise NoLogError(f"{file.path}: holds no arrays of numbers, so no log.")
     return arrays
 
 

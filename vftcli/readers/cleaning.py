@@ -30,6 +30,9 @@ ABSURD_STAMP = 1e19
 ABSURD = 1e9
 """Values as large as this are no measurement in any unit; anywhere in a log they are refused."""
 
+COLUMN = {"wrench": "axis", "jacobian": "cell"}
+"""What a column of a signal is that is none of a joint."""
+
 SHORTEST_STEP, LONGEST_LOG = 1e-7, 1e11
 """No robot is sampled ten million times a second, nor for three thousand years. [s]"""
 
@@ -64,15 +67,8 @@ def cleaned(
         LogError: If a signal holds NaN or infinity, or its unit cannot be radians.
         ClockError: If the clock is not finite, runs backwards, or holds no samples.
     """
-    if len(raw.stamps) == 0:
-        raise ClockError(f"{path}: no samples; the log holds a header only.")
     rows = len(raw.stamps) + (0 if raw.unknown is None else len(raw.unknown))
-    if raw.segment is not None:
-        raw = segment_of(raw, raw.segment, path)
-    raw = without_leading_garbage(without_empty_joints(raw))
-    refuse_unknown_numbers(raw, path)
-    refuse_backward_steps(raw, path)
-    refuse_standing_clock(raw, path)
+    raw = measured(raw, path)
     fresh = without_repeats(raw, path)
     if raw.degrees_possible:
         refuse_degrees(fresh, path)
@@ -86,6 +82,24 @@ def cleaned(
         remarks=(*fresh.remarks, *gaps_in(t)),
     )
     return recording_of(raw, t, fresh.signals, source)
+
+
+def measured(raw: RawLog, path: Path) -> RawLog:
+    """Samples that a robot may have given: of the segment that is asked for, without garbage.
+
+    Raises:
+        LogError: If a signal holds a value that nobody measured.
+        ClockError: If there is none, or the clock is none of a robot's log.
+    """
+    if len(raw.stamps) == 0:
+        raise ClockError(f"{path}: no samples; the log holds a header only.")
+    if raw.segment is not None:
+        raw = segment_of(raw, raw.segment, path)
+    raw = without_leading_garbage(without_empty_joints(raw))
+    refuse_unknown_numbers(raw, path)
+    refuse_backward_steps(raw, path)
+    refuse_standing_clock(raw, path)
+    return raw
 
 
 def source_of(
@@ -137,8 +151,8 @@ def first_nanosecond(raw: RawLog) -> int | None:
 
 def without_empty_joints(raw: RawLog) -> RawLog:
     """Leave out named joints of which a signal is NaN throughout, as a gripper's effort is."""
-    names, width = raw.joint_names, raw.signals["q"].shape[1]
-    if len(names) != width:
+    names, width = raw.joint_names, len(raw.joint_names)
+    if "q" not in raw.signals or raw.signals["q"].shape[1] != width:
         return raw
     empty = np.zeros(width, dtype=bool)
     joints = [name for name, v in raw.signals.items() if name != "wrench" and v.shape[1] == width]
@@ -210,7 +224,7 @@ def refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
                 "or NaN. Leave the signal out (with _ in --columns), or record it."
             )
         raise LogError(
-            f"{path}: {name} {'axis' if name == 'wrench' else 'of joint'} {column + 1} is "
+            f"{path}: {name} {COLUMN.get(name, 'of joint')} {column + 1} is "
             f"{value[row, column]:.6g} in sample {raw.first_row + row} (t = "
             f"{seconds(raw)[row]:.6g} s), {lost} such in all. Nothing is filled in: cut the rows "
             "out, or leave the signal out with _ in --columns."

@@ -6,14 +6,15 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from vftcli.readers import lerobot, recognise
+from vftcli.readers import lerobot, read_chosen, recognise
 from vftcli.readers.bags.formats import ROS2
 from vftcli.readers.droid import DROID, TRAJECTORY
 from vftcli.readers.estimates import stored_observers
+from vftcli.readers.json_file import JSON
 from vftcli.readers.library import absolute
 from vftcli.readers.opening import files_of
 from vftcli.readers.reader import LogFile, ReadChoice, Reader, open_log
-from vftcli.signals.errors import LogError, UnknownFormatError
+from vftcli.signals.errors import LogError, NoLogError, UnknownFormatError
 
 TRUTH = ".truth.parquet"
 """Ending of what a simulation writes beside its log."""
@@ -28,6 +29,9 @@ METADATA = "metadata.yaml"
 """The file that lists the pieces of a bag of ROS 2."""
 
 NUMBER = re.compile(rb"(?:^|[\s,;])[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?(?=$|[\s,;])")
+DESCRIPTION = 1 << 20
+"""A file of JSON beside logs that is smaller is read to see whether it is one. [B]"""
+
 FEWEST = 3
 """Numbers in a row: time, a position, an effort."""
 
@@ -138,6 +142,13 @@ class LogCollection:
             return False
         except (LogError, OSError):
             return True
+        if reader is JSON and path.stat().st_size < DESCRIPTION:
+            try:
+                read_chosen(path, self._choice)
+            except NoLogError:
+                return False  # it describes something
+            except LogError:
+                return True
         if reader.general and not holds_numbers(open_log(path)):
             return False  # prose reads as a table of one column
         return not stored_observers(path)

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
+from vftcli.readers.cleaning import measured, seconds, without_repeats
 from vftcli.readers.opening import Digest
 from vftcli.readers.picking import picked
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.table import JACOBIAN, Cell, JacobianError, Pick, Picks
-from vftcli.signals.arrays import Array, check_clock
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.remarks import Remark
 
@@ -42,6 +43,7 @@ class JacobianLog:
     remarks: tuple[Remark, ...] = ()
 
 
+@np.errstate(all="ignore")  # whatever a damaged file holds is judged, not computed with
 def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str) -> JacobianLog:
     """Read the log in which positions were looked for in vain.
 
@@ -52,8 +54,9 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
         name: What to call it.
 
     Raises:
-        LogError: If it lacks a signal, or its Jacobian is none of an arm of six joints or more.
-        ClockError: If its clock does not increase, or no sample is in the interval.
+        LogError: If it lacks a signal, a value is none that was measured, or its Jacobian is none
+            of an arm of six joints or more.
+        ClockError: If its clock is none of a robot's log, or no sample is in the interval.
     """
     table, digest = found.table, Digest((path,))
     digest.start()
@@ -66,13 +69,8 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
         )
     signals["jacobian"] = Pick(signal="jacobian", cells=cells)
     picks = Picks(signals=tuple(signals.values()), clock=found.picks.clock, rate=found.picks.rate)
-    raw = picked(table, picks, ReadChoice())
-    t = np.asarray((raw.stamps - raw.stamps[0]) * raw.tick, dtype=np.float64)
-    check_clock(t, str(path))
-    for signal, values in raw.signals.items():
-        if not np.all(np.isfinite(values)):
-            row = int(np.argwhere(~np.isfinite(values))[0][0]) + 1
-            raise LogError(f"{path}: {signal} is not a number in sample {row}.")
+    raw = without_repeats(measured(picked(table, picks, ReadChoice()), path), path)
+    t = seconds(raw)
     start, stop = choice.interval or (-np.inf, np.inf)
     inside = (t >= start) & (t <= stop)
     if np.count_nonzero(inside) < 2:

@@ -16,7 +16,7 @@ from vftcli.readers.parts import episode_of
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, from_table
-from vftcli.signals.errors import LogError
+from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.letters import printable
 from vftcli.signals.remarks import Remark, fact
 
@@ -56,7 +56,9 @@ def read_document(file: LogFile, log: Any, request: ReadChoice) -> RawLog:  # no
         return read_arrays(file, columns_of(file, log, 1), (), request)
     rows = arrays_of_lists(file, {"rows": log})["rows"]
     if rows.ndim != 2:
-        raise LogError(f"{file.path}: a JSON list that is neither of objects nor of rows; no log.")
+        raise NoLogError(
+            f"{file.path}: a JSON list that is neither of objects nor of rows; no log."
+        )
     columns = {str(k): rows[:, k] for k in range(rows.shape[1])}
     return from_table(ArrayTable(path=file.path, columns=columns, headed=False), request)
 

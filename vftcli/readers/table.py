@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 from numpy.typing import NDArray
 
 from vftcli.readers.columns import SIGNALS, ColumnSpec, Item
-from vftcli.signals.errors import LogError
+from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.letters import printable
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import WrenchFrame
@@ -258,7 +258,8 @@ def checked(table: Table, picks: Picks) -> Picks:
     """Return the picks, or raise unless there are positions and all signals have their width.
 
     Raises:
-        LogError: If q is missing or a signal has another number of columns than q.
+        NoLogError: If q is missing.
+        LogError: If a signal has another number of columns than q.
     """
     joints = next((len(p.cells) for p in picks.signals if p.signal == "q"), 0)
     if joints == 0:
@@ -272,7 +273,7 @@ def checked(table: Table, picks: Picks) -> Picks:
                 table,
                 picks,
             )
-        raise LogError(
+        raise NoLogError(
             f"{table.path}: no joint positions (q) among {there}. Name their columns with "
             "--columns, as in q=joint_pos_{i}; a table without positions is no log of an arm "
             "(a reference goes to --reference file:PATH)."

@@ -39,6 +39,9 @@ PARTLY = 0.8
 CUTOFF = 6.0
 """Where the disturbance is low-passed before it is weighed. [Hz]"""
 
+HEARD = 2.0
+"""Of what lies farther away the filter lets e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13 through. [s]"""
+
 RATE = 30.0
 """Samples a second that are weighed."""
 
@@ -137,16 +140,30 @@ def columns(piece: FreePiece) -> tuple[Array, Array] | None:
     Returns:
         (S, n) [N·m] and (S, n, 4 + 2n).
     """
-    run = piece.run
-    t, terms, n = run.recording.t, run.terms, run.robot.joints
-    dq = run.recording.require("dq")
+    run, inside = piece.run, np.flatnonzero(piece.inside)
+    if inside.size == 0:
+        return None
+    step, n = median_step(run.recording.t), run.robot.joints
+    # Of an hour with one free cycle that cycle, and what the filter hears of the rest.
+    near = round(HEARD / step)
+    first, stop = max(0, int(inside[0]) - near), int(inside[-1]) + near + 1
+    t, p, mu, q, dq = (
+        values[first:stop]
+        for values in (
+            run.recording.t,
+            run.terms.p,
+            run.terms.mu,
+            run.recording.q,
+            run.recording.require("dq"),
+        )
+    )
     try:
-        smooth = zero_phase(t, np.hstack([derivative(t, terms.p) - terms.mu, dq]), CUTOFF)
+        smooth = zero_phase(t, np.hstack([derivative(t, p) - mu, dq]), CUTOFF)
     except (ClockError, ValueError):
         return None
-    used = np.flatnonzero(piece.inside)[:: max(1, int(1.0 / (RATE * median_step(t))))]
+    used = inside[:: max(1, int(1.0 / (RATE * step)))] - first
     A = np.zeros((len(used), n, 4 + 2 * n))
-    A[:, :, :4] = load_regressor(run.robot.chain, run.recording.q[used])
+    A[:, :, :4] = load_regressor(run.robot.chain, q[used])
     j = np.arange(n)
     A[:, j, 4 + j] = np.tanh(smooth[used][:, n:] / SIGN_SPEED)
     A[:, j, 4 + n + j] = 1.0

@@ -86,6 +86,15 @@ class RobotChoice:
             return robot.with_simulated_friction()
         return robot.without_friction() if self.friction == "none" else robot
 
+    def check(self) -> None:
+        """Load the robot that is named, if one is, with its payload.
+
+        Raises:
+            RobotError: If there is no such robot, or it has no such payload.
+        """
+        if self.name is not None:
+            self.named().with_payload(None if self.payload == DECLARED else self.payload)
+
     def named(self) -> Robot:
         """The robot of the name, as it is described; it must have one.
 

@@ -25,6 +25,10 @@ class UnknownFormatError(LogError):
     """No reader recognises the file, or more than one does."""
 
 
+class NoLogError(LogError):
+    """A file that can be read holds no motion of an arm."""
+
+
 class MissingSignalError(VftError):
     """A computation needs a signal that the log does not have."""
 
