@@ -63,10 +63,12 @@ def simulate_log(
     """
     from vftcli.cli.console import command_line, say, say_json, say_left_out
     from vftcli.outputs.simulation import free_path, log_folder, save
+    from vftcli.robots import load_robot
     from vftcli.signals.packages import check_installed
     from vftcli.simulation import load_scenario
     from vftcli.simulation.experiment import simulate_pair
     from vftcli.simulation.load import listing
+    from vftcli.simulation.writers import usual_format
 
     if scenario == "list":
         for name, title in listing():
@@ -78,6 +80,7 @@ def simulate_log(
         say(f"note: {words}")
     paths = [output, free_path(output)] if setup.pair else [output]
     log_folder(paths, force)
+    usual_format(setup, load_robot(setup.robot), experiment.log_format)  # refused before the run
     runs = simulate_pair(setup, experiment.seed, progress_bar())
     places = dict(zip(paths, runs, strict=True))
     files = [str(f) for f in save(places, experiment.log_format, force, command_line())]

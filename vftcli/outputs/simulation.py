@@ -78,7 +78,7 @@ def save(
     """
     from vftcli.simulation.writers import usual_format
 
-    formats = {path: usual_format(run, format) for path, run in runs.items()}
+    formats = {path: usual_format(run.scenario, run.robot, format) for path, run in runs.items()}
     with log_folder(runs, force) as folder:
         for path, run in runs.items():
             write_run(folder, path, run, formats[path], command)

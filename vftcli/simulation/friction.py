@@ -10,6 +10,7 @@ smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + a ln(1 + |q̇|/b) sign(q̇)
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -110,14 +111,14 @@ class TrueFriction:
         speed = np.abs(dq)
         torque = self.offset + (self.viscous + self.quadratic * speed) * dq
         slope = self.viscous + 2.0 * self.quadratic * speed
-        if self.logarithmic.any():
+        if self.has_logarithm:
             bend = self.logarithmic_velocity
             torque = torque + self.logarithmic * np.log1p(speed / bend) * np.sign(dq)
             slope = slope + self.logarithmic / (bend + speed)
         if len(self.bends):
             beyond = np.maximum(speed - self.bends, 0.0)
-            torque = torque + np.sum(self.bend_slopes * beyond, axis=0) * np.sign(dq)
-            slope = slope + np.sum(np.where(beyond > 0.0, self.bend_slopes, 0.0), axis=0)
+            torque = torque + np.add.reduce(self.bend_slopes * beyond) * np.sign(dq)
+            slope = slope + np.add.reduce(np.where(beyond > 0.0, self.bend_slopes, 0.0))
         if self.has_sigmoid:
             bell = 1.0 / (1.0 + np.exp(-self.slope * (dq + self.shift)))
             rest = 1.0 / (1.0 + np.exp(-self.slope * self.shift))
@@ -126,12 +127,17 @@ class TrueFriction:
         # The step treats the slope implicitly; a negative one would pump energy into the joint.
         return torque, np.maximum(slope, 0.0)
 
-    @property
+    @cached_property
     def is_loaded(self) -> bool:
         """Whether any joint rubs more under load; gravity is left out where none does."""
         return bool(self.load_coulomb.any())
 
-    @property
+    @cached_property
+    def has_logarithm(self) -> bool:
+        """Whether the friction of any joint rises as a logarithm."""
+        return bool(self.logarithmic.any())
+
+    @cached_property
     def has_sigmoid(self) -> bool:
         """Whether any joint has sigmoid friction; exponentials are left out where none has."""
         return bool(self.amplitude.any())

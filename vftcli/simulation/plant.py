@@ -110,6 +110,6 @@ class Plant:
         """Presliding friction at positions `q` (n,) [rad], which the play follows. (n,) [N·m]"""
         true = self.true_friction
         reach = true.presliding_length
-        self.centre = np.clip(self.centre, q - reach, q + reach)
+        self.centre = np.minimum(np.maximum(self.centre, q - reach), q + reach)
         torque: Array = true.presliding * (q - self.centre) / reach
         return torque

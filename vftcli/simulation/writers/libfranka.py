@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.experiment import Simulation
@@ -27,6 +28,19 @@ GROUPS = (
 """Column groups after time and success rate, with their widths."""
 
 
+def check_franka(robot: Robot) -> None:
+    """Refuse an arm that cannot log as a Franka arm does.
+
+    Raises:
+        ParameterError: If it has not seven joints.
+    """
+    if robot.joints != 7:
+        raise ParameterError(
+            f"robot {robot.name!r} has {robot.joints} joints and cannot log as a Franka arm; "
+            "choose rtde, rosbag2 or parquet with --as"
+        )
+
+
 def write_libfranka(path: Path, simulation: Simulation) -> None:
     """Write the log as `franka::logToCSV` does.
 
@@ -36,11 +50,7 @@ def write_libfranka(path: Path, simulation: Simulation) -> None:
     Raises:
         ParameterError: If the robot has not seven joints.
     """
-    if simulation.robot.joints != 7:
-        raise ParameterError(
-            f"robot {simulation.robot.name!r} has {simulation.robot.joints} joints and cannot log "
-            "as a Franka arm; choose rtde, rosbag2 or parquet with --as"
-        )
+    check_franka(simulation.robot)
     names = [f"{name}[{i}]" for name, width in GROUPS for i in range(width)]
     rows = np.array(simulation.measured.rows)
     table = franka_table(simulation)[rows]

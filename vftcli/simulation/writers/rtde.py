@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.packages import needed
@@ -113,14 +114,26 @@ def recipe(simulation: Simulation) -> list[str]:
     return [*RECIPES[name], *extra]
 
 
+def check_ur(robot: Robot) -> None:
+    """Refuse an arm that cannot log as a UR does.
+
+    Raises:
+        ParameterError: If it measures no motor currents, or has not six joints.
+    """
+    in_current = robot.torque_source == "current" and robot.torque_constant is not None
+    if not in_current or robot.joints != UR_JOINTS:
+        raise ParameterError(
+            f"robot {robot.name!r} has no motor currents or not six joints and cannot log in a UR "
+            "format; choose libfranka, rosbag2 or parquet with --as"
+        )
+
+
 def ur_columns(simulation: Simulation, names: Sequence[str]) -> dict[str, list[Any]]:
     """Columns of a UR log by name, every row of the log in it."""
     current, target_current = simulation.measured.current, simulation.vendor.target_current
-    if current is None or target_current is None or simulation.robot.joints != UR_JOINTS:
-        raise ParameterError(
-            f"robot {simulation.robot.name!r} has no motor currents or not six joints and cannot "
-            "log in a UR format; choose libfranka, rosbag2 or parquet with --as"
-        )
+    check_ur(simulation.robot)
+    assert current is not None
+    assert target_current is not None
     known = joint_fields(simulation, current, target_current)
     if any("TCP" in name or "tool" in name or "momentum" in name for name in names):
         known |= tool_fields(simulation)
