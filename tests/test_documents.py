@@ -14,6 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from vftcli.cli import COMMANDS, app
+from vftcli.signals.version import VERSION
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
@@ -74,6 +75,15 @@ def test_every_command_and_snippet_of_a_document_runs(path: Path) -> None:
 def test_all_documents_run_one_after_another_in_one_folder() -> None:
     for path in in_the_menu():
         run(path)
+
+
+def test_citation_and_changelog_state_the_version() -> None:
+    citation = (ROOT / "docs" / "citation.md").read_text("utf-8")
+    assert re.findall(r"^ *version\W+([\d.]+)", citation, re.MULTILINE) == [VERSION, VERSION]
+    changelog = (ROOT / "docs" / "changelog.md").read_text("utf-8")
+    newest = re.search(r"^## (.*)$", changelog, re.MULTILINE)
+    assert newest is not None
+    assert newest[1] == VERSION
 
 
 def test_every_page_is_in_the_index() -> None:
