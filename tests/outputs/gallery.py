@@ -164,13 +164,13 @@ def launch_touched() -> None:
 
     def playing(marked: tuple[float, float] | None) -> rrb.TimePanel:
         begin, end = marked or (0.0, 1.0)
-        ends = (round(1e9 * (begin + share * (end - begin))) for share in (0.45, 0.55))
+        ends = (round(1e9 * (begin + share * (end - begin))) for share in (0.35, 0.65))
         span = rrb.components.AbsoluteTimeRange(*ends)
         return rrb.TimePanel(
             timeline="t",
             state="collapsed",
             play_state="playing",
-            playback_speed=30.0,
+            playback_speed=20.0,
             loop_mode="selection",
             time_selection=span,
         )
