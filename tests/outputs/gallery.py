@@ -147,7 +147,10 @@ def page() -> str:
     for exhibit in EXHIBITS:
         typed = "\n".join(f"$ {command}" for command in exhibit.commands)
         parts.append(f"## {exhibit.title}\n\n```console\n{typed}\n```\n")
-        parts += [f"![{each.text}](pictures/{each.name}.png)\n" for each in exhibit.pictures]
+        parts += [
+            f"{each.text}.\n\n![{each.text}](pictures/{each.name}.png)\n"
+            for each in exhibit.pictures
+        ]
     return "\n".join(parts)
 
 
