@@ -75,7 +75,7 @@ EXHIBITS = (
             Picture(
                 "recording",
                 "circle/recording.rrd",
-                "The recording: the arm, its touched part in orange, the force over time, the contacts",
+                "The recording: the arm, its touched part in orange, the force over time",
             ),
             Picture(
                 "torque",
