@@ -5,6 +5,8 @@ import json
 import os
 import re
 import shlex
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from vftcli.cli import COMMANDS, app
+from vftcli.signals.version import VERSION
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
@@ -27,6 +30,25 @@ def commands(path: Path) -> list[str]:
     """The vftcli commands of a document's shell blocks, in order."""
     text = "\n".join(blocks(path, "sh")).replace("\\\n", " ")
     return re.findall(r"(?:^|&& (?:\S*/)?)(vftcli .*)$", text, re.MULTILINE)
+
+
+def in_the_menu() -> list[Path]:
+    """The README, then the pages as the index lists them."""
+    text = (ROOT / "docs" / "index.md").read_text("utf-8")
+    listed = dict.fromkeys(re.findall(r"\]\(([\w-]+\.md)\)", text))
+    return [ROOT / "README.md", *(ROOT / "docs" / name for name in listed)]
+
+
+def run(path: Path, *added: str) -> None:
+    """Run every command and snippet of a document; outputs get the options that are added."""
+    for command in commands(path):
+        words = shlex.split(command)[1:]
+        if {"-o", "--output"} & set(words):
+            words += added
+        result = CliRunner().invoke(app, words)
+        assert result.exit_code == 0, f"{command}\n{result.output}\n{result.exception!r}"
+    for snippet in blocks(path, "python"):
+        exec(compile(snippet, path.name, "exec"), {})
 
 
 @pytest.fixture
@@ -45,14 +67,39 @@ TO_RUN = [path for path in DOCUMENTS if commands(path) or blocks(path, "python")
 @pytest.mark.parametrize("path", TO_RUN, ids=lambda p: p.name)
 @pytest.mark.usefixtures("folder")
 def test_every_command_and_snippet_of_a_document_runs(path: Path) -> None:
-    for command in commands(path):
-        words = shlex.split(command)[1:]
-        if {"-o", "--output"} & set(words):
-            words.append("--force")
-        result = CliRunner().invoke(app, words)
-        assert result.exit_code == 0, f"{command}\n{result.output}\n{result.exception!r}"
-    for snippet in blocks(path, "python"):
-        exec(compile(snippet, path.name, "exec"), {})
+    run(path, "--force")
+
+
+@pytest.mark.statistical  # minutes
+@pytest.mark.usefixtures("folder")
+def test_all_documents_run_one_after_another_in_one_folder() -> None:
+    for path in in_the_menu():
+        run(path)
+
+
+def test_citation_and_changelog_state_the_version() -> None:
+    citation = (ROOT / "docs" / "citation.md").read_text("utf-8")
+    assert re.findall(r"^ *version\W+([\d.]+)", citation, re.MULTILINE) == [VERSION, VERSION]
+    changelog = (ROOT / "docs" / "changelog.md").read_text("utf-8")
+    newest = re.search(r"^## (.*)$", changelog, re.MULTILINE)
+    assert newest is not None
+    assert newest[1] == VERSION
+
+
+def test_every_page_is_in_the_index() -> None:
+    pages = set((ROOT / "docs").glob("*.md")) - {ROOT / "docs" / "index.md"}
+    assert pages == set(in_the_menu()[1:])
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_the_pages_build_as_a_site_without_a_warning(tmp_path: Path) -> None:
+    for package in ("sphinx", "myst_parser", "furo"):
+        pytest.importorskip(package, reason="no site is built: the extra docs is not installed")
+    build = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "docs", str(tmp_path)]
+    result = subprocess.run(build, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stderr) == (0, "")
+    menu = (tmp_path / "index.html").read_text("utf-8")
+    assert all(f'href="{page.stem}.html"' in menu for page in in_the_menu()[1:])
 
 
 @pytest.mark.usefixtures("folder")
