@@ -147,8 +147,8 @@ def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
         load: Absolute gravity torque. [N·m]
     """
     if term in shape.points:
-        torques = np.eye(len(shape.speeds))[shape.points.index(term)]
-        return bent_line(dq, np.array(shape.speeds), torques, smoothing=shape.smoothing)
+        torques = np.eye(len(shape.speeds))[shape.points.index(term)].tolist()
+        return bent_line(dq, shape.speeds, torques, smoothing=shape.smoothing)
     own = ("smoothing", "stribeck_velocity", "logarithmic_velocity")
     numbers = {name: getattr(shape, name) for name in own}
     return coulomb_logarithmic(
