@@ -1,6 +1,9 @@
 """Fixtures for all tests: the folders of real logs, or a skip that says why."""
 
 import os
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -27,3 +30,17 @@ def samples(logs: Path) -> Path:
     if not folder.is_dir():
         pytest.skip("the folder of samples is not beside VFT_LOGS")
     return folder
+
+
+@pytest.fixture(scope="session")
+def loaded() -> Callable[[str], set[str]]:
+    """What Python has loaded once some modules, as "a, b", are imported in a process of its own."""
+
+    def after(modules: str) -> set[str]:
+        script = f"import sys, {modules}\nprint(*sys.modules)"
+        command = [sys.executable, "-c", script]
+        return set(
+            subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+        )
+
+    return after

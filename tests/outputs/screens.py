@@ -36,16 +36,14 @@ class Screen(NamedTuple):
 
 
 SCREENS = {
-    "push_pose": Screen(
-        "vftcli report push_pose.csv --robot ur10e --free free_14harm.csv -o push",
-        {name: f"ur10e/{name}" for name in ("push_pose.csv", "free_14harm.csv")},
-        real=True,
-    ),
-    "load_14harm": Screen(
-        "vftcli report load_14harm.csv --robot ur10e --free free_14harm.csv -o load",
-        {name: f"ur10e/{name}" for name in ("load_14harm.csv", "free_14harm.csv")},
-        real=True,
-    ),
+    **{
+        log: Screen(
+            f"vftcli report {log}.csv --robot ur10e --free free_14harm.csv -o {folder}",
+            {name: f"ur10e/{name}" for name in (f"{log}.csv", "free_14harm.csv")},
+            real=True,
+        )
+        for log, folder in (("push_pose", "push"), ("load_14harm", "load"))
+    },
     "ur5_circle": Screen(
         "vftcli report ur5_circle.csv --robot ur5 --free 0.3:4 --reference two-cycle -o circle",
         {"ur5_circle.csv": "ur5_circle.csv"},

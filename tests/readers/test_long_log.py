@@ -171,3 +171,12 @@ def test_log_that_grows_is_refused(tmp_path: Path) -> None:
     assert long.long is not None
     with pytest.raises(LogError, match="changed while it was read"):
         list(long.long.blocks(100))
+
+
+def test_a_last_row_that_is_cut_is_told_as_of_the_whole(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    table().write_csv(path)
+    path.write_bytes(path.read_bytes()[:-5])
+    whole, long = both_ways(path)
+    check_same(whole, long, 7)
+    assert [remark.code for remark in long.source.remarks] == ["row-cut"]

@@ -50,6 +50,9 @@ Forces = Mapping[int, Mapping[str, Single]]
 Statistics = Mapping[str, NDArray[Any]]
 """Key of a statistic, as mean → its values. (width,)"""
 
+OfEpisodes = Mapping[int, Mapping[str, Statistics]]
+"""Episode → name of a column → its statistics."""
+
 
 class Dataset(Protocol):
     """A folder of episodes that a copy is made of."""
@@ -75,12 +78,7 @@ class Dataset(Protocol):
     ) -> None:
         """Write a data file with the columns added."""
 
-    def finish(
-        self,
-        columns: Sequence[ForceColumn],
-        statistics: Mapping[int, Mapping[str, Statistics]],
-        copy: Path,
-    ) -> None:
+    def finish(self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path) -> None:
         """Write the descriptions of the copy that tell of its columns.
 
         Args:

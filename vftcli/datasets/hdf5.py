@@ -2,10 +2,10 @@
 
 import os
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from vftcli.datasets.episodes import DataFile, ForceColumn, Forces, Statistics
+from vftcli.datasets.episodes import DataFile, ForceColumn, Forces, OfEpisodes
 from vftcli.readers.hdf5 import is_hdf5
 from vftcli.readers.hdf5_layouts import episode_places, episodes_in
 from vftcli.readers.reader import open_log
@@ -98,10 +98,5 @@ class Hdf5Dataset:
                     if column.elements:
                         data.attrs["names"] = list(column.elements)
 
-    def finish(
-        self,
-        columns: Sequence[ForceColumn],
-        statistics: Mapping[int, Mapping[str, Statistics]],
-        copy: Path,
-    ) -> None:
+    def finish(self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path) -> None:
         """Nothing: what there is to tell stands in the files."""

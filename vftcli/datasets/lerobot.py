@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.datasets.episodes import DataFile, ForceColumn, Forces, Statistics
+from vftcli.datasets.episodes import DataFile, ForceColumn, Forces, OfEpisodes, Statistics
 from vftcli.datasets.statistics import KEYS, pooled
 from vftcli.readers.columnar import EPISODE, guarded
 from vftcli.readers.lerobot import data_file, episodes_told, info_of, text_of
@@ -108,12 +108,7 @@ class LeRobotDataset:
                 arrays = [*table.columns, *values]
                 writer.write_table(pa.table(arrays, schema=schema), row_group_size=len(table) or 1)
 
-    def finish(
-        self,
-        columns: Sequence[ForceColumn],
-        statistics: Mapping[int, Mapping[str, Statistics]],
-        copy: Path,
-    ) -> None:
+    def finish(self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path) -> None:
         """Write info.json with the new features, and their statistics wherever others stand."""
         info = info_of(self.folder)
         fps = {"fps": info["fps"]} if is_third(info) and "fps" in info else {}
@@ -136,10 +131,7 @@ class LeRobotDataset:
             self._finish_lines(lines, columns, statistics, copy)
 
     def _finish_stats(
-        self,
-        columns: Sequence[ForceColumn],
-        statistics: Mapping[int, Mapping[str, Statistics]],
-        copy: Path,
+        self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path
     ) -> None:
         """Write stats.json, of the whole dataset."""
         stats = json.loads(text_of(self.folder / "meta" / "stats.json"))
@@ -151,11 +143,7 @@ class LeRobotDataset:
         write_json(copy / "meta" / "stats.json", stats)
 
     def _finish_episodes(
-        self,
-        path: Path,
-        columns: Sequence[ForceColumn],
-        statistics: Mapping[int, Mapping[str, Statistics]],
-        copy: Path,
+        self, path: Path, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path
     ) -> None:
         """Write a table of episodes with the statistics of the columns, where it has those."""
         pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
@@ -178,11 +166,7 @@ class LeRobotDataset:
         pq.write_table(table, target, compression="none" if codec == "uncompressed" else codec)
 
     def _finish_lines(
-        self,
-        path: Path,
-        columns: Sequence[ForceColumn],
-        statistics: Mapping[int, Mapping[str, Statistics]],
-        copy: Path,
+        self, path: Path, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path
     ) -> None:
         """Write episodes_stats.jsonl, the statistics of version 2.1."""
         lines = []

@@ -96,6 +96,7 @@ def differences(
         way = (rung.clock, rung.phase)
         if way not in laid:
             # One way of pairing after the other: of a long log two have no room at once.
+            laid.clear()
             laid = {way: laid_over(motion, clocks[rung.clock], phase=rung.phase)}
         for cutoff in cutoffs:
             yield difference(laid[way], name, cutoff)
@@ -127,10 +128,10 @@ def difference(laid: LaidOver, name: str, cutoff: float | None) -> Difference:
     if corrected:
         signal += at(known, laid.change)
     smooth = signal if cutoff is None else low_pass(motion.t[known], signal, cutoff)
+    error = error_model(laid, signal, smooth, corrected=corrected, cutoff=cutoff)
     tau = np.full_like(laid.torque, np.nan)
     for column, found in zip(tau.T, smooth.T, strict=True):
         column[known] = found
-    error = error_model(laid, signal, smooth, corrected=corrected, cutoff=cutoff)
     return Difference(name, cutoff, tau, error)
 
 
@@ -161,4 +162,5 @@ def most_certain(made: Iterable[Difference]) -> Climbed:
         share = float(np.mean((candidate.error.floor_moving / lowest)[trusted]))
         if share < WORTH * least:
             chosen, least = candidate, share
+        del candidate  # it has no room beside the next
     return Climbed(chosen, tuple(floors))
