@@ -1,7 +1,8 @@
 """Thresholds learned on the first half of long free logs, counted on the second: the bars.
 
     vftcli simulate ur5-circle --seed 31 --set trajectory.cycles=450 \
-        --set contacts.hand.begin=100000 -o free_31.parquet --as parquet
+        --set contacts.hand.begin=100000 --set friction.presliding=0 \
+        --as parquet -o free_31.parquet
     python tests/contacts/thresholds_run.py --robot ur5 free_31.parquet free_32.parquet
 
 Another seed is another arm, so that each log is learned and counted for itself. At 60 per hour and
