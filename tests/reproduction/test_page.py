@@ -51,7 +51,10 @@ def test_ours_stands_over_the_print(made) -> None:
 
 def test_page_and_text_have_every_item_and_what_failed(made, cheap) -> None:
     found, jobs = made
-    page, text = render_page(cheap, found, jobs), render_markdown(cheap, found, jobs)
+    page, text = (
+        render_page(cheap, found, jobs),
+        render_markdown(cheap, found, jobs, "vftcli reproduce cheap"),
+    )
     for name in found:
         assert f'<h2 id="{name}">' in page
         assert f"## {cheap.items[name].label}:" in text
@@ -60,6 +63,7 @@ def test_page_and_text_have_every_item_and_what_failed(made, cheap) -> None:
     assert "**Failed:** what fails, seed 2: nothing moved with 2" in text
     assert "| alpha | N | 2 | 3 | 4 (3 … 5) | 0.500 |" in text
     assert "- what works: seeds 1, 2, 3" in text
+    assert "Made by `vftcli reproduce cheap`." in text
     assert "src=" not in page  # nothing is loaded from anywhere
     assert "- what takes the time\n" in text
 

@@ -168,13 +168,15 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def render_markdown(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job]) -> str:
-    """The same in Markdown."""
+def render_markdown(
+    paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job], command: str
+) -> str:
+    """The same in Markdown, with the command that made it."""
     parts = [
         f"# {paper.name}, reproduced\n",
         f"{paper.title}. doi {paper.doi}.\n",
         "\n".join(paper.setting) + "\n",
-        f"Made by `vftcli reproduce {paper.name} -o DIR`.\n",
+        f"Made by `{command}`.\n",
         markdown(overview(found)),
         f"{RATIOS}\n",
     ]
@@ -212,7 +214,7 @@ def write_reproduction(
 ) -> None:
     """Write page, Markdown, figures where a form is asked for, and the seal."""
     folder.write(PAGE, render_page(paper, found, jobs))
-    folder.write(TEXT, render_markdown(paper, found, jobs))
+    folder.write(TEXT, render_markdown(paper, found, jobs, command))
     if form is not None:
         write_figures(folder, drawings(found), form)
     record = {
