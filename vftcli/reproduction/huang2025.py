@@ -220,9 +220,9 @@ ITEMS = {
         label="Fig. 4",
         title="Virtual against real sensor, UR5, flange axes: RMSE",
         verdict="partly: not every axis within the bound",
-        why="What is left is stiction of joints that stand still and the error of the profile, "
-        "largest where a force is told by one joint alone; the print blames the sensor's "
-        "own weight too, which a zero does not take off in every pose.",
+        why="Inside are f_x, f_z and m_z; what is left is stiction of joints that stand still "
+        "and the error of the profile, and the print blames the sensor's own weight too, "
+        "which a zero does not take off in every pose.",
         experiments=("sensor",),
         variants=(AS_PRINTED, CORRECTED, sensor.ZEROED, DISCRETE),
         lines=tuple(
@@ -274,10 +274,10 @@ ITEMS = {
         title="One force record, traditional and α 1 to 1.9",
         verdict="no: not like for like",
         why="All controllers see the same record, and of it what is above the threshold; after "
-        "the last release α 1.9 turns round a quarter of the printed 0.64 s earlier, and "
-        "the whole drag's peak comes as much or more earlier only where the record dips "
+        "the last release α 1.9 turns round 0.1 s earlier (0.2 s as printed), not 0.64 s, "
+        "and the whole drag's peak comes more than that earlier where the record dips "
         "below the threshold meanwhile, which lets the variable controller return; time "
-        "back goes with 1/α beyond 1.6 too.",
+        "back goes on falling with α beyond 1.6.",
         experiments=("drag",),
         variants=SEVERAL,
         lines=comparison_lines("0.64"),
@@ -299,8 +299,8 @@ ITEMS = {
         label="Fig. 10",
         title="One moment record, traditional and α 1 to 1.9",
         verdict="no: not like for like",
-        why="As for Fig. 7: after the last release the turn comes at most 0.13 s earlier, not "
-        "0.32 s; a larger advance of the whole drag's peak comes from dips of the record.",
+        why="As for Fig. 7: after the last release the turn comes 0.13 s earlier, not 0.32 s; "
+        "a larger advance of the whole drag's peak comes from dips of the record.",
         experiments=("twist",),
         variants=SEVERAL,
         lines=comparison_lines("0.32"),
