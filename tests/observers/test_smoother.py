@@ -140,3 +140,17 @@ def test_it_knows_more_than_the_filter(wandering: TermsOf) -> None:
     assert after is not None
     assert np.all(after[:-1] < before[:-1])
     np.testing.assert_allclose(after[-1], before[-1], rtol=1e-12)
+
+
+def test_a_gap_of_days_parts_a_log_into_two() -> None:
+    """Nothing is known across it: each part is what a log of its own gives, but near the gap."""
+    rng = np.random.default_rng(3)
+    t = STEP * np.arange(2000)
+    t[200:] += 1e6
+    p, mu = np.cumsum(rng.standard_normal((2000, 2)), axis=0) * STEP, np.zeros((2000, 2))
+    whole = smoother().estimate(DynamicsTerms(t=t, p=p, mu=mu))
+    late = smoother().estimate(DynamicsTerms(t=t[200:], p=p[200:], mu=mu[200:]))
+    assert np.all(np.isfinite(whole.tau))
+    assert np.all(np.isfinite(whole.sd))
+    # forgotten at 7 rad/s in 13 s: to e⁻⁹⁰ of what was there
+    np.testing.assert_allclose(whole.tau[1800:], late.tau[1600:], atol=1e-12)

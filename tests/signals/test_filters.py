@@ -93,6 +93,15 @@ def test_an_even_clock_keeps_both_ends() -> None:
     assert abs(np.diff(clock)[0] - 1.0) < 0.5 / len(clock) * 2
 
 
+def test_a_log_that_is_nearly_all_gap_is_refused_and_told_where_it_waits() -> None:
+    t = 0.01 * np.arange(200)
+    t[100:] += 1e6
+    with pytest.raises(ClockError, match=r"waits 1e\+06 s after t = 0.990 s"):
+        low_pass(t, np.zeros((200, 1)), 5.0)
+    t[100:] -= 1e6 - 10.0  # a pause of five times the log is filled
+    assert low_pass(t, np.ones((200, 1)), 5.0) == pytest.approx(np.ones((200, 1)))
+
+
 def test_what_is_differentiated_goes_through_a_steep_filter() -> None:
     """Order 4 a pass, three periods of the cutoff to settle; a slow clock leaves it as it is."""
     t = 0.01 * np.arange(500)

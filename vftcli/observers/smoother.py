@@ -92,7 +92,8 @@ class KalmanSmoother(Shown):
         model = self.filter.model(np.broadcast_to(terms.dt, (samples, 1)), n)
         gains = gain_sequence(model, self.filter.first_prior(settled), settled.gains.posterior)
         # L₁ = P⁻₁₁/S and R = S − P⁻₁₁, so S = R/(1 − L₁).
-        S = model.r / (1.0 - gains.l1)
+        with np.errstate(divide="ignore"):  # a gap of days leaves nothing known: L₁ = 1, S = ∞
+            S = model.r / (1.0 - gains.l1)
         F, g = error_filter(gains, model.a12, model.a22)
         d = self.filter.unexplained(terms)
         states = recursion(F, g * d[:, None], np.zeros((2, n)))

@@ -24,6 +24,10 @@ UNEVEN = 0.05
 is filtered as an even one."""
 
 
+MOSTLY_GAP = 100
+"""An even clock of more than so many times the log's samples would be filled with gaps alone."""
+
+
 def low_pass(
     t: Array, x: Array, cutoff: float, order: int = ORDER, settling: float | None = None
 ) -> Array:
@@ -102,8 +106,19 @@ def filter_columns(t: Array, x: Array, sections: Array, settling: float | None =
 
 
 def even_clock(t: Array, step: float) -> Array:
-    """Instants about `step` [s] apart from a clock's first sample to its last. (K,) [s]"""
-    return np.linspace(t[0], t[-1], max(2, round(float(t[-1] - t[0]) / step) + 1))
+    """Instants about `step` [s] apart from a clock's first sample to its last. (K,) [s]
+
+    Raises:
+        ClockError: If nearly all of them would lie in gaps.
+    """
+    samples = max(2, round(float(t[-1] - t[0]) / step) + 1)
+    if samples > MOSTLY_GAP * len(t):
+        after = int(np.argmax(np.diff(t)))
+        raise ClockError(
+            f"the log waits {t[after + 1] - t[after]:.4g} s after t = {t[after]:.3f} s, longer than "
+            f"{MOSTLY_GAP} times what it holds; take the part before or behind with --interval"
+        )
+    return np.linspace(t[0], t[-1], samples)
 
 
 def butterworth(
