@@ -115,7 +115,7 @@ def even_clock(t: Array, step: float) -> Array:
     if samples > MOSTLY_GAP * len(t):
         after = int(np.argmax(np.diff(t)))
         raise ClockError(
-            f"the log waits {t[after + 1] - t[after]:.4g} s after t = {t[after]:.3f} s, longer than "
+            f"the log waits {t[after + 1] - t[after]:.4g} s after t = {t[after]:.3f} s, over "
             f"{MOSTLY_GAP} times what it holds; take the part before or behind with --interval"
         )
     return np.linspace(t[0], t[-1], samples)
