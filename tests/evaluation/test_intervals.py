@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from vftcli.evaluation import paired_significance
+from vftcli.evaluation import evaluate, paired_significance
 from vftcli.evaluation.intervals import (
     LEAST_BLOCKS,
     MEMORY,
     MOST_BLOCKS,
-    block_length,
+    Resampled,
+    block_lengths,
     correlation_time,
     interval,
     resample,
@@ -18,6 +19,11 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 
 STEP = 0.008
+
+
+def drawn_from(squares: Array) -> Resampled:
+    """Draws in the longest blocks that a column asks for."""
+    return resample(squares, int(block_lengths(squares).max()))
 
 
 def autoregressive(rng: np.random.Generator, samples: int, decay: float) -> Array:
@@ -56,17 +62,28 @@ def test_correlation_time_of_a_known_process(decay: float) -> None:
 def test_blocks_follow_the_memory() -> None:
     rng = np.random.default_rng(1)
     white = rng.standard_normal((30_000, 1)) ** 2
-    assert block_length(white) == 30_000 // MOST_BLOCKS
+    assert block_lengths(white) == 30_000 // MOST_BLOCKS
     slow = np.repeat(rng.standard_normal((30, 1)) ** 2, 100, axis=0)
-    assert block_length(slow) == 3000 // LEAST_BLOCKS
+    assert block_lengths(slow) == 3000 // LEAST_BLOCKS
     middle = np.repeat(rng.standard_normal((3000, 1)) ** 2, 10, axis=0)
-    assert block_length(middle) == pytest.approx(10 * MEMORY, abs=50)
-    assert block_length(np.ones((5, 1))) == 1
+    assert block_lengths(middle) == pytest.approx(10 * MEMORY, abs=50)
+    assert block_lengths(np.ones((5, 1))) == 1
+
+
+def test_an_interval_does_not_depend_on_who_else_is_asked() -> None:
+    rng = np.random.default_rng(7)
+    t = STEP * np.arange(4000)
+    quick, slow = (autoregressive(rng, 4000, decay)[:, None] for decay in (0.5, 0.99))
+    zero = ExternalTorque(name="zero", t=t, tau=np.zeros((4000, 1)))
+    both = [ExternalTorque(name=name, t=t, tau=x) for name, x in (("q", quick), ("s", slow))]
+    ends = ["rmse_low_Nm", "rmse_high_Nm"]
+    alone = evaluate("log", both[:1], zero).select(ends).row(0)
+    assert evaluate("log", both, zero).select(ends).row(0) == alone
 
 
 def test_the_same_log_gives_the_same_interval() -> None:
     squares = autoregressive(np.random.default_rng(2), 3000, 0.9)[:, None] ** 2
-    first, second = resample(squares), resample(squares)
+    first, second = drawn_from(squares), drawn_from(squares)
     assert np.array_equal(first.draws, second.draws)
     assert first.draws.mean() == pytest.approx(squares.mean(), rel=0.02)  # 1000 draws
 
@@ -74,14 +91,14 @@ def test_the_same_log_gives_the_same_interval() -> None:
 def test_white_noise_has_the_textbook_interval() -> None:
     """RMSE of N white samples: relative standard deviation 1/√(2N)."""
     squares = np.random.default_rng(3).standard_normal((20_000, 1)) ** 2
-    drawn = resample(squares)
+    drawn = drawn_from(squares)
     low, high = interval(float(squares.mean()), drawn.draws[:, 0], drawn.blocks)
     width = (high - low) / np.sqrt(squares.mean())
     assert width == pytest.approx(2.0 * 1.96 / np.sqrt(2.0 * 20_000), rel=0.15)
 
 
 def test_a_perfect_estimate_has_no_interval() -> None:
-    drawn = resample(np.zeros((100, 1)))
+    drawn = drawn_from(np.zeros((100, 1)))
     assert np.isnan(interval(0.0, drawn.draws[:, 0], drawn.blocks)).all()
 
 
@@ -127,7 +144,7 @@ def test_intervals_cover_the_true_rmse(samples: int) -> None:
     covered = 0
     for _ in range(400):
         squares = estimation_error(rng, samples)[:, None] ** 2
-        drawn = resample(squares)
+        drawn = drawn_from(squares)
         low, high = interval(float(squares.mean()), drawn.draws[:, 0], drawn.blocks)
         covered += low <= true <= high
     assert 0.90 <= covered / 400 <= 0.98
@@ -162,8 +179,8 @@ def test_a_resampled_series_closes_to_a_ring() -> None:
     last, first = noise.copy(), np.roll(noise, 1, axis=0)
     last[-1], first[0] = 500.0, 500.0
     # 1000 draws of a mean of ~1.25 with a scatter of .25: told to .008, four times that allowed.
-    assert resample(last).draws.mean() == pytest.approx(last.mean(), abs=0.035)
-    assert resample(first).draws.mean() == pytest.approx(first.mean(), abs=0.035)
+    assert drawn_from(last).draws.mean() == pytest.approx(last.mean(), abs=0.035)
+    assert drawn_from(first).draws.mean() == pytest.approx(first.mean(), abs=0.035)
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.99, 0.9995])

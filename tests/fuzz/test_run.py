@@ -12,7 +12,7 @@ from child import BROKEN, MUTATORS, Attempt
 from seed_logs import SEEDS
 from tokens import Seed
 
-INPUTS = 40
+INPUTS = 20
 
 
 def test_a_short_run_finds_nothing() -> None:

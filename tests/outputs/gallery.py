@@ -1,6 +1,6 @@
 """Pictures of what vftcli makes: docs/gallery.md and docs/pictures are made by running commands.
 
-It needs the extras figures and browser, a Chromium, and xvfb-run for the recording.
+It needs the extras figures and browser, a Chromium, and xvfb-run and xdotool for the recording.
 Example: python tests/outputs/gallery.py
 """
 
@@ -21,6 +21,8 @@ LARGEST = 150_000
 """Bytes of a picture."""
 WINDOW = (1440, 800)
 """Pixels of the Rerun viewer."""
+HARDEST = (11.1, 11.5)
+"""Within the hardest contact of the recording that is shown. [s]"""
 HEAD = """# Gallery
 
 What the terminal, pages, recordings and figures look like. All logs here are simulated; those under
@@ -75,7 +77,7 @@ EXHIBITS = (
             Picture(
                 "recording",
                 "circle/recording.rrd",
-                "The recording: the arm, its touched part in orange, the force over time",
+                "The recording: the arm, the force where it is touched, and the force over time",
             ),
             Picture(
                 "torque",
@@ -155,7 +157,7 @@ def page() -> str:
 
 
 def launch_touched() -> None:
-    """Run vftcli; a recording plays the middle of its marked contact instead of resting at zero.
+    """Run vftcli; a recording plays the middle of the hardest contact instead of resting at zero.
 
     Rerun lets no file say where its time cursor stands, and at the first sample nothing touches the
     arm. The picture is taken within a second or so of its clock: the playing is quick.
@@ -166,14 +168,13 @@ def launch_touched() -> None:
     from vftcli.outputs import rerun_file
 
     def playing(marked: tuple[float, float] | None) -> rrb.TimePanel:
-        begin, end = marked or (0.0, 1.0)
-        ends = (round(1e9 * (begin + share * (end - begin))) for share in (0.35, 0.65))
-        span = rrb.components.AbsoluteTimeRange(*ends)
+        del marked
+        span = rrb.components.AbsoluteTimeRange(*(round(1e9 * t) for t in HARDEST))
         return rrb.TimePanel(
             timeline="t",
             state="collapsed",
             play_state="playing",
-            playback_speed=20.0,
+            playback_speed=100.0,
             loop_mode="selection",
             time_selection=span,
         )
@@ -241,7 +242,11 @@ def photograph_recording(recording: Path, path: Path) -> None:
     viewer = Path(sys.executable).parent / "rerun"
     words = ["--window-size", f"{width}x{height}", "--screenshot-to", str(path), str(recording)]
     place = ["xvfb-run", "-a", "-s", f"-screen 0 {width}x{height}x24"]
-    subprocess.run([*place, str(viewer), *words], check=True, capture_output=True)
+    # Where the pointer rests in the middle it opens a box over the arm.
+    aside = f"xdotool mousemove {width - 1} {height - 1} && exec " + shlex.join(
+        [str(viewer), *words]
+    )
+    subprocess.run([*place, "sh", "-c", aside], check=True, capture_output=True)
 
 
 def shrink(path: Path) -> None:

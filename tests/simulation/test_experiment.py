@@ -20,7 +20,7 @@ from vftcli.virtual_sensor.solvers import wrench_of
 
 EXACT = [
     *(f"mismatch.{k}=0" for k in ("mass", "com", "rotor_inertia", "friction", "torque_constant")),
-    "friction.stribeck=0",
+    *("friction.stribeck=0", "friction.presliding=0"),  # of both the profile knows nothing
 ]
 ELSEWHERE = """
 name = "many"

@@ -15,6 +15,7 @@ from vftcli.simulation.scenario import MismatchSpec
 UR5E = [
     *("robot=ur5e", "contacts=[]", "duration=12.0", "sensing.rate=125"),
     *(f"mismatch.{name}=0" for name in MismatchSpec.__dataclass_fields__),
+    "friction.presliding=0",
 ]
 
 

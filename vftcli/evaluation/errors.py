@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.intervals import Resampled, interval, resample
+from vftcli.evaluation.intervals import Resampled, block_lengths, interval, resample
 from vftcli.evaluation.significance import p_value
 from vftcli.signals.arrays import Array, Mask, number_array
 from vftcli.signals.errors import ParameterError, ShapeError
@@ -83,7 +83,10 @@ class Scored(NamedTuple):
         reference: (T,) [N·m]
         moving: Whether the joint moves, so that the reference may be relied on. (T,)
         floor: The reference's own error, NaN where it is not known. [N·m]
-        resampled: Bootstrap draws of the mean squared errors, one column an observer.
+        paired: Bootstrap draws of the mean squared errors, one column an observer, all in the same
+            blocks: for comparing observers.
+        own: The same of each observer in blocks of its own length, so that its interval does not
+            depend on who else is asked.
         lag: Best-fitting delay of each observer, NaN where nothing fits. (m,) [s]
         within: Samples whose error lies within each observer's 95 % band. (m,)
         banded: Samples in which it has a band and the joint moves: `within` is a part of them. (m,)
@@ -95,7 +98,8 @@ class Scored(NamedTuple):
     reference: Array
     moving: Mask
     floor: float
-    resampled: Resampled
+    paired: Resampled
+    own: tuple[Resampled, ...]
     lag: Array
     within: Array
     banded: Array
@@ -153,7 +157,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
         squares = x - y[:, None]
         squares *= squares
         np.nan_to_num(squares, copy=False)
-        draws = resample(squares) if len(squares) else Resampled(np.ones((1, len(names))), 0)
+        paired, own = draw_blocks(squares)
         yield Scored(
             names=names,
             joint=j + 1,
@@ -161,11 +165,26 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
             reference=y,
             moving=moving[known, j],
             floor=floor_over(reference, j, known),
-            resampled=draws,
+            paired=paired,
+            own=own,
             lag=lag[:, j],
             within=np.array([within[j] for within, _ in covered]),
             banded=np.array([banded[j] for _, banded in covered]),
         )
+
+
+def draw_blocks(squares: Array) -> tuple[Resampled, tuple[Resampled, ...]]:
+    """Bootstrap draws of mean squares, in the longest blocks and in each column's own.
+
+    Args:
+        squares: Squared errors, one column an observer. (T, m) [(N·m)²]
+    """
+    if not len(squares):
+        none = Resampled(np.ones((1, squares.shape[1])), 0)
+        return none, (none,) * squares.shape[1]
+    lengths = [int(length) for length in block_lengths(squares)]
+    own = tuple(resample(x[:, None], n) for x, n in zip(squares.T, lengths, strict=True))
+    return resample(squares, max(lengths)), own
 
 
 def floor_over(reference: ExternalTorque, joint: int, known: Mask) -> float:
@@ -257,9 +276,9 @@ def sizes(joint: Scored, k: int, error: Array, best: int) -> dict[str, object]:
         error: Its error. (T,) [N·m]
         best: The observer with the smallest one.
     """
-    draws = joint.resampled
+    own, paired = joint.own[k], joint.paired.draws
     square = float(np.mean(error**2))
-    low, high = interval(square, draws.draws[:, k], draws.blocks)
+    low, high = interval(square, own.draws[:, 0], own.blocks)
     return {
         "rmse_Nm": number(np.sqrt(square)),
         "rmse_low_Nm": number(low),
@@ -268,7 +287,7 @@ def sizes(joint: Scored, k: int, error: Array, best: int) -> dict[str, object]:
         "max_Nm": number(np.max(np.abs(error))),
         "correlation": number(correlation(joint.estimates[:, k], joint.reference)),
         "lag_s": number(joint.lag[k]),
-        "p_vs_best": 1.0 if k == best else p_value(draws.draws[:, k], draws.draws[:, best]),
+        "p_vs_best": 1.0 if k == best else p_value(paired[:, k], paired[:, best]),
     }
 
 

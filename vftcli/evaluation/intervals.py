@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.lag import sliding
@@ -44,19 +45,19 @@ class Resampled(NamedTuple):
     blocks: int
 
 
-def resample(squares: Array, seed: int = SEED) -> Resampled:
+def resample(squares: Array, length: int, seed: int = SEED) -> Resampled:
     """Mean squares of moving-block bootstrap repetitions; all columns share the same blocks.
 
-    Blocks of `MEMORY` correlation times are drawn with replacement from the series closed to a
-    ring, so that every sample counts alike (Politis and Romano's circular variant of Künsch's
-    moving blocks). Sums over blocks come from one cumulative sum.
+    Blocks of `MEMORY` correlation times (`block_lengths`) are drawn with replacement from the
+    series closed to a ring, so that every sample counts alike (Politis and Romano's circular
+    variant of Künsch's moving blocks). Sums over blocks come from one cumulative sum.
 
     Args:
         squares: Squared errors, one column an observer. (T, m) [(N·m)²]
+        length: Length of the blocks. [samples]
         seed: Of the block starts.
     """
     samples = len(squares)
-    length = block_length(squares)
     blocks = max(1, round(samples / length))
     starts = np.random.default_rng(seed).integers(0, samples, (REPETITIONS, blocks))
     picked = np.zeros((REPETITIONS, squares.shape[1]))
@@ -67,13 +68,13 @@ def resample(squares: Array, seed: int = SEED) -> Resampled:
     return Resampled(picked, blocks)
 
 
-def block_length(squares: Array) -> int:
-    """Length of the blocks: `MEMORY` times the longest correlation time. [samples]"""
+def block_lengths(squares: Array) -> NDArray[np.intp]:
+    """Length of the blocks for each column: `MEMORY` times its correlation time. (m,) [samples]"""
     samples = len(squares)
     longest = max(1, samples // LEAST_BLOCKS)
     shortest = min(longest, max(1, -(-samples // MOST_BLOCKS)))
-    wanted = int(np.ceil(MEMORY * np.max(correlation_time(squares))))
-    return int(np.clip(wanted, shortest, longest))
+    wanted = np.ceil(MEMORY * correlation_time(squares)).astype(np.intp)
+    return np.clip(wanted, shortest, longest)
 
 
 def correlation_time(x: Array) -> Array:

@@ -8,6 +8,7 @@ import polars as pl
 
 from vftcli.evaluation.errors import SCHEMA, Scored, scored, table
 from vftcli.evaluation.intervals import Resampled
+from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 
 POOLED = "pooled"
@@ -49,7 +50,6 @@ def together(parts: Sequence[Scored]) -> Scored:
     parts = [p for p in parts if len(p.reference)] or list(parts[:1])
     weight = np.array([len(p.reference) for p in parts], dtype=np.float64)
     share = weight / max(weight.sum(), 1.0)
-    draws = sum(w * p.resampled.draws for w, p in zip(share, parts, strict=True))
     lag = np.array([p.lag for p in parts])
     # A log in which no lag fits says nothing of it: the others' shares are weighed anew.
     weights = np.isfinite(lag) * share[:, None]
@@ -60,8 +60,15 @@ def together(parts: Sequence[Scored]) -> Scored:
         reference=np.concatenate([p.reference for p in parts]),
         moving=np.concatenate([p.moving for p in parts]),
         floor=float(np.sqrt(np.sum(share * np.array([p.floor for p in parts]) ** 2))),
-        resampled=Resampled(np.asarray(draws), sum(p.resampled.blocks for p in parts)),
+        paired=weighed([p.paired for p in parts], share),
+        own=tuple(weighed(each, share) for each in zip(*(p.own for p in parts), strict=True)),
         lag=mean_lag,
         within=np.sum([p.within for p in parts], axis=0),
         banded=np.sum([p.banded for p in parts], axis=0),
     )
+
+
+def weighed(parts: Sequence[Resampled], share: Array) -> Resampled:
+    """Draws of several logs as those of one; each log has a share of the samples. (L,)"""
+    draws = sum(w * p.draws for w, p in zip(share, parts, strict=True))
+    return Resampled(np.asarray(draws), sum(p.blocks for p in parts))

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.intervals import LEVEL, known_rows, resample
+from vftcli.evaluation.intervals import LEVEL, block_lengths, known_rows, resample
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 
@@ -40,7 +40,8 @@ def paired_significance(
         errors = errors[known_rows(errors)]
         if len(errors) < 2:
             continue
-        draws = np.sqrt(resample(errors**2).draws)
+        squares = errors**2
+        draws = np.sqrt(resample(squares, int(block_lengths(squares).max())).draws)
         observed = np.sqrt(np.mean(errors**2, axis=0))
         for a, b in combinations(range(len(estimates)), 2):
             difference = draws[:, a] - draws[:, b]

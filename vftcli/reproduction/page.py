@@ -176,7 +176,7 @@ def render_markdown(
         f"# {paper.name}, reproduced\n",
         f"{paper.title}. doi {paper.doi}.\n",
         "\n".join(paper.setting) + "\n",
-        f"Made by `{command}`.\n",
+        f"Made by `{command}`. `--only table1,fig7` makes some items, `--fast` one seed of each.\n",
         markdown(overview(found)),
         f"{RATIOS}\n",
     ]
