@@ -34,13 +34,13 @@ DRIFT = ("-0.43166", "-0.53348", "0.83768", "-0.16294", "0.13407", "0.09103")
 XI_1 = "ξ = 1"
 
 EXPERIMENTS = {
+    "drag": Experiment("the UR5 dragged, controller in the loop (ur5-drag)", control.drag),
+    "twist": Experiment("the UR5 twisted, controller in the loop (ur5-twist)", control.twist),
+    "bearing": Experiment("the Panda and the bearing (panda-bearing)", sensor.assembled_bearing),
     "circle": Experiment(
         f"the circle, tapped ({circle.SCENARIO})", circle.tapped_circle, (5, 1, 2, 3, 4)
     ),
     "sensor": Experiment("the UR5 dragged by a sensor (ur5-sensor)", sensor.dragged_sensor),
-    "drag": Experiment("the UR5 dragged, controller in the loop (ur5-drag)", control.drag),
-    "twist": Experiment("the UR5 twisted, controller in the loop (ur5-twist)", control.twist),
-    "bearing": Experiment("the Panda and the bearing (panda-bearing)", sensor.assembled_bearing),
     "release-ur5": Experiment(
         "a release of the UR5 from 0.3 m",
         partial(control.released, "ur5", 0, 0.3, control.ALPHAS),
@@ -51,6 +51,7 @@ EXPERIMENTS = {
     ),
     "time": Experiment("computing time", computing_time, (0,), alone=True),
 }
+"""The longest first: two processes then end at about the same time."""
 
 
 def each(

@@ -44,11 +44,15 @@ Result = RunResult | str
 
 
 def jobs_of(paper: Paper, names: Sequence[str], fast: bool) -> list[Job]:
-    """Every experiment that these items show, once a seed; only the first seed if `fast`."""
-    wanted = dict.fromkeys(e for name in names for e in paper.items[name].experiments)
+    """Every experiment that these items show, once a seed; only the first seed if `fast`.
+
+    They stand in the paper's order of experiments.
+    """
+    wanted = {e for name in names for e in paper.items[name].experiments}
     return [
         Job(paper.name, name, seed)
-        for name in wanted
+        for name in paper.experiments
+        if name in wanted
         for seed in paper.experiments[name].seeds[: 1 if fast else None]
     ]
 
