@@ -20,9 +20,9 @@ from vftcli.identification.training import (
     prepare_training,
 )
 from vftcli.identification.whole_arm import (
-    base_remark,
     check_size,
     initial_columns,
+    undetermined,
     whole_arm,
     with_links,
     with_vector,
@@ -215,7 +215,7 @@ def test_open_parameters_are_counted_without_friction(data, weights):
     layout, _ = initial_columns(data, fit_frictions(data, weights))
     many = whole_arm(data, "base").base
     all_open = many._replace(determined=(False,) * len(many.determined))
-    assert base_remark(all_open, layout).values["undetermined"] == 40
+    assert undetermined(all_open, layout) == (40, 40)
 
 
 def test_too_short_logs_are_refused(data, weights):

@@ -45,6 +45,9 @@ from vftcli.signals.remarks import Remark, caution, fact
 NARROW = 0.7
 """Share of undetermined base parameters from which on a motion tells the links too little."""
 
+MOST = 0.5
+"""The same where cross-validation takes the weakest pull, as on rounds of one motion."""
+
 
 def whole_arm(data: Training, method: str) -> MethodResult:
     """Identify all parameters of the arm together.
@@ -63,16 +66,10 @@ def whole_arm(data: Training, method: str) -> MethodResult:
     layout, start = initial_columns(data, fits)
     triangles = stack_training(refined, layout, start, weights)
     base = base_parameters(triangles, start)
-    remark = base_remark(base, layout)
-    narrow = remark.level == "caution"
-    if method == "base":
-        x = nearest_physical(triangles, start, TABLE if narrow else WEIGHTS[0])
-        remarks.append(fact("nearest-physical-model"))
-    else:
-        margin = NARROW_MARGIN if narrow else MARGIN
-        x, weight, errors = fit_consistent(triangles, start, margin)
-        remarks.append(fact("profile-pull", weight=weight, weights=sorted(errors)))
-    remarks.append(remark)
+    count, open_ones = undetermined(base, layout)
+    x, narrow, said = fit_links(triangles, start, method, open_ones / max(count, 1))
+    level = caution if narrow else fact
+    remarks += [said, level("undetermined-base-parameters", count=count, undetermined=open_ones)]
     if data.robot.payload is not None:
         remarks.append(fact("payload-in-link"))
     numbers = []
@@ -101,12 +98,41 @@ def whole_arm(data: Training, method: str) -> MethodResult:
     )
 
 
-def base_remark(base: BaseParameters, layout: ParameterColumns) -> Remark:
-    """How many base parameters the logs leave open; friction coefficients are not counted."""
+def undetermined(base: BaseParameters, layout: ParameterColumns) -> tuple[int, int]:
+    """How many base parameters there are and how many are open, friction not counted."""
     count = len(base.values) - (layout.size - layout.inertial - layout.rotors)
-    open_ones = sum(not known for known in base.determined[:count])
-    level = caution if open_ones > NARROW * count else fact
-    return level("undetermined-base-parameters", count=count, undetermined=open_ones)
+    return count, sum(not known for known in base.determined[:count])
+
+
+def fit_links(
+    triangles: Triangles, start: Array, method: str, share: float
+) -> tuple[Array, bool, Remark]:
+    """Fit the links by a method.
+
+    The rounds of one motion predict each other whatever the links are: cross-validation then finds
+    no use for the profile. Where most base parameters are open too, a table's pull is taken.
+
+    Args:
+        triangles: The stacked equations.
+        start: The profile's parameters. (size,)
+        method: "base" or "consistent".
+        share: Share of base parameters that the motion leaves open.
+
+    Returns:
+        The parameters (size,), whether the motion tells the links too little, and how it was done.
+    """
+    narrow, weight = share > NARROW, TABLE
+    if method == "consistent" or MOST < share <= NARROW:
+        margin = NARROW_MARGIN if narrow else MARGIN
+        x, weight, _ = fit_consistent(triangles, start, margin)
+    rounds = share > MOST and weight == WEIGHTS[0]
+    narrow |= rounds
+    if method == "base":
+        pull = TABLE if narrow else WEIGHTS[0]
+        return nearest_physical(triangles, start, pull), narrow, fact("nearest-physical-model")
+    if rounds:
+        x, weight = nearest_physical(triangles, start, TABLE), TABLE
+    return x, narrow, fact("profile-pull", weight=weight, weights=sorted(WEIGHTS))
 
 
 def stack_training(
