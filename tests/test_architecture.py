@@ -32,7 +32,6 @@ ORDER = (
     "admittance",
     "analysis",
     "outputs",
-    "datasets",
     "pipeline",
     "streaming",
     "proposal",
@@ -53,7 +52,7 @@ KNOWN = {("evaluation", "refinement")}
 FILES = (
     "batch/shipping.py",  # unpacks what was sent
     "cli/",  # asks before it overwrites
-    "datasets/",
+    "batch/datasets/",
     "outputs/",
     "readers/",
     "observers/settings.py",  # gains in a file of their own

@@ -16,7 +16,7 @@ from vftcli.batch import annotated_copy
 from vftcli.batch.annotated_copy import CopyChoice, annotate
 from vftcli.batch.annotation import ForceChoice
 from vftcli.batch.choice import WorkersChoice
-from vftcli.datasets.copying import partial_of
+from vftcli.batch.datasets.copying import partial_of
 from vftcli.observers.choice import ObserverChoice
 from vftcli.readers import recognise
 from vftcli.readers.reader import ReadChoice

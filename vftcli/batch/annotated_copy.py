@@ -19,9 +19,8 @@ from vftcli.batch.annotation import (
     force_columns,
 )
 from vftcli.batch.choice import WorkersChoice
-from vftcli.batch.engine import Outcome, begin, run_tasks
-from vftcli.datasets import Dataset, open_dataset
-from vftcli.datasets.copying import (
+from vftcli.batch.datasets import Dataset, open_dataset
+from vftcli.batch.datasets.copying import (
     RECORD,
     WORK,
     check_copy,
@@ -30,8 +29,9 @@ from vftcli.datasets.copying import (
     stored_rows,
     unfinished,
 )
-from vftcli.datasets.episodes import DataFile, ForceColumn, Single, Statistics
-from vftcli.datasets.statistics import statistics_of
+from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Single, Statistics
+from vftcli.batch.datasets.statistics import statistics_of
+from vftcli.batch.engine import Outcome, begin, run_tasks
 from vftcli.outputs.files import put_text
 from vftcli.outputs.log.run_record import to_json, versions
 from vftcli.outputs.seals import digest

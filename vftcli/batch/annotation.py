@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.analysis import Analysis
+from vftcli.batch.datasets.copying import put_rows, stored_rows
+from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Single
 from vftcli.batch.engine import begin
-from vftcli.datasets.copying import put_rows, stored_rows
-from vftcli.datasets.episodes import DataFile, ForceColumn, Single
 from vftcli.doctor.examiner import Examiner
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.lead import settling_samples

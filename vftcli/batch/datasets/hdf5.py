@@ -5,7 +5,7 @@ import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from vftcli.datasets.episodes import DataFile, ForceColumn, Forces, OfEpisodes
+from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Forces, OfEpisodes
 from vftcli.readers.hdf5 import is_hdf5
 from vftcli.readers.hdf5_layouts import episode_places, episodes_in
 from vftcli.readers.reader import open_log

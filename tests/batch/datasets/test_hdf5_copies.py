@@ -6,9 +6,9 @@ import h5py
 import numpy as np
 import pytest
 
-from vftcli.datasets import open_dataset
-from vftcli.datasets.episodes import ForceColumn
-from vftcli.datasets.hdf5 import Hdf5Dataset, files_below
+from vftcli.batch.datasets import open_dataset
+from vftcli.batch.datasets.episodes import ForceColumn
+from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below
 from vftcli.signals.errors import LogError
 
 TORQUE = ForceColumn("external_torque", ("a", "b"), {"units": "N·m", "causal": True})

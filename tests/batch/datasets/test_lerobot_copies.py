@@ -9,13 +9,13 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from vftcli.datasets import open_dataset
-from vftcli.datasets.episodes import ForceColumn
-from vftcli.datasets.lerobot import LeRobotDataset, with_features
-from vftcli.datasets.statistics import statistics_of
+from vftcli.batch.datasets import open_dataset
+from vftcli.batch.datasets.episodes import ForceColumn
+from vftcli.batch.datasets.lerobot import LeRobotDataset, with_features
+from vftcli.batch.datasets.statistics import statistics_of
 from vftcli.signals.errors import LogError
 
-FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "panda_episodes"
+FIXTURE = Path(__file__).parents[3] / "fixtures" / "panda_episodes"
 TORQUE = ForceColumn("external_torque", tuple(f"j{k}.external_torque" for k in range(7)), {"a": 1})
 VALID = ForceColumn("valid", (), {})
 COLUMNS = [TORQUE, VALID]

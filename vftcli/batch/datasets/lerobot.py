@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.datasets.episodes import DataFile, ForceColumn, Forces, OfEpisodes, Statistics
-from vftcli.datasets.statistics import KEYS, pooled
+from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Forces, OfEpisodes, Statistics
+from vftcli.batch.datasets.statistics import KEYS, pooled
 from vftcli.readers.columnar import EPISODE, guarded
 from vftcli.readers.lerobot import data_file, episodes_told, info_of, text_of
 from vftcli.signals.errors import LogError

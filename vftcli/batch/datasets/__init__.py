@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from vftcli.datasets.episodes import Dataset
-from vftcli.datasets.hdf5 import Hdf5Dataset, files_below, is_hdf5_file
-from vftcli.datasets.lerobot import LeRobotDataset
+from vftcli.batch.datasets.episodes import Dataset
+from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below, is_hdf5_file
+from vftcli.batch.datasets.lerobot import LeRobotDataset
 from vftcli.readers.lerobot import LEROBOT
 from vftcli.readers.reader import open_log
 from vftcli.signals.errors import LogError

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vftcli.datasets.episodes import Single, Statistics
+from vftcli.batch.datasets.episodes import Single, Statistics
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 """Keys of the quantiles."""

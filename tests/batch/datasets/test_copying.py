@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.datasets.copying import (
+from vftcli.batch.datasets.copying import (
     RECORD,
     WORK,
     check_copy,
