@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import vftcli.readers
+import vftcli.readers.reading
 from vftcli.readers.library import Library, absolute, labelled
 from vftcli.readers.reader import ReadChoice
 from vftcli.signals.identity import same_run
@@ -21,13 +21,13 @@ FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 def count(monkeypatch):
     """The paths that were really read, in order."""
     seen = []
-    read = vftcli.readers.read_chosen
+    read = vftcli.readers.reading.read_chosen
 
     def counted(path, *choice):
         seen.append(Path(path).name)
         return read(path, *choice)
 
-    monkeypatch.setattr(vftcli.readers, "read_chosen", counted)
+    monkeypatch.setattr(vftcli.readers.reading, "read_chosen", counted)
     return seen
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from vftcli.readers import lerobot, read_chosen, recognise
+from vftcli.readers import lerobot
 from vftcli.readers.bags.formats import ROS2
 from vftcli.readers.droid import DROID, TRAJECTORY
 from vftcli.readers.estimates import stored_observers
@@ -14,6 +14,7 @@ from vftcli.readers.json_file import JSON
 from vftcli.readers.library import absolute
 from vftcli.readers.opening import files_of
 from vftcli.readers.reader import LogFile, ReadChoice, Reader, open_log
+from vftcli.readers.reading import read_chosen, recognise
 from vftcli.signals.errors import LogError, NoLogError, UnknownFormatError
 
 TRUTH = ".truth.parquet"

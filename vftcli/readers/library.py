@@ -34,7 +34,7 @@ class Library:
         Raises:
             VftError: As `vftcli.readers.read` does, or if the interval holds no samples.
         """
-        from vftcli.readers import read_chosen
+        from vftcli.readers.reading import read_chosen
 
         choice, at, label = choice or ReadChoice(), absolute(path), self.label(path)
         read = replace(choice, interval=None)
@@ -55,7 +55,7 @@ class Library:
         Raises:
             LogError: If all episodes are chosen, of a log that has none.
         """
-        from vftcli.readers import episode_numbers, holds_episodes
+        from vftcli.readers.reading import episode_numbers, holds_episodes
 
         for path in paths:
             unasked = whole and choice.episode is None and holds_episodes(path, choice)

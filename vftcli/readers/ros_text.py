@@ -11,7 +11,7 @@ from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.tables import from_table
 from vftcli.signals.errors import LogError
 
-BAGPY = ("Time", "header.seq", "header.stamp.secs", "header.stamp.nsecs")
+MESSAGE_START = ("Time", "header.seq", "header.stamp.secs", "header.stamp.nsecs")
 """How the header of a table by bagpy's message_by_topic begins."""
 
 STAMP = 3
@@ -103,7 +103,7 @@ def header_cells(file: LogFile) -> Sequence[str]:
 def is_bagpy(file: LogFile) -> bool:
     """Whether a file is bagpy's table of a JointState topic."""
     cells = header_cells(file)
-    return tuple(cells[:4]) == BAGPY and "name" in cells and "position_0" in cells
+    return tuple(cells[:4]) == MESSAGE_START and "name" in cells and "position_0" in cells
 
 
 def is_rostopic(file: LogFile) -> bool:
@@ -117,24 +117,23 @@ def is_echo(file: LogFile) -> bool:
     return len(header_cells(file)) > STAMP and EchoTable(file).joints > 0
 
 
-READERS = (
-    Reader(
-        name="bagpy",
-        recognises=is_bagpy,
-        read=lambda file, request: read_table(TextTable(file), request),
-        describes=True,
-    ),
-    Reader(
-        name="rostopic",
-        recognises=is_rostopic,
-        read=lambda file, request: read_table(TextTable(file), request),
-        describes=True,
-    ),
-    Reader(
-        name="ros2-echo",
-        recognises=is_echo,
-        read=lambda file, request: read_table(EchoTable(file), request),
-        describes=True,
-    ),
+BAGPY = Reader(
+    name="bagpy",
+    recognises=is_bagpy,
+    read=lambda file, request: read_table(TextTable(file), request),
+    describes=True,
 )
-"""The layouts, one a tool."""
+
+ROSTOPIC = Reader(
+    name="rostopic",
+    recognises=is_rostopic,
+    read=lambda file, request: read_table(TextTable(file), request),
+    describes=True,
+)
+
+ROS2_ECHO = Reader(
+    name="ros2-echo",
+    recognises=is_echo,
+    read=lambda file, request: read_table(EchoTable(file), request),
+    describes=True,
+)

@@ -1,0 +1,193 @@
+"""Reading: a file, bag or dataset becomes a Recording. The content decides, never the name."""
+
+import sys
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from vftcli.readers.cleaning import RestartError, cleaned
+from vftcli.readers.long_log import long_recording
+from vftcli.readers.opening import Digest
+from vftcli.readers.parts import refuse_arm
+from vftcli.readers.reader import (
+    InOnePieceError,
+    LogFile,
+    RawLog,
+    ReadChoice,
+    Reader,
+    open_log,
+)
+from vftcli.readers.registry import READERS, TEXTS_OF_MAKERS
+from vftcli.readers.rows import without_unknown_rows
+from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
+from vftcli.signals.parsing import did_you_mean
+from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.remarks import warning
+
+COMPUTED_WITH = frozenset(("dq", *EFFORTS, "temperature"))
+"""Signals that an estimate is made of, beside time and positions; others are only examined."""
+
+
+def read(
+    path: str | Path,
+    *,
+    format: str | None = None,
+    columns: str | None = None,
+    signals: Collection[str] | None = None,
+    label: str = "",
+    episode: int | None = None,
+    arm: str | None = None,
+) -> Recording:
+    """Read a log, recognising its format by content unless one is named.
+
+    Args:
+        path: A file, a bag folder or a dataset's folder.
+        format: Name of a format in READERS.
+        columns: Which columns hold which signals, in the grammar of ``--columns``.
+        signals: Fields of Recording that are wanted; others may be left unread. None for all.
+        label: What to call it in tables; its file's name if "".
+        episode: Which episode of a file that holds several; its first, said in a remark, if None.
+        arm: Which arm of a log of two, ``left`` or ``right``.
+
+    Raises:
+        UnknownFormatError: If no format fits, or more than one.
+        LogError: If the file cannot be read as what it is, or has no such episode or arm.
+        ClockError: If its clock stands still, runs backwards or holds no samples.
+    """
+    wanted = frozenset(signals) if signals is not None else None
+    choice = ReadChoice(format=format, columns=columns, signals=wanted, episode=episode, arm=arm)
+    return read_chosen(path, choice, label)
+
+
+def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Recording:
+    """Read a log whole, as `read` does, in the way a choice says.
+
+    Raises:
+        VftError: As `read` does; also if all episodes are chosen, for this returns one.
+    """
+    if not isinstance(path, str | Path):
+        raise ParameterError(f"the log is {path!r}; expected the name of a file or folder")
+    path = Path(path)
+    if choice.all_episodes:
+        raise ParameterError(
+            f"{path}: --episode all is for commands that take several logs (compare, report, "
+            "contacts, thresholds, identify); name one: --episode K"
+        )
+    file = open_log(path)
+    reader = _reader(file, choice.format, choice.columns)
+    if choice.episode is not None and reader.episodes is None:
+        raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
+    if not reader.arms:
+        refuse_arm(path, choice)
+    digest = Digest((path,))
+    if "polars" not in sys.modules and reader.episodes is None:
+        digest.start()  # its import takes longer than the hash and leaves a core idle
+
+    def found(choice: ReadChoice = choice) -> RawLog:
+        with np.errstate(all="ignore"):  # what a damaged file holds is judged when it is cleaned
+            raw = reader.read(file, choice)
+            raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
+            return without_unknown_rows(raw) if choice.skips_unknown else raw
+
+    try:
+        raw = found()
+        if raw.rest is not None:
+            digest.start()
+            used = None if choice.signals is None else choice.signals & COMPUTED_WITH
+            again = partial(found, replace(choice, signals=used))
+            return long_recording(raw, again, path, reader.name, digest.hexdigest, label)
+    except InOnePieceError:
+        raw = found(replace(choice, blocks=False))
+    digest = Digest(raw.files) if raw.files else digest
+    if not raw.part:
+        digest.start()  # of one of many parts it may never be asked for
+    return cleaned(raw, path, reader.name, digest.hexdigest, label)
+
+
+def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
+    """The numbers of the episodes that a file holds, rising.
+
+    Raises:
+        LogError: If it is of a format without episodes.
+    """
+    file = open_log(Path(path))
+    reader = _reader(file, choice.format, choice.columns)
+    if reader.episodes is None:
+        raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
+    return reader.episodes(file)
+
+
+def holds_episodes(path: str | Path, choice: ReadChoice) -> bool:
+    """Whether a file holds several episodes."""
+    file = open_log(Path(path))
+    reader = _reader(file, choice.format, choice.columns)
+    return reader.episodes is not None and len(reader.episodes(file)) > 1
+
+
+def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> Recording:
+    """Read a log as `read` does; of a file that holds several recordings or arms, the first.
+
+    For examining a log, where looking at a part and saying so tells more than refusing.
+    """
+    choice = replace(choice or ReadChoice(), examining=True)
+    try:
+        return read_chosen(path, choice)
+    except RestartError as error:
+        segment = f"{choice.columns},segment=1" if choice.columns else "segment=1"
+        first = read_chosen(path, replace(choice, columns=segment))
+        told = warning("time-reset", restarts=len(error.rows), rows=list(error.rows))
+        remarks = (told, *first.source.remarks)
+        return replace(first, source=replace(first.source, remarks=remarks))
+
+
+def recognise(path: str | Path, choice: ReadChoice | None = None) -> Reader:
+    """Return the reader that a path's content calls for, or that is chosen.
+
+    Raises:
+        UnknownFormatError: If no format fits, or more than one.
+        LogError: If there is nothing at the path, or it cannot be opened.
+    """
+    choice = choice or ReadChoice()
+    return _reader(open_log(Path(path)), choice.format, choice.columns)
+
+
+def _reader(file: LogFile, name: str | None, columns: str | None) -> Reader:
+    """The reader that is named, or that the content calls for."""
+    if name is not None and name not in READERS:
+        raise UnknownFormatError(
+            f"no format {name!r}; known formats: {', '.join(READERS)}.{did_you_mean(name, READERS)}"
+        )
+    reader = READERS[name] if name else _recognise(file)
+    if columns is None:
+        return reader
+    if not reader.columns:
+        takers = ", ".join(r.name for r in READERS.values() if r.columns)
+        raise LogError(
+            f"{file.path}: --columns does not apply to {reader.name}, whose signals are known. "
+            f"It applies to {takers}."
+        )
+    whole = reader.general or reader.describes or not file.lines
+    return reader if whole else READERS["table"]
+
+
+def _recognise(file: LogFile) -> Reader:
+    """The one reader that knows the content; a general one only where no other does."""
+    for name in TEXTS_OF_MAKERS:
+        if (reader := READERS[name]).recognises(file):
+            return reader
+    from vftcli.readers.unrecognised import description, known_kind
+
+    # A general reader would take nearly any text, also that of a vendor: it is asked last.
+    found = [r for r in READERS.values() if not r.general and r.recognises(file)]
+    if not found and known_kind(file) is None:
+        found = [r for r in READERS.values() if r.general and r.recognises(file)]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        raise UnknownFormatError(f"{file.path}: not recognised as a log: {description(file)}.")
+    raise UnknownFormatError(
+        f"{file.path}: could be {' or '.join(r.name for r in found)}. Say which with --format."
+    )
