@@ -22,7 +22,7 @@ from vftcli.outputs.believability import (
     percent_words,
     resting,
 )
-from vftcli.outputs.screen import facts
+from vftcli.outputs.short_screen import facts
 from vftcli.robots import load_robot
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.external_torque import ExternalTorque

@@ -13,14 +13,12 @@ from vftcli.outputs.log.rmse_tables import blocks
 from vftcli.outputs.screen import (
     MOST_LINES,
     against,
-    facts,
     log_screen,
     logs_screen,
     mean_errors,
     mean_of,
-    short_screen,
-    written_lines,
 )
+from vftcli.outputs.short_screen import facts, short_screen
 from vftcli.signals.remarks import caution, fact, warning
 
 CANVAS = Canvas(width=80)
@@ -132,24 +130,6 @@ def test_results_made_anyway_say_so(analysis: Analysis) -> None:
     assert "MEANINGLESS" in short_screen(made, [], CANVAS)
 
 
-def test_the_short_screen_is_facts_answer_and_files(without_reference: Analysis) -> None:
-    text = short_screen(listed(without_reference, 2), ["out/  run.json"], CANVAS)
-    assert len(text.splitlines()) == 3
-    assert "2 contacts" in text
-    assert text.endswith("out/  run.json\n")
-
-
-def test_only_paths_that_exist_are_printed(tmp_path: Path) -> None:
-    (tmp_path / "run.json").write_text("{}")
-    lines = written_lines(tmp_path, ["index.html", "run.json"], Canvas(width=100))
-    assert "run.json" in "".join(lines)
-    assert "index.html" not in "".join(lines)
-    (tmp_path / "index.html").write_text("")
-    lines = written_lines(tmp_path, ["index.html"], Canvas(width=100), several=True)
-    assert "one folder a log" in " ".join(" ".join(lines).split())  # wherever the line breaks
-    assert any(line.startswith("Open: ") for line in lines)
-
-
 def named(analysis: Analysis, label: str, as_if, count: int = 1) -> Analysis:  # type: ignore[no-untyped-def]
     source = replace(analysis.recording.source, label=label, remarks=())
     made: Analysis = as_if(analysis, replace(analysis.recording, source=source))
@@ -195,10 +175,3 @@ def test_columns_stay_columns_in_ascii(analysis: Analysis) -> None:
     table = [line for line in text.splitlines() if line.rstrip().endswith(("good", "trust"))]
     assert len({line.rstrip().rindex(" ") for line in table}) == 1
     assert "link 2 ... link 6" in text
-
-
-def test_a_thousand_samples_a_second_are_written_out(analysis: Analysis) -> None:
-    t = np.arange(analysis.recording.samples) * 1e-3
-    fast = replace(analysis.recording, t=t)
-    run = replace(analysis.motion.log, recording=fast)
-    assert facts(replace(analysis, motion=replace(analysis.motion, log=run))).endswith("at 1000 Hz")

@@ -64,14 +64,11 @@ def estimate(
 
     from vftcli.batch.kinds import for_estimates
     from vftcli.cli.console import command_line, say_left_out
-    from vftcli.cli.jacobian import write_by_jacobian
-    from vftcli.cli.opening import open_made
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.estimates import estimate_files
     from vftcli.readers.table import JacobianError
 
-    load("vftcli.streaming", "vftcli.robots.profile", "numpy.ma", "numpy.fft")
-    load("vftcli.outputs.screen", "pyarrow")
+    load("vftcli.robots.profile", "vftcli.outputs.short_screen", "numpy.ma", "numpy.fft", "pyarrow")
     OutputFolder(output, force, estimate_files(written.extras)).check()
     choice = for_estimates(analysis.choice(library))
     try:
@@ -83,6 +80,8 @@ def estimate(
             {"command": command_line(), "choice": written, "force": force},
         )
     except JacobianError as found:
+        from vftcli.cli.jacobian import write_by_jacobian
+
         write_by_jacobian(log, found, choice, output, force=force, json=json)
         return
     say_left_out(estimate_files(written.extras))
@@ -91,6 +90,8 @@ def estimate(
     else:
         show_estimates(made, output, estimate_files(written.extras))
     if show:
+        from vftcli.cli.opening import open_made
+
         open_made(output)
 
 
@@ -114,7 +115,11 @@ def write_estimates(
         The analysis, and the record that was written.
     """
     from vftcli.outputs.log.estimates import write_estimate_folder, write_long_estimates
-    from vftcli.pipeline import analyse
+    from vftcli.pipeline import analyse, prepared
+
+    if recording.long is None:
+        made = analyse(*prepared(recording, choice), choice)
+        return made, write_estimate_folder(output, made, **how)
     from vftcli.streaming import BlockAnalysis, prepared_in_blocks
 
     recording, robot = prepared_in_blocks(recording, choice, whole)
@@ -128,7 +133,7 @@ def write_estimates(
 def show_estimates(made: "Analysis", output: Path, files: "Sequence[str]") -> None:
     """Print what was found in short, and what was written."""
     from vftcli.cli.console import canvas, say_analysis, show
-    from vftcli.outputs.screen import short_screen, written_lines
+    from vftcli.outputs.short_screen import short_screen, written_lines
 
     say_analysis(made)
     screen = canvas()

@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.places import ArmPart
-from vftcli.contacts.windows import ContactPrior
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.remarks import Remark
 from vftcli.signals.shown import UNKNOWN, Shown, joined, value_text
 
 if TYPE_CHECKING:
     import polars as pl
+
+    from vftcli.contacts.places import ArmPart
+    from vftcli.contacts.windows import ContactPrior
 
 Trust = Literal["good", "fair", "weak"]
 """How far a row may be believed."""
@@ -89,7 +90,7 @@ class Contact(Shown):
     mean_force: Array | None
     impulse: Array | None
     anywhere: tuple[float, float] | None
-    where: ArmPart
+    where: "ArmPart"
     lead: float | None
     places: tuple[int, ...]
     evidence: float | None
@@ -214,7 +215,7 @@ class ContactModel(Shown):
         block: Length of a block. [s]
     """
 
-    prior: ContactPrior | None
+    prior: "ContactPrior | None"
     noise_sd: Array
     error_sd: Array
     error_time: Array

@@ -28,6 +28,7 @@ from vftcli.outputs.force_bars import force_bars, forces_of_list
 from vftcli.outputs.grid import Column, Grid, significant, terminal
 from vftcli.outputs.log.rmse_tables import Block, blocks
 from vftcli.outputs.log.wrench_tables import contact_grids
+from vftcli.outputs.short_screen import answer_lines, doubt_lines, facts
 from vftcli.signals.letters import printable
 from vftcli.signals.remarks import sentence
 
@@ -77,13 +78,6 @@ def log_screen(
     return canvas.shown(text)
 
 
-def short_screen(analysis: Analysis, below: Sequence[str], canvas: Canvas) -> str:
-    """Facts, the answer and what was written."""
-    head = canvas.painted(facts(analysis), "bold")
-    lines = [head, *answer_lines(analysis, canvas), *doubt_lines(analysis), *below]
-    return canvas.shown("\n".join(lines)) + "\n"
-
-
 def list_screen(found: ContactList, canvas: Canvas, *, every: bool = False) -> str:
     """A list that was made earlier: its log, the answer, the rows."""
     head = f"{printable(found.recording)} · {found.duration:.1f} s · as listed when it was written"
@@ -91,26 +85,6 @@ def list_screen(found: ContactList, canvas: Canvas, *, every: bool = False) -> s
     rows = list_lines(found, None if every else MOST_ROWS, canvas)
     end = "Whether it can be believed, and |F| over time: vftcli contacts on the log itself"
     return canvas.shown("\n".join([*lines, *rows, "", end])) + "\n"
-
-
-def answer_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
-    """The answer in a sentence."""
-    lines = canvas.wrapped(printable(headline(analysis)), 2)
-    return [f"  {line.strip()}" for line in lines]
-
-
-def facts(analysis: Analysis) -> str:
-    """Which log, which arm and how well it fits, how long, how fast."""
-    recording, match = analysis.recording, own_match(analysis)
-    fit = ""
-    if match is not None:
-        left = percent_words(match.misfit)
-        fit = f" (fits {left})" if match.fits else f" (does not fit: {left} unexplained)"
-    span = f"{recording.duration:.1f} s"
-    if recording.samples > 1:
-        rate = 1.0 / recording.median_step
-        span += f" at {rate:.0f} Hz" if rate >= 100.0 else f" at {rate:.3g} Hz"
-    return " · ".join((printable(recording.name), f"{printable(analysis.robot.name)}{fit}", span))
 
 
 def bar_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
@@ -245,41 +219,6 @@ def mean_of(values: np.ndarray) -> float:
     """Mean of the numbers that are known, NaN without any."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else float("nan")
-
-
-def doubt_lines(analysis: Analysis) -> list[str]:
-    """What is said where results mean nothing and are made anyway."""
-    codes = [f.code for one in analysis.examinations for f in one.refusals()]
-    if not codes:
-        return []
-    return [f"MEANINGLESS unless this is wrong (--anyway): {', '.join(dict.fromkeys(codes))}"]
-
-
-def written_lines(
-    folder: Path,
-    names: Iterable[str],
-    canvas: Canvas,
-    open_with: str = "",
-    *,
-    several: bool = False,
-) -> list[str]:
-    """What was written, as far as it is there, and how to open it.
-
-    Args:
-        folder: Where it is.
-        names: Files that may be there, the most wanted first.
-        canvas: What the terminal can show.
-        open_with: The command that opens it, "" for the page itself.
-        several: Whether there is a sub-folder a log.
-    """
-    there = [name for name in names if (folder / name).exists()]
-    there += ["one folder a log"] * several
-    lines = canvas.wrapped(printable(f"{folder}/  {'  '.join(there)}"), 2)
-    page = folder / "index.html"
-    if open_with or page.exists():
-        what = f"{open_with} {folder}" if open_with else str(page)
-        lines.append(f"Open: {printable(what)}        More here: --details")
-    return lines
 
 
 def logs_screen(

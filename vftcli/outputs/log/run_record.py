@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.observers.auto_tuning import AutoTuned
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.observers.table import BEST
 from vftcli.outputs.contacts import contacts_record
@@ -219,8 +218,7 @@ def observer_record(observer: Observer, tuning: Tuning | None) -> dict[str, Any]
 def parameters(observer: Observer) -> dict[str, Any]:
     """An observer's parameters by name, as JSON can hold them."""
     # What ran is the observer inside, with the gains that the log chose.
-    if isinstance(observer, AutoTuned):
-        return parameters(observer.observer)
+    observer = getattr(observer, "observer", observer)
     if not is_dataclass(observer):
         return {}
     return {

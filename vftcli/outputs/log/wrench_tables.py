@@ -8,10 +8,10 @@ import polars as pl
 from vftcli.outputs.grid import Column, Grid
 from vftcli.outputs.log.rmse_tables import logs_of
 from vftcli.signals.wrench import AXES, unit_of
-from vftcli.virtual_sensor.zero import Drift
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
+    from vftcli.virtual_sensor.zero import Drift
 
 PaperBounds = Mapping[str, tuple[float, float]]
 """Label of a log → bounds [N, N·m] that the paper gives for the RMSE of this log's arm."""
@@ -87,7 +87,7 @@ def contact_grids(errors: pl.DataFrame) -> Iterator[Grid]:
         )
 
 
-def drift_grid(drifts: Iterable[Drift], spans: bool = False) -> Grid:
+def drift_grid(drifts: "Iterable[Drift]", spans: bool = False) -> Grid:
     """Zero drift per observer and axis, with five decimals as the paper prints it.
 
     Args:
