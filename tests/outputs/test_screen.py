@@ -1,7 +1,6 @@
 """One screen: facts, answer, bars, table, whether it can be believed, what was written."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest

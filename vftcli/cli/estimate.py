@@ -44,8 +44,8 @@ def estimate(
     from vftcli.cli.background import Background, load
     from vftcli.readers.estimates import refuse_estimates
     from vftcli.readers.library import Library
+    from vftcli.signals.names import EXAMINED
     from vftcli.signals.packages import check_installed
-    from vftcli.signals.recording import EXAMINED
 
     written = also.choice(csv=csv, rrd=rrd or show)
     if "rrd" in written.extras:

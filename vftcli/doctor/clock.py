@@ -5,7 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from vftcli.doctor.velocity import VelocityFit, common_factor, is_clock, time_unit
-from vftcli.signals.recording import JOINT_SIGNALS, Recording
+from vftcli.signals.names import JOINT_SIGNALS
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
 
 SLOW_RATE = 50.0

@@ -11,7 +11,8 @@ from vftcli.doctor.signals import signal_findings, unusable_findings
 from vftcli.doctor.temperature import temperature_findings
 from vftcli.doctor.velocity import velocity_fit
 from vftcli.robots import Robot
-from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.names import EFFORTS
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 from vftcli.signals.shown import Shown
 

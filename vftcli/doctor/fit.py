@@ -17,7 +17,8 @@ from vftcli.doctor.windows import Windows, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.pairing import paired
 from vftcli.signals.errors import RobotError
-from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.names import EFFORTS
+from vftcli.signals.recording import Recording
 
 CLOSE = 1.3
 """Profiles whose misfits differ by less than this factor are not told apart."""

@@ -8,7 +8,8 @@ from vftcli.doctor.findings import on_joints
 from vftcli.doctor.stuck import stuck_findings
 from vftcli.doctor.velocity import VelocityFit, velocity_findings
 from vftcli.signals.arrays import Array
-from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.names import EFFORTS
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
 
 MOVING = 1e-3

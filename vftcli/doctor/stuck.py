@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from vftcli.doctor.findings import on_joints
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.names import EFFORTS
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
 
 LONG = 0.5

@@ -4,8 +4,7 @@ Facts, the answer in a sentence, |F| over time, the contacts, whether it can be 
 against a reference, and what was written: forty lines at most, whatever the number of logs.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -16,11 +15,8 @@ from vftcli.outputs.believability import (
     SEVERITY,
     Ground,
     grounds,
-    headline,
     health,
     otherwise,
-    own_match,
-    percent_words,
 )
 from vftcli.outputs.canvas import Canvas
 from vftcli.outputs.contacts import MOST_ROWS, answer, contact_grid, hardest_rows, hardest_words

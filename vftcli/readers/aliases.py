@@ -22,7 +22,7 @@ from vftcli.readers.table import (
     pick_of,
 )
 from vftcli.signals.errors import LogError
-from vftcli.signals.recording import EFFORTS
+from vftcli.signals.names import EFFORTS
 from vftcli.signals.remarks import fact
 
 CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "%time", "seconds")

@@ -9,7 +9,8 @@ from vftcli.readers.cleaning import cleaned
 from vftcli.readers.reader import RawLog
 from vftcli.signals.arrays import number_array
 from vftcli.signals.errors import MissingSignalError, ShapeError
-from vftcli.signals.recording import JOINT_SIGNALS, Recording
+from vftcli.signals.names import JOINT_SIGNALS
+from vftcli.signals.recording import Recording
 
 
 def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Recording:

@@ -8,7 +8,7 @@ from vftcli.readers.columns import SIGNALS, parse_columns
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
-from vftcli.signals.recording import EFFORTS
+from vftcli.signals.names import EFFORTS
 from vftcli.signals.remarks import fact
 
 UR_NAMES = (

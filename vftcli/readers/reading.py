@@ -23,8 +23,9 @@ from vftcli.readers.reader import (
 from vftcli.readers.registry import READERS, TEXTS_OF_MAKERS
 from vftcli.readers.rows import without_unknown_rows
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
+from vftcli.signals.names import EFFORTS
 from vftcli.signals.parsing import did_you_mean
-from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import warning
 
 COMPUTED_WITH = frozenset(("dq", *EFFORTS, "temperature"))

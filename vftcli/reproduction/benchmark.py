@@ -25,7 +25,8 @@ from vftcli.reproduction.yardsticks import analytic_script, literal_script, rnea
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array
-from vftcli.signals.recording import EFFORTS, EXAMINED, Recording
+from vftcli.signals.names import EFFORTS, EXAMINED
+from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
 

@@ -7,8 +7,9 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.transmission import joint_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, RobotError
+from vftcli.signals.names import EFFORTS
 from vftcli.signals.parsing import check_kind
-from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.recording import Recording
 
 CONSTANT_SD, SENSOR_SD = 0.03, 0.01
 """How well drive constants and torque sensors are known: a weighed 2.805 kg reads 2.88 kg through

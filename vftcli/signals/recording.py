@@ -8,6 +8,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, check_clock, check_series, check_shape, handed_over, seal
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
+from vftcli.signals.names import COLUMN_NAMES, EFFORTS, JOINT_SIGNALS, MEANINGS
 from vftcli.signals.remarks import fact
 from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown, frame_of, per_joint
@@ -17,38 +18,6 @@ from vftcli.signals.wrench import WrenchFrame, per_axis
 
 if TYPE_CHECKING:
     import polars as pl
-
-MEANINGS = {
-    "q": "joint positions",
-    "dq": "joint velocities",
-    "current": "motor currents",
-    "torque": "joint torques",
-    "torque_without_gravity": "joint torques without gravity's",
-    "target_q": "target positions",
-    "target_dq": "target velocities",
-    "target_current": "target currents",
-    "target_torque": "target torques",
-    "tau_ext": "vendor estimates of the external torque",
-    "temperature": "joint temperatures",
-    "wrench": "wrenches",
-}
-"""Fields of a Recording that hold a signal → what that is."""
-
-JOINT_SIGNALS = tuple(name for name in MEANINGS if name != "wrench")
-"""Those of them that hold one column a joint."""
-
-
-COLUMN_NAMES = {"torque": "tau"}
-"""Signals whose columns in tables are called otherwise than the field of a Recording."""
-
-EFFORTS = ("current", "torque", "torque_without_gravity")
-"""Those that say what the drives do; a log has one of them or several."""
-
-EXAMINED = frozenset(
-    ("dq", *EFFORTS, "target_dq", "target_current", "target_torque", "tau_ext", "temperature")
-)
-"""Signals that an examination looks at beside time and positions."""
-
 
 Change = Callable[["Recording"], "Recording"]
 """What is done to one block of a long log after another."""

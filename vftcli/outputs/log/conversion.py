@@ -16,7 +16,8 @@ from vftcli.outputs.log.mcap_output import (
 from vftcli.readers.bags.ros_messages import Value, in_parts
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import OutputError
-from vftcli.signals.recording import COLUMN_NAMES, JOINT_SIGNALS, Recording
+from vftcli.signals.names import COLUMN_NAMES, JOINT_SIGNALS
+from vftcli.signals.recording import Recording
 
 
 def convert(recording: Recording, path: Path, *, force: bool = False) -> None:
