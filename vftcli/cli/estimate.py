@@ -41,9 +41,9 @@ def estimate(
 
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5 -o out
     """
-    from vftcli.cli.background import Background, load
+    from vftcli.readers.ahead import Ahead
     from vftcli.readers.estimates import refuse_estimates
-    from vftcli.readers.library import Library
+    from vftcli.signals.background import Background, load
     from vftcli.signals.names import EXAMINED
     from vftcli.signals.packages import check_installed
 
@@ -53,13 +53,20 @@ def estimate(
     # Of a large log only the columns that are looked at are read; outputs show the others too.
     causal = analysis.observers.causal or analysis.contacts.no_contacts
     signals = EXAMINED if causal and not (analysis.wrench.asks or written.extras) else None
-    library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
+    if analysis.reading.columns is None:
+        refuse_estimates(log)
+    recognised = analysis.reading.columns is None and analysis.reading.format is None
+    ahead = Ahead.of(log, signals) if recognised else None
+
+    # From here on the log is being parsed: what follows loads NumPy, and all the rest.
+    from vftcli.readers.library import Library
+
+    library = Library([log])
+    chosen = replace(analysis.reading.choice(), signals=signals, ahead=ahead)
     # What needs no complete log comes in blocks, so that memory does not grow with it.
     chosen = replace(
         chosen, blocks=causal and set(written.extras) <= {"csv"} and not chosen.interval
     )
-    if chosen.columns is None:
-        refuse_estimates(log)
     reading = Background(lambda: library.open(log, chosen))
 
     from vftcli.batch.kinds import for_estimates

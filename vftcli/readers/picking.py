@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from vftcli.readers.opening import WHOLE_ROWS
 from vftcli.readers.reader import RawLog, ReadChoice
-from vftcli.readers.table import WHOLE_ROWS, Column, LongTable, Pick, Picks, Table
+from vftcli.readers.table import Column, LongTable, Pick, Picks, Table
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.series import median_step

@@ -10,6 +10,7 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Self
 
+from vftcli.readers.ahead import Ahead
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
 from vftcli.signals.arrays import Array, Indices
@@ -29,12 +30,14 @@ class LogFile:
         head: The first bytes of the content, after gzip or zstd were taken off; empty for a folder.
         entries: Names in the folder, sorted; empty for a file.
         wrapping: What the file is compressed with as a whole, or None.
+        ahead: Its table that is being parsed already, or None.
     """
 
     path: Path
     head: bytes = b""
     entries: tuple[str, ...] = ()
     wrapping: Wrapping | None = None
+    ahead: Ahead | None = field(default=None, repr=False, compare=False)
 
     @property
     def is_folder(self) -> bool:
@@ -197,6 +200,7 @@ class ReadChoice:
         blocks: Whether a long log may come in blocks, where its format allows it.
         skips_unknown: Whether rows with a value that is no number are left out and said, not
             refused.
+        ahead: A log that is being parsed already, or None.
 
     Raises:
         ParameterError: If the effort, the derived signal or the arm is none of these.
@@ -214,6 +218,7 @@ class ReadChoice:
     examining: bool = False
     blocks: bool = False
     skips_unknown: bool = False
+    ahead: Ahead | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.arm is not None:

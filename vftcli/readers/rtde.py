@@ -10,35 +10,19 @@ from vftcli.readers.aliases import vector_picks
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.picking import picked
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.rtde_names import CLOCK, JOINT_COLUMNS, PAYLOAD
 from vftcli.readers.table import Cell, Pick, Picks, Table, checked
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import WrenchFrame
 
-JOINT_COLUMNS = {
-    "q": "actual_q",
-    "dq": "actual_qd",
-    "current": "actual_current",
-    "torque_without_gravity": "actual_current_as_torque",
-    "target_q": "target_q",
-    "target_dq": "target_qd",
-    "target_current": "target_current",
-    "target_torque": "target_moment",
-    "temperature": "joint_temperatures",
-    "wrench": "actual_TCP_force",
-}
-"""Field of Recording → RTDE's name; all have six elements, name_0 to name_5."""
-
-CLOCK = "controller clock (timestamp, seconds since power-on)"
+CLOCK_WORDS = "controller clock (timestamp, seconds since power-on)"
 CB3_CYCLE = 8e-3
 """Cycle of a CB3 controller, which its time stamps count; an e-Series has 2 ms. [s]"""
 
 E_SERIES_FIELD = "ft_raw_wrench_0"
 """What only a controller with a sensor on the flange sends."""
-
-PAYLOAD = ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2")
-"""The payload that the controller was told of; its last value counts."""
 
 BINARY_TYPES = {
     b"DOUBLE": ">f8",
@@ -58,7 +42,7 @@ def read_rtde(table: Table, request: ReadChoice) -> RawLog:
         LogError: If there is no timestamp or no actual_q.
     """
     names = table.names or ()
-    if "timestamp" not in names:
+    if CLOCK not in names:
         raise LogError(
             f"{table.path}: no timestamp among {len(names)} columns. Record it, or state the rate: "
             "--format table --columns 't@125Hz,q=actual_q_{i},dq=actual_qd_{i},"
@@ -66,7 +50,7 @@ def read_rtde(table: Table, request: ReadChoice) -> RawLog:
         )
     picks = Picks(
         signals=vector_picks(table, JOINT_COLUMNS, range(6)),
-        clock=Pick(signal="t", cells=(Cell(names.index("timestamp")),), unit="s"),
+        clock=Pick(signal="t", cells=(Cell(names.index(CLOCK)),), unit="s"),
         constants=tuple(names.index(name) for name in PAYLOAD if name in names),
     )
     if not any(pick.signal == "q" for pick in picks.signals):
@@ -74,7 +58,7 @@ def read_rtde(table: Table, request: ReadChoice) -> RawLog:
             f"{table.path}: no actual_q_0 … actual_q_5 among its {len(names)} columns. Add "
             "actual_q to the recipe and record again."
         )
-    raw = picked(table, checked(table, picks), request, clock_name=CLOCK)
+    raw = picked(table, checked(table, picks), request, clock_name=CLOCK_WORDS)
     raw = replace(raw, wrench_frame=force_frame(names, raw.stamps * raw.tick))
     return raw.told_payload(raw.constants)
 

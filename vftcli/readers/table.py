@@ -17,9 +17,6 @@ from vftcli.signals.wrench import WrenchFrame
 JACOBIAN = re.compile(r"(?i)jac(obian)?_(\d)_(\d)")
 """A cell of a Jacobian among the columns: row, then column."""
 
-WHOLE_ROWS = 100_000
-"""A log of no more rows is read in one piece: there is memory for all that is done with it."""
-
 Column = NDArray[Any]
 """One column as it is stored: (T,) numbers, or (T, k) for a column of lists."""
 

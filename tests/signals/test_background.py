@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from vftcli.cli.background import Background, load
+from vftcli.signals.background import Background, load
 
 
 def test_the_result_or_the_error_comes_when_it_is_asked_for() -> None:
