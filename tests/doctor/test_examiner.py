@@ -38,7 +38,7 @@ def test_a_log_is_examined_once_for_an_arm() -> None:
     examiner, log = Examiner(), excited()
     first = examiner.examine(log, UR5E)
     assert examiner.examine(log, UR5E) is first
-    assert examiner.examine(log, load_robot("ur5e")) is not first
+    assert examiner.examine(log, replace(UR5E)) is not first
     assert examiner.examinations[0] is first
 
 

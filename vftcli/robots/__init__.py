@@ -1,6 +1,7 @@
 """Robots: the built-in profiles, and the loaders of users' own files."""
 
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 from vftcli.robots.chain import Chain, Payload
@@ -47,6 +48,14 @@ def same_model(name: str) -> list[str]:
     return [profile for profile in PROFILES if model(profile) == model(name)]
 
 
+@cache
+def built_in(path: Path) -> Robot:
+    """The robot of a built-in profile, made once: it does not change."""
+    from vftcli.robots.profile import load_profile
+
+    return load_profile(path)
+
+
 def load_robot(robot: str | Path, *, tip: str = "", arguments: Sequence[str] = ()) -> Robot:
     """Load a robot by profile name, from a robot file (TOML) or a description (URDF, xacro, MJCF).
 
@@ -63,11 +72,13 @@ def load_robot(robot: str | Path, *, tip: str = "", arguments: Sequence[str] = (
     path = PROFILES.get(plain_name(str(robot)), Path(robot))
     ending = path.suffix.lower()
     if ending == ".toml":
-        from vftcli.robots.profile import load_profile
-
         for option, given in (("--tip", tip), ("--robot-arg", arguments)):
             if given:
                 raise RobotError(f"{option} is for a URDF, xacro or MJCF; {robot} is a robot file")
+        if path in PROFILES.values():
+            return built_in(path)
+        from vftcli.robots.profile import load_profile
+
         return load_profile(path)
     if ending in DESCRIPTIONS:
         from vftcli.robots.described import load_described

@@ -101,7 +101,14 @@ def frame_of(columns: Iterable[tuple[str, Any]]) -> "pl.DataFrame":
     """A polars frame of named columns; what is not known is null."""
     import polars as pl
 
-    table = pl.DataFrame(dict(columns))
+    given = dict(columns)
+    table = pl.DataFrame(given)
     # Only columns that need it: to fill all of a long log takes longer than to write it.
-    unknown = [s.name for s in table if s.dtype == pl.Float64 and s.is_nan().any()]
+    unknown = [s.name for s in table if s.dtype == pl.Float64 and has_nan(given[s.name])]
     return table.with_columns(pl.col(unknown).fill_nan(None)) if unknown else table
+
+
+def has_nan(values: Any) -> bool:  # noqa: ANN401 - of an array, or what makes one
+    """Whether any number is NaN: the lowest is, then."""
+    numbers = np.asarray(values, dtype=np.float64)  # of what is not known, None, NaN
+    return bool(numbers.size and np.isnan(numbers.min()))
