@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from vftcli.outputs.files import OutputFolder
-from vftcli.outputs.grid import DASH
+from vftcli.outputs.grid import DASH, terminal
 from vftcli.reproduction.jobs import gather, jobs_of, run_jobs
 from vftcli.reproduction.page import (
     beside_print,
@@ -13,6 +13,7 @@ from vftcli.reproduction.page import (
     overview,
     render_markdown,
     render_page,
+    short_overview,
     spread,
     write_reproduction,
 )
@@ -47,6 +48,14 @@ def test_ours_stands_over_the_print(made) -> None:
     assert beside_print(found["fig1"]) == "1.5 (1.0 … 2.0)"
     assert beside_print(found["fig2"]) == DASH
     assert [row[0] for row in overview(found).cells][1].text == "Fig. 2"
+
+
+def test_the_terminal_shows_every_item_and_what_came_of_it(made) -> None:
+    found, _ = made
+    cells = short_overview(found).cells
+    assert [row[0].text for row in cells] == [row[0].text for row in overview(found).cells]
+    assert cells[0][1].text == "1.5 (1.0 … 2.0)"
+    assert max(map(len, terminal(short_overview(found)).splitlines())) <= 100
 
 
 def test_page_and_text_have_every_item_and_what_failed(made, cheap) -> None:

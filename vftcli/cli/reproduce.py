@@ -44,7 +44,7 @@ def reproduce(
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.grid import terminal
     from vftcli.reproduction.jobs import gather, jobs_of, run_jobs
-    from vftcli.reproduction.page import files_of, overview, write_reproduction
+    from vftcli.reproduction.page import files_of, short_overview, write_reproduction
     from vftcli.reproduction.papers import paper_of
     from vftcli.signals.packages import check_installed
 
@@ -62,7 +62,7 @@ def reproduce(
     found = gather(wanted, names, run_jobs(jobs, told))
     with folder:
         write_reproduction(folder, wanted, found, jobs, command_line(), form)
-    show(terminal(overview(found)).rstrip("\n"))
+    show(terminal(short_overview(found)))
     say(f"wrote {output}: vftcli open {output}")
     if any(shown.failures for shown in found.values()):
         raise typer.Exit(1)

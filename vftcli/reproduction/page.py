@@ -92,6 +92,16 @@ def ratio_of(values: Sequence[float | None], line: PrintedLine) -> float | None:
     return float(np.mean(known)) / line.number
 
 
+def short_overview(found: Mapping[str, ShownItem]) -> Grid:
+    """Every item in a row that fits a terminal: ours over the print, and what came of it."""
+    columns = Column("item", words=True), Column("ours / print"), Column("reproduced", words=True)
+    rows = [
+        (shown.item.label, beside_print(shown), "; ".join(shown.failures) or shown.item.verdict)
+        for shown in found.values()
+    ]
+    return Grid(columns=columns, rows=tuple(rows))
+
+
 def overview(found: Mapping[str, ShownItem]) -> Grid:
     """Every item in a row: what it shows, ours over the print, and what came of it."""
     columns = (
