@@ -10,6 +10,7 @@ from vftcli.reproduction.benchmark import (
     Timings,
     benchmark,
     circle,
+    command_costs,
     examination_costs,
     jittering,
     simd,
@@ -57,3 +58,11 @@ def test_the_examination_is_measured_on_a_log_that_reads_back(tmp_path: Path) ->
         (costs["examination_s"] + costs["columns_s"]) / costs["estimate_s"]
     )
     assert costs["examination_minute_s"] > 0.0
+
+
+def test_the_command_is_measured_beside_reading_its_columns(tmp_path: Path) -> None:
+    log = tmp_path / "long.csv"
+    pl.DataFrame(wide_table(UR5, samples=300)).write_csv(log)
+    costs = command_costs("ur5", log, rounds=1)
+    assert costs["over_reading"] == pytest.approx(costs["command_s"] / costs["reading_s"])
+    assert min(costs.values()) > 0.0

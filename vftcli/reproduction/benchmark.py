@@ -5,12 +5,15 @@ whose speed drifts drifts for both sides. Medians over the rounds are reported.
 """
 
 import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -21,6 +24,8 @@ from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Part, Spectra, spectra_of
 from vftcli.readers import read
+from vftcli.readers.ahead import header, wanted_columns
+from vftcli.readers.opening import head_of
 from vftcli.reproduction.yardsticks import analytic_script, literal_script, rnea_loop
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
@@ -309,6 +314,45 @@ def examination_costs(robot_name: str, log: Path, rounds: int) -> dict[str, floa
         "estimate_s": estimate,
         "over_estimate": (examination + columns) / estimate,
     }
+
+
+READING = """
+import sys
+import polars
+log, *columns = sys.argv[1:]
+polars.read_csv(log, columns=columns)
+"""
+"""A program that reads some columns of a log, and nothing else."""
+
+
+def command_costs(robot_name: str, log: Path, rounds: int) -> dict[str, float]:
+    """What the whole command takes beside reading the same columns, each a process of its own.
+
+    Args:
+        robot_name: The arm.
+        log: The log, as `wide_table` has it.
+        rounds: Interleaved repetitions.
+
+    Returns:
+        ``command_s`` of ``vftcli estimate --causal``, ``reading_s``, and ``over_reading``: the
+        first over the second.
+    """
+    head, _ = head_of(log)
+    names, _ = header(head)
+    columns = [names[c] for c in wanted_columns(head, log.stat().st_size, EXAMINED)]
+    words = ["estimate", log, "--robot", robot_name, "--causal", "--force", "--quiet", "-o"]
+    timings = Timings()
+    with TemporaryDirectory() as folder:
+        commands = {
+            "reading": [sys.executable, "-c", READING, log, *columns],
+            "command": [sys.executable, "-m", "vftcli", *words, folder],
+        }
+        for _ in range(rounds):
+            for name, command in commands.items():
+                run = partial(subprocess.run, command, check=True, capture_output=True)
+                timings.measure(name, run)
+    found = {f"{name}_s": timings.median(name) for name in commands}
+    return {**found, "over_reading": found["command_s"] / found["reading_s"]}
 
 
 def memory_per_sample(robot_name: str = "panda", samples: int = 1_000_000) -> float:
