@@ -18,11 +18,12 @@ import pytest
 from typer.testing import CliRunner
 
 import vftcli as vft
-from vftcli import pipeline, readers
+from vftcli import pipeline
 from vftcli.cli import app
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.readers import reading
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition import alignment, free_run
@@ -162,7 +163,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
 
         monkeypatch.setattr(module, name, wrapped)
 
-    count(readers, "read_chosen")
+    count(reading, "read_chosen")
     count(free_run, "dynamics_terms")
     count(alignment, "align")
     names = {"LOAD": runs[0], "FREE": runs[1], "MORE": runs[2], "OUT": tmp_path / "out"}

@@ -31,7 +31,7 @@ def test_a_model_is_made_once_for_a_recording_and_a_robot(circle: Recording) -> 
     assert first.terms is first.terms
     assert first.drive is first.drive
     assert models.of(circle, ROBOT, literal=True) is not first
-    assert models.of(circle, load_robot("ur5")) is not first
+    assert models.of(circle, replace(ROBOT)) is not first
     assert models.of(replace(circle), ROBOT) is not first
 
 
