@@ -31,12 +31,12 @@ from vftcli.robots.tape import NOTHING, ZERO, Program, Tape, Value, Vector, cons
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.pose import skew
 
-CHUNK = 4096
-"""Samples worked on at a time: small enough that a chunk's rows stay in the cache, large enough
-that calling an operation costs little beside it."""
+CHUNK = 8192
+"""Samples worked on at a time: few enough that a chunk's rows stay in the cache, many enough that
+calling an operation costs little beside it; blocks of a long log hold whole chunks."""
 
 KEPT = 4
-"""Programs that are kept, some 3 MB each: those of the arm in hand."""
+"""Programs that are kept, some 4 MB each: those of the arm in hand."""
 
 ROUNDING = 1e-15
 """An entry of a rotation, or of an inertia relative to its largest, that is zero but for this."""
