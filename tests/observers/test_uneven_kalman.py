@@ -5,7 +5,8 @@ import pytest
 
 from vftcli.observers import KalmanObserver
 from vftcli.observers.kalman_gains import Covariance, Gains, update
-from vftcli.observers.uneven_kalman import Fold, gain_sequence, spans
+from vftcli.observers.recursion import Fold, spans
+from vftcli.observers.uneven_kalman import gain_sequence
 from vftcli.robots.terms import DynamicsTerms
 
 SAMPLES = 3000
@@ -92,7 +93,7 @@ def test_folding_is_undone(samples: int) -> None:
     fold = Fold.of(samples)
     folded = fold.fold(x)
     np.testing.assert_array_equal(fold.unfold(folded), x)
-    np.testing.assert_array_equal(folded[fold.last, :, -1], x[-1])
+    np.testing.assert_array_equal(fold.last(folded), x[-1])
 
 
 def test_pieces_end_at_the_same_samples_wherever_a_block_begins() -> None:

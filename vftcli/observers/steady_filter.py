@@ -12,14 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.observers.recursion import PIECE
+from vftcli.observers.recursion import FORGOTTEN, PIECE
 from vftcli.signals.arrays import Array, empty_series
 
 BLOCK = 32
 """Samples in a block, a power of two: the work grows with it, the number of blocks shrinks."""
-
-FORGOTTEN = 1e-20
-"""What is left of a state that counts as nothing: far below the last digit of anything."""
 
 
 class BlockFilter(NamedTuple):
@@ -46,7 +43,7 @@ def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> 
         g: What the input adds to the state. (m, n)
         d: Input. (T, n)
         start: State before the first sample. (m, n)
-        wanted: Weights of the state's entries. (m, n)
+        wanted: Weights of the state's entries. (m, n) or (m, 1)
 
     Returns:
         One combination of the state, wanted·s_t (T, n), and the state after the last sample (m, n).

@@ -117,7 +117,6 @@ def sigmoid(dq: Array, amplitude: float, slope: float, shift: float) -> Array:
         C. Gaz et al., "Dynamic identification of the Franka Emika Panda robot with retrieval of
         feasible parameters using penalty-based optimization", IEEE RA-L 2019, Sec. II.
     """
-
     torque: Array = -slope * dq
     torque -= slope * shift
     with np.errstate(over="ignore"):  # far below zero: A/∞ is 0, as it should be
