@@ -14,7 +14,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Indices
 
-LENGTH = 64
+LENGTH = 40
 """Samples in a block at most: the Python loops have this length."""
 
 PIECE = 1 << 14
@@ -107,32 +107,27 @@ def run_blocks(F: Array, y: Array, start: Array, kind: Indices | slice = slice(N
         start: State before the first sample. (m, n)
         kind: Which of the kinds each joint is. (n,)
     """
-    reach = F[:, :, 0].copy()
-    for i in range(1, y.shape[1]):
-        y[:, i] += moved(F[:, :, i, kind], y[:, i - 1])
-        reach = product(F[:, :, i], reach)
-    ends = y[:, -1].copy()
+    steps, samples = np.moveaxis(F, 2, 0), np.moveaxis(y, 1, 0)
+    columns = steps[0].swapaxes(0, 1).copy()  # of the whole block's transition, Φ
+    for step, before, sample in zip(steps[1:], samples, samples[1:], strict=False):
+        sample += moved(step[:, :, kind], before)
+        columns = moved(step, columns)
+    ends, reach, apart = samples[-1].copy(), columns.swapaxes(0, 1), 1
     ends[..., :1] += moved(reach[:, :, kind, :1], start[..., None])
-    apart = 1
     while apart < ends.shape[-1] and np.max(np.abs(reach[..., apart:])) > FORGOTTEN:
         ends[..., apart:] += moved(reach[:, :, kind, apart:], ends[..., :-apart])
-        reach[..., apart:] = product(reach[..., apart:], reach[..., :-apart])
+        columns[..., apart:] = moved(reach[..., apart:], columns[..., :-apart])
         apart *= 2
     entering = np.concatenate([start[..., None], ends[..., :-1]], axis=-1)
-    for i in range(y.shape[1]):
-        entering = moved(F[:, :, i, kind], entering)
-        y[:, i] += entering
+    for step, sample in zip(steps, samples, strict=True):
+        entering = moved(step[:, :, kind], entering)
+        sample += entering
     return y
 
 
 def moved(F: Array, state: Array) -> Array:
-    """F·state for every joint and block: (m, m, n, B), (m, n, B) → (m, n, B)."""
-    return product(F, state[:, None])[:, 0]
-
-
-def product(F: Array, G: Array) -> Array:
-    """F·G for every joint and block: (m, m, n, B), (m, k, n, B) → (m, k, n, B)."""
-    total: Array = F[:, 0, None] * G[0]
-    for column in range(1, len(G)):
-        total += F[:, column, None] * G[column]
+    """F·state for every joint and block: (m, m, n, B), (…, m, n, B) → (…, m, n, B)."""
+    total: Array = F[:, 0] * state[..., :1, :, :]
+    for k in range(1, len(F)):
+        total += F[:, k] * state[..., k : k + 1, :, :]
     return total
