@@ -14,7 +14,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Indices
 
-LENGTH = 40
+LENGTH = 36
 """Samples in a block at most: the Python loops have this length."""
 
 PIECE = 1 << 14

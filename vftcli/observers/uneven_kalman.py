@@ -21,7 +21,7 @@ import numpy as np
 
 from vftcli.observers.kalman_gains import Covariance, Gains, update
 from vftcli.observers.kalman_model import Discrete
-from vftcli.observers.recursion import Fold, spans
+from vftcli.observers.recursion import Fold, moved, spans
 from vftcli.signals.arrays import Array
 
 SETTLED = 1e-15
@@ -57,79 +57,60 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
         guess: Where blocks start before they know better. (n,)
     """
     blocks = model.r.shape[2]
-    starts = Covariance(*(np.repeat(p[:, None], blocks, axis=1) for p in guess))
-    for start, value in zip(starts, entering, strict=True):
-        start[:, 0] = value
+    starts = np.repeat(np.stack(guess)[..., None], blocks, axis=2)
+    starts[..., 0] = entering
     if blocks > 1:
-        response = respond(model, starts)
-        guessed = Covariance(*(p.copy() for p in starts))
+        response, guessed = respond(model, Covariance(*starts)), starts.copy()
         # After k rounds the first k blocks are exact, so this ends, mostly long before.
         for _ in range(blocks):
-            ends = response.of(Covariance(*(p - g for p, g in zip(starts, guessed, strict=True))))
-            change = 0.0
-            for start, end in zip(starts, ends, strict=True):
-                new, old = end[:, :-1], start[:, 1:]
-                scale = np.maximum(np.abs(new), np.finfo(float).tiny)
-                change = max(change, float(np.max(np.abs(new - old) / scale)))
-                start[:, 1:] = new
-            if change <= SETTLED:
+            new, old = response.of(starts - guessed)[..., :-1], starts[..., 1:]
+            change = np.abs(new - old) / np.maximum(np.abs(new), np.finfo(float).tiny)
+            starts[..., 1:] = new
+            if np.max(change) <= SETTLED:
                 break
-    return run_blocks(model, starts)
+    return run_blocks(model, Covariance(*starts))
 
 
 class Response(NamedTuple):
-    """What blocks make of the covariance that they start from. (n, blocks) each
+    """What blocks make of the covariance that they start from.
 
     Attributes:
-        end: Posterior at the end, from the start that was tried.
-        phi: Φ, row by row.
-        information: O, as O₁₁, O₁₂, O₂₂.
+        end: Posterior at the end, from the start that was tried, as P₁₁, P₁₂, P₂₂. (3, n, blocks)
+        phi: Φ. (2, 2, n, blocks)
+        information: O. (2, 2, n, blocks)
     """
 
-    end: Covariance
-    phi: tuple[Array, Array, Array, Array]
-    information: tuple[Array, Array, Array]
+    end: Array
+    phi: Array
+    information: Array
 
-    def of(self, change: Covariance) -> Covariance:
+    def of(self, change: Array) -> Array:
         """Posterior at the end from a start that is changed by Δ: X = Δ(I + OΔ)⁻¹ written out."""
         a, b, c = change
-        f11, f12, f21, f22 = self.phi
-        o11, o12, o22 = self.information
+        (o11, o12), (_, o22) = self.information
         delta = a * c - b * b
         whole = 1.0 + o11 * a + 2.0 * o12 * b + o22 * c + (o11 * o22 - o12 * o12) * delta
-        x11, x12, x22 = (
-            (a + o22 * delta) / whole,
-            (b - o12 * delta) / whole,
-            (c + o11 * delta) / whole,
-        )
-        u1, u2 = f11 * x11 + f12 * x12, f11 * x12 + f12 * x22
-        w1, w2 = f21 * x11 + f22 * x12, f21 * x12 + f22 * x22
-        return Covariance(
-            self.end.p11 + u1 * f11 + u2 * f12,
-            self.end.p12 + u1 * f21 + u2 * f22,
-            self.end.p22 + w1 * f21 + w2 * f22,
-        )
+        cross = b - o12 * delta
+        X = np.array([[a + o22 * delta, cross], [cross, c + o11 * delta]]) / whole
+        gained = moved(self.phi, moved(self.phi, X).swapaxes(0, 1))
+        return self.end + gained[(0, 0, 1), (0, 1, 1)]
 
 
 def respond(model: Discrete, starts: Covariance) -> Response:
     """Run the covariance over every block, with Φ and O beside it."""
     (p11, p12, p22), r = starts, model.r
-    one, zero = np.ones_like(p11), np.zeros_like(p11)
-    f11, f12, f21, f22 = one, zero, zero, one
-    o11, o12, o22 = np.zeros((3, *p11.shape))
+    information, phi = np.zeros((2, 2, 2, *p11.shape))
+    phi[0, 0] = phi[1, 1] = 1.0
     for i in range(len(r)):
         prior = predict(p11, p12, p22, model, i)
         S = prior.p11 + r[i]
         l2, share = prior.p12 / S, r[i] / S
         p11, p12, p22 = share * prior.p11, r[i] * l2, prior.p22 - l2 * prior.p12
-        u1, u2 = f11 + model.a12[i] * f21, f12 + model.a12[i] * f22
-        told = u1 / S
-        o11 += told * u1
-        o12 += told * u2
-        o22 += u2 * u2 / S
-        f11, f12 = share * u1, share * u2
-        f21, f22 = model.a22[i] * f21 - l2 * u1, model.a22[i] * f22 - l2 * u2
-    return Response(Covariance(p11, p12, p22), (f11, f12, f21, f22), (o11, o12, o22))
+        u = phi[0] + model.a12[i] * phi[1]
+        information += u[:, None] * u / S
+        phi[0] = share * u
+        phi[1] = model.a22[i] * phi[1] - l2 * u
+    return Response(np.stack([p11, p12, p22]), phi, information)
 
 
 def predict(p11: Array, p12: Array, p22: Array, model: Discrete, i: int) -> Covariance:
