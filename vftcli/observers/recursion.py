@@ -110,7 +110,7 @@ def run_blocks(F: Array, y: Array, start: Array, kind: Indices | slice = slice(N
     steps, samples = np.moveaxis(F, 2, 0), np.moveaxis(y, 1, 0)
     columns = steps[0].swapaxes(0, 1).copy()  # of the whole block's transition, Φ
     for step, before, sample in zip(steps[1:], samples, samples[1:], strict=False):
-        sample += moved(step[:, :, kind], before)
+        np.add(sample, moved(step[:, :, kind], before), out=sample)
         columns = moved(step, columns)
     ends, reach, apart = samples[-1].copy(), columns.swapaxes(0, 1), 1
     ends[..., :1] += moved(reach[:, :, kind, :1], start[..., None])
@@ -121,7 +121,7 @@ def run_blocks(F: Array, y: Array, start: Array, kind: Indices | slice = slice(N
     entering = np.concatenate([start[..., None], ends[..., :-1]], axis=-1)
     for step, sample in zip(steps, samples, strict=True):
         entering = moved(step[:, :, kind], entering)
-        sample += entering
+        np.add(sample, entering, out=sample)
     return y
 
 
