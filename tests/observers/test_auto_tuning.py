@@ -88,13 +88,15 @@ def test_more_noise_calls_for_slower_filters(pushed: Pushed) -> None:
 
 def test_the_noise_level_gives_innovations_their_expected_variance(pushed: Pushed) -> None:
     """NIS = 1 on the loaded part, which is what R is scaled for."""
+    from vftcli.observers.smoother import innovations
+
     loaded, free = pushed()
     spectra = spectra_of(loaded, [free])
     omega_n = np.array([20.0, 40.0])
     observer = kalman_filter(omega_n, noise_level(omega_n, spectra))
     settled, model = observer.steady(STEP, 2), observer.model(STEP, 2)
     tau = observer.estimate(loaded.terms).tau
-    nu = ((tau[1:] - model.a22 * tau[:-1]) / settled.gains.l2)[4199:]  # τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ
+    nu = innovations(tau, settled.gains.l2, model.a22)[4200:]
     nis = np.mean(nu**2, axis=0) / (settled.prior.p11 + model.r)
     # variance of the same samples, windowed and not: the rest is the spectrum's own scatter
     np.testing.assert_allclose(nis, 1.0, rtol=0.1)

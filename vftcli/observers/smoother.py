@@ -130,11 +130,9 @@ class SteadyRun:
         """Take up the next block; the estimates of earlier blocks that are known by it."""
         gains, (a12, a22) = self._gains, (self._model.a12, self._model.a22)
         (F, g), d = error_filter(gains, a12, a22), self._smoother.filter.unexplained(terms)
-        before = self._state[1:]
+        before = self._state[1]
         tau, self._state = steady_filter(F, g, d, self._state, wanted=TORQUE)
-        # τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ
-        innovation = (tau - a22 * np.concatenate([before, tau[:-1]])) / gains.l2
-        self._blocks.append((terms.t, tau, innovation))
+        self._blocks.append((terms.t, tau, innovations(tau, gains.l2, a22, before)))
         while sum(len(t) for t, _, _ in self._blocks[1:]) > self._ahead:
             yield self._smoothed()
 
@@ -184,6 +182,20 @@ def steady_deviation(gains: Gains, model: Discrete, S: Array, samples: int) -> A
     step = information_step(gains, model.a12, model.a22)
     missing = missing_information(step, information_gain(model.a12, S), samples)
     return np.sqrt(smoothed_variance(gains.posterior, (missing[0] - missing).transpose(1, 0, 2)))
+
+
+def innovations(tau: Array, l2: Array, a22: Array, before: Array | float = 0.0) -> Array:
+    """ν of the steady filter, read off its estimate: τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ. (T, n)
+
+    Args:
+        tau: τ̂. (T, n)
+        l2: Its gain L₂. (n,)
+        a22: A₂₂ of its model. (n,)
+        before: τ̂ before the first sample. (n,)
+    """
+    earlier = np.concatenate([np.broadcast_to(before, tau[:1].shape), tau[:-1]])
+    nu: Array = (tau - a22 * earlier) / l2
+    return nu
 
 
 def backward_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
