@@ -29,7 +29,7 @@ from vftcli.observers.recursion import recursion
 from vftcli.observers.steady_filter import steady_filter
 from vftcli.observers.uneven_kalman import gain_sequence
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, handed_over
+from vftcli.signals.arrays import Array, empty_series, handed_over
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.shown import Shown
 
@@ -132,7 +132,8 @@ class SteadyRun:
         (F, g), d = error_filter(gains, a12, a22), self._smoother.filter.unexplained(terms)
         before = self._state[1]
         tau, self._state = steady_filter(F, g, d, self._state, wanted=TORQUE)
-        self._blocks.append((terms.t, tau, innovations(tau, gains.l2, a22, before)))
+        driving = innovations(tau, gains.l2 * self._S, a22, before)  # ν/S
+        self._blocks.append((terms.t, tau, driving))
         while sum(len(t) for t, _, _ in self._blocks[1:]) > self._ahead:
             yield self._smoothed()
 
@@ -144,20 +145,21 @@ class SteadyRun:
     def _smoothed(self) -> ExternalTorque:
         """The estimate of the first block that waits, by those behind it."""
         gains, model = self._gains, self._model
-        nu = np.concatenate([nu for _, _, nu in self._blocks])
+        waiting = [nu for _, _, nu in self._blocks]
+        nu = np.concatenate(waiting) if waiting[1:] else waiting[0]
         t, tau, _ = self._blocks.pop(0)
         known, seen = len(nu), int(min(len(nu), len(t) + self._ahead + 1))
         backward, b = backward_filter(gains, model.a12, model.a22)
         # λ̃ᵗ is driven by νᵗ⁺¹: turned round, by the sample before.
         driven = np.zeros_like(nu[:seen])
-        driven[1:] = nu[seen - 1 : 0 : -1] / self._S
+        driven[1:] = nu[seen - 1 : 0 : -1]
         weights = np.stack([gains.posterior.p12, gains.posterior.p22])
         correction, _ = steady_filter(backward, b, driven, 0.0 * weights, wanted=weights)
-        tau = tau - correction[::-1][: len(t)]
-        deviation = steady_deviation(gains, model, self._S, int(min(known, self._ahead + 1)))
-        # Samples from the log's end, as far as it is known.
-        behind = np.minimum(known - 1 - np.arange(len(t)), len(deviation) - 1)
-        sd = deviation.T.take(behind, axis=1).T
+        tau -= correction[::-1][: len(t)]
+        deviation, sd = steady_deviation(gains, model, self._S, known), empty_series(*tau.shape)
+        sd[:] = deviation[-1]
+        near = deviation[known - len(t) : known]
+        sd[len(t) - len(near) :] = near[::-1]
         return ExternalTorque(
             name=self._smoother.name, t=t, tau=handed_over(tau), sd=handed_over(sd)
         )
@@ -193,8 +195,10 @@ def innovations(tau: Array, l2: Array, a22: Array, before: Array | float = 0.0) 
         a22: A₂₂ of its model. (n,)
         before: τ̂ before the first sample. (n,)
     """
-    earlier = np.concatenate([np.broadcast_to(before, tau[:1].shape), tau[:-1]])
-    nu: Array = (tau - a22 * earlier) / l2
+    nu = tau.copy(order="K")
+    nu[1:] -= a22 * tau[:-1]
+    nu[0] -= a22 * before
+    nu /= l2
     return nu
 
 

@@ -54,10 +54,7 @@ class Blocks(NamedTuple):
 
     def part(self, chosen: slice) -> "Blocks":
         """Some of the blocks."""
-        t, length, d, q, velocity, known = self
-        return Blocks(
-            t[chosen], length[chosen], d[chosen], q[chosen], velocity[chosen], known[chosen]
-        )
+        return Blocks(*(values[chosen] for values in self))
 
 
 def disturbance_blocks(
