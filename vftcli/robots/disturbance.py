@@ -54,7 +54,10 @@ class Blocks(NamedTuple):
 
     def part(self, chosen: slice) -> "Blocks":
         """Some of the blocks."""
-        return Blocks(*(values[chosen] for values in self))
+        t, length, d, q, velocity, known = self
+        return Blocks(
+            t[chosen], length[chosen], d[chosen], q[chosen], velocity[chosen], known[chosen]
+        )
 
 
 def disturbance_blocks(

@@ -32,8 +32,8 @@ from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.pose import skew
 
 CHUNK = 8192
-"""Samples worked on at a time: few enough that a chunk's rows stay in the cache, many enough that
-calling an operation costs little beside it; blocks of a long log hold whole chunks."""
+"""Samples worked on at a time: so many that calling an operation costs little beside it; more than
+some 6000 gain nothing. Blocks of a long log hold whole chunks."""
 
 KEPT = 4
 """Programs that are kept, some 4 MB each: those of the arm in hand."""
