@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.observers import recursion as module
-from vftcli.observers.recursion import recursion
+from vftcli.observers.recursion import Fold, recursion, spans
 
 
 def loop(F: np.ndarray, x: np.ndarray, start: np.ndarray) -> np.ndarray:
@@ -31,3 +31,18 @@ def test_pieces_carry_their_state(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = recursion(F, x, np.ones((1, 2)))
     monkeypatch.setattr(module, "PIECE", 701)
     np.testing.assert_allclose(recursion(F, x, np.ones((1, 2))), whole, atol=1e-11)
+
+
+@pytest.mark.parametrize("samples", [1, 5, 64, 4095, 4096, 4097])
+def test_folding_is_undone(samples: int) -> None:
+    x = np.arange(2.0 * samples).reshape(samples, 2)
+    fold = Fold.of(samples)
+    folded = fold.fold(x)
+    np.testing.assert_array_equal(fold.unfold(folded), x)
+    np.testing.assert_array_equal(fold.last(folded), x[-1])
+
+
+def test_pieces_end_at_the_same_samples_wherever_a_block_begins() -> None:
+    assert spans(40000, begins=True) == [slice(1, 16384), slice(16384, 32768), slice(32768, 40000)]
+    assert spans(40000, begins=False)[0] == slice(0, 16384)
+    assert spans(1, begins=True) == []
