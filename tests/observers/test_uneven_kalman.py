@@ -5,7 +5,7 @@ import pytest
 
 from vftcli.observers import KalmanObserver
 from vftcli.observers.kalman_gains import Covariance, Gains, update
-from vftcli.observers.uneven_kalman import Fold, gain_sequence, spans
+from vftcli.observers.uneven_kalman import gain_sequence
 from vftcli.robots.terms import DynamicsTerms
 
 SAMPLES = 3000
@@ -84,18 +84,3 @@ def test_the_filter_is_the_plain_loop(samples: int, q_tau: float) -> None:
         # rounding over as many steps, of torques of 10
         np.testing.assert_allclose(found.tau[k], tau, rtol=1e-12, atol=1e-11)
     np.testing.assert_allclose(found.sd, np.sqrt(gains.posterior.p22), rtol=1e-12)
-
-
-@pytest.mark.parametrize("samples", [1, 5, 64, 4095, 4096, 4097])
-def test_folding_is_undone(samples: int) -> None:
-    x = np.arange(2.0 * samples).reshape(samples, 2)
-    fold = Fold.of(samples)
-    folded = fold.fold(x)
-    np.testing.assert_array_equal(fold.unfold(folded), x)
-    np.testing.assert_array_equal(folded[fold.last, :, -1], x[-1])
-
-
-def test_pieces_end_at_the_same_samples_wherever_a_block_begins() -> None:
-    assert spans(40000, begins=True) == [slice(1, 16384), slice(16384, 32768), slice(32768, 40000)]
-    assert spans(40000, begins=False)[0] == slice(0, 16384)
-    assert spans(1, begins=True) == []

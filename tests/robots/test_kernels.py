@@ -153,10 +153,9 @@ def test_general_rotations_agree_with_pinocchio(joints: int) -> None:
 
 def test_bodies_hand_on_what_their_joint_cannot_feel() -> None:
     """No mass, no first moment along the axis and no J_yy is left, so that little is computed."""
-    bodies = felt_bodies(load_robot("ur5").with_payload(LOAD).loaded_chain)
-    assert not bodies.mass.any()
-    assert not bodies.moment[:, 2].any()
-    assert not bodies.inertia[:, 1, 1].any()
+    inertia, moment = felt_bodies(load_robot("ur5").with_payload(LOAD).loaded_chain)
+    assert not moment[:, 2].any()
+    assert not inertia[:, 1, 1].any()
 
 
 @pytest.mark.parametrize("samples", [0, 1, 2])

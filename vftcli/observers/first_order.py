@@ -5,9 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.observers.observer import Complex, Tuning
-from vftcli.observers.recursion import PIECE
+from vftcli.observers.recursion import Fold, run_blocks, spans
 from vftcli.observers.steady_filter import steady_filter
-from vftcli.observers.uneven_kalman import Fold, sum_varying
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.remarks import Remark, caution
@@ -64,12 +63,11 @@ def run_first_order(
     d = terms.d if driven is None else driven
     if uniform:
         decay, gain = coefficients(terms.dt, rate)
-        tau, before = steady_filter(decay[None], gain, d, before, wanted=np.ones((1, n)))
+        tau, before = steady_filter(decay[None], gain, d, before, wanted=np.ones((1, 1)))
         return tau, FirstOrderState(before, gaps, longest)
     tau = empty_series(*d.shape)
     nominal = terms.clock.step * rate
-    for first in range(0, terms.samples, PIECE):
-        span = slice(first, first + PIECE)
+    for span in spans(terms.samples, begins=False):
         dt = terms.dt[span]
         fold = Fold.of(len(dt))
         decay, gain = coefficients(fold.fold(dt), rate[:, None])
@@ -84,35 +82,9 @@ def run_first_order(
             decay[at], x[at] = 0.0, 0.0 if afresh is None else afresh[span][samples, joints]
             rows = np.unique(samples)
             gaps, longest = gaps + len(rows), max(longest, float(np.max(dt[rows])))
-        tau[span] = scalar_recursion(decay, x, before[0], fold)
+        tau[span] = fold.unfold(run_blocks(decay[None, None], x[None], before)[0])
         before = tau[span][-1:]
     return tau, FirstOrderState(before, gaps, longest)
-
-
-def scalar_recursion(decay: Array, y: Array, before: Array, fold: Fold) -> Array:
-    """Run y_t = decay_t y_{t−1} + x_t from `before` (n,), blocks of samples side by side.
-
-    Args:
-        decay: What stays of the sample before. (length, n, blocks)
-        y: x, which is overwritten. (length, n, blocks)
-        before: The state before the first sample. (n,)
-        fold: The layout.
-
-    Returns:
-        The samples in their order. (N, n)
-    """
-    reach = decay[0].copy()
-    for i in range(1, len(y)):
-        y[i] += decay[i] * y[i - 1]
-        reach *= decay[i]
-    ends = y[-1].copy()
-    ends[:, 0] += reach[:, 0] * before
-    sum_varying(ends[None], reach[None, None], np.arange(len(before)))
-    entering = np.concatenate([before[:, None], ends[:, :-1]], axis=1)
-    for i in range(len(y)):
-        entering *= decay[i]
-        y[i] += entering
-    return fold.unfold(y)
 
 
 def coefficients(dt: Array, rate: Array) -> tuple[Array, Array]:

@@ -14,14 +14,19 @@ from vftcli.observers.kalman_model import (
     discretise,
 )
 from vftcli.observers.observer import Complex, Tuning, check_terms, numbers_of, per_joint
+from vftcli.observers.recursion import Fold, run_blocks, spans
 from vftcli.observers.steady_filter import steady_filter
-from vftcli.observers.uneven_kalman import Fold, filter_blocks, last_covariance, settle, spans
+from vftcli.observers.uneven_kalman import settle
 from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array, empty_series, frozen, handed_over
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_known
+from vftcli.signals.series import Clock
 from vftcli.signals.shown import Shown
+
+TORQUE = np.array([[0.0], [1.0]])
+"""Weights that pick the external torque out of a filter's two states. (2, 1)"""
 
 
 class KalmanState(NamedTuple):
@@ -111,6 +116,10 @@ class KalmanObserver(Shown):
         """Stationary gains and prior at a sample time. [s]"""
         return steady(self.model(step, joints), self.densities(joints).decay)
 
+    def is_steady(self, clock: Clock) -> bool:
+        """Whether the gains along a log of this clock are the stationary ones from its start on."""
+        return clock.uniform and self.initial_covariance is None
+
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """Run over a whole log; `sd` is √P₂₂, the filter's own account of its error."""
         return self.run(terms)[0]
@@ -124,10 +133,10 @@ class KalmanObserver(Shown):
         densities, d = self.densities(n), self.unexplained(terms)
         model = self._model_of(densities, clock.step)
         settled = steady(model, densities.decay)
-        if clock.uniform and self.initial_covariance is None:
+        if self.is_steady(clock):
             F, g = error_filter(settled.gains, model.a12, model.a22)
             start = np.zeros((2, n)) if state is None else state.error
-            tau, end = steady_filter(F, g, d, start, wanted=second_entry(n))
+            tau, end = steady_filter(F, g, d, start, wanted=TORQUE)
             row = handed_over(np.sqrt(settled.gains.posterior.p22))
             sd = np.broadcast_to(row, tau.shape)
             state = KalmanState(end, settled.gains.posterior)
@@ -165,9 +174,12 @@ class KalmanObserver(Shown):
             model = self._model_of(densities, fold.fold(dt[span]))
             model = Discrete(model.step, *map(np.ascontiguousarray, model[1:]))
             gains = settle(model, entering, guess)
-            entering = last_covariance(gains, fold)
-            answer, error = filter_blocks(model, gains, kind, fold.fold(d[span]), error, fold)
-            tau[span] = fold.unfold(answer)
+            entering = Covariance(*map(fold.last, gains.posterior))
+            F, g = error_filter(gains, model.a12, model.a22)
+            driven = g[:, :, kind] * fold.fold(d[span])
+            states = run_blocks(F, driven, error, kind)
+            error = fold.last(states)
+            tau[span] = fold.unfold(states[1])
             sd.T[:, span] = fold.unfold(np.sqrt(gains.posterior.p22)).T[kind]
         return tau, sd, KalmanState(error, Covariance(*(p[kind] for p in entering)))
 
@@ -218,7 +230,7 @@ class KalmanObserver(Shown):
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[:, None]
         omega = np.where(omega == 0.0, 1e-9, omega)
         back = np.exp(-1j * omega * step)
-        f11, f12, f21, f22 = transition(gains, model.a12, model.a22)
+        (f11, f12), (f21, f22) = closed_loop(gains, model.a12, model.a22)
         # (I − F z⁻¹) x = L p: the second row of the inverse times L.
         determinant = (1.0 - f11 * back) * (1.0 - f22 * back) - f12 * f21 * back**2
         second = (f21 * back * gains.l1 + (1.0 - f11 * back) * gains.l2) / determinant
@@ -226,19 +238,14 @@ class KalmanObserver(Shown):
         return response
 
 
-def transition(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array, Array, Array]:
-    """F = (I − LC)A of the filtered state, entry by entry."""
+def closed_loop(gains: Gains, a12: Array, a22: Array) -> Array:
+    """Transition F = (I − LC)A of the filtered state, entry by entry. (2, 2, …)"""
     rest = 1.0 - gains.l1
-    return rest, rest * a12, -gains.l2, a22 - gains.l2 * a12
-
-
-def second_entry(joints: int) -> Array:
-    """Weights that pick the external torque out of a two-state filter. (2, n)"""
-    return np.repeat([[0.0], [1.0]], joints, axis=1)
+    return np.array([[rest, rest * a12], [-gains.l2, a22 - gains.l2 * a12]])
 
 
 def error_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
-    """Transition (…, 2, 2, n) and input (…, 2, n) of the filter on its error e = p − p̂.
+    """Transition (2, 2, …) and input (2, …) of the filter on its error e = p − p̂.
 
     Subtracting p from x̂ᵗ = (I−LC)(A x̂ᵗ⁻¹ + B u) + L pᵗ leaves one input, `DynamicsTerms.d`:
 
@@ -247,6 +254,5 @@ def error_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
     from e⁰ = 0, τ̂⁰ = 0, which is x̂⁰ = [p⁰; 0]. It is the same filter without the cancellation of
     two large momenta.
     """
-    f11, f12, f21, f22 = transition(gains, a12, a22)
-    F = np.stack([f11, -f12, -f21, f22], axis=-2)
-    return F.reshape(*F.shape[:-2], 2, 2, F.shape[-1]), np.stack([f11, gains.l2], axis=-2)
+    (f11, f12), (f21, f22) = closed_loop(gains, a12, a22)
+    return np.array([[f11, -f12], [-f21, f22]]), np.array([f11, gains.l2])

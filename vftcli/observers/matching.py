@@ -127,31 +127,22 @@ MEASURES: dict[str, Callable[[Observer, float, Setup], Array]] = {
 """Quantity of ``--match`` → how far an observer is above the goal."""
 
 
-class Knob(NamedTuple):
-    """What is turned on an observer.
-
-    Attributes:
-        turn: Makes the observer anew with another value on each joint.
-        low: Least value.
-        high: Largest value.
-    """
-
-    turn: Callable[[Observer, Array], Observer]
-    low: float
-    high: float
-
-
-KNOBS: dict[type, Knob] = {
-    FilteredDynamicsObserver: Knob(
-        lambda _, value: FilteredDynamicsObserver(omega=float(value[0])), 1e-3, 1e6
+KNOBS: dict[type, tuple[Callable[[Observer, Array], Observer], float, float]] = {
+    FilteredDynamicsObserver: (
+        lambda _, value: FilteredDynamicsObserver(omega=float(value[0])),
+        1e-3,
+        1e6,
     ),
-    MomentumObserver: Knob(lambda _, value: MomentumObserver(gain=value), 1e-3, 1e6),
+    MomentumObserver: (lambda _, value: MomentumObserver(gain=value), 1e-3, 1e6),
     # Q_τ is the one number that moves a Kalman filter's ω_n alone.
-    KalmanObserver: Knob(
-        lambda kalman, value: replace(cast("KalmanObserver", kalman), q_tau_diag=value), 1e-9, 1e18
+    KalmanObserver: (
+        lambda kalman, value: replace(cast("KalmanObserver", kalman), q_tau_diag=value),
+        1e-9,
+        1e18,
     ),
 }
-"""Observer → its knob: cutoff ω [rad/s], gain K [1/s], or Q_τ. A cutoff is one for all joints."""
+"""Observer → what makes it anew with another cutoff ω [rad/s], gain K [1/s] or Q_τ on each joint,
+and the least and the largest there is. A cutoff is one for all joints."""
 
 
 def match_remarks(goal: MatchTarget, observers: Sequence[Observer]) -> tuple[Remark, ...]:

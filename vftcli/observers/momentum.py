@@ -92,14 +92,13 @@ def run_as_printed(
     """rᵗ = rᵗ⁻¹ + K dᵗ − a(rᵗ⁻¹ + rᵗ⁻²), r⁻¹ = r⁰ = 0: two states a joint. (T, n)"""
     n, a = terms.joints, 0.5 * terms.dt * gain
     start = np.zeros((2, n)) if state is None else state.states
-    F = np.zeros((len(a), 2, 2, n))
-    F[:, 0, 0], F[:, 0, 1], F[:, 1, 0] = 1.0 - a, -a, 1.0
-    g = np.stack([gain, np.zeros(n)])
+    F, g = np.array([[1.0 - a, -a], [a**0, 0.0 * a]]), np.array([gain, 0.0 * gain])
     # As printed it may well diverge: that is the result, and is shown as unknown.
     with np.errstate(over="ignore", invalid="ignore"):
         if terms.clock.uniform:
-            tau, end = steady_filter(F[0], g, terms.d, start, wanted=np.eye(2)[0][:, None] + 0 * g)
+            first = np.array([[1.0], [0.0]])
+            tau, end = steady_filter(F[:, :, 0], g, terms.d, start, wanted=first)
         else:
-            states = recursion(F, g * terms.d[:, None], start)
-            tau, end = states[:, 0], states[-1]
+            states = recursion(F, g[:, None] * terms.d, start)
+            tau, end = states[0], states[:, -1]
     return np.where(np.isfinite(tau), tau, np.nan), FirstOrderState(end)

@@ -1,97 +1,133 @@
-"""Linear recursions along time, without a Python loop over samples and without losing exactness.
+"""Linear recursions along time whose coefficients change with every sample.
 
-y_t = F_t y_{t−1} + x_t with a small state for each joint, where F_t changes with the sample time.
-The log is cut into blocks that are run side by side, each from zero; the states at the blocks' ends
-obey the same kind of recursion, once a block, and their effect is added back. That is the same sum
-in another order, so it agrees with a sample-by-sample loop to rounding.
+y_t = F_t y_{t−1} + x_t with a small state for each joint. The log is cut into blocks that are run
+side by side, each from zero; the states at the blocks' ends obey the same kind of recursion, once a
+block, and are summed by doubling: x_b ← x_b + Φ_b x_{b−1}, then over two blocks, four, … until the
+filter has forgotten. What enters a block is then run through it and added. That is the plain loop's
+sum in another order, so it agrees with it to rounding.
 """
+
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Indices
 
-BLOCK = 32
-"""Samples in a block: the Python loop has this length, once a level."""
-
-FEW = 48
-"""Below this many samples a plain loop is as quick."""
+LENGTH = 36
+"""Samples in a block at most: the Python loops have this length."""
 
 PIECE = 1 << 14
 """Samples handled at a time, so that memory does not grow with the log; blocks of a log that begin
 at multiples of it give the numbers of the whole log to the last bit."""
+
+FORGOTTEN = 1e-20
+"""What is left of a state that counts as nothing: far below the last digit of anything."""
+
+
+class Fold(NamedTuple):
+    """A piece of a log laid out as position in block × joint × block.
+
+    Every operation then runs along many blocks at once.
+
+    Attributes:
+        length: Samples in a block; the last one is filled up with its last sample.
+        blocks: Number of blocks.
+        samples: Samples of the piece.
+    """
+
+    length: int
+    blocks: int
+    samples: int
+
+    @classmethod
+    def of(cls, samples: int) -> "Fold":
+        """The layout of a piece: of short ones as many blocks as samples in a block."""
+        length = min(LENGTH, int(np.ceil(np.sqrt(samples))))
+        return cls(length, -(-samples // length), samples)
+
+    def fold(self, x: Array) -> Array:
+        """Samples in blocks: (…, N, k) → (…, length, k, blocks)."""
+        *entries, _, k = x.shape
+        whole = self.samples // self.length
+        covered, out = whole * self.length, np.empty((*entries, self.length, k, self.blocks))
+        inside = x[..., :covered, :].reshape(*entries, whole, self.length, k)
+        out[..., :whole] = np.moveaxis(inside, -3, -1)
+        if whole < self.blocks:
+            out[..., -1] = x[..., -1:, :]
+            out[..., : self.samples - covered, :, -1] = x[..., covered:, :]
+        return out
+
+    def unfold(self, y: Array) -> Array:
+        """Samples in their order: (…, length, k, blocks) → (…, N, k), columns whole."""
+        columns = np.moveaxis(y, -3, -1).reshape(*y.shape[:-3], y.shape[-2], -1)
+        return columns[..., : self.samples].swapaxes(-1, -2)
+
+    def last(self, y: Array) -> Array:
+        """The last sample of what is in blocks: (…, length, k, blocks) → (…, k)."""
+        return y[..., (self.samples - 1) % self.length, :, -1]
+
+
+def spans(samples: int, *, begins: bool) -> list[slice]:
+    """The pieces of a block of a log: they end at multiples of their length, wherever it begins.
+
+    Args:
+        samples: Its number of samples.
+        begins: Whether its first sample is the log's first, which no step leads to.
+    """
+    edges = [int(begins), *range(PIECE, samples, PIECE), samples]
+    return [slice(a, b) for a, b in pairwise(edges) if a < b]
 
 
 def recursion(F: Array, x: Array, start: Array) -> Array:
     """Run y_t = F_t y_{t−1} + x_t from y_{−1} = `start`, in pieces that carry their state.
 
     Args:
-        F: Transitions of an m-state filter for each of n joints. (T, m, m, n)
-        x: Input. (T, m, n)
+        F: Transitions of an m-state filter for each of n joints. (m, m, T, n)
+        x: Input. (m, T, n)
         start: State before the first sample. (m, n)
 
     Returns:
-        The states y. (T, m, n)
+        The states y. (m, T, n)
     """
     y = np.empty_like(x)
-    for first in range(0, len(x), PIECE):
-        span = slice(first, first + PIECE)
-        y[span] = blockwise(F[span], x[span], start)
-        start = y[min(span.stop, len(x)) - 1]
+    for span in spans(x.shape[1], begins=False):
+        fold = Fold.of(span.stop - span.start)
+        states = run_blocks(fold.fold(F[:, :, span]), fold.fold(x[:, span]), start)
+        y[:, span], start = fold.unfold(states), fold.last(states)
     return y
 
 
-def blockwise(F: Array, x: Array, start: Array) -> Array:
-    """One piece of `recursion`: blocks side by side, then the recursion over their ends.
+def run_blocks(F: Array, y: Array, start: Array, kind: Indices | slice = slice(None)) -> Array:
+    """One piece of `recursion`, everything in blocks.
 
-    Arrays are laid out as position in block × … × block, so that every operation runs along many
-    blocks at once.
+    Args:
+        F: Transitions of each kind of joint. (m, m, length, kinds, blocks)
+        y: The input x, over which the states are written. (m, length, n, blocks)
+        start: State before the first sample. (m, n)
+        kind: Which of the kinds each joint is. (n,)
     """
-    samples, m, n = x.shape
-    if samples <= FEW:
-        return stepwise(F, x, start)
-    blocks = -(-samples // BLOCK)
-    y, reach = by_position(x, blocks), by_position(F, blocks)
-    room = np.empty((n, blocks))
-    for i in range(1, BLOCK):
-        add_product(reach[i], y[i - 1], y[i], room)
-        reach[i] = transition_product(reach[i], reach[i - 1])
-    ends = blockwise(np.moveaxis(reach[-1], -1, 0), np.moveaxis(y[-1], -1, 0), start)
-    entering = np.ascontiguousarray(np.concatenate([start[None], ends[:-1]]).transpose(1, 2, 0))
-    for i in range(BLOCK):
-        add_product(reach[i], entering, y[i], room)
-    return y.transpose(3, 0, 1, 2).reshape(blocks * BLOCK, m, n)[:samples]
-
-
-def by_position(x: Array, blocks: int) -> Array:
-    """Arrange samples as position in block × … × block, the last block filled up with zeros."""
-    padded = np.zeros((blocks * BLOCK, *x.shape[1:]))
-    padded[: len(x)] = x
-    shaped = padded.reshape(blocks, BLOCK, *x.shape[1:])
-    return np.ascontiguousarray(np.moveaxis(shaped, 0, -1))
-
-
-def stepwise(F: Array, x: Array, start: Array) -> Array:
-    """The recursion as it is written, one sample after another."""
-    y = x.copy()
-    state, room = start, np.empty(x.shape[2])
-    for k in range(len(y)):
-        add_product(F[k], state, y[k], room)
-        state = y[k]
+    steps, samples = np.moveaxis(F, 2, 0), np.moveaxis(y, 1, 0)
+    columns = steps[0].swapaxes(0, 1).copy()  # of the whole block's transition, Φ
+    for step, before, sample in zip(steps[1:], samples, samples[1:], strict=False):
+        np.add(sample, moved(step[:, :, kind], before), out=sample)
+        columns = moved(step, columns)
+    ends, reach, apart = samples[-1].copy(), columns.swapaxes(0, 1), 1
+    ends[..., :1] += moved(reach[:, :, kind, :1], start[..., None])
+    while apart < ends.shape[-1] and np.max(np.abs(reach[..., apart:])) > FORGOTTEN:
+        ends[..., apart:] += moved(reach[:, :, kind, apart:], ends[..., :-apart])
+        columns[..., apart:] = moved(reach[..., apart:], columns[..., :-apart])
+        apart *= 2
+    entering = np.concatenate([start[..., None], ends[..., :-1]], axis=-1)
+    for step, sample in zip(steps, samples, strict=True):
+        entering = moved(step[:, :, kind], entering)
+        np.add(sample, entering, out=sample)
     return y
 
 
-def add_product(F: Array, state: Array, out: Array, room: Array) -> None:
-    """Add F·state to `out` for every joint and block, with `room` for one term. (m, n, …)"""
-    for row in range(len(state)):
-        for column in range(len(state)):
-            np.multiply(F[row, column], state[column], out=room)
-            out[row] += room
-
-
-def transition_product(F: Array, G: Array) -> Array:
-    """F·G for every joint and block. (m, m, n, …)"""
-    out = np.zeros_like(G)
-    room = np.empty_like(G[0, 0])
-    for column in range(len(G)):
-        add_product(F, G[:, column], out[:, column], room)
-    return out
+def moved(F: Array, state: Array) -> Array:
+    """F·state for every joint and block: (m, m, n, B), (…, m, n, B) → (…, m, n, B)."""
+    total: Array = F[:, 0] * state[..., :1, :, :]
+    for k in range(1, len(F)):
+        total += F[:, k] * state[..., k : k + 1, :, :]
+    return total

@@ -16,16 +16,12 @@ References:
     Int. J. Control 18(1), 1973, for the form used here.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.observers.kalman import (
-    KalmanObserver,
-    error_filter,
-    second_entry,
-    transition,
-)
+from vftcli.observers.kalman import TORQUE, KalmanObserver, closed_loop, error_filter
 from vftcli.observers.kalman_gains import Covariance, Gains
 from vftcli.observers.kalman_model import Discrete
 from vftcli.observers.observer import Complex, Tuning
@@ -57,33 +53,12 @@ class KalmanSmoother(Shown):
 
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """Smooth a whole log; `sd` is the smoother's own √P₂₂."""
-        if terms.clock.uniform and self.filter.initial_covariance is None:
-            tau, sd = self._steady(terms)
-        else:
-            tau, sd = self._step_by_step(terms)
+        if self.filter.is_steady(terms.clock):
+            run = SteadyRun(self, terms.clock.step, terms.joints)
+            (whole,) = (*run.take(terms), *run.end())
+            return whole
+        tau, sd = self._step_by_step(terms)
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=handed_over(sd))
-
-    def _steady(self, terms: DynamicsTerms) -> tuple[Array, Array]:
-        """Smooth with constant gains. (T, n) each"""
-        n, step = terms.joints, terms.clock.step
-        settled, model = self.filter.steady(step, n), self.filter.model(step, n)
-        gains, d = settled.gains, self.filter.unexplained(terms)
-        F, g = error_filter(gains, model.a12, model.a22)
-        start = np.zeros((2, n))
-        tau, _ = steady_filter(F, g, d, start, wanted=second_entry(n))
-        innovation = innovations(tau, gains.l2, model.a22)
-        S = settled.prior.p11 + model.r
-        backward, b = backward_filter(gains, model.a12, model.a22)
-        # λ̃ᵗ is driven by νᵗ⁺¹: turned round, by the sample before.
-        driven = np.zeros_like(innovation)
-        driven[1:] = innovation[:0:-1] / S
-        weights = np.stack([gains.posterior.p12, gains.posterior.p22])
-        tau -= steady_filter(backward, b, driven, start, wanted=weights)[0][::-1]
-        deviation = steady_deviation(gains, model, S, terms.samples)
-        sd = empty_series(terms.samples, n)
-        sd[:] = deviation[-1]
-        sd[terms.samples - len(deviation) :] = deviation[::-1]
-        return tau, sd
 
     def _step_by_step(self, terms: DynamicsTerms) -> tuple[Array, Array]:
         """Smooth with gains that follow each step's own sample time. (T, n) each"""
@@ -94,21 +69,15 @@ class KalmanSmoother(Shown):
         # L₁ = P⁻₁₁/S and R = S − P⁻₁₁, so S = R/(1 − L₁).
         with np.errstate(divide="ignore"):  # a gap of days leaves nothing known: L₁ = 1, S = ∞
             S = model.r / (1.0 - gains.l1)
-        F, g = error_filter(gains, model.a12, model.a22)
-        d = self.filter.unexplained(terms)
-        states = recursion(F, g * d[:, None], np.zeros((2, n)))
-        tau = states[:, 1].copy()
-        innovation = innovations(tau, gains.l2, model.a22)
+        (F, g), d = error_filter(gains, model.a12, model.a22), self.filter.unexplained(terms)
+        states = recursion(F, g * d, np.zeros((2, n)))
+        e, tau = np.concatenate([np.zeros((2, 1, n)), states[:, :-1]], axis=1)
+        innovation = e + d - model.a12 * tau
         backward, b = backward_filter(gains, model.a12, model.a22)
-        forced = -b * (innovation / S)[:, None, :]
-        lam = one_sample_later(recursion(backward[::-1], -forced[::-1], np.zeros((2, n)))[::-1])
-        P = gains.posterior
-        tau -= P.p12 * lam[:, 0] + P.p22 * lam[:, 1]
-        step = information_step(gains, model.a12, model.a22)
-        gain = information_gain(model.a12, S)
-        information = one_sample_later(recursion(step[::-1], gain[::-1], np.zeros((3, n)))[::-1])
-        variance = smoothed_variance(P, information.transpose(1, 0, 2))
-        return tau, np.sqrt(variance)
+        lam, P = from_the_end(backward, b * (innovation / S)), gains.posterior
+        step, gain = information_step(gains, model.a12, model.a22), information_gain(model.a12, S)
+        variance = smoothed_variance(P, from_the_end(step, gain))
+        return states[1] - (P.p12 * lam[0] + P.p22 * lam[1]), np.sqrt(variance)
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """What the parameters mean: no delay, −3 dB where |H_KFO|² has fallen to 1/√2.
@@ -137,48 +106,122 @@ class KalmanSmoother(Shown):
         return response
 
 
+class SteadyRun:
+    """The smoother with settled gains, block by block of a log; a whole log is one block.
+
+    The backward recursion forgets: started from zero `look_ahead` samples behind a sample it errs
+    there by `SETTLED`. So it goes along in one pass, as many samples behind.
+
+    Args:
+        smoother: The smoother.
+        step: Sample time. [s]
+        joints: Number of joints n.
+    """
+
+    def __init__(self, smoother: KalmanSmoother, step: float, joints: int) -> None:
+        self._smoother, self._model = smoother, smoother.filter.model(step, joints)
+        settled = smoother.filter.steady(step, joints)
+        self._gains, self._S = settled.gains, settled.prior.p11 + self._model.r
+        self._ahead = look_ahead(smoother, step, joints)
+        self._state = np.zeros((2, joints))
+        self._blocks: list[tuple[Array, Array, Array]] = []
+
+    def take(self, terms: DynamicsTerms) -> Iterator[ExternalTorque]:
+        """Take up the next block; the estimates of earlier blocks that are known by it."""
+        gains, (a12, a22) = self._gains, (self._model.a12, self._model.a22)
+        (F, g), d = error_filter(gains, a12, a22), self._smoother.filter.unexplained(terms)
+        before = self._state[1]
+        tau, self._state = steady_filter(F, g, d, self._state, wanted=TORQUE)
+        driving = innovations(tau, gains.l2 * self._S, a22, before)  # ν/S
+        self._blocks.append((terms.t, tau, driving))
+        while sum(len(t) for t, _, _ in self._blocks[1:]) > self._ahead:
+            yield self._smoothed()
+
+    def end(self) -> Iterator[ExternalTorque]:
+        """The estimates of the blocks that are left, up to the log's end."""
+        while self._blocks:
+            yield self._smoothed()
+
+    def _smoothed(self) -> ExternalTorque:
+        """The estimate of the first block that waits, by those behind it."""
+        gains, model = self._gains, self._model
+        waiting = [nu for _, _, nu in self._blocks]
+        nu = np.concatenate(waiting) if waiting[1:] else waiting[0]
+        t, tau, _ = self._blocks.pop(0)
+        known, seen = len(nu), int(min(len(nu), len(t) + self._ahead + 1))
+        backward, b = backward_filter(gains, model.a12, model.a22)
+        # λ̃ᵗ is driven by νᵗ⁺¹: turned round, by the sample before.
+        driven = np.zeros_like(nu[:seen])
+        driven[1:] = nu[seen - 1 : 0 : -1]
+        weights = np.stack([gains.posterior.p12, gains.posterior.p22])
+        correction, _ = steady_filter(backward, b, driven, 0.0 * weights, wanted=weights)
+        tau -= correction[::-1][: len(t)]
+        deviation, sd = steady_deviation(gains, model, self._S, known), empty_series(*tau.shape)
+        sd[:] = deviation[-1]
+        near = deviation[known - len(t) : known]
+        sd[len(t) - len(near) :] = near[::-1]
+        return ExternalTorque(
+            name=self._smoother.name, t=t, tau=handed_over(tau), sd=handed_over(sd)
+        )
+
+
+def look_ahead(smoother: KalmanSmoother, step: float, joints: int) -> float:
+    """Samples after which the backward recursion has forgotten where it began, L.
+
+    Args:
+        smoother: The smoother.
+        step: Sample time. [s]
+        joints: Number of joints n.
+    """
+    gains, model = smoother.filter.steady(step, joints).gains, smoother.filter.model(step, joints)
+    F = np.moveaxis(closed_loop(gains, model.a12, model.a22), -1, 0)
+    pole = float(np.max(np.abs(np.linalg.eigvals(F))))
+    return float(np.ceil(np.log(SETTLED) / np.log(pole))) if pole < 1.0 else np.inf
+
+
 def steady_deviation(gains: Gains, model: Discrete, S: Array, samples: int) -> Array:
     """√P₂₂ of the smoother from a log's last sample backwards, until it has settled. (≤ T, n)"""
     step = information_step(gains, model.a12, model.a22)
     missing = missing_information(step, information_gain(model.a12, S), samples)
-    information = (missing[0] - missing).transpose(1, 0, 2)
-    variances = smoothed_variance(gains.posterior, information)
-    return np.sqrt(variances)
+    return np.sqrt(smoothed_variance(gains.posterior, (missing[0] - missing).transpose(1, 0, 2)))
 
 
-def innovations(tau: Array, l2: Array, a22: Array) -> Array:
-    """ν of the filter, read off its estimate: τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ; none at the first sample."""
-    nu = empty_series(*tau.shape)
-    nu[0] = 0.0
-    rows = l2.ndim == 2
-    before = tau[:-1] * (a22[1:] if rows else a22)
-    np.subtract(tau[1:], before, out=nu[1:])
-    nu[1:] /= l2[1:] if rows else l2
+def innovations(tau: Array, l2: Array, a22: Array, before: Array | float = 0.0) -> Array:
+    """ν of the steady filter, read off its estimate: τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ. (T, n)
+
+    Args:
+        tau: τ̂. (T, n)
+        l2: Its gain L₂. (n,)
+        a22: A₂₂ of its model. (n,)
+        before: τ̂ before the first sample. (n,)
+    """
+    nu = tau.copy(order="K")
+    nu[1:] -= a22 * tau[:-1]
+    nu[0] -= a22 * before
+    nu /= l2
     return nu
 
 
 def backward_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
-    """Transition ((I − LC)A)ᵀ and input −AᵀCᵀ of the backward recursion. (…, 2, 2, n), (…, 2, n)"""
-    f11, f12, f21, f22 = transition(gains, a12, a22)
-    F = np.stack([f11, f21, f12, f22], axis=-2)
-    b = np.stack([-np.ones_like(f11), -a12 * np.ones_like(f11)], axis=-2)
-    return F.reshape(*F.shape[:-2], 2, 2, F.shape[-1]), b
+    """Transition ((I − LC)A)ᵀ and input −AᵀCᵀ of the backward recursion. (2, 2, …), (2, …)"""
+    return closed_loop(gains, a12, a22).swapaxes(0, 1), np.array([-np.ones_like(a12), -a12])
 
 
 def information_step(gains: Gains, a12: Array, a22: Array) -> Array:
-    """Λ̃ ← FᵀΛ̃F with F = (I − LC)A, as a matrix on (Λ₁₁, Λ₁₂, Λ₂₂). (…, 3, 3, n)"""
-    f11, f12, f21, f22 = transition(gains, a12, a22)
-    rows = [
-        [f11 * f11, 2.0 * f11 * f21, f21 * f21],
-        [f11 * f12, f11 * f22 + f12 * f21, f21 * f22],
-        [f12 * f12, 2.0 * f12 * f22, f22 * f22],
-    ]
-    return np.stack([np.stack(row, axis=-2) for row in rows], axis=-3)
+    """Λ̃ ← FᵀΛ̃F with F = (I − LC)A, as a matrix on (Λ₁₁, Λ₁₂, Λ₂₂). (3, 3, …)"""
+    (f11, f12), (f21, f22) = closed_loop(gains, a12, a22)
+    return np.array(
+        [
+            [f11 * f11, 2.0 * f11 * f21, f21 * f21],
+            [f11 * f12, f11 * f22 + f12 * f21, f21 * f22],
+            [f12 * f12, 2.0 * f12 * f22, f22 * f22],
+        ]
+    )
 
 
 def information_gain(a12: Array, S: Array) -> Array:
-    """AᵀCᵀCA/S, what one sample tells of the one before, as (Λ₁₁, Λ₁₂, Λ₂₂). (…, 3, n)"""
-    return np.stack([1.0 / S, a12 / S, a12**2 / S], axis=-2)
+    """AᵀCᵀCA/S, what one sample tells of the one before, as (Λ₁₁, Λ₁₂, Λ₂₂). (3, …)"""
+    return np.array([1.0 / S, a12 / S, a12**2 / S])
 
 
 def smoothed_variance(P: Covariance, information: Array) -> Array:
@@ -207,8 +250,7 @@ def missing_information(step: Array, gain: Array, samples: int) -> Array:
     return kept
 
 
-def one_sample_later(series: Array) -> Array:
-    """The series one sample later, zero at the end: what a sample learns from those after it."""
-    out = np.zeros_like(series)
-    out[:-1] = series[1:]
-    return out
+def from_the_end(F: Array, x: Array) -> Array:
+    """Run y_t = F_t y_{t+1} + x_t from a log's end; what comes of the samples behind each one."""
+    y = recursion(F[:, :, ::-1], x[:, ::-1], np.zeros_like(x[:, 0]))[:, ::-1]
+    return np.concatenate([y[:, 1:], np.zeros_like(y[:, :1])], axis=1)

@@ -12,14 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.observers.recursion import PIECE
+from vftcli.observers.recursion import FORGOTTEN, PIECE
 from vftcli.signals.arrays import Array, empty_series
 
 BLOCK = 32
 """Samples in a block, a power of two: the work grows with it, the number of blocks shrinks."""
-
-FORGOTTEN = 1e-20
-"""What is left of a state that counts as nothing: far below the last digit of anything."""
 
 
 class BlockFilter(NamedTuple):
@@ -46,7 +43,7 @@ def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> 
         g: What the input adds to the state. (m, n)
         d: Input. (T, n)
         start: State before the first sample. (m, n)
-        wanted: Weights of the state's entries. (m, n)
+        wanted: Weights of the state's entries. (m, n) or (m, 1)
 
     Returns:
         One combination of the state, wanted·s_t (T, n), and the state after the last sample (m, n).
@@ -94,7 +91,7 @@ def filter_piece(blocks: BlockFilter, d: Array, state: Array, out: Array) -> Arr
     for j in range(n):
         answer = out[j, :covered].reshape(count, BLOCK)
         np.matmul(inputs[j], blocks.toeplitz[j], out=answer)
-        answer += product(x[j, :-1], blocks.carry[j])
+        answer += np.dot(x[j, :-1], blocks.carry[j])
     # The few samples left fill no block: the same matrices, cut off.
     rest, left, state = d[:, None, covered:], samples - covered, x[:, -1]
     tail = rest @ blocks.toeplitz[:, :left, :left] + state[:, None] @ blocks.carry[:, :, :left]
@@ -107,11 +104,7 @@ def sum_by_doubling(x: Array, R: Array) -> None:
     """Run x_b ← x_b + R x_{b−1} over all blocks in place: x (n, B, m), R (n, m, m)."""
     reach, apart = R.transpose(0, 2, 1), 1
     while apart < x.shape[1] and np.max(np.abs(reach)) > FORGOTTEN:
-        x[:, apart:] += product(x[:, :-apart], reach)
+        # numpy.matmul is slow at states of one number.
+        x[:, apart:] += x[:, :-apart] * reach if len(R[0]) == 1 else x[:, :-apart] @ reach
         reach = reach @ reach
         apart *= 2
-
-
-def product(x: Array, M: Array) -> Array:
-    """The matrix product x M; for states of one number without BLAS, which is slow at these."""
-    return x * M if M.shape[-2] == 1 else x @ M

@@ -117,12 +117,14 @@ def sigmoid(dq: Array, amplitude: float, slope: float, shift: float) -> Array:
         C. Gaz et al., "Dynamic identification of the Franka Emika Panda robot with retrieval of
         feasible parameters using penalty-based optimization", IEEE RA-L 2019, Sec. II.
     """
-
-    def rise(v: Array) -> Array:
-        # Far below zero the term is zero long before the exponential overflows, at e^709.
-        return amplitude / (1.0 + np.exp(np.minimum(-slope * v, 700.0)))
-
-    return rise(dq + shift) - rise(np.asarray(shift))
+    torque: Array = -slope * dq
+    torque -= slope * shift
+    with np.errstate(over="ignore"):  # far below zero: A/∞ is 0, as it should be
+        np.exp(torque, out=torque)
+    torque += 1.0
+    np.divide(amplitude, torque, out=torque)
+    torque -= amplitude / (1.0 + np.exp(-slope * shift))
+    return torque
 
 
 def bent_line(

@@ -31,12 +31,12 @@ from vftcli.robots.tape import NOTHING, ZERO, Program, Tape, Value, Vector, cons
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.pose import skew
 
-CHUNK = 4096
-"""Samples worked on at a time: small enough that a chunk's rows stay in the cache, large enough
-that calling an operation costs little beside it."""
+CHUNK = 8192
+"""Samples worked on at a time: so many that calling an operation costs little beside it; more than
+some 6000 gain nothing. Blocks of a long log hold whole chunks."""
 
 KEPT = 4
-"""Programs that are kept, some 3 MB each: those of the arm in hand."""
+"""Programs that are kept, some 4 MB each: those of the arm in hand."""
 
 ROUNDING = 1e-15
 """An entry of a rotation, or of an inertia relative to its largest, that is zero but for this."""
@@ -56,22 +56,11 @@ class MomentumTerms(NamedTuple):
     gravity: Array
 
 
-class Bodies(NamedTuple):
-    """The inertia of each link about the origin of its own frame.
-
-    Attributes:
-        inertia: J. (n, 3, 3) [kg·m²]
-        moment: First moment h = m c. (n, 3) [kg·m]
-        mass: m. (n,) [kg]
-    """
-
-    inertia: Array
-    moment: Array
-    mass: Array
-
-
-def felt_bodies(chain: Chain) -> Bodies:
+def felt_bodies(chain: Chain) -> tuple[Array, Array]:
     """Bodies that move as the arm's links do, with as few numbers as possible (base parameters).
+
+    Returned are their inertias J about the origins of the links' frames (n, 3, 3) [kg·m²] and first
+    moments h = m c (n, 3) [kg·m]. Their masses are zero.
 
     Joint j cannot feel a body of link j that is symmetric about its axis and has no moment of
     inertia there: turning it changes neither energy nor momentum. Each link therefore hands the
@@ -94,25 +83,18 @@ def felt_bodies(chain: Chain) -> Bodies:
             h[j - 1] += R[:, 2] * h[j, 2] + m[j] * chain.translation[j]
             m[j - 1] += m[j]
         J[j] -= symmetric
-        h[j, 2] = m[j] = 0.0
+        h[j, 2] = 0.0
     size = np.abs(J).max(axis=(1, 2), keepdims=True, initial=0.0)
-    return Bodies(np.where(np.abs(J) <= ROUNDING * size, 0.0, J), h, m)
+    return np.where(np.abs(J) <= ROUNDING * size, 0.0, J), h
 
 
-class Recorded(NamedTuple):
-    """The equations of an arm on tape, and their results, one a joint."""
-
-    tape: Tape
-    results: dict[str, list[Value]]
-
-
-def record(chain: Chain) -> Recorded:
+def record(chain: Chain) -> tuple[Tape, dict[str, list[Value]]]:
     """Record the equations above. Rows given: q̇ (n), cos q (n), sin q (n).
 
-    The results are ``p``, ``coriolis`` Cᵀq̇, ``gravity`` g, and ``bias`` Cᵀq̇ − g.
+    The results, one a joint, are ``p``, ``coriolis`` Cᵀq̇, ``gravity`` g, and ``bias`` Cᵀq̇ − g.
     """
-    n = chain.joints
-    on, bodies = Tape(inputs=3 * n), felt_bodies(chain)
+    n, (inertia, moment) = chain.joints, felt_bodies(chain)
+    on = Tape(inputs=3 * n)
     dq, cosine, sine = ([Value(1.0, part * n + j) for j in range(n)] for part in range(3))
     # cos(π/2) is 6e-17 in floating point, and 1 − 1e-16 is one.
     whole = np.rint(chain.rotation)
@@ -136,14 +118,14 @@ def record(chain: Chain) -> Recorded:
     K, L, H = NOTHING, NOTHING, NOTHING  # of the links behind, in the axes of this one
     for j in range(n - 1, -1, -1):
         omega, v, gamma = motion[j]
-        h = constants(bodies.moment[j])  # the mass is zero
-        K = on.add(on.map(bodies.inertia[j], omega), on.cross(h, v), K)
+        h = constants(moment[j])
+        K = on.add(on.map(inertia[j], omega), on.cross(h, v), K)
         L = on.add(on.cross(omega, h), L)
         H = on.add(h, H)
         coriolis = on.plus(on.cross_z(K, omega), on.cross_z(L, v))
         weight = on.cross_z(H, gamma)
         found = {
-            "p": on.plus(K[2], on.dot([Value(float(inertia)) for inertia in rotors[j]], dq)),
+            "p": on.plus(K[2], on.dot([Value(float(J)) for J in rotors[j]], dq)),
             "coriolis": coriolis,
             "gravity": -weight,
             "bias": on.plus(coriolis, weight),
@@ -152,33 +134,25 @@ def record(chain: Chain) -> Recorded:
             results[name].insert(0, value)
         K, L, H = (on.map(R[j], on.turn(x, cosine[j], sine[j])) for x in (K, L, H))
         K = on.add(K, on.cross(r[j], L))
-    return Recorded(on, results)
+    return on, results
 
 
-class Programs(threading.local):
-    """The programs that a thread used last; each works in memory of its own.
-
-    Attributes:
-        made: Of an arm's constants and what is wanted, the one last used at the end.
-    """
-
-    def __init__(self) -> None:
-        self.made: dict[tuple[bytes, tuple[str, ...]], Program] = {}
-
-    def get(self, chain: Chain, wanted: tuple[str, ...]) -> Program:
-        """The program of an arm, recorded where it is not among the last `KEPT`."""
-        numbers = (*vars(chain).values(), chain.rotor_coupling)
-        key = b"".join(x.tobytes() for x in numbers if isinstance(x, np.ndarray)), wanted
-        if (program := self.made.pop(key, None)) is None:
-            tape, results = record(chain)
-            program = Program(tape, [value for name in wanted for value in results[name]])
-        self.made[key] = program
-        if len(self.made) > KEPT:
-            del self.made[next(iter(self.made))]
-        return program
+PROGRAMS = threading.local()
+"""The programs that a thread used last; each works in memory of its own."""
 
 
-PROGRAMS = Programs()
+def program_of(chain: Chain, wanted: tuple[str, ...]) -> Program:
+    """The program of an arm, recorded where it is not among the last `KEPT`."""
+    made: dict[tuple[bytes, tuple[str, ...]], Program] = vars(PROGRAMS).setdefault("made", {})
+    numbers = (*vars(chain).values(), chain.rotor_coupling)
+    key = b"".join(x.tobytes() for x in numbers if isinstance(x, np.ndarray)), wanted
+    if (program := made.pop(key, None)) is None:
+        tape, results = record(chain)
+        program = Program(tape, [value for name in wanted for value in results[name]])
+    made[key] = program
+    if len(made) > KEPT:
+        del made[next(iter(made))]
+    return program
 
 
 def momentum_chunks(
@@ -199,7 +173,7 @@ def momentum_chunks(
     samples, n = q.shape
     if not samples:
         return
-    program, size = PROGRAMS.get(chain, wanted), -(-samples // -(-samples // CHUNK))
+    program, size = program_of(chain, wanted), -(-samples // -(-samples // CHUNK))
     for start in range(0, samples, size):
         # All chunks have one size: the last one reaches back.
         begin = min(start, samples - size)
