@@ -68,7 +68,7 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
             starts[..., 1:] = new
             if np.max(change) <= SETTLED:
                 break
-    return run_blocks(model, Covariance(*starts))
+    return gains_from(model, Covariance(*starts))
 
 
 class Response(NamedTuple):
@@ -116,16 +116,16 @@ def respond(model: Discrete, starts: Covariance) -> Response:
 def predict(p11: Array, p12: Array, p22: Array, model: Discrete, i: int) -> Covariance:
     """Covariance before the measurement at position i, P⁻ = A P Aᵀ + Q."""
     a12, a22 = model.a12[i], model.a22[i]
-    moved = p12 + a12 * p22
+    carried = p12 + a12 * p22
     return Covariance(
-        p11 + a12 * (p12 + moved) + model.q11[i],
-        a22 * moved + model.q12[i],
+        p11 + a12 * (p12 + carried) + model.q11[i],
+        a22 * carried + model.q12[i],
         a22 * a22 * p22 + model.q22[i],
     )
 
 
-def run_blocks(model: Discrete, starts: Covariance) -> Gains:
-    """The covariance recursion of all blocks side by side. (length, n, blocks) each"""
+def gains_from(model: Discrete, starts: Covariance) -> Gains:
+    """The gains of all blocks side by side, from where each starts. (length, n, blocks) each"""
     (p11, p12, p22), r = starts, model.r
     l1, l2, torque = np.empty((3, *r.shape))
     for i in range(len(r)):
