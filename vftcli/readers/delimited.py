@@ -143,6 +143,8 @@ class TextTable:
         for text in (self._text, self._mended):
             try:
                 frame = self._parse(text(), kinds)
+            except pl.exceptions.NoDataError:  # a header alone, before polars 2
+                return {c: np.empty(0) for c in columns}
             except pl.exceptions.PolarsError:
                 continue
             if not self._has_blank_rows(frame):
