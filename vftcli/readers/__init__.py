@@ -41,6 +41,10 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 - the names are of every kind
     return getattr(import_module(f"vftcli.readers.{HOMES[name]}"), name)
 
 
+def __dir__() -> list[str]:
+    return sorted(HOMES)
+
+
 __all__ = [
     "READERS",
     "LogFile",
