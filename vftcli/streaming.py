@@ -1,7 +1,7 @@
 """Long logs: the same analysis block by block, so that its memory does not grow with the log."""
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.observers.block_run import block_run, runs_in_blocks
 from vftcli.observers.recursion import PIECE
-from vftcli.pipeline import AnalysisChoice, prepared
+from vftcli.pipeline import AnalysisChoice
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import RunningTerms
@@ -39,22 +39,6 @@ def comes_in_blocks(recording: Recording, robot: Robot, choice: AnalysisChoice) 
     timing = recording.long.timing
     observers, _ = choice.observers.build(robot, timing.step)
     return all(runs_in_blocks(each, timing.clock, robot.joints) for each in observers)
-
-
-def prepared_in_blocks(
-    recording: Recording, choice: AnalysisChoice, whole: Callable[[], Recording]
-) -> tuple[Recording, Robot]:
-    """A log with its robot as `vftcli.pipeline.prepared` makes it, in blocks if that will do.
-
-    Args:
-        recording: The log.
-        choice: What is asked of it.
-        whole: Reads it in one piece.
-    """
-    found = prepared(recording, choice)
-    if recording.long is None or comes_in_blocks(*found, choice):
-        return found
-    return prepared(whole(), choice)
 
 
 class BlockAnalysis:

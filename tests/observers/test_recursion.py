@@ -15,7 +15,9 @@ def loop(F: np.ndarray, x: np.ndarray, start: np.ndarray) -> np.ndarray:
     return y
 
 
-@pytest.mark.parametrize("samples", [1, 2, 63, 64, 65, 1000, 5003])
+@pytest.mark.parametrize(
+    "samples", [1, 2, 35, 36, 37, 47, 48, 49, 63, 64, 65, 1000, 1296, 1297, 5003]
+)
 @pytest.mark.parametrize("m", [1, 2])
 def test_agrees_with_a_plain_loop(samples: int, m: int) -> None:
     rng = np.random.default_rng(samples + m)
@@ -33,7 +35,7 @@ def test_pieces_carry_their_state(monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_allclose(recursion(F, x, np.ones((1, 2))), whole, atol=1e-11)
 
 
-@pytest.mark.parametrize("samples", [1, 5, 64, 4095, 4096, 4097])
+@pytest.mark.parametrize("samples", [1, 5, 64, 1295, 1296, 1297, 4095, 4096, 4097])
 def test_folding_is_undone(samples: int) -> None:
     x = np.arange(2.0 * samples).reshape(samples, 2)
     fold = Fold.of(samples)

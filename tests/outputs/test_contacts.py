@@ -16,7 +16,6 @@ from vftcli.outputs.contacts import (
     hardest_rows,
     hardest_words,
     place_words,
-    toward,
 )
 from vftcli.outputs.log.run_record import jsonable
 
@@ -76,22 +75,6 @@ def test_the_hardest_rows_are_in_the_order_of_time() -> None:
     assert [row.number for row in hardest_rows(many, 3)] == [1, 2, 3]
 
 
-@pytest.mark.parametrize(
-    ("force", "words"),
-    [
-        ((0.0, 0.0, -5.0), "down"),
-        ((1.0, 9.0, 0.0), "+y"),
-        ((-9.0, 1.0, 0.0), "−x"),
-        ((3.0, 4.0, -0.01), "(0.6, 0.8, 0.0)"),
-        ((0.0, 0.0, 0.0), "–"),
-    ],
-)
-def test_directions_are_words_where_one_axis_holds_most(
-    force: tuple[float, float, float], words: str
-) -> None:
-    assert direction(np.array(force)) == words
-
-
 def test_places_that_cannot_be_told_apart_are_named() -> None:
     def told(*links: int) -> str:
         return place_words(contact(where="cannot tell", places=links))
@@ -108,14 +91,17 @@ def test_places_that_cannot_be_told_apart_are_named() -> None:
         ((0.4, 51.9, -38.8), "+y, down"),
         ((3.0, -4.0, 3.0), "−y, +x, up"),
         ((0.0, 0.0, 2.0), "up"),
+        ((0.0, 0.0, -5.0), "down"),
+        ((1.0, 9.0, 0.0), "+y"),
+        ((-9.0, 1.0, 0.0), "−x"),
         ((0.0, 0.0, 0.0), "–"),
     ],
 )
-def test_the_table_names_every_axis_that_holds_much(
+def test_a_direction_names_every_axis_that_holds_much(
     force: tuple[float, float, float], words: str
 ) -> None:
     """More than .35 of the force: 0.35² is an eighth of its square."""
-    assert toward(np.array(force)) == words
+    assert direction(np.array(force)) == words
 
 
 def test_the_answer_is_no_force_within_its_band() -> None:

@@ -146,17 +146,17 @@ def write_estimates(
     from vftcli.outputs.log.estimates import write_estimate_folder, write_long_estimates
     from vftcli.pipeline import analyse, prepared
 
-    if recording.long is None:
-        made = analyse(*prepared(recording, choice), choice)
-        return made, write_estimate_folder(output, made, **how)
-    from vftcli.streaming import BlockAnalysis, prepared_in_blocks
+    log, robot = prepared(recording, choice)
+    if recording.long is not None:
+        from vftcli.streaming import BlockAnalysis, comes_in_blocks
 
-    recording, robot = prepared_in_blocks(recording, choice, whole)
-    run = BlockAnalysis(analyse(recording, robot, choice), choice)
-    if recording.long is None:
-        return run.made, write_estimate_folder(output, run.made, **how)
-    record = write_long_estimates(output, run.blocks(), lambda: run.made, **how)
-    return run.made, record
+        if comes_in_blocks(log, robot, choice):
+            run = BlockAnalysis(analyse(log, robot, choice), choice)
+            record = write_long_estimates(output, run.blocks(), lambda: run.made, **how)
+            return run.made, record
+        log, robot = prepared(whole(), choice)
+    made = analyse(log, robot, choice)
+    return made, write_estimate_folder(output, made, **how)
 
 
 def show_estimates(made: "Analysis", output: Path, files: "Sequence[str]") -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from vftcli.signals.arrays import Array, Indices
 
 LENGTH = 36
-"""Samples in a block at most: the Python loops have this length."""
+"""Samples in a block at most: the Python loops have this length. From 32 to 64 all take as long."""
 
 PIECE = 1 << 14
 """Samples handled at a time, so that memory does not grow with the log; blocks of a log that begin

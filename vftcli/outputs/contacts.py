@@ -13,9 +13,6 @@ from vftcli.signals.remarks import sentence
 MOST_ROWS = 20
 """Rows on the terminal unless all are asked for."""
 
-ONE_AXIS = 0.8
-"""A force is said to go along an axis that holds more than this share of it."""
-
 PART = 0.35
 """An axis that holds more than this share of a force is named in its direction."""
 
@@ -136,26 +133,13 @@ def contact_row(contact: Contact, force: bool) -> list[str]:
     if force and contact.wrench is not None and contact.anywhere is not None:
         low, high = contact.anywhere
         row += [f"{contact.peak_force:.0f} ± {contact.peak_band:.0f}", f"{low:.0f}–{high:.0f}"]
-        row.append(toward(contact.wrench[:3]))
+        row.append(direction(contact.wrench[:3]))
     else:
         row.append(" ".join(f"{torque:.1f}" for torque in contact.joint_torque))
     return [*row, place_words(contact), contact.trust]
 
 
 def direction(force: Array) -> str:
-    """A force's direction: an axis that holds most of it, else the unit vector."""
-    size = float(np.linalg.norm(force))
-    if size == 0.0:
-        return "–"
-    u = force / size
-    k = int(np.argmax(np.abs(u)))
-    if abs(u[k]) > ONE_AXIS:
-        return AXIS_WORDS[k][int(u[k] > 0)]
-    # Rounding leaves no minus before a nought.
-    return f"({', '.join(f'{x + 0.0:.1f}' for x in np.round(u, 1))})".replace("-", "−")
-
-
-def toward(force: Array) -> str:
     """A force's direction in words: every axis that holds much of it, the most first."""
     size = float(np.linalg.norm(force))
     if size == 0.0:
@@ -194,7 +178,7 @@ def hardest_words(found: ContactList) -> str:
 def beginning(contact: Contact) -> str:
     """What is said where a contact begins: when, for how long, how hard, in which direction, where.
 
-    As ``4.70 s: contact 1 begins, for 0.89 s: 86 ± 10 N, +x, wrist (good)``.
+    As ``4.70 s: contact 1 begins, for 0.89 s: 86 ± 10 N, +x, up, wrist (good)``.
     """
     if contact.peak_force is None or contact.wrench is None:
         torque = ", ".join(f"{value:.1f}" for value in contact.joint_torque)

@@ -60,8 +60,8 @@ def test_the_log_says_when_how_hard_and_where() -> None:
     assert first.path == "/contacts/3"
     assert first.t == 4.602
     assert first.colour == PLACES["forearm"]
-    words = "4.60 s: contact 3 begins, for 0.18 s: 65 ± 7 N, +y, forearm (weak)"
-    # |F_y| is .801 of the force: one axis holds more than .8 of it
+    words = "4.60 s: contact 3 begins, for 0.18 s: 65 ± 7 N, +y, down, forearm (weak)"
+    # |F_y| is .801 of the force and |F_z| nearly .6: both hold more than .35 of it
     assert first.text in {words, words.replace("weak", "good")}
     assert (remark.path, remark.t, remark.level) == ("/remarks", 17.9, "WARN")
     (nothing,) = contact_log(contact_list(remarks=()))

@@ -162,7 +162,7 @@ def contact_row(analysis: Analysis, contact: Contact, most: float) -> str:
     """One contact; its number leads to the chart."""
     number, lasts = contact.number, contact.stop - contact.start
     hard = "not told" if contact.peak_force is None else size(contact) + range_bar(contact, most)
-    toward = "–" if contact.wrench is None else direction(contact.wrench[:3])
+    pushed = "–" if contact.wrench is None else direction(contact.wrench[:3])
     mark = (
         f'<a class="n" href="#mark-{number}" title="show in the chart" '
         f'aria-label="contact {number}: show in the chart">{number}</a>'
@@ -170,7 +170,7 @@ def contact_row(analysis: Analysis, contact: Contact, most: float) -> str:
     cells = (
         ("num", f"{contact.start:.2f} – {contact.stop:.2f} s<small>{lasts:.2f} s</small>"),
         ("num big", hard),
-        ("num", escape(toward)),
+        ("num", escape(pushed)),
         ("place", f"{arm_drawing(analysis, contact)}<div>{place(contact)}</div>"),
         ("", trust(contact)),
     )
