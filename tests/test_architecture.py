@@ -46,7 +46,7 @@ ORDER = (
 APART = {"refinement", "evaluation", "identification", "simulation", "doctor", "contacts"}
 """Rooms that do not know each other."""
 
-KNOWN = {("evaluation", "refinement")}
+KNOWN = {("evaluation", "refinement"), ("contacts", "refinement")}
 """Pairs of those that do, the first the second."""
 
 FILES = (

@@ -169,7 +169,8 @@ def list_touches(
     examinations = examine(motion, choice)
     choice.progress(f"{recording.name}: listing contacts", 0.3, 1.0)
     made = Analysis(motion=motion, observers=(), estimates=(), tunings={})
-    return replace(made, contacts=list_contacts(motion), examinations=examinations)
+    found = list_contacts(motion).weighed(examinations[0].load)
+    return replace(made, contacts=found, examinations=examinations)
 
 
 def prepared(recording: Recording, choice: AnalysisChoice) -> tuple[Recording, Robot]:
@@ -307,20 +308,18 @@ def find_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
 
     choice.progress(f"{analysis.recording.name}: listing contacts", 0.3, 0.5)
     try:
-        return replace(analysis, contacts=list_contacts(unloaded_motion(analysis.motion, choice)))
+        motion, made = unloaded_motion(analysis.motion, choice), analysis.refinement
+        bias = None if made is None else made.baseline.under(BEST).correction
+        found = list_contacts(motion, bias, referenced=choice.reference is not None)
+        return replace(analysis, contacts=found.weighed(analysis.examinations[0].load))
     except VftError as error:
         reason = caution("contacts-not-told", reason=str(error))
         return replace(analysis, remarks=(*analysis.remarks, reason))
 
 
 def unloaded_motion(motion: FreeMotion, choice: AnalysisChoice) -> FreeMotion:
-    """The log with what is free of contact: where that is not said, what is said to be unloaded."""
-    if motion.choice.is_given or choice.wrench is None:
-        return motion
-    spans, zero = choice.wrench.zero.spans, motion.zero
-    if spans:
-        return replace(motion, choice=replace(motion.choice, spans=spans))
-    return motion if zero is None else replace(motion, runs=(zero,))
+    """The log with what is free of contact: where that is not given, what is given as unloaded."""
+    return motion if choice.wrench is None else motion.unloaded(choice.wrench.zero.spans)
 
 
 def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":

@@ -11,7 +11,7 @@ def contact(**changed: object) -> Contact:
     """A push of 65 N on the wrist."""
     values: dict[str, object] = {
         "number": 1, "start": 4.602, "stop": 4.781, "peak": 4.69,
-        "peak_force": 64.8, "peak_band": 7.1,
+        "peak_force": 64.8, "peak_band": 7.1, "place_band": changed.get("peak_band", 7.1),
         "wrench": np.array([0.4, 51.9, -38.8, 0.2, 0.1, 0.0]),
         "wrench_sd": np.array([1.9, 3.1, 2.8, 0.5, 0.5, 0.5]),
         "mean_force": np.array([0.3, 32.0, -24.0]),
@@ -26,7 +26,7 @@ def contact(**changed: object) -> Contact:
 def contact_list(*contacts: Contact, **changed: object) -> ContactList:
     """A list of contacts with a free part."""
     values: dict[str, object] = {
-        "recording": "log.csv", "duration": 20.0, "contacts": contacts, "method": "smoother",
+        "recording": "log.csv", "duration": 20.0, "contacts": contacts, "basis": "free motion",
         "free": (fact("free-span", begin_s=0.3, end_s=4.0),), "free_seconds": 3.7,
         "false_on_free": 0, "threshold": 12.0, "smallest_force": 6.5, "stops": (17.9,),
         "model": ContactModel(

@@ -59,7 +59,7 @@ def test_a_bearing_and_two_knocks_are_three_contacts(listed: Lister) -> None:
 
 def test_free_cycles_are_found_where_nothing_is_said(listed: Lister) -> None:
     found = listed("ur5_circle.csv", "ur5")
-    assert found.method == "smoother"
+    assert found.basis == "free motion"
     assert found.free
     scored = score(found.contacts, true_contacts(*true_wrench("ur5_circle.csv")))
     assert (len(scored.pairs), len(scored.false)) == (12, 0)
@@ -150,11 +150,58 @@ def test_free_motion_lists_nothing(logs: Path, name: str) -> None:
     assert found.false_on_free == 0
 
 
-def test_without_free_motion_the_hands_are_told_by_the_drives_friction(logs: Path) -> None:
-    found = list_contacts(motion(ur10e(logs, "push_pose.csv"), "ur10e"))
-    assert found.method == "threshold"
-    assert len(found.contacts) == 4
-    assert not list_contacts(motion(ur10e(logs, "free_12harm.csv"), "ur10e")).contacts
+def ranges(found: ContactList) -> list[tuple[float, float]]:
+    """95 % range of every row's force. [N]"""
+    sizes = [(row.peak_force or 0.0, row.peak_band or 0.0) for row in found.contacts]
+    return [(size - band, size + band) for size, band in sizes]
+
+
+def test_free_motion_and_none_give_one_answer(logs: Path) -> None:
+    free, push = ur10e(logs, "free_14harm.csv"), ur10e(logs, "push_pose.csv")
+    answers = [list_contacts(motion(push, "ur10e", run=run)) for run in (None, free)]
+    for other in answers:
+        assert len(other.contacts) == 4
+    for rows in zip(*map(ranges, answers), strict=True):
+        assert max(low for low, _ in rows) < min(high for _, high in rows)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["free_12harm.csv", "free_10harm.csv.gz", "free_repeat_a.csv", "jointwise_2.csv",
+     "load_14harm.csv"],
+)  # fmt: skip
+def test_motion_of_which_nothing_is_named_lists_nothing(logs: Path, name: str) -> None:
+    found = list_contacts(motion(ur10e(logs, name), "ur10e"))
+    assert found.basis in {"whole log", "friction"}
+    assert not found.contacts
+    # 2.805 kg hang on the flange of the last.
+    assert (found.load is not None) == name.startswith("load")
+    if found.load is not None:
+        assert found.load.mass == pytest.approx(2.805, rel=0.1)
+
+
+@pytest.mark.parametrize("name", ["identification", "repeat_a", "repeat_b"])
+def test_another_arm_that_nobody_touches_lists_nothing(logs: Path, name: str) -> None:
+    recording = read(logs / "ur3" / f"{name}.bag", columns="-tau")
+    assert not list_contacts(motion(recording, "ur3")).contacts
+
+
+def test_without_friction_and_free_motion_no_contact_is_listed() -> None:
+    """Inverse dynamics by Pinocchio, friction of 8 N·m that the model lacks, nobody touches."""
+    _, log = moving_arm(6, friction=8.0)
+    found = list_contacts(FreeMotion(log=log))
+    assert found.basis == "none"
+    assert not found.contacts
+    assert found.unexplained is not None
+    assert found.unexplained.torque == pytest.approx(8.0, rel=0.3)
+
+
+def test_inferred_rows_are_never_good_unless_something_checks_them() -> None:
+    plain = motion(read(FIXTURES / "ur5_sensor.parquet"), "ur5")
+    found = list_contacts(plain)
+    assert len(found.contacts) == 5
+    assert {row.trust for row in found.contacts} <= {"fair", "weak"}
+    assert "good" in {row.trust for row in list_contacts(plain, referenced=True).contacts}
 
 
 def short_arm(joints: int) -> Robot:
@@ -170,20 +217,32 @@ def short_arm(joints: int) -> Robot:
     )  # fmt: skip
 
 
-def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons() -> None:
-    """Inverse dynamics by Pinocchio, and 12 N·m on joint 2 from 6 to 7 s."""
+def moving_arm(joints: int, friction: float = 0.0) -> tuple[Robot, ModelledRun]:
+    """Ten seconds of inverse dynamics by Pinocchio, with dry friction that no model knows."""
     import pinocchio as pin
 
-    robot, t = short_arm(3), 0.008 * np.arange(1250)
-    rate = np.array([0.9, 1.3, 1.7])
+    robot, t = short_arm(joints), 0.008 * np.arange(1250)
+    rate = np.array([0.9, 1.3, 1.7, 1.1, 2.1, 1.5])[:joints]
     q, dq, ddq = (f * 0.4 * rate**k for k, f in enumerate((
         np.sin(np.outer(t, rate)), np.cos(np.outer(t, rate)), -np.sin(np.outer(t, rate)),
     )))  # fmt: skip
     data = robot.model.createData()
     torque = np.array([pin.rnea(robot.model, data, *row) for row in zip(q, dq, ddq, strict=True)])
     torque += 0.2 * np.random.default_rng(10).standard_normal(torque.shape)
-    torque[(t > 6.0) & (t < 7.0), 1] -= 12.0
-    log = ModelledRun(recording=Recording(t=t, q=q, dq=dq, torque=torque), robot=robot)
+    torque += friction * np.tanh(dq / 0.02)
+    recording = Recording(t=t, q=q, dq=dq, torque=torque)
+    return robot, ModelledRun(recording=recording, robot=robot)
+
+
+def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons() -> None:
+    """12 N·m on joint 2 from 6 to 7 s."""
+    robot, log = moving_arm(3)
+    recording = log.recording
+    t, torque = recording.t, recording.torque
+    assert torque is not None
+    pushed = torque.copy()
+    pushed[(t > 6.0) & (t < 7.0), 1] -= 12.0
+    log = ModelledRun(recording=replace(recording, torque=pushed), robot=robot)
     motion = FreeMotion(log=log, choice=FreeChoice.parsed(free_part="0:5"))
     found = list_contacts(motion)
     (row,) = found.contacts
@@ -194,7 +253,6 @@ def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons() -> None:
     assert row.wrench is None
     assert found.smallest_force is None
     assert [remark.code for remark in found.remarks] == ["no-wrench-of-few-joints"]
-    assert not list_contacts(replace(motion, choice=FreeChoice())).contacts[0].anywhere
 
 
 def test_a_load_that_stays_to_the_end_of_the_log_is_listed() -> None:

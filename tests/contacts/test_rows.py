@@ -128,4 +128,4 @@ def test_every_row_has_its_course(listed: Callable[..., ContactList]) -> None:
         k = int(np.argmax(course.force))
         assert course.t[k] == pytest.approx(contact.peak)
         assert course.force[k] == pytest.approx(contact.peak_force)
-        assert course.band[k] == pytest.approx(contact.peak_band)
+        assert course.band[k] == pytest.approx(contact.place_band)

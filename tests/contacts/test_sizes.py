@@ -85,7 +85,7 @@ def test_a_drawn_wrench_is_measured_and_its_prior_learned() -> None:
     assert abs(prior.force / 30.0 - 1.0) < 0.25
     assert abs(prior.moment / 3.0 - 1.0) < 0.25
     for run, course in zip(
-        runs, smooth_contacts(log, [jacobian] * len(runs), runs, prior), strict=True
+        runs, smooth_contacts(log, [jacobian] * len(runs), runs, [prior] * len(runs)), strict=True
     ):
         inside = course.within(run)
         sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))

@@ -9,7 +9,7 @@ from contact_logs import FIXTURES, motion
 from vftcli.contacts.sizes import START
 from vftcli.contacts.untouched import (
     BLOCK,
-    MOVING_SHARE,
+    DRY_SHARE,
     RESTING_SHARE,
     block_length,
     expected_torque,
@@ -99,7 +99,7 @@ def test_resting_joints_are_given_their_stiction() -> None:
     sd, dry = expected_torque(log, None), dry_torques(log.robot)
     speed = np.abs(LOG.require("dq"))
     far = np.convolve(speed[:, 0] < 0.01, np.ones(101), "same") == 0
-    np.testing.assert_allclose(sd[far, 0], MOVING_SHARE * dry[0])
+    np.testing.assert_allclose(sd[far, 0], DRY_SHARE * dry[0])
     assert np.all(sd[speed < 0.01] >= np.tile(RESTING_SHARE * dry, (len(speed), 1))[speed < 0.01])
 
 

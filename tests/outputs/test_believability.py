@@ -146,7 +146,7 @@ def test_friction_of_a_profile_names_the_command_for_ones_own(without_reference:
 
 
 def test_without_free_motion_the_list_says_so(without_reference: Analysis) -> None:
-    found = contact_list(contact(), method="threshold", free=(), false_on_free=None, remarks=())
+    found = contact_list(contact(), basis="friction", free=(), false_on_free=None, remarks=())
     made = replace(without_reference, contacts=found)
     (ground,) = of(made, "free motion")
     assert ground.standing == "caution"
@@ -187,17 +187,19 @@ def test_what_measures_the_force(analysis: Analysis, without_reference: Analysis
 
 
 def test_the_rest_of_the_log(without_reference: Analysis) -> None:
-    assert otherwise(contact_list(contact())).startswith("else: nothing above 6 N")
-    threshold = contact_list(contact(), method="threshold", smallest_force=29.7)
-    assert otherwise(threshold).startswith("else: nothing above 30 N, below which friction alone")
+    assert otherwise(contact_list(contact())).startswith("Nothing else above 6 N.")
+    inferred = contact_list(contact(), basis="friction", smallest_force=29.7)
+    assert otherwise(inferred) == "Pushes below 30 N do not show."
+    more = replace(inferred, candidates=(contact(), contact()))
+    assert otherwise(more) == "Pushes below 30 N do not show. 2 candidates more: --all."
     assert otherwise(contact_list(contact(is_load=True))) == ""
     assert otherwise(contact_list(smallest_force=float("nan"))) == ""
-    assert "a push along one axis may go unseen" in otherwise(contact_list(smallest_force=3473.0))
+    assert "A push along one axis may go unseen" in otherwise(contact_list(smallest_force=3473.0))
     faint = contact_list(contact(peak_force=5.0, peak_band=2.0))
-    assert otherwise(faint) == "else: nothing above 6 N, and less where the arm feels a push best"
+    assert otherwise(faint) == "Nothing else above 6 N (less at good poses)."
     assert otherwise(contact_list(smallest_force=None)) == ""
     listed = replace(without_reference, contacts=contact_list())
-    assert headline(listed) == "Nothing touched the arm, as far as this log can tell."
+    assert headline(listed) == "Nothing touched the arm, as far as this log shows."
     assert "no contacts are listed" in headline(replace(listed, contacts=None))
 
 

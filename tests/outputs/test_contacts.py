@@ -2,11 +2,13 @@
 
 import csv
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from contact_rows import contact, contact_list
 
+from vftcli.contacts.contact_list import CarriedLoad, Unexplained
 from vftcli.outputs.contacts import (
     answer,
     contact_grid,
@@ -18,13 +20,14 @@ from vftcli.outputs.contacts import (
     place_words,
 )
 from vftcli.outputs.log.run_record import jsonable
+from vftcli.signals.remarks import caution
 
-KEYS = {"recording", "frame", "sign", "free_part", "smallest_force_N", "contacts"}
+KEYS = {"recording", "frame", "sign", "free_part", "smallest_force_N", "contacts", "candidates"}
 """What scripts rely on of a log."""
 
 ROW = {"number", "start_s", "stop_s", "peak_s", "peak_force_N", "peak_force_band_N", "force_N",
-       "moment_Nm", "mean_force_N", "impulse_Ns", "where", "evidence_nats", "joint_torque_Nm",
-       "remarks"}  # fmt: skip
+       "moment_Nm", "mean_force_N", "impulse_Ns", "where", "trust", "size_known", "anywhere_N",
+       "evidence_nats", "joint_torque_Nm", "remarks"}  # fmt: skip
 """And of a contact."""
 
 
@@ -62,11 +65,45 @@ def test_csv_has_a_row_a_contact_and_vectors_taken_apart() -> None:
 def test_the_answer_is_a_sentence() -> None:
     found = contact_list(contact())
     assert answer(found) == "1 contact. The hardest, at 4.7 s: 65 ± 7 N on the wrist."
-    assert answer(contact_list()) == "Nothing touched the arm, as far as this log can tell."
+    assert answer(contact_list()) == "Nothing touched the arm, as far as this log shows."
     load = contact(is_load=True, mean_force=np.array([0.0, 0.0, -27.0]), peak_force=27.0)
     assert answer(contact_list(load)) == (
         "A load, or a wrong payload, or a wrong model: 27 ± 7 N on average, down."
     )
+
+
+def test_a_log_without_free_motion_is_never_called_untouched() -> None:
+    empty = contact_list(basis="whole log")
+    assert answer(empty) == "No contact stands out."
+    likely = replace(empty, candidates=(contact(peak_force=33.0, peak_band=7.0, peak=12.9),))
+    assert answer(likely).startswith(
+        "No contact stands out. Up to 40 N near 12.9 s this model cannot explain: name free motion "
+    )
+    nothing = contact_list(basis="none", unexplained=Unexplained(22.1, 4, 3.2))
+    assert answer(nothing).startswith(
+        "Largest unexplained torque: 22 N·m on J4 at 3.2 s: a contact or a model error."
+    )
+
+
+def test_a_load_that_the_model_lacks_is_in_the_headline() -> None:
+    load = CarriedLoad(2.88, 0.09, "ur10e", None, (4.7, 50.5))
+    assert answer(contact_list(basis="whole log", load=load)) == (
+        "The arm carries 2.88 ± 0.09 kg that ur10e does not know of (4.7–50.5 s). "
+        "No contact stands out."
+    )
+    hand = answer(contact_list(load=load._replace(payload="franka_hand")))
+    assert "(4.7–50.5 s): franka_hand? Add --payload franka_hand." in hand
+
+
+def test_a_size_that_depends_on_the_place_is_a_range() -> None:
+    by_place = caution("size-goes-with-place", least_N=20.0, most_N=248.0)
+    unknown = contact(remarks=(by_place,), anywhere=(20.0, 248.0))
+    assert answer(contact_list(unknown)) == (
+        "1 contact. Its size depends on where it touched, unknown: 20–248 N."
+    )
+    (row,) = contact_grid([unknown]).rows
+    assert row[2:4] == ["unknown", "20–248"]
+    assert "The hardest of known size" in answer(contact_list(unknown, contact(number=2)))
 
 
 def test_the_hardest_rows_are_in_the_order_of_time() -> None:
@@ -107,11 +144,9 @@ def test_a_direction_names_every_axis_that_holds_much(
 def test_the_answer_is_no_force_within_its_band() -> None:
     wide = contact(number=2, peak_force=88.0, peak_band=170.0)
     assert answer(contact_list(contact(), wide)) == (
-        "2 contacts. The hardest whose size can be told, at 4.7 s: 65 ± 7 N on the wrist."
+        "2 contacts. The hardest of known size, at 4.7 s: 65 ± 7 N on the wrist."
     )
-    assert answer(contact_list(wide)) == (
-        "1 contact. How hard cannot be told: the band is wider than the force."
-    )
+    assert answer(contact_list(wide)) == ("1 contact. How hard is unknown: below 258 N.")
     assert hardest_words(contact_list(wide)) == "not told (88 ± 170 N at 4.7 s)"
     assert [row.number for row in hardest_rows([wide, contact()], 1)] == [1]
     load = contact(peak_force=3.0, peak_band=5.0, is_load=True)

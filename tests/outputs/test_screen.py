@@ -42,7 +42,14 @@ def test_the_answer_stands_first_and_everything_on_one_screen(analysis: Analysis
     assert len(lines) <= MOST_LINES
     assert "· ur5" in lines[0]
     assert lines[2].strip().startswith("4 contacts. The hardest, at ")
-    order = ["┤", "from – to [s]", "else: ", "Can it be believed?", "Against vendor", "out/  "]
+    order = [
+        "┤",
+        "from – to [s]",
+        "Nothing else",
+        "Can it be believed?",
+        "Against vendor",
+        "out/  ",
+    ]
     assert [text.index(word) for word in order] == sorted(text.index(word) for word in order)
     assert "the others" in text or "the paper's gains" in text
     assert "\x1b" not in text

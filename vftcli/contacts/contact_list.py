@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from vftcli.contacts.places import ArmPart
+    from vftcli.contacts.untouched import Basis
     from vftcli.contacts.windows import ContactPrior
 
 Trust = Literal["good", "fair", "weak"]
@@ -59,7 +60,8 @@ class Contact(Shown):
         is_load: Whether it lasts so long that it is a load, a wrong payload or a wrong model; its
             numbers are then means over the row, not those of a peak.
         peak_force: |F| at the peak. [N]
-        peak_band: Half width of its 95 % band. [N]
+        peak_band: Half width of its 95 % band, what the place may change in it. [N]
+        place_band: Half width of its 95 % band at the place that fits best. [N]
         wrench: Force and moment at the peak. (6,) [N, N·m]
         wrench_sd: Standard deviation. (6,) [N, N·m]
         mean_force: Mean force. (3,) [N]
@@ -74,7 +76,8 @@ class Contact(Shown):
         at_rest: Whether no joint moves at the peak.
         vendor_force: |F| of the log's own torque estimate at the peak, None without one. [N]
         sensor_force: |F| of the log's own wrench at the peak, None without one. [N]
-        course: |F| from start to end, None where no force is told.
+        course: |F| from start to end, None where no force is known.
+        inferred: Whether neither free motion nor a reference lets its size be checked.
         remarks: What limits this row.
     """
 
@@ -85,6 +88,7 @@ class Contact(Shown):
     is_load: bool = False
     peak_force: float | None
     peak_band: float | None
+    place_band: float | None
     wrench: Array | None
     wrench_sd: Array | None
     mean_force: Array | None
@@ -100,6 +104,7 @@ class Contact(Shown):
     vendor_force: float | None = None
     sensor_force: float | None = None
     course: ForceCourse | None = None
+    inferred: bool = False
     remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
@@ -119,9 +124,11 @@ class Contact(Shown):
 
     @property
     def _size(self) -> str:
-        """|F| at the peak with its 95 % band; the joints' torques where no force is told."""
+        """|F| at the peak with its band or range; the joints' torques where no force is known."""
         if self.peak_force is None:
             return f"{joined(self.joint_torque)} N·m"
+        if self.place_unknown and self.anywhere is not None:
+            return f"{self.anywhere[0]:.0f} to {self.anywhere[1]:.0f} N"
         return f"{self.peak_force:.0f} ± {self.peak_band:.0f} N"
 
     def record(self) -> dict[str, Any]:
@@ -135,6 +142,7 @@ class Contact(Shown):
             "peak_s": self.peak,
             "peak_force_N": self.peak_force,
             "peak_force_band_N": self.peak_band,
+            "place_band_N": self.place_band,
             "force_N": None if wrench is None else wrench[:3],
             "force_sd_N": None if sd is None else sd[:3],
             "moment_Nm": None if wrench is None else wrench[3:],
@@ -146,6 +154,7 @@ class Contact(Shown):
             "places": [link or "flange" for link in self.places],
             "anywhere_N": None if self.anywhere is None else list(self.anywhere),
             "trust": self.trust,
+            "size_known": self.size_known,
             "evidence_nats": self.evidence,
             "joint_torque_Nm": self.joint_torque,
             "joint_torque_sd_Nm": self.joint_torque_sd,
@@ -176,31 +185,81 @@ class Contact(Shown):
         return replace(self, number=number)
 
     @property
-    def has_size(self) -> bool:
-        """Whether its force is larger than the band of it."""
-        if self.peak_force is None or self.peak_band is None:
+    def size_known(self) -> bool:
+        """Whether its force is larger than its band, and does not hang on an unknown place."""
+        if self.peak_force is None or self.peak_band is None or self.place_unknown:
             return False
         return self.peak_force > self.peak_band
+
+    @property
+    def place_unknown(self) -> bool:
+        """Whether its size depends on where it touched, and that is unknown."""
+        return any(remark.code == "size-goes-with-place" for remark in self.remarks)
 
     @property
     def is_told(self) -> bool:
         """Whether it says more than that something may be there: a force, or sure evidence.
 
-        Where no force is told, its torques are what it says.
+        The band at the place that fits best decides. Where no force is known its torques are what
+        it says.
         """
-        return self.peak_force is None or self.has_size or (self.evidence or 0.0) >= SURE_NATS
+        if self.peak_force is None or self.place_band is None:
+            return True
+        return self.peak_force > self.place_band or (self.evidence or 0.0) >= SURE_NATS
 
     @property
     def trust(self) -> Trust:
-        """How far the row may be believed: by its evidence, its band and its remarks."""
+        """How far the size of the row may be believed: by its evidence, band and remarks."""
         if self.remarks or self.is_load or self.evidence is None or self.evidence < SURE_NATS:
             return "weak"
-        if self.peak_force is None or self.peak_band is None:
+        if self.peak_force is None or self.place_band is None or self.peak_band is None:
             return "weak"
-        share = self.peak_band / max(self.peak_force, 1e-9)
-        if share > WIDE:
+        size = max(self.peak_force, 1e-9)
+        if self.place_band > WIDE * size:
             return "weak"
-        return "good" if share <= TIGHT else "fair"
+        return "good" if self.peak_band <= TIGHT * size and not self.inferred else "fair"
+
+
+class CarriedLoad(NamedTuple):
+    """A load that the arm carries and its model lacks; it is in no row.
+
+    Attributes:
+        mass: Its mass. [kg]
+        sd: Standard deviation of the mass. [kg]
+        robot: The model's name.
+        payload: The payload of the robot's file that weighs as much, None without one.
+        span: From the arm's first motion to its last, in which it is weighed. [s]
+    """
+
+    mass: float
+    sd: float
+    robot: str
+    payload: str | None
+    span: tuple[float, float]
+
+    def record(self) -> dict[str, Any]:
+        """The load for machines, units in the names."""
+        return {
+            "mass_kg": self.mass,
+            "mass_sd_kg": self.sd,
+            "robot": self.robot,
+            "payload": self.payload,
+            "span_s": list(self.span),
+        }
+
+
+class Unexplained(NamedTuple):
+    """The largest torque that the robot's model does not explain.
+
+    Attributes:
+        torque: Its size. [N·m]
+        joint: Of which joint, from 1.
+        at: When. [s]
+    """
+
+    torque: float
+    joint: int
+    at: float
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -233,12 +292,15 @@ class ContactList(Shown):
         recording: The log's label.
         duration: How long it is. [s]
         contacts: The contacts, in the order of time.
-        method: "smoother", or "threshold" where no free motion is known.
+        candidates: What may be contacts, and what may be errors of the model, with less evidence.
+        basis: What tells a contact from an error of the model.
         free: What is known of free motion, as remarks; none where nothing is.
         free_seconds: How much of it there is. [s]
         false_on_free: Contacts listed in the log's own free part, None where it has none.
         threshold: Evidence that a contact must have, None without. [nats]
         smallest_force: The smallest force that this log can tell, None without a wrench. [N]
+        unexplained: Where nothing can be listed the largest torque, else None.
+        load: A load that the arm carries and its model lacks, None where none shows.
         stops: When the arm stopped so abruptly that what follows is no contact. [s]
         model: What the list rests on.
         remarks: What limits the list as a whole.
@@ -247,12 +309,15 @@ class ContactList(Shown):
     recording: str
     duration: float
     contacts: tuple[Contact, ...]
-    method: Literal["smoother", "threshold"]
+    candidates: tuple[Contact, ...] = ()
+    basis: "Basis"
     free: tuple[Remark, ...]
     free_seconds: float
     false_on_free: int | None
     threshold: float | None
     smallest_force: float | None
+    unexplained: Unexplained | None = None
+    load: CarriedLoad | None = None
     stops: tuple[float, ...]
     model: ContactModel
     remarks: tuple[Remark, ...] = ()
@@ -290,10 +355,16 @@ class ContactList(Shown):
             return pl.DataFrame(schema=dict.fromkeys(FIRST_COLUMNS, pl.Float64))
         return pl.DataFrame([c.row() for c in self.contacts], infer_schema_length=None)
 
+    def weighed(self, load: tuple[float, float] | None) -> "ContactList":
+        """The list with its load's mass and standard deviation as they were weighed, if so. [kg]"""
+        if self.load is None or load is None:
+            return self
+        return replace(self, load=self.load._replace(mass=load[0], sd=load[1]))
+
     @property
     def tells_untouched(self) -> bool:
         """Whether nothing touches the arm outside of the rows: known from its free motion."""
-        return self.method == "smoother" and not any(c.is_load for c in self.contacts)
+        return self.basis == "free motion" and not any(c.is_load for c in self.contacts)
 
     @property
     def told_force(self) -> float | None:
@@ -303,9 +374,6 @@ class ContactList(Shown):
 
     @property
     def hardest(self) -> Contact | None:
-        """The contact with the largest force, None without any.
-
-        One whose force is no larger than its band is taken only where all are so.
-        """
+        """The contact with the largest known force; the largest of all where none is known."""
         felt = [contact for contact in self.contacts if contact.peak_force is not None]
-        return max(felt, key=lambda c: (c.has_size, c.peak_force or 0.0), default=None)
+        return max(felt, key=lambda c: (c.size_known, c.peak_force or 0.0), default=None)

@@ -1,28 +1,36 @@
-"""A log's contacts: the smoother's list where free motion is known, else a threshold's."""
+"""The contacts of a log: found by evidence, measured by the smoother, with what limits them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from vftcli.contacts.contact_list import Contact, ContactList, ContactModel
-from vftcli.contacts.evidence import LEAST_EVIDENCE
+from vftcli.contacts.contact_list import (
+    CarriedLoad,
+    Contact,
+    ContactList,
+    ContactModel,
+    Unexplained,
+)
+from vftcli.contacts.evidence import LEAST_EVIDENCE, LEAST_IN_MOTION
 from vftcli.contacts.loads import is_load, load_row
 from vftcli.contacts.model_error import UNKNOWN, UNSEEN_SHARE, error_course
 from vftcli.contacts.places import places
 from vftcli.contacts.rows import NORMAL, Measurer
 from vftcli.contacts.search import Found, search
 from vftcli.contacts.stops import follows_stop
-from vftcli.contacts.threshold_list import axes_told, threshold_rows
 from vftcli.contacts.untouched import (
     BLOCK,
-    MOVING_SHARE,
     SETTLED,
     Untouched,
     block_length,
+    inferred_motion,
+    observed,
     untouched_motion,
 )
 from vftcli.contacts.windows import BlockLog, Run, gate_of
+from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
+from vftcli.repetition.free_load import FreeLoad
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.disturbance import disturbance_blocks
@@ -31,7 +39,6 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
-from vftcli.virtual_sensor.smoother.noise import dry_torques
 
 SHORT, FINE = 0.25, 0.008
 """A contact shorter than this [s] is measured in blocks of this length [s]: longer ones cut its
@@ -43,12 +50,27 @@ SHORTEST = 0.5
 FALSE_MARGIN = 1.5
 """A contact's evidence must be this much above that of any row in the log's own free part."""
 
+AT_ENDS = 0.3
+"""What lies within so long of either end of the log is no contact: filters begin there. [s]"""
 
-def list_contacts(motion: FreeMotion) -> ContactList:
+SAME_MASS = 0.1
+"""A payload of the robot's file is named where it weighs as much as a load to this share."""
+
+RESTS, AROUND = 0.02, 1.0
+"""The arm rests around a contact where no joint is faster than this [rad/s] in 95 % of the samples
+from so long [s] before it to so long after it."""
+
+
+def list_contacts(
+    motion: FreeMotion, bias: WholeLogBias | None = None, *, referenced: bool = False
+) -> ContactList:
     """What touched the arm along a log.
 
     Args:
         motion: The log, its robot, and what is known of its free motion.
+        bias: The model error of the whole log where it has been fitted already; else it is fitted
+            here if no free motion is known.
+        referenced: Whether a reference stands beside the list, against which a size can be checked.
 
     Raises:
         VftError: If a free part that the user names does not exist or holds no samples, or the log
@@ -58,8 +80,12 @@ def list_contacts(motion: FreeMotion) -> ContactList:
     check_length(motion.log.recording)
     seconds = block_length(motion.log.recording.t)
     free = untouched_motion(motion, seconds)
-    made = by_threshold(motion) if free is None else by_smoother(free, seconds)
-    if made.contacts and is_load(motion.log.recording, made.contacts) and has_wrench(motion.log):
+    if free is None:
+        free = inferred_motion(motion.log, bias or whole_log_bias(motion.log), seconds)
+    if free is None:
+        return without_list(motion.log)
+    made = by_smoother(free, seconds, proven=referenced or free.basis == "free motion")
+    if is_load(motion.log.recording, made.contacts) and has_wrench(motion.log):
         row = load_row(motion, made.contacts)
         made = replace(made, contacts=(row,), remarks=(*made.remarks, caution("contact-is-load")))
     return made if has_wrench(motion.log) else without_forces(made)
@@ -98,34 +124,47 @@ def has_wrench(run: ModelledRun) -> bool:
     return run.robot.joints >= 6
 
 
-def by_smoother(free: Untouched, seconds: float) -> ContactList:
+def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList:
     """The list by the two-state filter, evidence, and the gated smoother."""
-    run = free.log
+    run, named = free.log, free.basis == "free motion"
     found = search(run, free.noise, free.level, seconds)
     own = [k for k, span in enumerate(found.runs) if in_free_part(run, found, span, free)]
+    false = sum(1 for k in own if found.best[k] > LEAST_EVIDENCE)
     least = LEAST_EVIDENCE
     if own:
         least = max(least, FALSE_MARGIN * float(found.best[own].max()))
-    strong = [k for k in range(len(found.runs)) if found.best[k] > LEAST_EVIDENCE]
-    kept = [k for k in range(len(found.runs)) if found.best[k] > least]
-    halted = [k for k in kept if is_stop(run, found, k, seconds)]
-    stops = tuple(float(found.log.blocks.t[found.runs[k][0]]) for k in halted)
-    found = found.kept([k for k in kept if k not in halted])
-    measurer = Measurer.of(run, found, free)
-    rows = dict(enumerate(measurer.rows()))
-    if brief := [k for k, span in enumerate(found.runs) if lasts(found, span) < SHORT]:
-        rows |= fine_rows(free, brief, measurer)
+    found = found.kept([k for k, span in enumerate(found.runs) if not at_end(found, span)])
+    at_rest = np.array([rests_around(run.recording, found, span) for span in found.runs], bool)
+    asked = np.where(at_rest | named, least, LEAST_IN_MOTION)
+    passed = found.best > asked
+    if not named:
+        passed |= at_rest & np.array(found.beyond, dtype=bool)
+    seen = [k for k in range(len(found.runs)) if passed[k] or found.best[k] > LEAST_EVIDENCE]
+    halted = {k for k in seen if is_stop(run, found, k, seconds)}
+    stops = [float(found.log.blocks.t[found.runs[k][0]]) for k in sorted(halted) if passed[k]]
+    kept = [k for k in seen if passed[k] and k not in halted]
+    measurer = Measurer.of(run, found.kept(kept).joined(), free)
+    rows = measured_rows(free, measurer)
+    others = [k for k in seen if not passed[k] and k not in halted]
+    weak = measured_rows(free, measurer.beside(found.kept(others), free)) if others else []
+    weak += [row for row in rows if not row.is_told]
+    told = [replace(row, inferred=not proven) for row in rows if row.is_told]
+    smallest = measurer.test.smallest_force
+    if not np.isfinite(smallest) and not named and has_wrench(run):
+        smallest = felt_by(run, free.level)
     return ContactList(
         recording=run.recording.name,
         duration=run.recording.duration,
-        contacts=numbered([rows[k] for k in sorted(rows) if rows[k].is_told]),
-        method="smoother",
+        contacts=numbered(told),
+        candidates=numbered(sorted((replace(row, inferred=True) for row in weak), key=start_of)),
+        basis=free.basis,
         free=free.remarks,
         free_seconds=free.noise.free_seconds,
-        false_on_free=len(set(own) & set(strong)) + false_rows(free, seconds),
-        threshold=least,
-        smallest_force=measurer.test.smallest_force,
-        stops=stops,
+        false_on_free=false + false_rows(free, seconds) if named else None,
+        threshold=least if named else LEAST_IN_MOTION,
+        smallest_force=smallest,
+        load=None if free.load is None else carried(free.load, run),
+        stops=tuple(stops),
         model=ContactModel(
             prior=measurer.prior,
             noise_sd=np.sqrt(free.noise.white),
@@ -133,8 +172,46 @@ def by_smoother(free: Untouched, seconds: float) -> ContactList:
             error_time=free.noise.time,
             block=seconds,
         ),
-        remarks=tuple(limits(run, free, stops, measurer.test.smallest_force)),
+        remarks=tuple(limits(run, free, tuple(stops), smallest)),
     )
+
+
+def carried(load: FreeLoad, run: ModelledRun) -> CarriedLoad:
+    """A load that the arm carries, with the payload of the robot's file that weighs as much."""
+    t, dq = run.recording.t, run.recording.require("dq")
+    moves = t[np.any(np.abs(dq) > RESTS, axis=1)]
+    span = (float(moves[0]), float(moves[-1])) if len(moves) else (float(t[0]), float(t[-1]))
+    apart = {name: abs(p.mass - load.mass) for name, p in run.robot.payloads.items()}
+    name = min(apart, key=lambda key: apart[key], default=None)
+    alike = name is not None and apart[name] <= max(2.0 * load.sd, SAME_MASS * load.mass)
+    return CarriedLoad(load.mass, load.sd, run.robot.name, name if alike else None, span)
+
+
+def start_of(row: Contact) -> float:
+    """When a contact begins. [s]"""
+    return row.start
+
+
+def measured_rows(free: Untouched, measurer: Measurer) -> list[Contact]:
+    """The rows of all that a measurer holds, those of short contacts from finer blocks."""
+    found, rows = measurer.found, dict(enumerate(measurer.rows()))
+    if brief := [k for k, span in enumerate(found.runs) if lasts(found, span) < SHORT]:
+        rows |= fine_rows(free, brief, measurer)
+    return [rows[k] for k in sorted(rows)]
+
+
+def at_end(found: Found, span: Run) -> bool:
+    """Whether a candidate lies wholly within `AT_ENDS` of either end of the log."""
+    t = found.log.blocks.t
+    return bool(t[span[1] - 1] < t[0] + AT_ENDS or t[span[0]] > t[-1] - AT_ENDS)
+
+
+def rests_around(recording: Recording, found: Found, span: Run) -> bool:
+    """Whether the arm rests during a candidate, and for `AROUND` before and after it."""
+    t = found.log.blocks.t
+    first, last = np.searchsorted(recording.t, [t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
+    speed = np.abs(recording.require("dq")[first:last])
+    return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max() < RESTS)
 
 
 def numbered(rows: Sequence[Contact]) -> tuple[Contact, ...]:
@@ -211,6 +288,8 @@ def limits(
 ) -> list[Remark]:
     """What limits the list as a whole; the smallest force as the free part shows it. [N]"""
     found = [caution("arm-stopped-abruptly", Where(span=(at, at)), at_s=at) for at in stops]
+    if free.basis != "free motion":
+        return found
     unseen = [j + 1 for j in np.flatnonzero(free.noise.seen < 0.5).tolist()]
     if len(unseen) == run.robot.joints:
         # At rest the free part shows no friction of motion: the share of F_c that is added does.
@@ -233,30 +312,35 @@ def felt_by(run: ModelledRun, torque: Array) -> float:
     return float(np.median(each.min(axis=1)))
 
 
-def by_threshold(motion: FreeMotion) -> ContactList:
-    """The list where no free motion is known."""
-    run = motion.log
-    dry = dry_torques(run.robot)
+def without_list(run: ModelledRun) -> ContactList:
+    """A list without rows: nothing tells a contact from an error of the model."""
+    unknown = np.full(run.robot.joints, np.nan)
     return ContactList(
         recording=run.recording.name,
         duration=run.recording.duration,
-        contacts=threshold_rows(run),
-        method="threshold",
+        contacts=(),
+        candidates=(),
+        basis="none",
         free=(),
         free_seconds=0.0,
         false_on_free=None,
         threshold=None,
-        smallest_force=float(axes_told(run)[2]) if has_wrench(run) else None,
+        smallest_force=None,
+        unexplained=largest_torque(run),
         stops=(),
         model=ContactModel(
-            prior=None,
-            noise_sd=np.full(len(dry), np.nan),
-            error_sd=MOVING_SHARE * dry,
-            error_time=np.full(len(dry), np.nan),
-            block=float(run.recording.median_step),
+            prior=None, noise_sd=unknown, error_sd=unknown, error_time=unknown, block=np.nan
         ),
-        remarks=(caution("contacts-without-free-part"),),
     )
+
+
+def largest_torque(run: ModelledRun) -> Unexplained:
+    """The largest torque that the momentum observer reads along a log."""
+    t = run.recording.t
+    torque = np.abs(observed(run))
+    torque[t < t[0] + SETTLED] = 0.0
+    k, j = np.unravel_index(np.argmax(torque), torque.shape)
+    return Unexplained(float(torque[k, j]), int(j) + 1, float(t[k]))
 
 
 def without_forces(made: ContactList) -> ContactList:
@@ -264,6 +348,7 @@ def without_forces(made: ContactList) -> ContactList:
     return replace(
         made,
         contacts=tuple(bare(contact) for contact in made.contacts),
+        candidates=tuple(bare(contact) for contact in made.candidates),
         smallest_force=None,
         remarks=(*made.remarks, caution("no-wrench-of-few-joints")),
     )
@@ -275,6 +360,7 @@ def bare(contact: Contact) -> Contact:
         contact,
         peak_force=None,
         peak_band=None,
+        place_band=None,
         wrench=None,
         wrench_sd=None,
         mean_force=None,

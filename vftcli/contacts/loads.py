@@ -23,18 +23,30 @@ pushes that follow one another come from different sides."""
 MOVES = 0.01
 """A joint that is faster moves. [rad/s]"""
 
+AROUND = 1.0
+"""The arm rests at the beginning of a contact if no joint moves for so long on either side. [s]"""
+
 PIECE = 5.0
 """Length of the pieces whose means tell how far the mean may be off. [s]"""
 
 
 def is_load(recording: Recording, contacts: tuple[Contact, ...]) -> bool:
-    """Whether contacts fill more than half of the time since the first motion, with one force."""
+    """Whether contacts fill more than half of the time since the first motion, with one force.
+
+    A load neither begins nor ends while the arm rests: what does is a push.
+    """
+    if not contacts:
+        return False
     moving = np.any(np.abs(recording.require("dq")) > MOVES, axis=1)
     t = recording.t
     first = float(t[np.argmax(moving)]) if moving.any() else float(t[0])
     lasts = np.array([contact.stop - contact.start for contact in contacts])
     if lasts.sum() <= SHARE * (float(t[-1]) - first):
         return False
+    for edge in (contacts[0].start, contacts[-1].stop):
+        near = np.abs(t - edge) < AROUND
+        if t[0] + AROUND < edge < t[-1] - AROUND and not moving[near].any():
+            return False
     forces = np.array([contact.mean_force for contact in contacts]) * lasts[:, None]
     sizes = np.linalg.norm(forces, axis=1).sum()
     together = float(np.linalg.norm(forces.sum(axis=0)))
@@ -68,6 +80,7 @@ def load_row(motion: FreeMotion, contacts: tuple[Contact, ...]) -> Contact:
         is_load=True,
         peak_force=size,
         peak_band=band,
+        place_band=band,
         wrench=mean,
         wrench_sd=sd,
         mean_force=mean[:3],

@@ -15,7 +15,7 @@ import numpy as np
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.series import runs_of
-from vftcli.virtual_sensor.smoother.noise import fit_joints, resting, steps
+from vftcli.virtual_sensor.smoother.noise import LEAST_NOISE, fit_joints, resting, steps
 
 LEAST_STRETCH = 20
 """Fewest blocks in a row that a spectrum is learned from."""
@@ -25,6 +25,14 @@ MOVES = 0.3
 
 QUANTILES = (0.9, 2.706), (0.97, 4.709)
 """Shares of the normalised squares ν²/S, and where χ² of one degree has them."""
+
+DRY_SHARE, LEAST_ERROR, LEAST_TIME = 0.2, 0.1, 0.3
+"""Smallest model error that is inferred where no free motion is known: this share of F_c, and so
+much [N·m]; its correlation time is no shorter where it is this error. [s]"""
+
+QUIET, QUIET_SD = 0.6, 0.8416
+"""Where nothing was learned the quietest 60 % of the blocks in which a joint moves are taken for
+free; 60 % of a normal variable lie within so many standard deviations."""
 
 UNSEEN, UNSEEN_SHARE, UNSEEN_TIME = 0.2, 0.2, 1.0
 """A joint that moves in less than this share of the free part errs by so much of F_c beyond what
@@ -127,6 +135,47 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> ErrorNoise | None:
     )
     factor = inflation(found, pieces)
     return replace(found, white=white * factor, variance=variance * factor)
+
+
+def infer_noise(log: Blocks, dry: Array, learned: ErrorNoise | None) -> ErrorNoise | None:
+    """The noise of a log without known free motion, None where it has too few known blocks.
+
+    Args:
+        log: The whole log.
+        dry: F_c of each joint. (n,) [N·m]
+        learned: What the samples show that the fit of the whole log calls free; None without.
+    """
+    bends = [np.diff(log.d[a:b], n=2, axis=0) for a, b in runs_of(log.known) if b - a > 2]
+    if not bends:
+        return None
+    # The median of |x| is sd/1.4826, a second difference of white noise has 6 R.
+    spread = 1.4826 * np.median(np.abs(np.concatenate(bends)), axis=0)
+    white, least = (
+        np.maximum(spread**2 / 6.0, LEAST_NOISE),
+        np.maximum(DRY_SHARE * dry, LEAST_ERROR),
+    )
+    moving = log.known[:, None] & ~resting(log)
+    asked = moving.mean(axis=0) >= UNSEEN
+    if learned is not None:
+        # The fit calls the quietest samples free; what its friction says is a floor, if it is any.
+        asked &= DRY_SHARE * dry < LEAST_ERROR
+    for j in np.flatnonzero(asked):
+        quiet = np.quantile(np.abs(log.d[moving[:, j], j]), QUIET) / QUIET_SD
+        least[j] = max(least[j], quiet)
+    if learned is None:
+        variance, time = least**2, np.full(len(dry), LEAST_TIME)
+    else:
+        white, variance = np.maximum(white, learned.white), np.maximum(learned.variance, least**2)
+        floored = variance > learned.variance
+        time = np.where(floored, np.maximum(learned.time, LEAST_TIME), learned.time)
+    return ErrorNoise(
+        white=white,
+        variance=variance,
+        time=time,
+        dry=dry,
+        seen=np.ones(len(dry)),
+        free_seconds=0.0 if learned is None else learned.free_seconds,
+    )
 
 
 def stretches(piece: Blocks) -> list[tuple[int, int]]:

@@ -1,7 +1,7 @@
 """From what was found to the rows of the list: peak, band, place, torques, and what others say."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -42,6 +42,9 @@ BENT_SHORT = 0.4
 
 NORMAL = 1.96
 """Half width of a 95 % band in standard deviations."""
+
+OWN_TIME = 0.5
+"""A contact's wrench changes within this share of its duration, however slow the others are."""
 
 CORE, CORE_TIME = 0.5, 0.1
 """A contact's place is told from the blocks in which its force is above this share of the peak,
@@ -107,11 +110,23 @@ class Measurer:
             bent=bent,
         )
 
+    def beside(self, found: Found, free: Untouched) -> "Measurer":
+        """What measures other candidates of the same log likewise."""
+        other = Measurer.of(self.run, found, free, self)
+        return replace(other, bent=self.bent)
+
+    @cached_property
+    def priors(self) -> list[ContactPrior]:
+        """How the wrench of every contact may move: one that is short moves faster."""
+        blocks, own = self.found.log.blocks, loosened(self.prior)
+        lasts = [float(blocks.length[slice(*run)].sum()) for run in self.found.runs]
+        return [own._replace(time=min(own.time, OWN_TIME * seconds)) for seconds in lasts]
+
     @cached_property
     def courses(self) -> list[WindowWrench]:
         """The wrench of every contact at the flange."""
         runs, J = self.found.runs, self.found.places[0].jacobian
-        return smooth_contacts(self.log, [J] * len(runs), runs, loosened(self.prior))
+        return smooth_contacts(self.log, [J] * len(runs), runs, self.priors)
 
     @cached_property
     def sites(self) -> list["Site"]:
@@ -124,15 +139,15 @@ class Measurer:
         Args:
             sites: Where each is, as longer blocks tell it; None to see.
         """
-        runs, prior = self.found.runs, loosened(self.prior)
+        runs, priors = self.found.runs, self.priors
         courses, J = list(self.courses), self.found.places[0].jacobian
         sites = [site._replace(jacobian=J) for site in (self.sites if sites is None else sites)]
         moved = [i for i, site in enumerate(sites) if not site.on_wrist]
-        point = prior._replace(moment=POINT_MOMENT)
+        points = [priors[i]._replace(moment=POINT_MOMENT) for i in moved]
         jacobians = [self.point_jacobian(sites[i].fits[0]) for i in moved]
         if moved:
             some = self.found.kept(moved)
-            again = smooth_contacts(self.log, jacobians, some.runs, point)
+            again = smooth_contacts(self.log, jacobians, some.runs, points)
             for i, jacobian, course in zip(moved, jacobians, again, strict=True):
                 courses[i] = course
                 sites[i] = sites[i]._replace(jacobian=jacobian)
@@ -175,8 +190,9 @@ class Measurer:
         where, named, lead = self.part(number, site)
         band = NORMAL * float(np.sqrt(u @ covariance[:3, :3] @ u))
         anywhere = site.sizes(size, band)
-        told = named == "wrist" and lead >= SURE_NATS
-        remarks = () if told else site.limits(size, anywhere)
+        on_wrist = named == "wrist" and lead >= SURE_NATS
+        remarks = () if on_wrist else site.limits(size, anywhere)
+        spread = 0.0 if on_wrist else site.spread(size)
         sd = np.sqrt(np.diag(covariance))
         J = site.jacobian[peak]
         torque_sd = np.sqrt(np.einsum("in,ij,jn->n", J, covariance, J))
@@ -190,7 +206,8 @@ class Measurer:
             stop=float(blocks.t[run[1] - 1] + 0.5 * length[-1]),
             peak=float(blocks.t[peak]),
             peak_force=size,
-            peak_band=band,
+            peak_band=float(np.hypot(band, NORMAL * spread)),
+            place_band=band,
             wrench=wrench,
             wrench_sd=sd,
             mean_force=np.average(force, axis=0, weights=length),
@@ -258,11 +275,11 @@ class Site(NamedTuple):
         return tuple(sorted(found))
 
     def spread(self, size: float) -> float:
-        """What the size may be off by for the place, where more than one part fits. [N]
+        """What the size may be off by for the place, 0 of a contact at the wrist alone. [N]
 
         The root mean square over the points that fit, each as likely as its score makes it.
         """
-        if len(self.parts) == 1:
+        if self.parts == ["wrist"] or self.fits[0].misfit > MORE_THAN_A_FORCE:
             return 0.0
         likely = np.exp(-0.5 * np.array([fit.score - self.fits[0].score for fit in self.fits]))
         apart = np.array([fit.size for fit in self.fits]) - size
@@ -270,7 +287,7 @@ class Site(NamedTuple):
 
     def limits(self, size: float, anywhere: tuple[float, float]) -> tuple[Remark, ...]:
         """Where another part may have been touched, another force touched it: a remark if so."""
-        if NORMAL * self.spread(size) <= WIDE * size:
+        if len(self.parts) == 1 or NORMAL * self.spread(size) <= WIDE * size:
             return ()
         return (caution("size-goes-with-place", least_N=anywhere[0], most_N=anywhere[1]),)
 

@@ -30,6 +30,7 @@ class Found(NamedTuple):
         places: Where a contact may be.
         runs: Blocks of every candidate, in the order of time.
         evidence: Of every candidate at every place. (C, places) [nats]
+        beyond: Of every candidate whether a joint's torque is beyond its threshold in it.
         prior: How the wrench of the candidates moves.
     """
 
@@ -37,6 +38,7 @@ class Found(NamedTuple):
     places: list[ContactPlace]
     runs: list[Run]
     evidence: Array
+    beyond: list[bool]
     prior: ContactPrior
 
     @property
@@ -48,7 +50,24 @@ class Found(NamedTuple):
     def kept(self, chosen: Sequence[int]) -> "Found":
         """Some of the candidates."""
         return self._replace(
-            runs=[self.runs[i] for i in chosen], evidence=self.evidence[list(chosen)]
+            runs=[self.runs[i] for i in chosen],
+            evidence=self.evidence[list(chosen)],
+            beyond=[self.beyond[i] for i in chosen],
+        )
+
+    def joined(self) -> "Found":
+        """The candidates, those with no more than a block between them as one."""
+        groups: list[list[int]] = []
+        for i, (start, _) in enumerate(self.runs):
+            if groups and start - self.runs[groups[-1][-1]][1] <= 1:
+                groups[-1].append(i)
+            else:
+                groups.append([i])
+        evidence = [self.evidence[group].sum(axis=0) for group in groups]
+        return self._replace(
+            runs=[(self.runs[group[0]][0], self.runs[group[-1]][1]) for group in groups],
+            evidence=np.array(evidence).reshape(len(groups), len(self.places)),
+            beyond=[any(self.beyond[i] for i in group) for group in groups],
         )
 
 
@@ -79,12 +98,13 @@ def search(run: ModelledRun, noise: ErrorNoise, level: Array, seconds: float) ->
     white = np.where(taken[:, None], ahead.white, spiked)
     log = BlockLog.of(blocks, ahead._replace(white=white))
     if not runs:
-        return Found(log, there, [], np.zeros((0, len(there))), START)
+        return Found(log, there, [], np.zeros((0, len(there))), [], START)
     prior = learn_prior(log, J, runs, START, rounds=1)
-    courses = smooth_contacts(log, [J] * len(runs), runs, prior)
+    courses = smooth_contacts(log, [J] * len(runs), runs, [prior] * len(runs))
     pairs = zip(courses, runs, strict=True)
     pieces = [piece for course, run in pairs for piece in split_run(blocks.t, course, run, J)]
-    return Found(log, there, pieces, evidence(log, there, pieces, prior), prior)
+    passed = [any(a < stop and b > start for a, b in beyond) for start, stop in pieces]
+    return Found(log, there, pieces, evidence(log, there, pieces, prior), passed, prior)
 
 
 def turned_round(blocks: Blocks) -> Blocks:

@@ -45,7 +45,10 @@ these point so far apart (cosine) and each side lasts so long [s]: one hand foll
 
 
 def smooth_contacts(
-    log: BlockLog, jacobians: Sequence[Array], runs: Sequence[Run], prior: ContactPrior
+    log: BlockLog,
+    jacobians: Sequence[Array],
+    runs: Sequence[Run],
+    priors: Sequence[ContactPrior],
 ) -> list[WindowWrench]:
     """The wrench in the window of every contact.
 
@@ -53,16 +56,16 @@ def smooth_contacts(
         log: The log.
         jacobians: J of each contact's point along the log. (K, 6, n) each
         runs: The blocks of every contact.
-        prior: How the wrench may move.
+        priors: How the wrench of each may move.
     """
-    return smooth_lanes(log, contact_lanes(log, jacobians, runs, prior))
+    return smooth_lanes(log, contact_lanes(log, jacobians, runs, priors))
 
 
 def contact_lanes(
     log: BlockLog,
     jacobians: Sequence[Array],
     runs: Sequence[Run],
-    prior: ContactPrior,
+    priors: Sequence[ContactPrior],
     margin: float = MARGIN,
 ) -> list[Lane]:
     """A lane for every contact, the others hidden.
@@ -71,12 +74,12 @@ def contact_lanes(
         log: The log.
         jacobians: J of each contact's point along the log. (K, 6, n) each
         runs: The blocks of every contact.
-        prior: How the wrench may move.
+        priors: How the wrench of each may move.
         margin: How far a lane reaches beyond its contact. [s]
     """
     count = len(log.blocks.t)
     every, lanes = gate_of(count, runs), []
-    for run, jacobian in zip(runs, jacobians, strict=True):
+    for run, jacobian, prior in zip(runs, jacobians, priors, strict=True):
         gate = gate_of(count, [run])
         window = window_of(log.blocks.t, run, margin)
         lanes.append(Lane(window, gate, every & ~gate, jacobian, prior))
@@ -98,10 +101,13 @@ def learn_prior(
     each = [jacobian] * len(runs)
     for _ in range(rounds):
         priors = [prior._replace(time=time) for time in TIMES]
-        lanes = [lane for p in priors for lane in contact_lanes(log, each, runs, p, NEAR)]
+        lanes = [
+            lane for p in priors for lane in contact_lanes(log, each, runs, [p] * len(runs), NEAR)
+        ]
         nats = likelihoods(log, lanes).reshape(len(priors), len(runs)).sum(axis=1)
         time = TIMES[int(np.argmax(nats))]
-        tried = contact_lanes(log, each, runs, prior._replace(time=time), NEAR)
+        timed = [prior._replace(time=time)] * len(runs)
+        tried = contact_lanes(log, each, runs, timed, NEAR)
         courses = smooth_lanes(log, tried)
         inside = [course.within(run) for course, run in zip(courses, runs, strict=True)]
         values = np.concatenate([course.values for course in inside])

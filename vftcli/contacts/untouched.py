@@ -1,13 +1,20 @@
-"""What motion that nobody touched tells: noise, the level of a threshold, the smallest force."""
+"""Motion that nobody touched, named or inferred: its noise, its level, the smallest force."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from vftcli.contacts.candidates import threshold_contacts
-from vftcli.contacts.model_error import ErrorNoise, error_course, learn_noise
+from vftcli.contacts.model_error import (
+    DRY_SHARE,
+    LEAST_ERROR,
+    ErrorNoise,
+    error_course,
+    infer_noise,
+    learn_noise,
+)
 from vftcli.contacts.places import places
 from vftcli.contacts.windows import (
     BlockLog,
@@ -19,6 +26,7 @@ from vftcli.contacts.windows import (
 )
 from vftcli.observers import MomentumObserver
 from vftcli.observers.spectra import Part, looks_free, spectra_of
+from vftcli.refinement.whole_log import WholeLogBias
 from vftcli.repetition.free_load import FreeLoad, free_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.repetition.free_run import ModelledRun
@@ -42,12 +50,12 @@ SETTLED = 0.3
 MOVING, LEAST_MOVING = 0.01, 50
 """Speed from which a joint moves [rad/s], and fewest such samples that its level is taken from."""
 
-NEAR_REST, MOVING_SHARE, RESTING_SHARE = 0.3, 0.2, 0.6 / 1.96
-"""What the drives' dry friction F_c lets expect: shares of it in motion, and within so long [s] of
-a rest."""
+NEAR_REST, RESTING_SHARE = 0.3, 0.6 / 1.96
+"""Within so long [s] of a rest a joint's torque may be this share of the dry friction F_c."""
 
-LEAST_LEVEL = 0.1
-"""Smallest standard deviation of a joint's torque where no free motion is known. [N·m]"""
+Basis = Literal["free motion", "whole log", "friction", "none"]
+"""What tells a contact from an error of the model: motion that is known to be free; the samples
+that the fit of the whole log calls free; the drives' dry friction; or nothing."""
 
 LEAST_CYCLES = 2
 """Fewest whole cycles of which free ones can be found: one alone cannot be compared."""
@@ -61,16 +69,20 @@ class Untouched:
     """Motion that nobody touched, as a list of contacts needs it.
 
     Attributes:
+        basis: What tells a contact from an error of the model.
         noise: Noise and model error.
         level: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
-        own: Samples of the log itself that are free. (T,)
-        log: The log, less a load that the free part carries.
+        own: Samples of the log itself that are known to be free. (T,)
+        log: The log, less a load that the free part carries; less the model error of the whole log
+            where the basis is that.
         runs: Free runs in other logs, less a load that they carry.
         free: Every free piece, less a load that it carries.
         pieces: The same in blocks.
+        load: A load that the arm carries in this log and its model lacks, None where none shows.
         remarks: What it is and how it was found, and a load that it carries.
     """
 
+    basis: Basis = "free motion"
     noise: ErrorNoise
     level: Array
     own: Mask
@@ -78,11 +90,13 @@ class Untouched:
     runs: tuple[ModelledRun, ...]
     free: tuple[FreePiece, ...]
     pieces: tuple[Blocks, ...]
+    load: FreeLoad | None
     remarks: tuple[Remark, ...]
 
     def in_blocks(self, seconds: float) -> "Untouched | None":
         """The same in blocks of another length [s], None where no stretch holds enough of them."""
-        found = noise_of(self.free, seconds)
+        known = self.basis == "free motion"
+        found = noise_of(self.free, seconds) if known else inferred(self.log, self.free, seconds)
         return None if found is None else replace(self, noise=found[0], pieces=found[1])
 
 
@@ -123,8 +137,55 @@ def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
         runs=tuple(p.run for p in pieces if p.run.recording is not motion.log.recording),
         free=pieces,
         pieces=found[1],
+        load=load if part.own.any() else None,
         remarks=part.remarks if load is None else (*part.remarks, load.remark),
     )
+
+
+def inferred_motion(log: ModelledRun, bias: WholeLogBias, seconds: float) -> Untouched | None:
+    """What a log without known free motion lets infer of it, None where it lets infer nothing.
+
+    The model error that the whole log shows is taken off where its guard allows it, then a load.
+    Nothing is inferred without dry friction where that error is taken off no joint.
+
+    Args:
+        log: The log.
+        bias: The model error that was fitted to the whole log.
+        seconds: Length of a block. [s]
+    """
+    if not (dry_torques(log.robot).any() or bias.applied.any()):
+        return None
+    corrected = log.with_terms(bias.corrected(log.terms))
+    short = any(remark.code == "whole-log-too-short" for remark in bias.remarks)
+    # An arm that holds one pose does not tell a mass from a push.
+    weighed = free_load([FreePiece(corrected, bias.free, ())]) if bias.fitted or short else None
+    corrected = unloaded(corrected, weighed)
+    free = (FreePiece(corrected, bias.free, ()),) if bias.fitted else ()
+    found = inferred(corrected, free, seconds)
+    if found is None:
+        return None
+    return Untouched(
+        basis="whole log" if bias.fitted else "friction",
+        noise=found[0],
+        level=np.sqrt(found[0].variance + observer_noise(corrected) ** 2),
+        own=np.zeros(log.recording.samples, dtype=bool),
+        log=corrected,
+        runs=(),
+        free=free,
+        pieces=found[1],
+        load=weighed,
+        remarks=() if weighed is None else (weighed.remark,),
+    )
+
+
+def inferred(
+    log: ModelledRun, free: Sequence[FreePiece], seconds: float
+) -> tuple[ErrorNoise, tuple[Blocks, ...]] | None:
+    """Noise that is inferred, and its free pieces in blocks of a length [s]; None without any."""
+    whole = disturbance_blocks(log.terms, log.recording.q, seconds)
+    learned = noise_of(free, seconds) if free else None
+    noise = infer_noise(whole, dry_torques(log.robot), None if learned is None else learned[0])
+    return None if noise is None else (noise, () if learned is None else learned[1])
 
 
 def noise_of(
@@ -194,6 +255,20 @@ def observed(run: ModelledRun) -> Array:
     return MomentumObserver(gain=GAIN).estimate(run.terms).tau
 
 
+def observer_noise(run: ModelledRun) -> Array:
+    """Standard deviation of the noise of the observer's torque, whatever touches. (n,) [N·m]
+
+    By second differences over twice the observer's time, which white noise has six times: what
+    pushes last longer, and a median passes over what begins and ends in between.
+    """
+    torque = observed(run)
+    step = max(round(2.0 / (GAIN * median_step(run.recording.t))), 1)
+    bends = torque[2 * step :] - 2.0 * torque[step:-step] + torque[: -2 * step]
+    if not len(bends):
+        return np.zeros(torque.shape[1])
+    return np.asarray(1.4826 * np.median(np.abs(bends), axis=0) / np.sqrt(6.0))
+
+
 def torque_level(pieces: Sequence[FreePiece]) -> Array:
     """q95|τ|/1.96 of each joint over the free samples in which it moves. (n,) [N·m]"""
     values, moves = [], []
@@ -219,8 +294,8 @@ def expected_torque(run: ModelledRun, level: Array | None) -> Array:
         level: What free motion shows, None without any. (n,) [N·m]
     """
     dry, recording = dry_torques(run.robot), run.recording
-    least = np.full(len(dry), LEAST_LEVEL) if level is None else level
-    sd = np.tile(np.maximum(least, MOVING_SHARE * dry), (recording.samples, 1))
+    least = np.full(len(dry), LEAST_ERROR) if level is None else level
+    sd = np.tile(np.maximum(least, DRY_SHARE * dry), (recording.samples, 1))
     count = max(round(NEAR_REST / median_step(recording.t)), 1)
     still = np.abs(recording.require("dq")) < MOVING
     total = np.vstack([np.zeros((1, len(dry))), np.cumsum(still, axis=0)])

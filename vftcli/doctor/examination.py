@@ -80,6 +80,14 @@ class Examination(Shown):
         """The findings that can make results wrong."""
         return tuple(finding for finding in self.findings if finding.level == "warning")
 
+    @property
+    def load(self) -> tuple[float, float] | None:
+        """Mass and standard deviation of a load that the model lacks, None without one. [kg]"""
+        for remark in self.findings:
+            if "load_kg" in remark.values:
+                return float(remark.values["load_kg"]), float(remark.values["sd_kg"])
+        return None
+
 
 def examine(recording: Recording, robot: Robot | None = None) -> Examination:
     """Examine a log; it is not changed.

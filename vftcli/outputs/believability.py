@@ -86,6 +86,8 @@ def load_doubt(analysis: Analysis) -> str:
     """What is said where rows may be the weight of a load that the doctor found; else ""."""
     contacts = analysis.contacts.contacts if analysis.contacts is not None else ()
     found = {f.code for one in analysis.examinations[:1] for f in one.warnings}
+    if analysis.contacts is not None and analysis.contacts.load is not None:
+        return ""
     if not contacts or any(c.is_load for c in contacts) or not found & LOADS:
         return ""
     return "But the arm bears a load that nobody told: they may be its weight."
@@ -102,12 +104,16 @@ def otherwise(found: ContactList) -> str:
     if least is None and np.isnan(found.smallest_force):
         return ""
     if least is None:
-        return "else: a push along one axis may go unseen, since the pose hardly tells it"
-    cause = "friction alone" if found.method == "threshold" else "the error in free motion"
+        return "A push along one axis may go unseen: the pose hardly shows it."
+    if found.basis != "free motion":
+        count = len(found.candidates)
+        more = f" {count} candidate{'s' * (count != 1)} more: --all." if count else ""
+        return f"Pushes below {least:.0f} N do not show.{more}"
+    rest = "Nothing else" if found.contacts else "Nothing"
     if any(c.peak_force is not None and c.peak_force < least for c in found.contacts):
-        # Along the axes that are felt best less is told than along all.
-        return f"else: nothing above {least:.0f} N, and less where the arm feels a push best"
-    return f"else: nothing above {least:.0f} N, below which {cause} explains what is read"
+        # Along the axes that are felt best less shows than along all.
+        return f"{rest} above {least:.0f} N (less at good poses)."
+    return f"{rest} above {least:.0f} N. Weaker pushes would not show."
 
 
 def grounds(analysis: Analysis) -> tuple[Ground, ...]:
@@ -157,7 +163,8 @@ def robot_ground(analysis: Analysis) -> Ground:
             subject=subject,
             sentence="the log does not let the model be checked",
         )
-    load = f" with {own.load:.2g} kg on the flange" if own.load else ""
+    listed = analysis.contacts.load if analysis.contacts is not None else None
+    load = f" with {own.load:.2g} kg on the flange" if own.load and listed is None else ""
     percent = percent_words(own.misfit)
     if not own.fits:
         return Ground(
@@ -242,11 +249,20 @@ def list_grounds(analysis: Analysis) -> Iterator[Ground]:
         if told:
             yield Ground(standing="unknown", subject="contacts", sentence=sentence(told[0]))
         return
-    if found.method == "threshold":
+    if found.basis == "none":
+        yield Ground(
+            standing="unknown",
+            subject=subject,
+            sentence="none is given, and the robot has no friction model: no contact is listed",
+            remedy=command("contacts", analysis.recording, "--robot", robot_option(analysis),
+                           "--free", "free.csv"),
+            of_log=False,
+        )  # fmt: skip
+    elif found.basis != "free motion":
         yield Ground(
             standing="caution",
             subject=subject,
-            sentence="none is named: what the drives' dry friction explains counts as no contact",
+            sentence="none is given: pushes weaker than friction are missed, sizes are unchecked",
             remedy=command("contacts", analysis.recording, "--robot", robot_option(analysis),
                            "--free", "free.csv"),
             of_log=False,
@@ -260,8 +276,6 @@ def list_grounds(analysis: Analysis) -> Iterator[Ground]:
             sentence=f"{free_words(found)}; {listed}",
         )
     for remark in found.remarks:
-        if remark.code == "contacts-without-free-part":
-            continue
         load = remark.code == "contact-is-load"
         yield Ground(
             standing="bad" if load else "caution",
@@ -359,6 +373,15 @@ def reference_ground(analysis: Analysis) -> Ground:
                                robot_option(analysis)),
                 of_log=False,
             )  # fmt: skip
+    if not contacts and analysis.recording.tau_ext is not None:
+        return Ground(
+            standing="unknown",
+            subject="no reference",
+            sentence="the log holds the vendor's own estimate",
+            remedy=command("compare", analysis.recording, "--reference", "vendor", "--robot",
+                           robot_option(analysis)),
+            of_log=False,
+        )  # fmt: skip
     return Ground(
         standing="unknown",
         subject="no reference",

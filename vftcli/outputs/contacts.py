@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.contacts.contact_list import FIRST_COLUMNS, Contact, ContactList
+from vftcli.contacts.contact_list import FIRST_COLUMNS, CarriedLoad, Contact, ContactList
 from vftcli.outputs.grid import Column, Grid, csv_rows
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import sentence
@@ -34,7 +34,9 @@ def contacts_record(found: ContactList) -> dict[str, Any]:
         "smallest_force_N": found.smallest_force,
         "evidence_threshold_nats": found.threshold,
         "false_on_free": found.false_on_free,
-        "method": found.method,
+        "basis": found.basis,
+        "load": None if found.load is None else found.load.record(),
+        "largest_unexplained": None if found.unexplained is None else found.unexplained._asdict(),
         "duration_s": found.duration,
         "stops_s": list(found.stops),
         "model": {
@@ -48,6 +50,7 @@ def contacts_record(found: ContactList) -> dict[str, Any]:
         },
         "remarks": list(found.remarks),
         "contacts": [contact.record() for contact in found.contacts],
+        "candidates": [contact.record() for contact in found.candidates],
     }
 
 
@@ -71,23 +74,42 @@ def hardest_rows(contacts: Sequence[Contact], most: int = MOST_ROWS) -> list[Con
 
 def by_force(contact: Contact) -> tuple[bool, float, float]:
     """By what contacts are ordered: those with a size before the others, then force, evidence."""
-    return contact.has_size, contact.peak_force or 0.0, contact.evidence or 0.0
+    return contact.size_known, contact.peak_force or 0.0, contact.evidence or 0.0
 
 
 def answer(found: ContactList) -> str:
-    """What touched the arm, in one sentence."""
+    """What the arm carries and what touched it, in a few sentences."""
+    return " ".join(filter(None, (carried_words(found.load), list_words(found))))
+
+
+def carried_words(load: CarriedLoad | None) -> str:
+    """A load that the arm carries and its model lacks; "" without one."""
+    if load is None:
+        return ""
+    mass, (start, stop) = f"{load.mass:.2f} ± {load.sd:.2f} kg", load.span
+    hint = f": {load.payload}? Add --payload {load.payload}" if load.payload else ""
+    return (
+        f"The arm carries {mass} that {load.robot} does not know of "
+        f"({start:.1f}–{stop:.1f} s){hint}."
+    )
+
+
+def list_words(found: ContactList) -> str:
+    """What touched the arm, in one or two sentences."""
     count = len(found.contacts)
-    if not count and found.false_on_free:
+    if found.unexplained is not None:
+        torque, joint, at = found.unexplained
         return (
-            "No contact stands out from the free part, which itself shows "
-            f"{found.false_on_free}: was nobody there?"
+            f"Largest unexplained torque: {torque:.2g} N·m on J{joint} at {at:.1f} s: a contact or "
+            "a model error. To list contacts name free motion (--free) or give a robot with "
+            "friction (vftcli identify)."
         )
     if not count:
-        return "Nothing touched the arm, as far as this log can tell."
+        return none_words(found)
     first = found.contacts[0]
     if first.is_load and first.peak_force is not None and first.mean_force is not None:
         size = f"{first.peak_force:.0f} ± {first.peak_band:.0f} N"
-        if not first.has_size:
+        if not first.size_known:
             most = first.peak_force + (first.peak_band or 0.0)
             return f"A load, or a wrong payload, or a wrong model: below {most:.0f} N on average."
         return (
@@ -98,21 +120,57 @@ def answer(found: ContactList) -> str:
     hardest = found.hardest
     if hardest is None:
         return what
-    if not hardest.has_size:
-        return f"{what} How hard cannot be told: the band is wider than the force."
+    if not hardest.size_known:
+        return f"{what} {unknown_size(hardest)}"
     where = "" if hardest.where == "cannot tell" else f" on the {hardest.where}"
     size = f"{hardest.peak_force:.0f} ± {hardest.peak_band:.0f} N"
     weak = " (weak)" if hardest.trust == "weak" else ""
     return f"{what} {hardest_name(found)}, at {hardest.peak:.1f} s: {size}{where}{weak}."
 
 
+def none_words(found: ContactList) -> str:
+    """What is said of a log in which no contact is listed."""
+    if found.false_on_free:
+        return (
+            "No contact stands out from the free part, which itself shows "
+            f"{found.false_on_free}: was nobody there?"
+        )
+    if found.basis == "free motion":
+        return "Nothing touched the arm, as far as this log shows."
+    return f"No contact stands out. {candidate_words(found)}".rstrip()
+
+
+def unknown_size(contact: Contact) -> str:
+    """Why a contact has no known size, and between which bounds it lies."""
+    if contact.place_unknown and contact.anywhere is not None:
+        low, high = contact.anywhere
+        return f"Its size depends on where it touched, unknown: {low:.0f}–{high:.0f} N."
+    return (
+        f"How hard is unknown: below {(contact.peak_force or 0) + (contact.peak_band or 0):.0f} N."
+    )
+
+
+def candidate_words(found: ContactList) -> str:
+    """The hardest candidate, and what would tell it from a model error; "" without one."""
+    felt = [c for c in found.candidates if c.peak_force is not None]
+    if not felt:
+        return ""
+    hardest = max(felt, key=lambda c: c.peak_force or 0.0)
+    return (
+        f"Up to {(hardest.peak_force or 0.0) + (hardest.place_band or 0.0):.0f} N near "
+        f"{hardest.peak:.1f} s this model cannot explain: name free motion (--free) or measure "
+        "your friction (vftcli identify)."
+    )
+
+
 def hardest_name(found: ContactList) -> str:
-    """What the hardest contact is called: a row may state a larger force within a wider band."""
+    """What the hardest contact is called: one of unknown size may be harder."""
     hardest = found.hardest
     most = max((c.peak_force or 0.0 for c in found.contacts), default=0.0)
-    if hardest is None or (hardest.peak_force or 0.0) >= most:
+    unknown = any(c.place_unknown for c in found.contacts)
+    if hardest is None or ((hardest.peak_force or 0.0) >= most and not unknown):
         return "The hardest"
-    return "The hardest whose size can be told"
+    return "The hardest of known size"
 
 
 def contact_grid(contacts: Sequence[Contact]) -> Grid:
@@ -120,7 +178,7 @@ def contact_grid(contacts: Sequence[Contact]) -> Grid:
     force = any(contact.peak_force is not None for contact in contacts)
     columns = [Column("#"), Column("from – to [s]", words=True)]
     if force:
-        columns += [Column("|F| [N]"), Column("anywhere"), Column("direction", words=True)]
+        columns += [Column("|F| [N]"), Column("range"), Column("direction", words=True)]
     else:
         columns += [Column("joint torque [N·m]", words=True)]
     columns += [Column("where", words=True), Column("trust", words=True)]
@@ -132,7 +190,8 @@ def contact_row(contact: Contact, force: bool) -> list[str]:
     row = [str(contact.number), f"{contact.start:6.2f} – {contact.stop:6.2f}"]
     if force and contact.wrench is not None and contact.anywhere is not None:
         low, high = contact.anywhere
-        row += [f"{contact.peak_force:.0f} ± {contact.peak_band:.0f}", f"{low:.0f}–{high:.0f}"]
+        size = f"{contact.peak_force:.0f} ± {contact.peak_band:.0f}"
+        row += ["unknown" if contact.place_unknown else size, f"{low:.0f}–{high:.0f}"]
         row.append(direction(contact.wrench[:3]))
     else:
         row.append(" ".join(f"{torque:.1f}" for torque in contact.joint_torque))
@@ -172,7 +231,10 @@ def hardest_words(found: ContactList) -> str:
     if contact is None or contact.peak_force is None:
         return "–"
     size = f"{contact.peak_force:.0f} ± {contact.peak_band:.0f} N at {contact.peak:.1f} s"
-    return size if contact.has_size else f"not told ({size})"
+    if contact.place_unknown and contact.anywhere is not None:
+        low, high = contact.anywhere
+        size = f"{low:.0f}–{high:.0f} N at {contact.peak:.1f} s"
+    return size if contact.size_known else f"unknown ({size})"
 
 
 def beginning(contact: Contact) -> str:
@@ -184,11 +246,18 @@ def beginning(contact: Contact) -> str:
         torque = ", ".join(f"{value:.1f}" for value in contact.joint_torque)
         size = f"joint torques {torque} N·m"
     else:
-        size = f"{contact.peak_force:.0f} ± {contact.peak_band:.0f} N"
+        size = force_size(contact)
         size += f", {direction(contact.wrench[:3])}"
     where = f"{place_words(contact)} ({contact.trust})"
     span = f"for {contact.stop - contact.start:.2f} s"
     return f"{contact.start:.2f} s: {contact_name(contact)} begins, {span}: {size}, {where}"
+
+
+def force_size(contact: Contact) -> str:
+    """|F| with its band, or its range where the place is unknown."""
+    if contact.place_unknown and contact.anywhere is not None:
+        return f"{contact.anywhere[0]:.0f}–{contact.anywhere[1]:.0f} N"
+    return f"{contact.peak_force:.0f} ± {contact.peak_band:.0f} N"
 
 
 def contact_name(contact: Contact) -> str:

@@ -47,7 +47,7 @@ SUBJECT = 17
 MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
 """Remarks that the other observers run on the paper's gains."""
 
-LEGEND = "± 95 %; force ON the robot, base axes; anywhere: over every place that fits"
+LEGEND = "± 95 %; force ON the robot, base axes; range: if it touched another possible place"
 
 
 def log_screen(
@@ -107,12 +107,17 @@ def table_lines(analysis: Analysis, most: int | None, canvas: Canvas) -> list[st
 def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str]:
     """The rows of a list, and what can be said of the rest of its log."""
     contacts, rest = found.contacts, otherwise(found)
-    if not contacts:
+    if not contacts and (most is not None or not found.candidates):
         return [f"  {rest}"] if rest else []
     shown = hardest_rows(contacts, len(contacts) if most is None else most)
-    lines = [f"  {line}" for line in terminal(contact_grid(shown), canvas.shown).splitlines()]
+    grid = terminal(contact_grid(shown), canvas.shown) if shown else ""
+    lines = [f"  {line}" for line in grid.splitlines()]
     if len(shown) < len(contacts):
         lines.append(f"  the {len(shown)} hardest of {len(contacts)}; --details shows all")
+    if most is None and found.candidates:
+        lines += ["", "  Candidates, too little evidence to list:"]
+        grid = terminal(contact_grid(found.candidates), canvas.shown)
+        lines += [f"  {line}" for line in grid.splitlines()]
     if rest:
         lines.append(f"  {rest}")
     if found.hardest is not None:
@@ -322,7 +327,7 @@ def log_row(analysis: Analysis, *, judged: bool) -> list[str]:
         load = any(contact.is_load for contact in found.contacts)
         count = "load" if load else str(len(found.contacts))
         hardest = hardest_words(found)
-        if found.told_force is not None and not load:
+        if found.told_force is not None and found.basis == "free motion" and not load:
             rest = f"{found.told_force:.0f} N"
     row = [recording.name, f"{recording.duration:.1f} s", count, hardest, rest]
     if judged:

@@ -7,7 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.contacts.contact_list import Contact, ContactList, ContactModel
+from vftcli.contacts.contact_list import (
+    CarriedLoad,
+    Contact,
+    ContactList,
+    ContactModel,
+    Unexplained,
+)
 from vftcli.contacts.windows import ContactPrior
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
@@ -43,12 +49,15 @@ def stored_list(record: Mapping[str, Any]) -> ContactList:
         recording=record["recording"],
         duration=record["duration_s"],
         contacts=tuple(stored_contact(row) for row in record["contacts"]),
-        method=record["method"],
+        candidates=tuple(stored_contact(row) for row in record["candidates"]),
+        basis=record["basis"],
         free=(),
         free_seconds=record["free_s"],
         false_on_free=record["false_on_free"],
         threshold=record["evidence_threshold_nats"],
         smallest_force=record["smallest_force_N"],
+        unexplained=stored_torque(record["largest_unexplained"]),
+        load=stored_load(record["load"]),
         stops=tuple(record["stops_s"]),
         model=ContactModel(
             prior=None if None in prior else ContactPrior(*prior),
@@ -58,6 +67,21 @@ def stored_list(record: Mapping[str, Any]) -> ContactList:
             block=model["block_s"],
         ),
         remarks=tuple(stored_remark(each) for each in record["remarks"]),
+    )
+
+
+def stored_torque(row: Mapping[str, Any] | None) -> Unexplained | None:
+    """The largest unexplained torque from its record."""
+    return None if row is None else Unexplained(**row)
+
+
+def stored_load(row: Mapping[str, Any] | None) -> CarriedLoad | None:
+    """A load from its record."""
+    if row is None:
+        return None
+    start, stop = row["span_s"]
+    return CarriedLoad(
+        row["mass_kg"], row["mass_sd_kg"], row["robot"], row["payload"], (start, stop)
     )
 
 
@@ -73,6 +97,7 @@ def stored_contact(row: Mapping[str, Any]) -> Contact:
         is_load=row["kind"] == "load",
         peak_force=row["peak_force_N"],
         peak_band=row["peak_force_band_N"],
+        place_band=row["place_band_N"],
         wrench=None if force is None else numbers([*force, *row["moment_Nm"]]),
         wrench_sd=None if sd is None else numbers([*sd, *row["moment_sd_Nm"]]),
         mean_force=None if row["mean_force_N"] is None else numbers(row["mean_force_N"]),

@@ -1,6 +1,6 @@
 """All that is known to be free of contact beside a log: its own spans and cycles, other runs."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -184,6 +184,14 @@ class FreeMotion(Shown):
                 pieces.append(FreePiece(run.run, whole, ()))
                 remarks.append(fact("free-run-of-another-motion", about))
         return FreePart(tuple(pieces), own, tuple(remarks))
+
+    def unloaded(self, spans: tuple[tuple[float, float], ...]) -> "FreeMotion":
+        """The log with its unloaded spans or its zero run as free motion, where none is given."""
+        if self.choice.is_given or not (spans or self.zero):
+            return self
+        if spans:
+            return replace(self, choice=replace(self.choice, spans=spans))
+        return replace(self, runs=() if self.zero is None else (self.zero,))
 
     @property
     def repeats(self) -> bool:

@@ -178,8 +178,9 @@ def test_the_arrow_is_the_tabled_force_at_its_own_point(frame: str) -> None:
 
 
 def test_a_long_log_is_held_by_levels_and_whole_where_the_strongest_contacts_begin(
-    analysis: Analysis, monkeypatch: pytest.MonkeyPatch
+    touched: Analysis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    analysis = touched
     monkeypatch.setattr("vftcli.outputs.log.rerun_recording.STRETCHES", 20)
     monkeypatch.setattr("vftcli.outputs.log.rerun_recording.AROUND", 0.2)
     monkeypatch.setattr("vftcli.outputs.log.rerun_recording.WHOLE_TIME", 0.4)

@@ -32,13 +32,13 @@ def bare(contact: Contact) -> Contact:
 
 
 def sized(contact: Contact, force: float, band: float, **rest: object) -> Contact:
-    return replace(contact, peak_force=force, peak_band=band, **rest)
+    return replace(contact, peak_force=force, peak_band=band, place_band=band, **rest)
 
 
 @pytest.mark.parametrize(
     ("count", "words"),
     [
-        (0, "Nothing pushed the arm, as far as this log can tell."),
+        (0, "Nothing touched the arm, as far as this log shows."),
         (1, "Something pushed the arm once, with 90 ± 7 N."),
         (2, "Something pushed the arm twice, hardest with 90 ± 7 N."),
         (4, "Something pushed the arm four times, hardest with 90 ± 7 N."),
@@ -58,7 +58,9 @@ def test_the_headline_is_no_force_within_its_band(found: ContactList) -> None:
         "Something may have pushed the arm twice, hardest with 30 ± 14 N (weak)."
     )
     alone = replace(found, contacts=(wide,))
-    assert headline(alone) == ("Something may have pushed the arm once; how hard cannot be told.")
+    assert headline(alone) == (
+        "Something may have pushed the arm once. How hard is unknown: below 258 N."
+    )
     assert "is seen only where the arm feels it best" in belief_words(
         replace(found, contacts=(sized(found.contacts[0], 1.0, 0.5),))
     )
@@ -97,9 +99,9 @@ def test_the_places_are_told_together(found: ContactList) -> None:
     assert where_words([wrist, replace(other, where="wrist")]) == "All touched the <b>wrist</b>."
     assert where_words([wrist, other, untold]) == (
         "Contact <b>1</b> touched the <b>wrist</b>; contact <b>2</b> touched the <b>forearm</b>; "
-        "where contact <b>3</b> touched cannot be told, since several places fit."
+        "where contact <b>3</b> touched is unknown, since several places fit."
     )
-    assert where_words(found.contacts).startswith("10 of 12 touched the <b>wrist</b>; where the ")
+    assert where_words(found.contacts).startswith("11 of 12 touched the <b>wrist</b>; where the ")
     assert listed([1, 3, 4]) == "<b>1</b>, <b>3</b> and <b>4</b>"
     assert where_words([]) == ""
 
@@ -135,7 +137,7 @@ def test_the_details_hold_every_number(found: ContactList) -> None:
     first = found.contacts[0]
     assert f"{first.joint_torque[1]:.2f} ± {first.joint_torque_sd[1]:.2f}".replace("-", "−") in html
     pairs = model_pairs(found)
-    assert pairs["method"] == "smoother"
+    assert pairs["basis"] == "free motion"
     assert pairs["free motion"].endswith(" s")
     unknown = replace(found.model, noise_sd=np.full(6, np.nan), prior=None)
     assert "nan" not in str(model_pairs(replace(found, model=unknown)))

@@ -36,7 +36,7 @@ def test_a_line_says_how_many_how_hard_and_how_sound(pushed: Analysis) -> None:
         index_line("a", pushed, sound)
     )
     assert (log.text, robot, span) == ("ur5_circle.csv", "ur5", "20.0 s")
-    assert (contacts, hardest, least) == ("12", "94 ± 8 N at 11.3 s", "4 N")
+    assert (contacts, hardest, least) == ("12", "95 ± 9 N at 11.3 s", "4 N")
     assert error == "0.349 N·m (best)"
     assert state.text == "✓ sound"
     bad = Ground(standing="bad", subject="load", sentence="heavy <b>")
@@ -67,7 +67,7 @@ def test_the_headline_counts_logs(pushed: Analysis) -> None:
     title, words = headline([("a", pushed), ("b", quiet), ("c", loaded)])
     assert title == "Something pushed the arm in 1 of 3 logs."
     assert words == (
-        "Hardest in ur5_circle.csv: 94 ± 8 N at 11.3 s. "
+        "Hardest in ur5_circle.csv: 95 ± 9 N at 11.3 s. "
         "1 more bears a load, or a wrong payload or model."
     )
     title, words = headline([("b", quiet), ("b", quiet)])

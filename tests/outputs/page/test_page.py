@@ -107,7 +107,7 @@ def test_the_answer_comes_first(pushed: Analysis) -> None:
     text = page.text
     order = (
         "ur5_circle.csv · Universal Robots UR5",
-        "Something pushed the arm 12 times, hardest with 94 ± 8 N.",
+        "Something pushed the arm 12 times, hardest with 95 ± 9 N.",
         "The contacts",
         "Can it be believed?",
         "vftcli identify",

@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import SURE_NATS, TIGHT, Contact, ContactList
-from vftcli.outputs.contacts import answer, direction, place_words
+from vftcli.outputs.contacts import answer, direction, place_words, unknown_size
 from vftcli.outputs.grid import Column, Entry, Grid, html, significant
 from vftcli.outputs.page.arm_drawing import arm_drawing
 from vftcli.outputs.page.hero import told
@@ -32,14 +32,12 @@ HEADS = ("", "When", "How hard (95 %)", "Direction, base axes", "Where", "Trust"
 def headline(found: ContactList) -> str:
     """The answer as a headline. Plain text."""
     contacts = found.contacts
-    if not contacts and found.false_on_free:
-        return answer(found)
     if not contacts:
-        return "Nothing pushed the arm, as far as this log can tell."
+        return answer(found)
     hardest = found.hardest
     if contacts[0].is_load and hardest is not None:
         how = f"of {size(hardest)}"
-        if not hardest.has_size:
+        if not hardest.size_known:
             how = f"below {(hardest.peak_force or 0.0) + (hardest.peak_band or 0.0):.0f} N"
         return f"The arm bears a load {how}, or its payload or its model is wrong."
     count = len(contacts)
@@ -50,8 +48,8 @@ def headline(found: ContactList) -> str:
         pushed = "Something may have pushed"
     if hardest is None:
         return f"{pushed} the arm {often}."
-    if not hardest.has_size:
-        return f"{pushed} the arm {often}; how hard cannot be told."
+    if not hardest.size_known:
+        return f"{pushed} the arm {often}. {unknown_size(hardest)}"
     weak = " (weak)" if hardest.trust == "weak" else ""
     return f"{pushed} the arm {often}, {'hardest ' * (count > 1)}with {size(hardest)}{weak}."
 
@@ -103,14 +101,14 @@ def which(numbers: list[int], count: int) -> str:
 
 
 def touched(numbers: list[int], count: int) -> str:
-    """Which contacts' places cannot be told."""
+    """Which contacts' places are unknown."""
     if len(numbers) == count:
         subject = "it" if count == 1 else "they"
     elif count > FEW:
         subject = f"the other {len(numbers) if len(numbers) > 1 else 'one'}"
     else:
         subject = f"{'contact' if len(numbers) == 1 else 'contacts'} {listed(numbers)}"
-    return f"where {subject} touched cannot be told, since several places fit"
+    return f"where {subject} touched is unknown, since several places fit"
 
 
 def listed(numbers: Sequence[int]) -> str:
@@ -122,7 +120,7 @@ def listed(numbers: Sequence[int]) -> str:
 def belief_words(found: ContactList) -> str:
     """How far times and sizes may be believed, and what would not be seen. HTML."""
     parts = []
-    bands = [c.peak_band or 0.0 for c in found.contacts if c.has_size and not c.is_load]
+    bands = [c.peak_band or 0.0 for c in found.contacts if c.size_known and not c.is_load]
     if bands:
         parts.append(
             f"Believe times to about ±{ONSET:g} s and sizes to about "
@@ -202,7 +200,7 @@ def range_bar(contact: Contact, most: float) -> str:
     )
     return (
         '<small><svg class="bar" viewBox="0 0 100 12" preserveAspectRatio="none" '
-        f'aria-hidden="true">{"".join(parts)}</svg>{low:.0f}–{high:.0f} N, anywhere</small>'
+        f'aria-hidden="true">{"".join(parts)}</svg>{low:.0f}–{high:.0f} N, range</small>'
     )
 
 
@@ -302,7 +300,7 @@ def model_pairs(found: ContactList) -> dict[str, str]:
         return ", ".join(significant(float(value)) for value in values)
 
     pairs = {
-        "method": found.method,
+        "basis": found.basis,
         "free motion": f"{found.free_seconds:.1f} s",
         "false contacts in it": "–" if found.false_on_free is None else str(found.false_on_free),
         "evidence asked": "–" if found.threshold is None else f"{found.threshold:.1f} nats",

@@ -177,7 +177,7 @@ def peaks(scales: Scales, contacts: Sequence[Contact]) -> list[str]:
             continue
         x, y = float(scales.across(contact.peak)), float(scales.up(contact.peak_force))
         parts.append(f'<circle class="peak" cx="{x:.1f}" cy="{y:.1f}" r="3.5"/>')
-        if not contact.has_size:
+        if not contact.size_known:
             continue
         text = f"{contact.peak_force:.0f} ± {contact.peak_band:.0f}"
         half = 0.5 * LETTER * len(text)
