@@ -276,3 +276,13 @@ def test_a_load_that_is_struck_is_listed_as_a_whole(listed: Lister) -> None:
     first = listed("panda_bearing.csv", "panda", "0.3:3.9").contacts[0]
     assert first.start == pytest.approx(4.2, abs=0.3)
     assert first.stop > 16.0
+
+
+def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap() -> None:
+    """Every second sample of a log at 125 Hz."""
+    whole = read(FIXTURES / "ur5_taps_ur_rtde.csv")
+    slow = list_contacts(motion(part(whole, np.arange(0, whole.samples, 2)), "ur5", "0.3:4"))
+    assert slow.contacts
+    assert {remark.code for row in slow.contacts for remark in row.remarks} == {"peak-cut-by-rate"}
+    fast = list_contacts(motion(whole, "ur5", "0.3:4"))
+    assert not {remark.code for row in fast.contacts for remark in row.remarks}

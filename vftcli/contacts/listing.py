@@ -16,7 +16,7 @@ from vftcli.contacts.evidence import LEAST_EVIDENCE, LEAST_IN_MOTION
 from vftcli.contacts.loads import is_load, load_row
 from vftcli.contacts.model_error import UNKNOWN, UNSEEN_SHARE, error_course
 from vftcli.contacts.places import places
-from vftcli.contacts.rows import NORMAL, Measurer
+from vftcli.contacts.rows import NORMAL, SHORT, Measurer
 from vftcli.contacts.search import Found, search
 from vftcli.contacts.stops import follows_stop
 from vftcli.contacts.untouched import (
@@ -40,9 +40,8 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 
-SHORT, FINE = 0.25, 0.008
-"""A contact shorter than this [s] is measured in blocks of this length [s]: longer ones cut its
-peak."""
+FINE = 0.008
+"""A short contact is measured in blocks of this length: longer ones cut its peak. [s]"""
 
 SHORTEST = 0.5
 """A log shorter than this tells no contact. [s]"""

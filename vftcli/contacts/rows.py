@@ -26,6 +26,7 @@ from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.series import median_step
 from vftcli.virtual_sensor.smoother.noise import resting
 from vftcli.virtual_sensor.smoother.smoothing import BENT, DRIVES, hidden_by_blocks
 
@@ -45,6 +46,10 @@ NORMAL = 1.96
 
 OWN_TIME = 0.5
 """A contact's wrench changes within this share of its duration, however slow the others are."""
+
+SHORT, SLOW = 0.25, 95.0
+"""The peak of a contact shorter than this [s] is cut by a log of fewer samples a second [Hz]: a
+tap's force lasts some 50 ms."""
 
 CORE, CORE_TIME = 0.5, 0.1
 """A contact's place is told from the blocks in which its force is above this share of the peak,
@@ -193,6 +198,9 @@ class Measurer:
         on_wrist = named == "wrist" and lead >= SURE_NATS
         remarks = () if on_wrist else site.limits(size, anywhere)
         spread = 0.0 if on_wrist else site.spread(size)
+        rate = 1.0 / median_step(self.run.recording.t)
+        if length.sum() < SHORT and rate < SLOW:
+            remarks = (*remarks, caution("peak-cut-by-rate", rate_hz=rate))
         sd = np.sqrt(np.diag(covariance))
         J = site.jacobian[peak]
         torque_sd = np.sqrt(np.einsum("in,ij,jn->n", J, covariance, J))

@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import SURE_NATS, TIGHT, Contact, ContactList
-from vftcli.outputs.contacts import answer, direction, place_words, unknown_size
+from vftcli.outputs.contacts import answer, direction, force_size, place_words, unknown_size
 from vftcli.outputs.grid import Column, Entry, Grid, html, significant
 from vftcli.outputs.page.arm_drawing import arm_drawing
 from vftcli.outputs.page.hero import told
@@ -55,10 +55,8 @@ def headline(found: ContactList) -> str:
 
 
 def size(contact: Contact) -> str:
-    """|F| with its band; "" where no force is told."""
-    if contact.peak_force is None or contact.peak_band is None:
-        return ""
-    return f"{contact.peak_force:.0f} ± {contact.peak_band:.0f} N"
+    """|F| with its band or its range; "" where no force is known."""
+    return "" if contact.peak_force is None else force_size(contact)
 
 
 def lead(found: ContactList) -> str:
