@@ -8,13 +8,13 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.observers.block_run import block_run, runs_in_blocks
-from vftcli.observers.recursion import PIECE
 from vftcli.pipeline import AnalysisChoice
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import RunningTerms
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import LongLog, Recording
+from vftcli.signals.steady_filter import PIECE
 
 
 def comes_in_blocks(recording: Recording, robot: Robot, choice: AnalysisChoice) -> bool:

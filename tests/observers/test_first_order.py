@@ -8,7 +8,6 @@ import pytest
 
 from vftcli.observers import FilteredDynamicsObserver, MomentumObserver
 from vftcli.observers.observer import Observer
-from vftcli.observers.recursion import PIECE
 from vftcli.observers.table import Setup, build_observers
 from vftcli.readers import read
 from vftcli.robots import load_robot
@@ -16,6 +15,7 @@ from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark
 from vftcli.signals.series import median_step
+from vftcli.signals.steady_filter import PIECE
 
 RATE = 125.0
 

@@ -15,7 +15,6 @@ from vftcli.observers.kalman_model import (
 )
 from vftcli.observers.observer import Complex, Tuning, check_terms, numbers_of, per_joint
 from vftcli.observers.recursion import Fold, run_blocks, spans
-from vftcli.observers.steady_filter import steady_filter
 from vftcli.observers.uneven_kalman import settle
 from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array, empty_series, frozen, handed_over
@@ -24,6 +23,7 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_known
 from vftcli.signals.series import Clock
 from vftcli.signals.shown import Shown
+from vftcli.signals.steady_filter import steady_filter
 
 TORQUE = np.array([[0.0], [1.0]])
 """Weights that pick the external torque out of a filter's two states. (2, 1)"""

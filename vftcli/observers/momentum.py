@@ -13,13 +13,13 @@ from vftcli.observers.first_order import (
 )
 from vftcli.observers.observer import Complex, Tuning, check_terms, numbers_of, per_joint
 from vftcli.observers.recursion import recursion
-from vftcli.observers.steady_filter import steady_filter
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, warning
 from vftcli.signals.shown import Shown
+from vftcli.signals.steady_filter import steady_filter
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

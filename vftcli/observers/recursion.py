@@ -13,16 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.signals.arrays import Array, Indices
+from vftcli.signals.steady_filter import FORGOTTEN, PIECE
 
 LENGTH = 36
 """Samples in a block at most: the Python loops have this length. From 32 to 64 all take as long."""
-
-PIECE = 1 << 14
-"""Samples handled at a time, so that memory does not grow with the log; blocks of a log that begin
-at multiples of it give the numbers of the whole log to the last bit."""
-
-FORGOTTEN = 1e-20
-"""What is left of a state that counts as nothing: far below the last digit of anything."""
 
 
 class Fold(NamedTuple):

@@ -26,12 +26,12 @@ from vftcli.observers.kalman_gains import Covariance, Gains
 from vftcli.observers.kalman_model import Discrete
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.recursion import recursion
-from vftcli.observers.steady_filter import steady_filter
 from vftcli.observers.uneven_kalman import gain_sequence
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series, handed_over
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.shown import Shown
+from vftcli.signals.steady_filter import steady_filter
 
 SETTLED = 1e-16
 """Share of the smoother's settled information that may be missing where it counts as settled."""

@@ -16,6 +16,9 @@ from vftcli.refinement.model_error import column_numbers
 from vftcli.refinement.slow_load import SlowLoads
 from vftcli.signals.arrays import Array, Mask
 
+BLOCK = 64
+"""Rows that are substituted at a time."""
+
 PENALTY = 2.0
 """What a column of a load has to gain before it is believed (Akaike's criterion)."""
 
@@ -57,10 +60,7 @@ class FittedError(NamedTuple):
     @property
     def covariance(self) -> Array:
         """Covariance of the model's error, in squared standard deviations. (P, P)"""
-        from scipy.linalg import solve_triangular
-
-        unit = np.eye(len(self.factor), len(self.model))
-        half = solve_triangular(self.factor, unit, lower=True, check_finite=False)
+        half = forward_solved(self.factor, np.eye(len(self.factor), len(self.model)))
         return np.asarray(self.scale**2 * (half.T @ half))
 
 
@@ -182,17 +182,30 @@ def solve(sums: Sums, unknowns: int, sizes: Sequence[int], scale: float = 1.0) -
         sizes: Columns of the loads' groups, each with those before it.
         scale: What the model's standard deviations are multiplied with.
     """
-    from scipy.linalg import cholesky, solve_triangular
-
     scales = np.ones(len(sums.vector))
     scales[:unknowns] = scale
     matrix = sums.matrix * scales * scales[:, None]
     matrix.flat[:: len(matrix) + 1] += 1.0
-    factor = cholesky(matrix, lower=True, check_finite=False)
-    z = solve_triangular(factor, scales * sums.vector, lower=True, check_finite=False)
+    factor = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+    z = forward_solved(factor, scales * sums.vector)
     gained = np.concatenate([[0.0], np.cumsum(z**2)])
     loads = min(sizes, key=lambda size: PENALTY * size - gained[unknowns + size])
     size = unknowns + loads
     factor, z = factor[:size, :size], z[:size]
-    values = -solve_triangular(factor, z, lower=True, trans="T", check_finite=False)
+    values = -forward_solved(factor.T[::-1, ::-1], z[::-1])[::-1]
     return FittedError(scale * values[:unknowns], values[unknowns:], scale, factor)
+
+
+def forward_solved(factor: Array, right: Array) -> Array:
+    """L⁻¹ times the right-hand sides, by forward substitution in blocks. (N,) or (N, k)
+
+    Args:
+        factor: Lower triangular L. (N, N)
+        right: Right-hand sides. (N,) or (N, k)
+    """
+    found = right.astype(np.float64)
+    for first in range(0, len(found), BLOCK):
+        own = slice(first, first + BLOCK)
+        rest = found[own] - factor[own, :first] @ found[:first]
+        found[own] = np.linalg.solve(factor[own, own], rest)
+    return found

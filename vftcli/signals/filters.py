@@ -1,4 +1,12 @@
-"""Filters without phase shift on clocks that may be uneven, and how much white noise they pass."""
+"""Filters without phase shift on clocks that may be uneven, and how much white noise they pass.
+
+The filters are SciPy's `butter` and `sosfiltfilt` to rounding, by `steady_filter`: importing
+`scipy.signal` takes longer than all that a log of a minute asks of them.
+
+References:
+    A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing, Section 7.2, 2010 (bilinear
+    transformation).
+"""
 
 from functools import lru_cache
 from typing import Literal
@@ -8,6 +16,7 @@ import numpy as np
 from vftcli.signals.arrays import Array, is_uniform
 from vftcli.signals.errors import ClockError, ParameterError
 from vftcli.signals.series import median_step, resample_columns
+from vftcli.signals.steady_filter import steady_filter
 
 ORDER = 2
 """Order of the Butterworth filter; run forwards and backwards it attenuates twice as much."""
@@ -23,6 +32,12 @@ UNEVEN = 0.05
 """Steps that differ from their median by a larger share are resampled; a clock that jitters by less
 is filtered as an even one."""
 
+
+BAND_ZEROS = np.array([1.0, 0.0, -1.0])
+"""Zeros of a band pass' section, at 0 and at half the sample rate, as a polynomial in z⁻¹."""
+
+FREQUENCIES = 1024
+"""Frequencies at which a filter's power is summed."""
 
 MOSTLY_GAP = 100
 """An even clock of more than so many times the log's samples would be filled with gaps alone."""
@@ -86,23 +101,44 @@ def band_pass(t: Array, x: Array, low: float, high: float) -> Array:
 
 def filter_columns(t: Array, x: Array, sections: Array, settling: float | None = None) -> Array:
     """Columns behind second-order sections that run forwards and backwards along time. (T, n)"""
-    from scipy.signal import sosfiltfilt
-
     step = median_step(t)
     if settling is not None:
         padding = int(settling / step)
     elif len(t) <= 3 * (2 * len(sections) + 1):
         return x.copy()
     else:
-        padding = None
+        ends = min(np.count_nonzero(sections[:, 2] == 0), np.count_nonzero(sections[:, 5] == 0))
+        padding = 3 * (2 * len(sections) + 1 - int(ends))
     # A log keeps its own samples where it can: resampling is a filter too.
     even = is_uniform(t, tolerance=UNEVEN)
     clock = t if even else even_clock(t, step)
-    if padding is not None:
-        padding = min(len(clock) - 1, padding)
+    padding = min(len(clock) - 1, padding)
     columns = x if even else resample_columns(clock, t, x)
-    smooth: Array = sosfiltfilt(sections, columns, axis=0, padlen=padding)
+    smooth = there_and_back(sections, columns, padding)
     return smooth if even else resample_columns(t, clock, smooth)
+
+
+def there_and_back(sections: Array, x: Array, padding: int) -> Array:
+    """Columns behind the sections, forwards and backwards, the ends mirrored about their value."""
+    before, after = 2.0 * x[:1] - x[padding:0:-1], 2.0 * x[-1:] - x[-2 : -padding - 2 : -1]
+    padded = np.concatenate([before, x, after])
+    once = cascade(sections, padded)
+    both = cascade(sections, once[::-1])[::-1]
+    return both[padding : len(both) - padding].copy()
+
+
+def cascade(sections: Array, x: Array) -> Array:
+    """Columns behind one section after the other, each settled on its first input. (T, n)"""
+    for b0, b1, b2, _, a1, a2 in sections.tolist():
+        # y_t = z_{t−1} + b₀x_t with the state (z, z') of the transposed direct form.
+        F = np.array([[-a1, 1.0], [-a2, 0.0]])
+        g = np.array([b1 - a1 * b0, b2 - a2 * b0])
+        settled = np.linalg.solve(np.eye(2) - F, g)[:, None] * x[0]
+        n = x.shape[1]
+        turned = np.repeat(F[:, :, None], n, axis=2), np.repeat(g[:, None], n, axis=1)
+        state = steady_filter(*turned, x[:-1], settled, np.array([[1.0], [0.0]]))[0]
+        x = b0 * x + np.concatenate([settled[:1], state])
+    return x
 
 
 def even_clock(t: Array, step: float) -> Array:
@@ -139,11 +175,28 @@ def butterworth(
 
 @lru_cache
 def designed(step: float, cutoff: float | tuple[float, float], kind: Kind, order: int) -> Array:
-    """A filter's sections, designed once: that takes longer than to filter a short log."""
-    from scipy.signal import butter
+    """Sections of a Butterworth filter of even order, by the bilinear transformation. (S, 6)
 
-    sections: Array = butter(order, cutoff, kind, fs=1.0 / step, output="sos")
-    return sections
+    Args:
+        step: Sample time. [s]
+        cutoff: One edge, or two of a band. [Hz]
+        kind: "lowpass" or "bandpass".
+        order: Order of the low pass, or of either side of the band.
+    """
+    edges = np.tan(np.pi * step * np.atleast_1d(cutoff))
+    angles = np.pi * (np.arange(order // 2) + 0.5) / order
+    poles = -np.sin(angles) + 1j * np.cos(angles)
+    if kind == "lowpass":
+        poles, zeros, gain = poles * edges[0], np.array([1.0, 2.0, 1.0]), edges[0] ** 2
+    else:
+        low, high = edges
+        half = 0.5 * (high - low) * poles
+        root = np.sqrt(half**2 - low * high)
+        poles, zeros, gain = np.concatenate([half + root, half - root]), BAND_ZEROS, high - low
+    # (s − p)(s − p*) with s = (1 − z⁻¹)/(1 + z⁻¹)
+    power, double = np.abs(poles) ** 2, 2.0 * poles.real
+    a = np.stack([1.0 - double + power, 2.0 * (power - 1.0), 1.0 + double + power], axis=1)
+    return np.concatenate([gain * zeros / a[:, :1], a / a[:, :1]], axis=1)
 
 
 @lru_cache
@@ -158,9 +211,10 @@ def noise_passed(
         kind: "lowpass" or "bandpass".
         slope: 0, or 1 for the central difference (x_{k+1} − x_{k−1})/2Ts behind the filter.
     """
-    from scipy.signal import sosfreqz
-
-    omega, response = sosfreqz(butterworth(step, cutoff, kind), 1024)
+    omega = np.pi * np.arange(FREQUENCIES) / FREQUENCIES
+    delays = np.exp(-1j * np.outer(np.arange(3), omega))
+    sections = butterworth(step, cutoff, kind)
+    response = np.prod((sections[:, :3] @ delays) / (sections[:, 3:] @ delays), axis=0)
     # |H|² of one pass is the amplitude of both, so |H|⁴ is their power.
     gain = np.abs(response) ** 4
     if slope:

@@ -12,8 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.observers.recursion import FORGOTTEN, PIECE
 from vftcli.signals.arrays import Array, empty_series
+
+PIECE = 1 << 14
+"""Samples handled at a time, so that memory does not grow with the log; blocks of a log that begin
+at multiples of it give the numbers of the whole log to the last bit."""
+
+FORGOTTEN = 1e-20
+"""What is left of a state that counts as nothing: far below the last digit of anything."""
 
 BLOCK = 32
 """Samples in a block, a power of two: the work grows with it, the number of blocks shrinks."""

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from vftcli.observers import steady_filter as module
-from vftcli.observers.steady_filter import steady_filter
+from vftcli.signals import steady_filter as module
+from vftcli.signals.steady_filter import steady_filter
 
 RNG = np.random.default_rng(6)
 
