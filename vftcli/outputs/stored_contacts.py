@@ -38,6 +38,8 @@ def stored_record(estimates: Path) -> dict[str, Any]:
         ) from None
     if not isinstance(found, dict):
         raise LogError(f"{estimates} was made without a list of contacts; give the log, {log}")
+    if "basis" not in found:
+        raise LogError(f"{estimates} was written by an older vftcli; give the log, {log}")
     return found
 
 
