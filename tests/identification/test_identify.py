@@ -172,6 +172,42 @@ def test_the_payload_comes_back_from_poses():
         payload_from_poses([recording.between(0.0, 1.9)], UR5)
 
 
+HAND = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_payload_comes_back_from_one_motion(seed):
+    """In every joint another friction than the profile's; the load's inertia counts too."""
+    asked = Task(method=None, find_payload=True)
+    found = identify(
+        [log(rubbed(UR5, "coulomb-viscous-offset").with_payload(HAND), seed)], UR5, asked
+    )
+    assert found.remarks[-1].code == "load-from-motion"
+    sd = dict(zip(found.parameters["parameter"], found.parameters["sd"], strict=True))
+    # .2 N·m of noise on 900 samples: what is left is how friction is rounded around reversals
+    assert found.robot.payload.mass == pytest.approx(2.0, rel=0.02)
+    for name, value, true in zip("xyz", found.robot.payload.com, HAND.com, strict=True):
+        assert abs(value - true) < 3.0 * sd[f"com_{name}"] < 0.05
+    # its drives carry 18 kg of arm: 3 % of that weigh more than 3 % of the load
+    assert 0.06 < sd["mass"] < 0.4
+
+
+@pytest.mark.parametrize("mass", [0.0, 0.15])
+def test_a_motion_in_which_no_load_shows_says_so(mass):
+    true = rubbed(UR5, "coulomb-viscous-offset", coulomb=2.0)
+    light = replace(HAND, mass=mass) if mass else None
+    asked = Task(method=None, find_payload=True)
+    with pytest.raises(IdentificationError, match="no load shows; in this motion one from"):
+        identify([log(true.with_payload(light), 1)], UR5, asked)
+
+
+def test_an_arm_that_hardly_moves_is_not_weighed():
+    held = log(UR5.with_payload(HAND), 1)
+    still = replace(held, q=held.q[0] + 0.01 * (held.q - held.q[0]), dq=0.01 * held.dq)
+    with pytest.raises(IdentificationError, match="the arm passes 1 different poses"):
+        identify([still], UR5, Task(method=None, find_payload=True))
+
+
 def test_different_motions_are_no_pair():
     with pytest.raises(IdentificationError, match="not the same motion"):
         payload_from_pair(log(UR5, 1), log(UR5, 2), UR5)
