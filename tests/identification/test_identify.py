@@ -292,6 +292,25 @@ def test_turned_currents_are_refused():
         identify([replace(good, current=-good.current)], UR5, Task())
 
 
+@pytest.mark.parametrize(("push", "terms"), [(-0.1, "coulomb and viscous"), (0.1, None)])
+def test_a_joint_that_hardly_rubs_is_bounded_at_zero_and_named(push, terms):
+    """Of joint 6 noise of .2 N·m and a model that is .1 N·m wrong are all there is to fit."""
+    recording = log(rubbed(UR5, "coulomb-viscous-offset"), 3)
+    current = recording.current.copy()
+    current[:, 5] += (push - 5.0) * np.tanh(recording.dq[:, 5] / 0.01) / UR5.torque_constant[5]
+    current[:, 5] += (push - 8.0) * recording.dq[:, 5] / UR5.torque_constant[5]
+    found = identify([replace(recording, current=current)], UR5, Task(method="friction"))
+    friction = found.robot.friction[5].parameters
+    assert friction.get("coulomb", 0.0) >= 0.0
+    assert friction.get("viscous", 0.0) >= 0.0
+    bounded = [r for r in found.remarks if r.code == "friction-at-bound"]
+    assert [(r.where.joints, r.values["terms"]) for r in bounded] == (
+        [((6,), terms)] if terms else []
+    )
+    # the other joints are none the worse: 5 N·m on 3000 samples of .2 N·m
+    assert found.robot.friction[4].parameters["coulomb"] == pytest.approx(5.0, rel=0.05)
+
+
 def test_turned_velocities_are_refused():
     good = log(rubbed(UR5))
     with pytest.raises(IdentificationError, match="it would push"):

@@ -15,10 +15,10 @@ from vftcli.identification.payload import (
     LoadFit,
     NotSameMotionError,
     TooFewPosesError,
-    payload_from_motion,
     payload_from_pair,
     payload_from_poses,
 )
+from vftcli.identification.payload_in_motion import payload_from_motion
 from vftcli.identification.processing import Processing
 from vftcli.identification.provenance import with_provenance
 from vftcli.identification.result import (
