@@ -105,7 +105,7 @@ UR10E = ("--robot", "ur10e", "--columns", "t,q:6,dq:6,current:6,target_current:6
 
 
 @pytest.mark.parametrize("name", [*FREE.split(), *REPEATS.split()])
-def test_real_free_logs_are_taken(name: str, logs: Path, run: Run) -> None:
+def test_real_free_logs_are_accepted(name: str, logs: Path, run: Run) -> None:
     code, out, err = run("thresholds", logs / "ur10e" / name, *UR10E, "--json")
     assert code == 0, err
     assert "as if touched" not in err
@@ -119,7 +119,7 @@ def test_real_free_logs_are_taken(name: str, logs: Path, run: Run) -> None:
 
 
 @pytest.mark.parametrize("name", ["salerno_ur10/ur10_exciting.db3", "ur3/identification.bag"])
-def test_free_logs_of_other_arms_are_taken(name: str, logs: Path, run: Run) -> None:
+def test_free_logs_of_other_arms_are_accepted(name: str, logs: Path, run: Run) -> None:
     arm = ("ur3", "-tau") if name.startswith("ur3") else ("ur10", "tau=effort")
     words = ("--robot", arm[0], f"--columns={arm[1]}", "--json")
     code, _, err = run("thresholds", logs / name, *words)

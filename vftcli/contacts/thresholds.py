@@ -90,7 +90,7 @@ class Thresholds(Shown):
         joints: One a joint. [N·m]
         axes: One an axis of the wrench, none for an arm of fewer than six joints; one that is wide
             is none. [N, N·m]
-        force: That of the force's size, or none; its rate is `rate` itself; wide likewise. [N]
+        force: That of the force's size, or none; its rate is `rate` itself; as of an axis. [N]
         of_vendor: Whether the joints' are of the robot's own estimate.
         logged_wrench: Whether those of axes and force are of the robot's own wrench.
         remarks: What a reader of the numbers should know.

@@ -28,7 +28,7 @@ reach 1.15, logs of hands 1.8–7."""
 LEAST = 2.0
 """Torque below which nothing is called a contact: an arm of link torques leaves 1.8 open. [N·m]"""
 PLAIN = 1.5
-"""Multiple of its limit from which what stands out is plainly no model error: a free UR10 reaches
+"""Multiple of its limit from which open torque is plainly no model error: a free UR10 reaches
 1.14, hands and pushes 2.1 and more."""
 SHORTEST = 2.0
 """Shorter logs have no quiet level. [s]"""
@@ -43,7 +43,7 @@ class ShownContact(NamedTuple):
         stop: When it ends. [s]
         torque: The largest torque that is open. [N·m]
         quiet: The joint's quiet level. [N·m]
-        excess: The largest torque that is open over the limit from which it stands out.
+        excess: The largest torque that is open, over its limit.
     """
 
     joint: int

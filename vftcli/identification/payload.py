@@ -330,7 +330,7 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
 
     Raises:
         TooFewPosesError: If there are too few different poses.
-        IdentificationError: If no load can be told.
+        IdentificationError: If the poses determine no load.
     """
     each = [resting_poses([recording], robot) for recording in recordings]
     q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))

@@ -72,7 +72,7 @@ def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFi
     """Find a load from motion: what the torque has beyond the robot's own weight.
 
     The columns of `vftcli.repetition.free_load` know of a load's weight alone: with what was found
-    on the arm the motion is weighed again, so that the load's inertia is not taken for more of it.
+    on the arm the motion is weighed again, so that the load's inertia does not count as weight.
 
     Raises:
         IdentificationError: If the arm hardly moves, or no load shows.
@@ -126,7 +126,10 @@ def weigh_motion(runs: Sequence[ModelledRun], carried: Array) -> MotionWeighing:
         if own is not None:
             signals.append((*own, run.recording.q[at], run.recording.require("dq")[at]))
     if not signals:
-        raise IdentificationError(f"{names_of([run.recording for run in runs])}: too short")
+        names = names_of([run.recording for run in runs])
+        raise IdentificationError(
+            f"{names}: too short to weigh a load; record ten seconds at least"
+        )
     d, A, q, dq = (np.concatenate(each) for each in zip(*signals, strict=True))
     A = np.concatenate([A, dq[:, :, None] * np.eye(robot.joints)], axis=2)
     usable = (np.abs(dq) > SLOW).astype(float)
