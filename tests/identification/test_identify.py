@@ -208,6 +208,12 @@ def test_an_arm_that_hardly_moves_is_not_weighed():
         identify([still], UR5, Task(method=None, find_payload=True))
 
 
+def test_a_motion_of_some_seconds_is_not_weighed():
+    short = log(UR5.with_payload(HAND), 1).between(5.0, 14.0)
+    with pytest.raises(IdentificationError, match=r"9 s of motion are too short .* record 10 s"):
+        identify([short], UR5, Task(method=None, find_payload=True))
+
+
 def test_different_motions_are_no_pair():
     with pytest.raises(IdentificationError, match="not the same motion"):
         payload_from_pair(log(UR5, 1), log(UR5, 2), UR5)
