@@ -223,16 +223,26 @@ def modelled(
     return run
 
 
-def touched(run: ModelledRun) -> tuple[Remark, ...]:
-    """A remark where a log that is to be free shows contact."""
+def touched(run: ModelledRun, *, anyway: bool = False) -> tuple[Remark, ...]:
+    """A remark where a log that is to be free shows contact.
+
+    Raises:
+        ParameterError: If it shows contact plainly, unless it shall be used `anyway`.
+    """
     from vftcli.contacts.tail import SETTLING
-    from vftcli.evaluation.touches import touches
+    from vftcli.evaluation.touches import PLAIN, touches
 
     known = touches(run) if set(EFFORTS) & set(run.recording.signals) else ()
     found = [touch for touch in known if touch.stop > run.recording.t[0] + SETTLING]
     if not found:
         return ()
-    worst = max(found, key=lambda touch: touch.torque)
+    worst = max(found, key=lambda touch: touch.excess)
     where = Where(run.recording.name, (worst.joint + 1,), (worst.start, worst.stop))
     sizes = {"torque_Nm": worst.torque, "quiet_Nm": worst.quiet}
-    return (caution("free-log-touched", where, count=len(found), **sizes),)
+    remark = caution("free-log-touched", where, count=len(found), **sizes)
+    if worst.excess > PLAIN and not anyway:
+        raise ParameterError(
+            f"{remark}. Give motion that nobody touches, a part of this log with --interval, or "
+            "take it all with --anyway"
+        )
+    return (remark,)

@@ -83,12 +83,53 @@ def test_two_free_logs_are_counted_against_each_other(free: Path, pushed: Path, 
 
 def test_a_simulated_log_is_checked_against_the_truth_beside_it(run: Run) -> None:
     log = FIXTURES / "panda_bearing.csv"
-    words = ("--robot", "panda", "--rate", 60)
+    words = ("--robot", "panda", "--rate", 60, "--anyway")
     code, out, err = run("thresholds", log, *words, "--check", log)
     assert code == 0, err
     assert "of 3 contacts caught" in out
     assert "contacts are where file:panda_bearing.csv.truth.parquet says so" in err
     # It is no free log: J2 bears the load for half of it.
+    assert "as if touched" in err
+
+
+def test_a_log_in_which_something_touches_the_arm_is_refused(run: Run) -> None:
+    code, out, err = run("thresholds", FIXTURES / "panda_bearing.csv", "--robot", "panda")
+    assert (code, out) == (1, "")
+    assert "J2 shows" in err
+    assert "take it all with --anyway" in err
+
+
+FREE = "free_10harm.csv.gz free_12harm.csv free_12harm_40s.csv.gz free_14harm.csv jointwise_2.csv"
+REPEATS = "jointwise_4.csv free_repeat_a.csv free_repeat_b.csv free_repeat_c.csv"
+UR10E = ("--robot", "ur10e", "--columns", "t,q:6,dq:6,current:6,target_current:6,target_torque:6")
+
+
+@pytest.mark.parametrize("name", [*FREE.split(), *REPEATS.split()])
+def test_real_free_logs_are_accepted(name: str, logs: Path, run: Run) -> None:
+    code, out, err = run("thresholds", logs / "ur10e" / name, *UR10E, "--json")
+    assert code == 0, err
+    assert "as if touched" not in err
+    # what is printed as a threshold of the wrench is no wider than it is high
+    record = json.loads(out)
+    for row in (*record["axes"], *([record["force"]] if record["force"] else [])):
+        unit = "N" if "threshold_N" in row else "Nm"
+        low, high = row[f"interval_{unit}"]
+        level = row[f"threshold_{unit}"]
+        assert level is None or high - low <= level
+
+
+@pytest.mark.parametrize("name", ["salerno_ur10/ur10_exciting.db3", "ur3/identification.bag"])
+def test_free_logs_of_other_arms_are_accepted(name: str, logs: Path, run: Run) -> None:
+    arm = ("ur3", "-tau") if name.startswith("ur3") else ("ur10", "tau=effort")
+    words = ("--robot", arm[0], f"--columns={arm[1]}", "--json")
+    code, _, err = run("thresholds", logs / name, *words)
+    assert code == 0, err
+
+
+@pytest.mark.parametrize("name", ["ur10e/push_pose.csv", "ur10e_planted/planted_12harm.csv.gz"])
+def test_real_pushes_are_refused(name: str, logs: Path, run: Run) -> None:
+    code, _, err = run("thresholds", logs / name, *UR10E)
+    assert code == 1
     assert "as if touched" in err
 
 

@@ -4,6 +4,7 @@ import ast
 import json
 import re
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -84,6 +85,22 @@ def test_an_interface_of_other_joints_is_left_out() -> None:
     assert set(calls(made(6))) == {"ur_script", "toml"}
     assert set(calls(made(7, axes=0))) == {"toml"}
     assert set(calls(made(4, axes=0))) == {"toml"}
+
+
+def test_what_is_wide_is_no_threshold_and_in_no_call() -> None:
+    plain = made(6)
+    wide = plain.axes[2]._replace(interval=(1.0, 99.0))
+    axes = (*plain.axes[:2], wide, *plain.axes[3:])
+    some = replace(plain, axes=axes, force=(plain.force[0]._replace(interval=(3.0, 70.0)),))
+    assert set(calls(some)) == {"toml"}
+    assert set(calls(replace(made(7), axes=axes))) == {"toml"}
+    table = tomllib.loads(calls(some)["toml"])["thresholds"]
+    assert not {"force_N", "force_upper_N", "force_size_N"} & set(table)
+    assert table["moment_Nm"] == [13.01, 14.01, 15.01]
+    record = thresholds_record(some, (), None)
+    assert [row["threshold_N"] for row in record["axes"][:3]] == [10.001, 11.001, None]
+    assert record["force"]["threshold_N"] is None
+    assert "–" in terminal(thresholds_grid(some)).splitlines()[-1]
 
 
 def test_a_call_says_that_the_robot_compares_something_else() -> None:

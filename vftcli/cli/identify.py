@@ -27,7 +27,7 @@ class TaskOptions(Bundle):
     )
     find_payload: bool = flag(
         "--find-payload",
-        "Find a load on the flange: from two LOGs of one motion, from --free, or poses.",
+        "Find a load on the flange: two LOGs of one motion, --free, poses, or motion.",
     )
     fit_constants: bool = flag("--fit-constants", "Friction method: drive constants K too.")
     cutoff: float = option("--cutoff", "HZ", "Cutoff of the zero-phase filter.", 8.0)

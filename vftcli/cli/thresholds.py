@@ -76,6 +76,7 @@ def contact_thresholds(
     models = Models()
     opened = library.open_logs(logs, choice.read)
     free = [modelled(*prepared(log, choice), choice, models) for log in opened]
+    shown = [remark for run in free for remark in touched(run, anyway=anyway.anyway)]
     signals = [compared_signals(run) for run in free]
     thresholds = find_thresholds(signals, rate)
     counted = left_out(signals, rate)
@@ -86,7 +87,7 @@ def contact_thresholds(
         check_alike((signals[0], compared := compared_signals(pushed)))
         truth = truth_of(pushed, asked or settled_reference(pushed.recording))
         checked = check_contacts(compared, thresholds, *truth)
-    remarks = (*thresholds.remarks, *(r for run in free for r in touched(run)))
+    remarks = (*thresholds.remarks, *shown)
     if json:
         record = thresholds_record(thresholds, counted, checked)
         record |= {"logs": [run.recording.name for run in free], "remarks": list(remarks)}

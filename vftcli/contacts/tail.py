@@ -25,6 +25,8 @@ KNOWN = 0.5
 """A block counts if at least this share of its samples is known."""
 ENOUGH = 5
 """Maxima beyond the level that tell a tail; below four its interval has no lower end."""
+LEAST_READINGS, AN_HOUR, SHARE = 30, 60.0, 5
+"""Readings in a tail: at least so many where there are, more an hour, of so many blocks one."""
 NORMAL = 1.96
 """Half width of a normal's 95 % in standard deviations."""
 
@@ -148,7 +150,12 @@ def tail_of(maxima: Array) -> Tail | None:
     k = min(max(30, 60 an hour), B/5) of them are taken for the tail.
     """
     hours = len(maxima) * BLOCK / 3600.0
-    count = min(max(30, round(60.0 * hours)), len(maxima) // 5)
+    count = min(max(LEAST_READINGS, round(AN_HOUR * hours)), len(maxima) // SHARE)
     if count < 1:
         return None
     return Tail(maxima=np.sort(maxima)[::-1], count=count)
+
+
+def blocks_for(count: float) -> float:
+    """How many blocks there must be for a tail of so many readings."""
+    return SHARE * count if count <= LEAST_READINGS else count / AN_HOUR * 3600.0 / BLOCK

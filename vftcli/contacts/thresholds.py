@@ -1,13 +1,22 @@
 """Thresholds from motion that nobody touched, at a stated rate of false alarms."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from vftcli.contacts.compared_signals import ComparedSignals, check_alike
-from vftcli.contacts.tail import BLOCK, ENOUGH, SETTLING, Tail, block_maxima, events, tail_of
+from vftcli.contacts.tail import (
+    BLOCK,
+    ENOUGH,
+    SETTLING,
+    Tail,
+    block_maxima,
+    blocks_for,
+    events,
+    tail_of,
+)
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, caution, fact
@@ -55,6 +64,22 @@ class SignalThreshold(NamedTuple):
     log: str
     tail: Tail | None
 
+    @property
+    def is_wide(self) -> bool:
+        """Whether its interval is wider than its value, which then says nothing."""
+        return self.interval[1] - self.interval[0] > self.value
+
+    @property
+    def more_share(self) -> float:
+        """How much more of its log's motion would narrow the interval to the value, of its length.
+
+        The width falls with the root of the tail's readings, see `vftcli.contacts.tail.tail_of`.
+        """
+        if self.tail is None or not self.is_wide:
+            return 0.0
+        width = (self.interval[1] - self.interval[0]) / max(self.value, LEAST)
+        return max(blocks_for(self.tail.count * width**2) / len(self.tail.maxima) - 1.0, 0.0)
+
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Thresholds(Shown):
@@ -63,8 +88,9 @@ class Thresholds(Shown):
     Attributes:
         rate: False alarms of a whole set, as of any joint. [1/h]
         joints: One a joint. [N·m]
-        axes: One an axis of the wrench, none for an arm of fewer than six joints. [N, N·m]
-        force: That of the force's size, or none; its rate is `rate` itself. [N]
+        axes: One an axis of the wrench, none for an arm of fewer than six joints; one that is wide
+            is none. [N, N·m]
+        force: That of the force's size, or none; its rate is `rate` itself; as of an axis. [N]
         of_vendor: Whether the joints' are of the robot's own estimate.
         logged_wrench: Whether those of axes and force are of the robot's own wrench.
         remarks: What a reader of the numbers should know.
@@ -83,26 +109,36 @@ class Thresholds(Shown):
         return f"passed {self.rate:g} × an hour: {values} N·m on J1…"
 
     @property
-    def named(self) -> tuple[tuple[str, str, SignalThreshold], ...]:
-        """Name, unit and threshold of every joint and axis, and of the force's size."""
+    def named(self) -> tuple[tuple[str, str, float, SignalThreshold], ...]:
+        """Name, unit, level and threshold of every joint and axis, and of the force's size.
+
+        The level is NaN of an axis that has none.
+        """
         return (
-            *((f"J{j}", "N·m", one) for j, one in enumerate(self.joints, start=1)),
-            *((name, unit_of(name), one) for name, one in zip(AXES, self.axes, strict=False)),
-            *(("|F|", "N", one) for one in self.force),
+            *((f"J{j}", "N·m", one.value, one) for j, one in enumerate(self.joints, start=1)),
+            *((n, unit_of(n) if n in AXES else "N", level_of(x), x) for n, x in self.of_wrench),
         )
+
+    @property
+    def of_wrench(self) -> tuple[tuple[str, SignalThreshold], ...]:
+        """Name and threshold of every axis, and of the force's size."""
+        size = (("|F|", one) for one in self.force)
+        return (*zip(AXES, self.axes, strict=False), *size)
 
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "signal", "threshold", "unit", "95 %", "needed by"
-        for name, unit, one in self.named:
-            yield name, one.value, unit, joined(one.interval), one.log
+        for name, unit, level, one in self.named:
+            yield name, level, unit, joined(one.interval), one.log
 
     def to_polars(self) -> "pl.DataFrame":
-        """One row a signal: its threshold with its interval, unit, rate and log."""
+        """One row a signal: its threshold, null where there is none, interval, unit, rate, log."""
         import polars as pl
 
         names = ("signal", "threshold", "low", "high", "unit", "rate_per_h", "log")
-        rows = [(n, x.value, *x.interval, unit, x.rate, x.log) for n, unit, x in self.named]
-        return pl.DataFrame(rows, names, orient="row")
+        rows = [(n, level, *x.interval, unit, x.rate, x.log) for n, unit, level, x in self.named]
+        return pl.DataFrame(rows, names, orient="row").with_columns(
+            pl.col("threshold").fill_nan(None)
+        )
 
     def level(self, name: str, signals: ComparedSignals) -> Array:
         """A set's signals in multiples of their thresholds, no column without thresholds. (T, k)
@@ -111,12 +147,19 @@ class Thresholds(Shown):
             name: A key of `SETS`.
             signals: A log.
         """
-        limits = np.array([one.value for one in getattr(self, name)])
-        if not len(limits):
+        values = [one.value if name == "joints" else level_of(one) for one in getattr(self, name)]
+        if not values:
             return np.zeros((len(signals.t), 0))
+        # An axis without a threshold raises no alarm.
+        limits = np.nan_to_num(values, nan=np.inf)
         # A signal that never moved has the threshold zero: whatever it reads then is an alarm.
         share: Array = np.abs(SETS[name](signals)) / np.maximum(limits, LEAST)
         return share
+
+
+def level_of(one: SignalThreshold) -> float:
+    """The threshold of an axis or of the force's size, NaN of one that is wide. [N, N·m]"""
+    return float("nan") if one.is_wide else one.value
 
 
 def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
@@ -146,7 +189,7 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
         )
     untold = (caution("axes-untold"),) if free[0].wrench.shape[1] and not found["axes"] else ()
     remarks = (*remarks_on(free, len(found["joints"]), rate), *untold)
-    return Thresholds(
+    made = Thresholds(
         rate=rate,
         joints=found["joints"],
         axes=found["axes"],
@@ -155,6 +198,16 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
         logged_wrench=free[0].logged_wrench,
         remarks=remarks,
     )
+    return replace(made, remarks=(*remarks, *wide_remarks(made, free)))
+
+
+def wide_remarks(made: Thresholds, free: Sequence[ComparedSignals]) -> list[Remark]:
+    """Which axes have no threshold, and how much more free motion would give them one."""
+    wide = [(name, one) for name, one in made.of_wrench if one.is_wide]
+    lengths = {signals.recording.name: signals.recording.duration for signals in free}
+    more = [one.more_share * lengths[one.log] / 60.0 for _, one in wide]
+    names = [name for name, _ in wide]
+    return [caution("axes-too-wide", axes=", ".join(names), more_min=max(more))] if wide else []
 
 
 def thresholds_of_set(

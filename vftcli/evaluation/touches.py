@@ -27,6 +27,9 @@ OF_FRICTION = 1.5
 reach 1.15, logs of hands 1.8–7."""
 LEAST = 2.0
 """Torque below which nothing is called a contact: an arm of link torques leaves 1.8 open. [N·m]"""
+PLAIN = 1.5
+"""Multiple of its limit from which open torque is plainly no model error: a free UR10 reaches
+1.14, hands and pushes 2.1 and more."""
 SHORTEST = 2.0
 """Shorter logs have no quiet level. [s]"""
 
@@ -40,6 +43,7 @@ class ShownContact(NamedTuple):
         stop: When it ends. [s]
         torque: The largest torque that is open. [N·m]
         quiet: The joint's quiet level. [N·m]
+        excess: The largest torque that is open, over its limit.
     """
 
     joint: int
@@ -47,6 +51,7 @@ class ShownContact(NamedTuple):
     stop: float
     torque: float
     quiet: float
+    excess: float
 
 
 def touches(run: ModelledRun) -> tuple[ShownContact, ...]:
@@ -72,9 +77,11 @@ def touch_in(
     t: Array, level: Array, limit: Array, quiet: Array, start: int, stop: int
 ) -> ShownContact:
     """The contact of a run of samples, told by the joint that exceeds its limit most."""
-    joint = int(np.argmax((level[start:stop] / limit).max(axis=0)))
+    excess = (level[start:stop] / limit).max(axis=0)
+    joint = int(np.argmax(excess))
     torque = float(level[start:stop, joint].max())
-    return ShownContact(joint, float(t[start]), float(t[stop - 1]), torque, float(quiet[joint]))
+    begin, end = float(t[start]), float(t[stop - 1])
+    return ShownContact(joint, begin, end, torque, float(quiet[joint]), float(excess[joint]))
 
 
 def check_untouched(run: ModelledRun) -> None:

@@ -7,6 +7,7 @@ from vftcli.identification.friction_shapes import round_digits
 from vftcli.identification.method_result import (
     DETERMINED,
     MethodResult,
+    bound_remarks,
     check_friction,
     friction_numbers,
     friction_source,
@@ -78,7 +79,8 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
     friction = tuple(frictions) if data.rubs else ()
     new = replace(robot, chain=chain, friction=friction, torque_constant=constants)
     choices = [c for f in fits if f is not None for c in f.choices]
-    remarks += [*presliding_remark(fits), *temperature_remarks(data), *held_joints(data)]
+    remarks += [*bound_remarks(fits), *presliding_remark(fits), *temperature_remarks(data)]
+    remarks += held_joints(data)
     return MethodResult(new, numbers, choices, None, remarks)
 
 

@@ -14,9 +14,11 @@ from vftcli.identification.method_result import MethodResult
 from vftcli.identification.payload import (
     LoadFit,
     NotSameMotionError,
+    TooFewPosesError,
     payload_from_pair,
     payload_from_poses,
 )
+from vftcli.identification.payload_in_motion import payload_from_motion
 from vftcli.identification.processing import Processing
 from vftcli.identification.provenance import with_provenance
 from vftcli.identification.result import (
@@ -161,7 +163,7 @@ def found_by_method(
 
 
 def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:
-    """Find the load: from a pair if there is one, else from poses at rest."""
+    """Find the load: from a pair if there is one, else from poses at rest, else from motion."""
     bare = robot.with_payload(None)
     if free is not None:
         fit = payload_from_pair(logs[0], free, bare)
@@ -177,8 +179,11 @@ def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -
         try:
             return payload_from_pair(logs[0], logs[1], bare)
         except NotSameMotionError:
-            pass  # two different motions with the load: their poses at rest may still tell it
-    return payload_from_poses(logs, bare)
+            pass  # two different motions with the load may still tell it
+    try:
+        return payload_from_poses(logs, bare)
+    except TooFewPosesError:
+        return payload_from_motion(logs, bare)
 
 
 def free_logs(

@@ -55,6 +55,8 @@ def fit_column(A: Array, y: Array, weights: Array) -> ColumnFit:
             f"{np.count_nonzero(weights)} samples in motion for {A.shape[1]} unknowns; "
             "record a longer log in which every joint moves"
         )
+    if not A.shape[1]:
+        return ColumnFit(np.zeros(0), np.zeros(0), y, weights)
     # Iteratively reweighted least squares: what the last fit leaves decides who is an outlier.
     outliers = np.ones_like(y)
     for _ in range(PASSES):

@@ -97,6 +97,15 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> list[Rema
     return []
 
 
+def bound_remarks(fits: Sequence[JointFit | None]) -> list[Remark]:
+    """Remarks on joints whose friction sits at its bound of zero."""
+    return [
+        caution("friction-at-bound", Where(joints=(j,)), terms=" and ".join(fit.at_bound))
+        for j, fit in enumerate(fits, start=1)
+        if fit is not None and fit.at_bound
+    ]
+
+
 def presliding_remark(fits: Sequence[JointFit | None]) -> list[Remark]:
     """Which presliding length the arm got, and what every length left of the error without."""
     for fit in fits:

@@ -66,6 +66,10 @@ class NotSameMotionError(IdentificationError):
     """Two logs that were taken for a pair do not repeat one motion."""
 
 
+class TooFewPosesError(IdentificationError):
+    """Logs hold too few different poses at rest."""
+
+
 class LoadFit(NamedTuple):
     """An identified load.
 
@@ -325,12 +329,13 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     log: of several logs, how they differ is part of the standard deviations.
 
     Raises:
-        IdentificationError: If there are too few different poses.
+        TooFewPosesError: If there are too few different poses.
+        IdentificationError: If the poses determine no load.
     """
     each = [resting_poses([recording], robot) for recording in recordings]
     q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))
     if (different := different_poses(q)) < POSES:
-        raise IdentificationError(
+        raise TooFewPosesError(
             f"{names_of(recordings)}: {len(q)} poses at rest of at least {DWELL:g} s, {different} "
             f"of them different; a load needs {POSES} different ones, or a pair of logs of one "
             "motion with and without it"

@@ -12,6 +12,7 @@ from vftcli.identification.excitation import (
     find_excitation,
 )
 from vftcli.identification.friction_fit import (
+    BOUNDED,
     JointData,
     PreslidingChoice,
     ShapeChoice,
@@ -152,6 +153,12 @@ class JointFit(NamedTuple):
         return self.shape.friction(self.fit.values[: len(self.shape.terms)])
 
     @property
+    def at_bound(self) -> tuple[str, ...]:
+        """The friction terms that sit at their bound of zero."""
+        rubs = not self.choices and self.shape.terms
+        return tuple(t for t in BOUNDED if rubs and t not in self.shape.terms)
+
+    @property
     def is_kept(self) -> bool:
         """Whether the profile's friction and rotor predict clearly better."""
         return self.errors[1] < KEPT * self.errors[0]
@@ -179,9 +186,7 @@ def fit_joint(
     """Choose and fit one joint's model, with its drive constant or without."""
     given = data_of_joint(data, j, weights, constant)
     if not data.rubs:
-        fit = ColumnFit(np.zeros(0), np.zeros(0), given.y, given.weights)
-        if given.fixed.shape[1]:
-            fit = fit_column(given.fixed, given.y, given.weights)
+        fit = fit_column(given.fixed, given.y, given.weights)
         return JointFit(Shape(()), fit, [], constant, presliding)
     shape, choices = choose_shape(j, given, presliding.length)
     fit = fit_column(given.columns(j, shape), given.y, given.weights)
@@ -215,6 +220,7 @@ def data_of_joint(data: Training, j: int, weights: Sequence[Array], constant: bo
         load_spread=float(np.std(load)),
         reverses=bool(data.excited.reverses[j]),
         speed_limit=data.top_speed(j),
+        torque_limit=float(np.nan_to_num(data.robot.limits.tau_max[j], posinf=0.0)),
         profile=None if constant else np.concatenate([r[:, j] for r in data.rubbing]),
     )
 

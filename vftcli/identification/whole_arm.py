@@ -19,6 +19,7 @@ from vftcli.identification.friction_fit import PLAIN, is_dissipative
 from vftcli.identification.friction_shapes import Shape, round_digits
 from vftcli.identification.method_result import (
     MethodResult,
+    bound_remarks,
     check_friction,
     friction_numbers,
     friction_source,
@@ -70,6 +71,7 @@ def whole_arm(data: Training, method: str) -> MethodResult:
     x, narrow, said = fit_links(triangles, start, method, open_ones / max(count, 1))
     level = caution if narrow else fact
     remarks += [said, level("undetermined-base-parameters", count=count, undetermined=open_ones)]
+    remarks += bound_remarks(fits)
     if data.robot.payload is not None:
         remarks.append(fact("payload-in-link"))
     numbers = []

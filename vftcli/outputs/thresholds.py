@@ -8,7 +8,6 @@ from vftcli.contacts.caught import CheckedContact, ContactCheck
 from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
 from vftcli.outputs.grid import DASH, Column, Grid, joint_columns, significant, terminal
 from vftcli.robots.writing import lines_of
-from vftcli.signals.wrench import AXES, unit_of
 
 SHARES = 100
 """A threshold in a call is a multiple of a hundredth: no robot tells less of a newton-metre."""
@@ -42,7 +41,9 @@ def thresholds_grid(thresholds: Thresholds) -> Grid:
             Column("log", unit="h"),
             Column("needed by", words=True),
         ),
-        rows=tuple((n, one.value, unit, *tail_entries(one)) for n, unit, one in thresholds.named),
+        rows=tuple(
+            (name, level, unit, *tail_entries(one)) for name, unit, level, one in thresholds.named
+        ),
     )
 
 
@@ -128,23 +129,22 @@ def check_line(check: ContactCheck) -> str:
 
 
 def threshold_rows(
-    thresholds: Sequence[SignalThreshold], key: str, names: Sequence[Any], units: Sequence[str]
+    thresholds: Sequence[tuple[str, str, float, SignalThreshold]], key: str
 ) -> list[dict[str, Any]]:
     """Rows for machines, the unit in the names.
 
     Args:
-        thresholds: One a signal.
-        key: What a signal is, as "joint".
-        names: Their names.
-        units: Unit of each, as it stands in a name: N or Nm.
+        thresholds: Name, unit, level and threshold of each signal, as `Thresholds.named`.
+        key: What a signal is: "joint", by its number, or "axis".
     """
     rows = []
-    for name, unit, one in zip(names, units, thresholds, strict=True):
-        tail = one.tail
+    for shown, of, level, one in thresholds:
+        unit, tail = of.replace("·", ""), one.tail
+        name = int(shown[1:]) if key == "joint" else shown
         rows.append(
             {
                 key: name,
-                f"threshold_{unit}": one.value,
+                f"threshold_{unit}": None if isnan(level) else level,
                 f"interval_{unit}": list(one.interval),
                 "rate_per_h": one.rate,
                 "log": one.log,
@@ -162,16 +162,14 @@ def thresholds_record(
     thresholds: Thresholds, counted: Sequence[CountedAlarms], check: ContactCheck | None
 ) -> dict[str, Any]:
     """All of it for machines."""
-    joints = range(1, len(thresholds.joints) + 1)
-    axes = AXES[: len(thresholds.axes)]
-    units = [unit_of(axis).replace("·", "") for axis in axes]
-    count = len(thresholds.force)
-    force = threshold_rows(thresholds.force, "axis", ["|F|"] * count, ["N"] * count)
+    count = len(thresholds.joints)
+    of_wrench = threshold_rows(thresholds.named[count:], "axis")
+    axes = len(thresholds.axes)
     return {
         "rate_per_h": thresholds.rate,
-        "joints": threshold_rows(thresholds.joints, "joint", joints, ["Nm"] * len(joints)),
-        "axes": threshold_rows(thresholds.axes, "axis", axes, units),
-        "force": force[0] if force else None,
+        "joints": threshold_rows(thresholds.named[:count], "joint"),
+        "axes": of_wrench[:axes],
+        "force": of_wrench[axes] if thresholds.force else None,
         "calls": calls(thresholds),
         "left_out": [one._asdict() for one in counted],
         "check": None if check is None else check_record(check),
@@ -233,6 +231,11 @@ def calls(thresholds: Thresholds) -> dict[str, str]:
     return {name: text for name, text in written.items() if text}
 
 
+def are_known(thresholds: Sequence[SignalThreshold]) -> bool:
+    """Whether there are thresholds of the wrench, and none of them is wide."""
+    return bool(thresholds) and not any(one.is_wide for one in thresholds)
+
+
 def lower(thresholds: Sequence[SignalThreshold]) -> list[float]:
     """The thresholds themselves: what is beyond is a contact. [N·m, N]"""
     return [rounded_up(one.value) for one in thresholds]
@@ -257,7 +260,7 @@ def doubt(thresholds: Thresholds) -> str:
 
 def libfranka_call(thresholds: Thresholds) -> str:
     """`set_collision_behavior` of pylibfranka; the C++ call takes the same four lists."""
-    if not thresholds.axes:
+    if not are_known(thresholds.axes):
         return ""
     lists = {
         "lower_torque_thresholds": lower(thresholds.joints),
@@ -271,7 +274,7 @@ def libfranka_call(thresholds: Thresholds) -> str:
 
 def franka_ros_parameters(thresholds: Thresholds) -> str:
     """`collision_config` of franka_control_node.yaml."""
-    if not thresholds.axes:
+    if not are_known(thresholds.axes):
         return ""
     each = {"torque": thresholds.joints, "force": thresholds.axes}
     lines = [doubt(thresholds), "collision_config:\n"]
@@ -284,7 +287,7 @@ def franka_ros_parameters(thresholds: Thresholds) -> str:
 
 def ur_script(thresholds: Thresholds) -> str:
     """A thread in URScript that ends the program when the size of the force is beyond the limit."""
-    if not thresholds.force:
+    if not are_known(thresholds.force):
         return ""
     limit = lower(thresholds.force)[0]
     own = thresholds.logged_wrench
@@ -309,12 +312,11 @@ def toml_text(thresholds: Thresholds) -> str:
         "joint_torque_Nm": lower(thresholds.joints),
         "joint_torque_upper_Nm": upper(thresholds.joints),
     }
-    if thresholds.axes:
-        table["force_N"] = lower(thresholds.axes)[:3]
-        table["force_upper_N"] = upper(thresholds.axes)[:3]
-        table["moment_Nm"] = lower(thresholds.axes)[3:]
-        table["moment_upper_Nm"] = upper(thresholds.axes)[3:]
-    if thresholds.force:
+    parts = {"force_{}N": thresholds.axes[:3], "moment_{}Nm": thresholds.axes[3:]}
+    for name, some in parts.items():
+        if are_known(some):
+            table[name.format("")], table[name.format("upper_")] = lower(some), upper(some)
+    if are_known(thresholds.force):
         table["force_size_N"] = lower(thresholds.force)[0]
         table["force_size_upper_N"] = upper(thresholds.force)[0]
     return "".join(lines_of({"thresholds": table})).lstrip()

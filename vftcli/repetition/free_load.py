@@ -21,7 +21,7 @@ from vftcli.robots.drive import gain_sd
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.regressor import load_regressor
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, handed_over, seal
+from vftcli.signals.arrays import Array, Indices, handed_over, seal
 from vftcli.signals.errors import ClockError
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, caution
@@ -134,6 +134,12 @@ def free_load(pieces: Sequence[FreePiece]) -> FreeLoad | None:
     return FreeLoad(mass=mass, moment=loaded.weights[1:4].copy(), sd=whole, share=share)
 
 
+def weighed(piece: FreePiece) -> Indices:
+    """The samples of a piece that are weighed. (S,)"""
+    step = median_step(piece.run.recording.t)
+    return np.flatnonzero(piece.inside)[:: max(1, int(1.0 / (RATE * step)))]
+
+
 def columns(piece: FreePiece) -> tuple[Array, Array] | None:
     """The disturbance of a piece, and the columns that explain it; None of a piece too short.
 
@@ -143,9 +149,9 @@ def columns(piece: FreePiece) -> tuple[Array, Array] | None:
     run, inside = piece.run, np.flatnonzero(piece.inside)
     if inside.size == 0:
         return None
-    step, n = median_step(run.recording.t), run.robot.joints
+    n = run.robot.joints
     # Of an hour with one free cycle that cycle, and what the filter hears of the rest.
-    near = round(HEARD / step)
+    near = round(HEARD / median_step(run.recording.t))
     first, stop = max(0, int(inside[0]) - near), int(inside[-1]) + near + 1
     t, p, mu, q, dq = (
         values[first:stop]
@@ -161,7 +167,7 @@ def columns(piece: FreePiece) -> tuple[Array, Array] | None:
         smooth = zero_phase(t, np.hstack([derivative(t, p) - mu, dq]), CUTOFF)
     except (ClockError, ValueError):
         return None
-    used = inside[:: max(1, int(1.0 / (RATE * step)))] - first
+    used = weighed(piece) - first
     A = np.zeros((len(used), n, 4 + 2 * n))
     A[:, :, :4] = load_regressor(run.robot.chain, q[used])
     j = np.arange(n)
