@@ -19,6 +19,7 @@ from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 from vftcli.virtual_sensor.smoother.smoothing import (
     MOST_BLOCKS,
+    UNLISTED,
     block_length,
     hidden_by_blocks,
     smooth_wrench,
@@ -85,21 +86,58 @@ def test_pushes_are_followed_in_short_blocks() -> None:
 
 
 def test_the_gate_leaves_no_wrench_where_nothing_touches() -> None:
-    """What lies outside the listed contact is zero for certain, so its model error is known."""
+    """Outside of the listed contact the wrench is zero within a band, and the model error known."""
     robot, t = load_robot("ur5"), np.arange(0.0, 20.0, STEP)
     q, push = swing(robot, t), load(t) * ((t > 8.0) & (t < 11.0))[:, None]
     terms, prior = simulated(robot, q, push, t), WrenchPrior(3.0, 30.0)
     free = FreeTerms(terms, q, t < 7.0)
     gate, whole = (smooth_wrench(terms, q, robot, [free], g, prior) for g in ([(8.0, 11.0)], None))
     assert not gate.values[~gate.inside].any()
-    assert not gate.sd[~gate.inside].any()
+    assert gate.sd.min() > 0.0
     np.testing.assert_allclose(gate.t[gate.inside][[0, -1]], [8.0, 11.0], atol=2 * gate.seconds)
+    assert gate.unlisted(np.array([5.0, 9.0, 15.0, 25.0])).tolist() == [True, False, True, True]
+    assert not whole.unlisted(t).any()
     assert whole.inside.all()
     touched = (gate.t > 8.2) & (gate.t < 10.8)
     # Stiction gives way under a listed contact: the same where nearly all of the log is one.
     wide = smooth_wrench(terms, q, robot, [free], [(0.0, 19.5)], prior)
     assert np.all(gate.sd[touched].mean(axis=0) < wide.sd[touched].mean(axis=0))
     assert np.mean(gate.values[touched, 2]) == pytest.approx(-25.0, abs=3.0)
+
+
+@pytest.mark.parametrize("at", [4.0, 9.0])
+def test_the_band_where_nothing_is_listed_is_that_of_a_contact_there(at: float) -> None:
+    """As the smoother itself tells it of .6 s that are listed there.
+
+    It takes every block for itself, the band their mean weight: the two agree within a quarter
+    (measured .90 to 1.22), near the reversal of a joint at 4.1 s too.
+    """
+    robot, t = load_robot("ur5"), np.arange(0.0, 12.0, STEP)
+    q, prior = swing(robot, t), WrenchPrior(1.0, 30.0)
+    terms = simulated(robot, q, 0 * load(t), t)
+    free, half = FreeTerms(terms, q, np.ones(len(t), dtype=bool)), 0.5 * UNLISTED
+    never = smooth_wrench(terms, q, robot, [free], [], prior)
+    # A block on either side is inside of the gate, too.
+    edge = half - 1.5 * never.seconds
+    once = smooth_wrench(terms, q, robot, [free], [(at - edge, at + edge)], prior)
+    k = int(np.argmin(np.abs(never.t - at)))
+    assert once.inside[k]
+    np.testing.assert_allclose(never.sd[k], once.sd[k], rtol=0.25)
+
+
+def test_the_band_where_nothing_is_listed_grows_with_the_blindness_of_the_pose() -> None:
+    """With q5 at zero a force along one line turns nothing: the prior alone bounds it there."""
+    robot, t = load_robot("ur5"), np.arange(0.0, 10.0, STEP)
+    q, prior = swing(robot, t), WrenchPrior(3.0, 30.0)
+    q[:, 4] *= np.clip(5.0 - t, 0.0, 1.0)
+    terms = simulated(robot, q, 0 * load(t), t)
+    found = smooth_wrench(
+        terms, q, robot, [FreeTerms(terms, q, np.ones(len(t), dtype=bool))], [], prior
+    )
+    blind, clear = (found.sd[span].max(axis=0) for span in (found.t > 6.0, found.t < 3.0))
+    assert np.max(blind / clear) > 2.0
+    # 1.5 and 2 widen what is told, and so the prior's 30 N and 3 N·m.
+    assert np.all(found.sd <= np.repeat([45.0, 6.0], 3) * (1.0 + 1e-9))
 
 
 def test_the_band_grows_where_the_pose_is_blind_and_nothing_is_missing() -> None:

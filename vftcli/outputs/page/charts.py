@@ -260,7 +260,11 @@ def families_of(limits: Array) -> tuple[int, ...]:
 def packed_charts(charts: Iterable[Chart]) -> list[dict[str, Any]]:
     """Charts over time as the script takes them, all together within the page's room."""
     charts = list(charts)
-    lines = sum(len(c.panels) * (1 if s.half is None else 2) for c in charts for s in c.series)
+    lines = sum(
+        len(c.panels) * (1 + (s.half is not None) + (s.quiet is not None))
+        for c in charts
+        for s in c.series
+    )
     duration = max((float(c.x[-1] - c.x[0]) for c in charts), default=0.0)
     room = ROOM * float(np.clip(duration / 60.0, 1.0, LONG))
     stretches = int(np.clip(room / (POINT * max(lines, 1)), FEWEST, MOST))

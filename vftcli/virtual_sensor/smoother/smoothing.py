@@ -244,18 +244,18 @@ def unlisted(
 ) -> Array:
     """Covariance that a contact of `UNLISTED` seconds about each block would have. (K, 6, 6)
 
-    The quiet blocks on one side of it leave the model error b with the variance of a filter's
-    steady state,
+    The quiet blocks before it leave the model error b with the variance of a filter's steady state,
 
-        p⁺ = p⁻R/(p⁻ + R),    p⁻ = f²p⁺ + v(1 − f²),
+        p⁺ = p⁻R/(p⁻ + R),    p⁻ = f²p⁺ + v(1 − f²).
 
-    which to the middle of the contact grows to a = g²p⁺ + u(1 − g²), v and u the model error's own
-    variance before and under a contact, f and g what is kept of it over a block and half of the
-    contact. Both sides together leave c = 1/(2/a − 1/u), an end of the log a. The wrench has
+    From there to the middle of the contact it grows to a by f and v of a contact's blocks, and so
+    does that of the blocks behind, to a′. Together they leave c = 1/(1/a + 1/a′ − 1/v), and the
+    wrench has
 
         (Σ⁻¹ + J (c̄ + R/m)⁻¹ Jᵀ)⁻¹,
 
-    Σ of the prior, c̄ the mean over the contact's m blocks.
+    Σ of the prior, c̄ the harmonic mean over the contact's m blocks: what some of them tell holds
+    for all.
 
     Args:
         blocks: The log.
@@ -263,25 +263,46 @@ def unlisted(
         noise: Noise and model error.
         prior: How the contacts' wrench moves.
     """
-    t, R, length = blocks.t, measured.noise, float(np.median(blocks.length))
+    R, length = measured.noise, float(np.median(blocks.length))
+    count = len(blocks.t)
+    # A log of one sample is a block without length.
+    half = round(0.5 * UNLISTED / length) if length else 0
     kept = np.exp(-2.0 * length / noise.time(blocks))
     added = noise.variance(blocks) * (1.0 - kept)
     beta = R * (1.0 - kept) - added
     ahead = 0.5 * (np.sqrt(beta**2 + 4.0 * added * R) - beta)
-    touched = np.ones(len(t), dtype=bool)
-    under, kept = noise.variance(blocks, touched), np.exp(-UNLISTED / noise.time(blocks, touched))
-    one = kept * ahead * R / (ahead + R) + (1.0 - kept) * under
-    half = 0.5 * UNLISTED
-    room = np.minimum(t - t[0], t[-1] - t) >= half
-    error = np.where(room[:, None], 1.0 / (2.0 / one - 1.0 / under), one)
-    first, last = np.searchsorted(t, t - half), np.searchsorted(t, t + half, side="right")
-    total = np.vstack([np.zeros(error.shape[1]), np.cumsum(error, axis=0)])
-    error = (total[last] - total[first]) / (last - first)[:, None]
+    touched = np.ones(count, dtype=bool)
+    v, kept = noise.variance(blocks, touched), np.exp(-2.0 * length / noise.time(blocks, touched))
+    quiet = ahead * R / (ahead + R)
+    before = coasted(quiet, v, kept, half)
+    behind = coasted(quiet[::-1], v[::-1], kept[::-1], half)[::-1]
+    told = 1.0 / before + 1.0 / behind - 1.0 / v
+    first = np.maximum(np.arange(count) - half, 0)
+    last = np.minimum(np.arange(count) + half + 1, count)
+    total = np.vstack([np.zeros(told.shape[1]), np.cumsum(told, axis=0)])
+    told = (total[last] - total[first]) / (last - first)[:, None]
     # In a gap of the clock nothing would be known of it.
-    weight = blocks.known[:, None] / (error + R * min(length / UNLISTED, 1.0))
+    weight = blocks.known[:, None] / (1.0 / told + R * min(length / UNLISTED, 1.0))
     J = measured.jacobian
     information = (J * weight[:, None, :]) @ J.swapaxes(1, 2) + np.diag(1.0 / prior.variance)
     return np.linalg.inv(information)
+
+
+def coasted(quiet: Array, v: Array, kept: Array, count: int) -> Array:
+    """Variance of the model error `count` blocks after the last one that told of it. (K, n)
+
+    Args:
+        quiet: Its variance in a block that tells; the log's start has v. (K, n)
+        v: What it tends to. (K, n)
+        kept: Share of its variance that is kept from the block before. (K, n)
+        count: How many blocks tell nothing.
+    """
+    blocks = np.arange(len(v))
+    found = np.where((blocks >= count)[:, None], quiet[np.maximum(blocks - count, 0)], v)
+    for back in range(count - 1, -1, -1):
+        at = np.maximum(blocks - back, 0)
+        found = kept[at] * found + (1.0 - kept[at]) * v[at]
+    return found
 
 
 def hidden_by_blocks(values: Array, bent: float = BENT) -> Array:
