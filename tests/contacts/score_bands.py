@@ -83,7 +83,7 @@ def compared(
 def simulated(
     scenario: str, seed: int, settings: Sequence[str], free: str | None
 ) -> tuple[Analysis, Array]:
-    """A scenario with its true wrench, the weight of a payload nobody told of in it."""
+    """A scenario with its true wrench, the weight of a forgotten payload in it."""
     made = simulate(load_scenario(scenario, list(settings)), seed)
     truth = made.truth.wrench[np.unique(np.array(made.measured.rows))].copy()
     load = made.scenario.payload
@@ -159,12 +159,12 @@ def cases(seeds: Sequence[int]) -> Iterator[Case]:
 
 
 def of_fixture(log: Path, robot: str, truth: str, free: str | None) -> tuple[Analysis, Array]:
-    """A log whose truth is in a file."""
+    """A log with its truth in a file."""
     return compared(log, robot, free, truth)
 
 
 def of_sensor(log: Path, robot: str, columns: str, free: str | None) -> tuple[Analysis, Array]:
-    """A log whose truth is the wrench that it holds."""
+    """A log with its truth in its own wrench columns."""
     return compared(log, robot, free, "sensor", columns)
 
 
@@ -184,9 +184,9 @@ def line(name: str, analysis: Analysis, truth: Array) -> str:
     parts |= {"in rows": held[inside].mean(axis=0)} if inside.any() else {}
     parts |= {"elsewhere": held[~inside].mean(axis=0)} if not inside.all() else {}
     parts |= {"rms": np.sqrt((error**2).mean(axis=0)), "sd": np.median(sd, axis=0)}
-    told = (f"{key} {' '.join(f'{x:.2f}' for x in each)}" for key, each in parts.items())
+    shown = (f"{key} {' '.join(f'{x:.2f}' for x in each)}" for key, each in parts.items())
     gated = any(found.gate for found in analysis.virtual_sensor.smoothed.values())
-    return f"{name}, {'gated' if gated else 'not gated'}: {'; '.join(told)}"
+    return f"{name}, {'gated' if gated else 'not gated'}: {'; '.join(shown)}"
 
 
 def main() -> None:

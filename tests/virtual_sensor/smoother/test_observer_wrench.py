@@ -192,7 +192,7 @@ def test_a_load_of_the_free_part_is_in_the_wrench_and_no_noise(motion: FreeMotio
     np.testing.assert_allclose(found.values, bare.values + weight, atol=1e-6)
     np.testing.assert_allclose(found.covariance, bare.covariance + spread, atol=1e-6)
     np.testing.assert_allclose(weight[:, 2], -2.0 * 9.81, rtol=1e-3)
-    # What a free run reads at the same place is taken off, and the load with it.
+    # What a free run reads at the same place comes off, and the load with it.
     zero = smooth_all(
         loaded, ["best"], lambda _: given, unloaded=nothing, torque=torque, gate=gate
     )["best"]

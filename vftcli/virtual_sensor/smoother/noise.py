@@ -109,7 +109,7 @@ class TorqueNoise:
         return np.where(resting(blocks) & pushed[:, None], again, found)
 
     def time(self, blocks: Blocks, pushed: Mask | None = None) -> Array:
-        """Correlation time of the model error in every block, likewise. (K, n) [s]"""
+        """Correlation time of the model error in every block; as `variance`. (K, n) [s]"""
         found = np.where(self.rests(blocks), self.resting_time, self.moving_time)
         if pushed is None:
             return found

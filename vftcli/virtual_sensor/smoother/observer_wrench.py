@@ -40,7 +40,7 @@ class SmootherInput(NamedTuple):
 
     Attributes:
         terms: p and μ along the log, corrected as the observer's are.
-        free: Motion that nobody touched, corrected likewise, less a load that it carries; none
+        free: Motion that nobody touched, corrected alike, less a load that it carries; none
             where nothing is known of it.
         load: A load that the free motion carries, and with it the whole log; None without one.
         uncorrected: The same as the robot's model alone gives it, None where nothing is corrected.
@@ -136,7 +136,7 @@ def less_torque(terms: DynamicsTerms, torque: Array | None) -> DynamicsTerms:
 
 
 def carrying(found: SmoothedWrench, load: FreeLoad, run: ModelledRun) -> SmoothedWrench:
-    """A wrench that was told beside a load with that load in it."""
+    """A wrench that was found beside a load, with the load in it."""
     q = resample_columns(found.t, run.recording.t, run.recording.q)
     values, covariance = load.wrench(run.robot.chain, q)
     return replace(

@@ -52,7 +52,7 @@ their mean loses of a peak and what lies between two of them."""
 
 UNLISTED = 0.6
 """Outside of the listed contacts the band is that of a contact which lasts so long, as long as
-those that the list makes up in free motion to find the smallest force it can tell. [s]"""
+those that the list makes up in free motion to find the smallest force it can see. [s]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +73,7 @@ class SmoothedWrench:
         noise: What counts as noise.
         gate: Whether contacts were listed; else the whole log is one.
         uncorrected: Whether a correction of the model's error was left out; see `InputOf`.
-        load: A load that the free motion carries, whose weight is in the wrench; None without one.
+        load: A load that the free motion carries, in the wrench with its weight; None without one.
     """
 
     t: Array
@@ -248,13 +248,13 @@ def unlisted(
 
         p⁺ = p⁻R/(p⁻ + R),    p⁻ = f²p⁺ + v(1 − f²).
 
-    From there to the middle of the contact it grows to a by f and v of a contact's blocks, and so
-    does that of the blocks behind, to a′. Together they leave c = 1/(1/a + 1/a′ − 1/v), and the
-    wrench has
+    From there to the middle of the contact it grows to a by f and v of a contact's blocks, that of
+    the blocks behind to a′, and to u where these say nothing. Together they leave
+    c = 1/(1/a + 1/a′ − 1/u), and the wrench has
 
         (Σ⁻¹ + J (c̄ + R/m)⁻¹ Jᵀ)⁻¹,
 
-    Σ of the prior, c̄ the harmonic mean over the contact's m blocks: what some of them tell holds
+    Σ of the prior, c̄ the harmonic mean over the contact's m blocks: what some of them show holds
     for all.
 
     Args:
@@ -263,10 +263,10 @@ def unlisted(
         noise: Noise and model error.
         prior: How the contacts' wrench moves.
     """
-    R, length = measured.noise, float(np.median(blocks.length))
-    count = len(blocks.t)
     # A log of one sample is a block without length.
-    half = round(0.5 * UNLISTED / length) if length else 0
+    R, length = measured.noise, float(np.median(blocks.length)) or FINE
+    count = len(blocks.t)
+    half = round(0.5 * UNLISTED / length)
     kept = np.exp(-2.0 * length / noise.time(blocks))
     added = noise.variance(blocks) * (1.0 - kept)
     beta = R * (1.0 - kept) - added
@@ -274,28 +274,28 @@ def unlisted(
     touched = np.ones(count, dtype=bool)
     v, kept = noise.variance(blocks, touched), np.exp(-2.0 * length / noise.time(blocks, touched))
     quiet = ahead * R / (ahead + R)
-    before = coasted(quiet, v, kept, half)
-    behind = coasted(quiet[::-1], v[::-1], kept[::-1], half)[::-1]
-    told = 1.0 / before + 1.0 / behind - 1.0 / v
+    backward = v[::-1], kept[::-1], half
+    behind, nothing = (coasted(each[::-1], *backward)[::-1] for each in (quiet, v))
+    known = 1.0 / coasted(quiet, v, kept, half) + 1.0 / behind - 1.0 / nothing
     first = np.maximum(np.arange(count) - half, 0)
     last = np.minimum(np.arange(count) + half + 1, count)
-    total = np.vstack([np.zeros(told.shape[1]), np.cumsum(told, axis=0)])
-    told = (total[last] - total[first]) / (last - first)[:, None]
+    total = np.vstack([np.zeros(known.shape[1]), np.cumsum(known, axis=0)])
+    known = (total[last] - total[first]) / (last - first)[:, None]
     # In a gap of the clock nothing would be known of it.
-    weight = blocks.known[:, None] / (1.0 / told + R * min(length / UNLISTED, 1.0))
+    weight = blocks.known[:, None] / (1.0 / known + R * min(length / UNLISTED, 1.0))
     J = measured.jacobian
     information = (J * weight[:, None, :]) @ J.swapaxes(1, 2) + np.diag(1.0 / prior.variance)
     return np.linalg.inv(information)
 
 
 def coasted(quiet: Array, v: Array, kept: Array, count: int) -> Array:
-    """Variance of the model error `count` blocks after the last one that told of it. (K, n)
+    """Variance of the model error `count` blocks after the last one that shows it. (K, n)
 
     Args:
-        quiet: Its variance in a block that tells; the log's start has v. (K, n)
+        quiet: Its variance in a block that shows it; the log's start has v. (K, n)
         v: What it tends to. (K, n)
         kept: Share of its variance that is kept from the block before. (K, n)
-        count: How many blocks tell nothing.
+        count: How many blocks show nothing of it.
     """
     blocks = np.arange(len(v))
     found = np.where((blocks >= count)[:, None], quiet[np.maximum(blocks - count, 0)], v)
