@@ -135,8 +135,9 @@ class Analysis(Shown):
 
         if self.refinement is None:
             return plain_input(self.motion)
-        pieces = self.refinement.baseline.untouched
-        return corrected_input(self.motion, pieces, self.terms_of, name)
+        found = self.refinement.baseline
+        load = found.load if found.untouched else None
+        return corrected_input(self.motion, found.untouched, load, self.terms_of, name)
 
     @property
     def t(self) -> Array:

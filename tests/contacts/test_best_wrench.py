@@ -1,16 +1,20 @@
 """The list and the wrench of `best` beside it: two accounts of one contact that must agree."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from contact_logs import FIXTURES
+from contact_logs import FIXTURES, true_wrench
 
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
-from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
 from vftcli.repetition.choice import FreeChoice
+from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
+from vftcli.robots.regressor import load_regressor, load_wrench
+from vftcli.signals.series import resample_columns
 from vftcli.virtual_sensor.choice import WrenchChoice
 
 NAMES = "ur5_circle.csv", "ur5_table1.csv"
@@ -61,7 +65,7 @@ def test_the_wrench_of_best_is_within_the_lists_band_at_its_peaks(name: str) -> 
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_outside_of_the_rows_and_a_block_on_either_side_best_has_no_wrench(name: str) -> None:
+def test_outside_of_the_rows_best_reads_nothing_within_a_band(name: str) -> None:
     analysis = analysed(name)
     assert analysis.contacts is not None
     assert analysis.virtual_sensor is not None
@@ -70,3 +74,46 @@ def test_outside_of_the_rows_and_a_block_on_either_side_best_has_no_wrench(name:
     for row in analysis.contacts.contacts:
         near |= (best.t > row.start - 0.08) & (best.t < row.stop + 0.08)
     assert not best.values[~near].any()
+    assert best.sd is not None
+    assert best.sd.min() > 0.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_band_of_best_holds_the_true_wrench_of_every_sample(name: str) -> None:
+    """Measured .97 to 1.00 an axis; with no band outside of the rows .93 to .98."""
+    analysis = analysed(name)
+    assert analysis.virtual_sensor is not None
+    (best,) = analysis.virtual_sensor.wrenches
+    assert best.sd is not None
+    truth = resample_columns(best.t, *true_wrench(name))
+    held = np.abs(best.values - truth) <= 1.96 * best.sd
+    assert np.all(held.mean(axis=0) >= 0.88)
+
+
+def test_a_load_nobody_told_is_in_the_wrench_of_best() -> None:
+    """2 kg at 5 cm in the drives of 14 s of the circle: 19.6 N, of which best had none.
+
+    Measured 1.2 N rms along z, .97 to 1.00 of the samples in the band; without the load in it
+    18.4 N and .21 of them.
+    """
+    whole = analysed(NAMES[0]).recording
+    robot = load_robot("ur5")
+    weights = np.array([2.0, 0.0, 0.0, 0.1])
+    log = replace(
+        whole,
+        current=whole.current
+        - load_regressor(robot.chain, whole.q) @ weights / robot.torque_constant,
+    )
+    choice = AnalysisChoice(
+        free=FreeChoice.parsed(free_part="0.3:4"),
+        observers=ObserverChoice(names=("best",)),
+        wrench=WrenchChoice(frame="base"),
+    )
+    sensed = analyse(log, robot, choice).virtual_sensor
+    assert sensed is not None
+    (best,) = sensed.wrenches
+    assert best.sd is not None
+    carried = load_wrench(robot.chain, log.q) @ weights
+    error = best.values - resample_columns(best.t, *true_wrench(NAMES[0])) - carried
+    assert np.all(np.mean(np.abs(error) <= 1.96 * best.sd, axis=0) >= 0.88)
+    assert np.sqrt(np.mean(error[:, 2] ** 2)) < 4.0

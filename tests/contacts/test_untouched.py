@@ -116,7 +116,7 @@ def test_contacts_that_are_none_read_little() -> None:
 def test_a_load_in_the_free_part_is_no_noise() -> None:
     """2.8 kg that the model lacks, in every sample: said, and off the noise and the log alike."""
     plain = motion(LOG, "ur5", "0.3:4")
-    load = FreeLoad(mass=2.8, moment=np.zeros(3), sd=0.1, share=0.5)
+    load = FreeLoad(mass=2.8, moment=np.zeros(3), sd=0.1, moment_sd=np.zeros(3), share=0.5)
     run = plain.log.with_terms(
         replace(plain.log.terms, mu=plain.log.terms.mu - load.torque(plain.log))
     )

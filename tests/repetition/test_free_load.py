@@ -10,10 +10,12 @@ from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_load import columns, free_load, weigh
+from vftcli.repetition.free_load import FreeLoad, columns, free_load, weigh
 from vftcli.repetition.free_motion import FreeMotion, FreePiece
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
+from vftcli.robots.drive import gain_sd
+from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.regressor import load_regressor
 from vftcli.signals.recording import Recording
 
@@ -47,6 +49,30 @@ def test_a_payload_is_weighed_and_told(log: Recording) -> None:
     (remark,) = [r for r in found.remarks if r.code == "free-part-loaded"]
     assert remark.values["load_kg"] == found.load.mass
     assert str(remark)
+
+
+def test_its_wrench_is_what_its_torque_comes_from(log: Recording) -> None:
+    """τ = Jᵀw; of 2.8 ± .1 kg each axis of the force is known to .1 kg of weight."""
+    load = FreeLoad(
+        mass=2.8, moment=PAYLOAD[1:], sd=0.1, moment_sd=np.array([0.01, 0.02, 0.03]), share=0.5
+    )
+    run, q = ModelledRun(recording=log, robot=ROBOT), log.q
+    wrench, covariance = load.wrench(ROBOT.chain, q)
+    J = flange_jacobian(ROBOT.chain, q)
+    np.testing.assert_allclose(np.einsum("tij,ti->tj", J, wrench), load.torque(run), atol=1e-10)
+    sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    np.testing.assert_allclose(sd[:, :3], np.broadcast_to([0, 0, 0.981], (len(q), 3)), rtol=1e-3)
+    assert not sd[:, 5].any()  # weight turns about no vertical line
+    assert np.all(sd[:, 3:5] <= 9.81 * 0.03 * np.sqrt(2.0))
+
+
+def test_the_sd_of_a_weighed_load_holds_the_drives_constants(log: Recording) -> None:
+    """The drives' constants are known to a share of what they read: mass and moment alike."""
+    found = baseline(carrying(log)).load
+    assert found is not None
+    gain = gain_sd(log, ROBOT)
+    assert found.sd >= gain * found.mass
+    assert np.all(found.moment_sd >= gain * np.abs(found.moment))
 
 
 def test_no_load_is_found_where_there_is_none(log: Recording) -> None:

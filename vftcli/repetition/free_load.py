@@ -17,9 +17,10 @@ import numpy as np
 
 from vftcli.repetition.free_motion import FreePiece
 from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.chain import Chain
 from vftcli.robots.drive import gain_sd
 from vftcli.robots.friction import dry_friction
-from vftcli.robots.regressor import load_regressor
+from vftcli.robots.regressor import load_regressor, load_wrench
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Indices, handed_over, seal
 from vftcli.signals.errors import ClockError
@@ -66,16 +67,18 @@ class FreeLoad:
         mass: Its mass. [kg]
         moment: Mass times its centre, in flange axes. (3,) [kg·m]
         sd: Standard deviation of the mass. [kg]
+        moment_sd: That of the moment. (3,) [kg·m]
         share: What is left of the free part's disturbance with it.
     """
 
     mass: float
     moment: Array
     sd: float
+    moment_sd: Array
     share: float
 
     def __post_init__(self) -> None:
-        seal(self, "moment")
+        seal(self, "moment", "moment_sd")
 
     @property
     def remark(self) -> Remark:
@@ -87,10 +90,28 @@ class FreeLoad:
             left_percent=100.0 * self.share,
         )
 
+    @property
+    def weights(self) -> Array:
+        """Mass and moment. (4,) [kg, kg·m]"""
+        return np.concatenate([[self.mass], self.moment])
+
     def torque(self, run: ModelledRun) -> Array:
         """External joint torque of its weight along a recording. (T, n) [N·m]"""
-        weights = np.concatenate([[self.mass], self.moment])
-        return handed_over(load_regressor(run.robot.chain, run.recording.q) @ weights)
+        return handed_over(load_regressor(run.robot.chain, run.recording.q) @ self.weights)
+
+    def wrench(self, chain: Chain, q: Array) -> tuple[Array, Array]:
+        """Wrench of its weight, and the covariance of that. (N, 6), (N, 6, 6)
+
+        Args:
+            chain: The arm.
+            q: Joint positions. (N, n) [rad]
+
+        Returns:
+            In base axes, the moment about the flange point. [N, N·m]
+        """
+        each = load_wrench(chain, q)
+        spread = each * np.concatenate([[self.sd], self.moment_sd])
+        return each @ self.weights, spread @ spread.swapaxes(1, 2)
 
     def off(self, terms: DynamicsTerms, run: ModelledRun) -> DynamicsTerms:
         """Terms of a recording as they were without it, μ ← μ + τ_load."""
@@ -129,9 +150,15 @@ def free_load(pieces: Sequence[FreePiece]) -> FreeLoad | None:
     share = float(np.sqrt(np.mean((loaded.left / bare.left) ** 2)))
     if mass < max(LEAST, SURE * sd) or share > PARTLY:
         return None
-    scale = gain_sd(pieces[0].run.recording, robot) * mass
-    whole = float(np.hypot(sd, scale))
-    return FreeLoad(mass=mass, moment=loaded.weights[1:4].copy(), sd=whole, share=share)
+    gain = gain_sd(pieces[0].run.recording, robot)
+    whole = np.hypot(loaded.sd[:4], gain * loaded.weights[:4])
+    return FreeLoad(
+        mass=mass,
+        moment=loaded.weights[1:4].copy(),
+        sd=float(whole[0]),
+        moment_sd=whole[1:],
+        share=share,
+    )
 
 
 def weighed(piece: FreePiece) -> Indices:

@@ -97,21 +97,29 @@ def torque_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
     return np.ascontiguousarray(out.transpose(3, 0, 1, 2)).reshape(samples, n, n * LINK)
 
 
-def load_regressor(chain: Chain, q: Array) -> Array:
-    """External joint torque of a load's weight, by its mass and its first moment m·c. (N, n, 4)
+def load_wrench(chain: Chain, q: Array) -> Array:
+    """Wrench of a load's weight, by its mass and its first moment m·c. (N, 6, 4)
 
     A mass m at c in flange axes pulls with m g₀, and turns by R m c × g₀ about the flange.
 
     Args:
         chain: The arm.
         q: Joint positions. (N, n) [rad]
+
+    Returns:
+        In base axes, the moment about the flange point.
     """
     gravity = np.asarray(chain.gravity)
     wrench = np.zeros((len(q), 6, 4))
     wrench[:, :3, 0] = gravity
     # v × g₀ = −[g₀]× v
     wrench[:, 3:, 1:] = -skew(gravity) @ link_poses(chain, q).rotation[:, -1]
-    torque: Array = flange_jacobian(chain, q).transpose(0, 2, 1) @ wrench
+    return wrench
+
+
+def load_regressor(chain: Chain, q: Array) -> Array:
+    """External joint torque of `load_wrench`, by the same four numbers. (N, n, 4)"""
+    torque: Array = flange_jacobian(chain, q).transpose(0, 2, 1) @ load_wrench(chain, q)
     return torque
 
 

@@ -33,7 +33,11 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "sd": (TORQUE, "standard deviation of the external torque by the estimator's own account"),
     "band": (TORQUE, "standard deviation of the external torque, what the model errs by included"),
     "wrench": (FORCE, "external force and moment"),
-    "wrench_sd": (FORCE, "standard deviation of the external force and moment"),
+    "wrench_sd": (
+        FORCE,
+        "standard deviation of the external force and moment, outside of listed contacts of what "
+        "would show",
+    ),
     "wrench_masked": (FORCE, "force and moment where the pose cannot tell them, by a prior"),
     "null_space": (TORQUE, "joint torque that no wrench at the flange explains"),
     "sigma_min": ("m", "smallest singular value of J, angular rows × 0.3 m"),

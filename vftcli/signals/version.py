@@ -1,3 +1,3 @@
 """The version that every output states."""
 
-VERSION = "0.2.0"
+VERSION = "0.3.0"

@@ -6,7 +6,7 @@ import pytest
 
 from vftcli.outputs.figures.lines import Plot, line_figure, plain, plots_of
 from vftcli.outputs.figures.paper import paper_style
-from vftcli.outputs.page.charts import DASHES, INK, REFERENCE, Chart, ChartLine
+from vftcli.outputs.page.charts import DASHES, INK, QUIET, REFERENCE, Chart, ChartLine
 from vftcli.outputs.palette import SPARE
 
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
@@ -56,6 +56,15 @@ def test_lines_are_told_apart_without_colour() -> None:
         if one._dash_pattern == other._dash_pattern:
             assert abs(lightness(one) - lightness(other)) > 0.1
             assert one.get_linewidth() != other.get_linewidth()
+
+
+def test_the_legend_names_a_ribbon_where_no_contact_is_listed() -> None:
+    first = chart().series[1]
+    quiet = chart(series=(first._replace(quiet=T < 5.0),))
+    for made, names in ((quiet, ["line 0", "95 % band", QUIET]), (chart(series=(first,)), 2)):
+        (legend,) = drawn(7.16, plots_of(made)).legends
+        texts = [text.get_text() for text in legend.get_texts()]
+        assert texts == (names if isinstance(names, list) else ["line 0", "95 % band"])
 
 
 def test_nothing_sticks_out_of_the_sheet_or_covers_another_plot() -> None:

@@ -6,6 +6,7 @@ import pytest
 from vftcli.outputs.page.charts import (
     FEWEST,
     LONG,
+    QUIET,
     ROOM,
     STEPS,
     Chart,
@@ -62,6 +63,25 @@ def test_a_chart_over_time_keeps_every_column_and_its_band() -> None:
     # a step of 6 in 65534
     np.testing.assert_allclose(unpacked(series["lines"][1]["y"]), values[:, 1], atol=1e-4)
     np.testing.assert_allclose(unpacked(series["lines"][0]["half"]), half[:, 0], atol=1e-4)
+
+
+def test_a_ribbon_is_grey_where_no_contact_is_listed() -> None:
+    t, values = np.arange(6.0), np.zeros((6, 1))
+    quiet = np.array([True, True, False, False, True, True])
+    line = ChartLine("best", values, "#112233", half=np.full((6, 1), 2.0), quiet=quiet)
+    own, grey = line.ribbons(0) or ((), ())
+    assert np.isnan(own).tolist() == quiet.tolist()
+    np.testing.assert_array_equal(np.where(quiet, grey, own), 2.0)
+    (lines,) = packed(chart(t, line), 100)["series"][0]["lines"]
+    assert np.isnan(unpacked(lines["half"])).tolist() == quiet.tolist()
+    assert np.isnan(unpacked(lines["quiet"])).tolist() == (~quiet).tolist()
+    html = multiples(chart(t, line))
+    assert html.count('class="rim"/>') == 1 + 1  # one more in the legend
+    assert html.count('class="floor"/>') == 1
+    assert QUIET in html
+    plain = chart(t, line._replace(quiet=None))
+    assert "quiet" not in packed(plain, 100)["series"][0]["lines"][0]
+    assert QUIET not in multiples(plain)
 
 
 @pytest.mark.parametrize(("seconds", "factor"), [(60.0, 1.0), (600.0, LONG)])

@@ -51,6 +51,22 @@ def test_wrenches_have_a_panel_an_axis(with_wrench: Analysis) -> None:
     assert "ON the robot in base axes" in html
 
 
+def test_the_band_is_grey_where_no_contact_is_listed(pushed: Analysis) -> None:
+    """The twelve pushes of the circle and their edges of a block; a wrench without a list: none."""
+    chart = wrench_chart(pushed)
+    assert chart is not None
+    (line,) = chart.series
+    assert pushed.contacts is not None
+    assert line.quiet is not None
+    t, inside = pushed.t, np.zeros(len(pushed.t), dtype=bool)
+    for row in pushed.contacts.contacts:
+        inside |= (t > row.start) & (t < row.stop)
+        assert line.quiet[np.argmin(np.abs(t - row.start + 0.2))] or row.number > 1
+    assert not line.quiet[inside].any()
+    assert line.quiet[t < 4.0].all()
+    assert np.nanmin(line.half) > 0.0
+
+
 @pytest.fixture
 def score() -> ContactScore:
     """Thresholds in steps of √2 about the free band; hits fall as they rise."""

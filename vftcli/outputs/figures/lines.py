@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vftcli.outputs.figures.paper import add_legend, legend_room, sheet, shortened
-from vftcli.outputs.page.charts import INK, REFERENCE, Chart, ChartLine, ends_of_family
+from vftcli.outputs.page.charts import INK, QUIET, REFERENCE, Chart, ChartLine, ends_of_family
 from vftcli.outputs.page.figures import thinned, thinned_log
 from vftcli.signals.arrays import Array
 
@@ -180,9 +180,9 @@ def draw_line(axes: "Axes", chart: Chart, series: ChartLine, j: int) -> None:
     x = chart.x if series.x is None else series.x
     thin = thinned_log if chart.log else thinned
     t, y = thin(x, series.values[:, j], STRETCHES)
-    if series.half is not None:
-        half = np.interp(t, x, series.half[:, j])
-        axes.fill_between(t, y - half, y + half, facecolor=paint(series), **RIBBON)
+    for width, style in zip(series.ribbons(j) or (), ribbon_looks(series), strict=False):
+        half = np.interp(t, x, width)
+        axes.fill_between(t, y - half, y + half, **style)
     axes.plot(t, y, **look(series))
 
 
@@ -192,8 +192,10 @@ def dot_look(k: int) -> dict[str, Any]:
     return {"color": "black", "linestyle": "none", "markeredgewidth": 0.7, **shape}
 
 
-RIBBON: dict[str, Any] = {"alpha": 0.25, "linewidth": 0.0}
-"""How the band about a line looks."""
+def ribbon_looks(series: ChartLine) -> tuple[dict[str, Any], dict[str, Any]]:
+    """How the band about a line looks, and where no contact is listed."""
+    common = {"alpha": 0.25, "linewidth": 0.0}
+    return {"facecolor": paint(series), **common}, {"facecolor": "0.4", **common}
 
 
 def band_look() -> dict[str, Any]:
@@ -232,7 +234,10 @@ def legend_handles(plots: Sequence[Plot], marks: Sequence[str]) -> dict[str, Any
             found[shortened(series.name)] = Line2D([], [], **look(series))
         for series in shown:
             if series.half is not None:
-                found["95 % band"] = Patch(facecolor=paint(series), **RIBBON)
+                own, grey = ribbon_looks(series)
+                found["95 % band"] = Patch(**own)
+                if series.quiet is not None:
+                    found[QUIET] = Patch(**grey)
         if chart.band is not None:
             found[chart.band_label] = Line2D([], [], **band_look())
         if chart.spans:

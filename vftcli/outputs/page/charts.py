@@ -15,7 +15,7 @@ from vftcli.outputs.decimation import decimated
 from vftcli.outputs.page import figures
 from vftcli.outputs.page.figures import Box, Scales, Span
 from vftcli.outputs.palette import colours_of_names
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.external_torque import ExternalTorque
 
 ROOM, LONG = 350_000, 4.0
@@ -32,6 +32,9 @@ STEPS, UNKNOWN = 65534, -32768
 
 DASHES = ("7 3", "2 2.5", "9 3 2 3", "4 2", "1.5 3.5", "12 3")
 """How lines are broken, in turn: none is told by its colour alone."""
+
+QUIET = "95 % band, no contact listed"
+"""What a grey ribbon is called."""
 
 INK, REFERENCE = "ink", "reference"
 """Colours that follow the page: its text's, and the reference's."""
@@ -52,6 +55,8 @@ class ChartLine(NamedTuple):
         leads: Whether it is the line to look at: drawn thicker.
         shown: Whether it is drawn at once, rather than when asked for.
         x: Its own horizontal places, None for the chart's. (T,)
+        quiet: Where the ribbon is grey: no contact is listed there, so that it says what would
+            show. None for nowhere. (T,)
     """
 
     name: str
@@ -62,6 +67,15 @@ class ChartLine(NamedTuple):
     leads: bool = False
     shown: bool = True
     x: Array | None = None
+    quiet: Mask | None = None
+
+    def ribbons(self, panel: int) -> tuple[Array, Array] | None:
+        """The half width in the line's colour and the grey one, NaN where it is the other. (T,)"""
+        if self.half is None:
+            return None
+        half = self.half[:, panel]
+        quiet = np.zeros(len(half), dtype=bool) if self.quiet is None else self.quiet
+        return np.where(quiet, np.nan, half), np.where(quiet, half, np.nan)
 
 
 class Chart(NamedTuple):
@@ -135,6 +149,8 @@ def legend(chart: Chart) -> str:
         parts.append(f'<span class="patch floor"></span> {escape(chart.band_label)}')
     ribbons = dict.fromkeys(s.colour for s in shown if s.half is not None)
     parts += [f"{patch(colour)} 95 % band" for colour in ribbons]
+    if any(s.quiet is not None and s.half is not None for s in shown):
+        parts.append(f'<span class="patch floor"></span> {QUIET}')
     if chart.spans:
         parts.append('<span class="patch contact"></span> contact')
     if len(parts) < 2:
@@ -217,9 +233,10 @@ def drawn_line(scales: Scales, chart: Chart, series: ChartLine, panel: int) -> s
         return figures.line(scales, t, y, look_of(series.colour, series.dash))
     t, y = figures.thinned(x, values)
     under = ""
-    if series.half is not None:
-        half = np.interp(t, x, series.half[:, panel])
-        under = figures.ribbon(scales, t, y - half, y + half, f'fill="{series.colour}" class="rim"')
+    looks = f'fill="{series.colour}" class="rim"', 'class="floor"'
+    for width, style in zip(series.ribbons(panel) or (), looks, strict=False):
+        half = np.interp(t, x, width)
+        under += figures.ribbon(scales, t, y - half, y + half, style)
     return under + figures.line(
         scales, t, y, look_of(series.colour, series.dash, leads=series.leads)
     )
@@ -243,7 +260,11 @@ def families_of(limits: Array) -> tuple[int, ...]:
 def packed_charts(charts: Iterable[Chart]) -> list[dict[str, Any]]:
     """Charts over time as the script takes them, all together within the page's room."""
     charts = list(charts)
-    lines = sum(len(c.panels) * (1 if s.half is None else 2) for c in charts for s in c.series)
+    lines = sum(
+        len(c.panels) * (1 + (s.half is not None) + (s.quiet is not None))
+        for c in charts
+        for s in c.series
+    )
     duration = max((float(c.x[-1] - c.x[0]) for c in charts), default=0.0)
     room = ROOM * float(np.clip(duration / 60.0, 1.0, LONG))
     stretches = int(np.clip(room / (POINT * max(lines, 1)), FEWEST, MOST))
@@ -281,8 +302,9 @@ def packed_lines(chart: Chart, series: ChartLine, stretches: int) -> list[dict[s
     found = []
     for j, part in enumerate(decimated(x, series.values, stretches)):
         line: dict[str, Any] = {"x": base64_of(part.t, "<f4"), "y": quantised(part.y)}
-        if series.half is not None:
-            line["half"] = quantised(np.interp(part.t, x, series.half[:, j]))
+        names = ("half",) if series.quiet is None else ("half", "quiet")
+        for name, half in zip(names, series.ribbons(j) or (), strict=False):
+            line[name] = quantised(np.interp(part.t, x, half))
         found.append(line)
     return found
 

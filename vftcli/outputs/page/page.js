@@ -95,11 +95,12 @@
         const line = series.lines[this.panel], x = Array.from(new Float32Array(bytes(line.x))), y = values(line.y);
         const stroke = ink(series.colour), columns = [y];
         drawn.push({ label: series.name, stroke, width: series.colour === "reference" ? 4 : series.leads ? 2 : 1.3, dash: series.dash, points: { show: false }, entry: k });
-        if (line.half) {
-          const half = values(line.half), at = drawn.length;
-          columns.push(y.map((v, i) => (v === null ? null : v + half[i])), y.map((v, i) => (v === null ? null : v - half[i])));
+        for (const [ribbon, fill] of [[line.half, `${stroke}30`], [line.quiet, css("--untold")]]) {
+          if (!ribbon) continue;
+          const half = values(ribbon), at = drawn.length, edge = (sign) => y.map((v, i) => (v === null || half[i] === null ? null : v + sign * half[i]));
+          columns.push(edge(1), edge(-1));
           for (let i = 0; i < 2; i++) drawn.push({ stroke: "transparent", points: { show: false } });
-          bands.push({ series: [at, at + 1], fill: `${stroke}30` });
+          bands.push({ series: [at, at + 1], fill });
         }
         tables.push([x, ...columns]);
       });

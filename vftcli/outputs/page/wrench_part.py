@@ -45,6 +45,7 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
             half=COVERS * w.sd if w.sd is not None and w.name == first else None,
             leads=w.name == first,
             shown=w.name == first,
+            quiet=quiet_samples(analysis, w.name),
         )
         for w in sorted(found, key=lambda wrench: wrench.name == first)
     ]
@@ -60,6 +61,13 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
         families=(1, 1, 1, 2, 2, 2),
         spans=contact_spans(analysis),
     )
+
+
+def quiet_samples(analysis: Analysis, name: str) -> Mask | None:
+    """Samples of a wrench outside of every listed contact, None where it asks no list. (T,)"""
+    sensed = analysis.virtual_sensor
+    found = None if sensed is None else sensed.smoothed.get(name)
+    return found.unlisted(analysis.t) if found is not None and found.gate else None
 
 
 def condition_charts(analysis: Analysis) -> Iterator[Chart]:

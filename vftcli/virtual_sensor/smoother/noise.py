@@ -108,12 +108,16 @@ class TorqueNoise:
         again = self.moving + (PUSHED_SHARE / REST_SHARE) ** 2 * self.resting
         return np.where(resting(blocks) & pushed[:, None], again, found)
 
+    def time(self, blocks: Blocks, pushed: Mask | None = None) -> Array:
+        """Correlation time of the model error in every block; as `variance`. (K, n) [s]"""
+        found = np.where(self.rests(blocks), self.resting_time, self.moving_time)
+        if pushed is None:
+            return found
+        return np.where(resting(blocks) & pushed[:, None], PUSHED_TIME, found)
+
     def decay(self, blocks: Blocks, pushed: Mask | None = None) -> Array:
         """Share of the model error that is kept from one block to the next, likewise. (K, n)"""
-        time = np.where(self.rests(blocks), self.resting_time, self.moving_time)
-        if pushed is not None:
-            time = np.where(resting(blocks) & pushed[:, None], PUSHED_TIME, time)
-        return np.exp(-steps(blocks)[:, None] / time)
+        return np.exp(-steps(blocks)[:, None] / self.time(blocks, pushed))
 
     def rests(self, blocks: Blocks) -> Mask:
         """Blocks in which each joint rests, those within `near` of one too. (K, n)"""

@@ -7,12 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.repetition.free_load import FreeLoad
 from vftcli.repetition.free_motion import FreeMotion, FreePiece
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.kinematics import link_poses
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import from_base
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
@@ -38,12 +40,15 @@ class SmootherInput(NamedTuple):
 
     Attributes:
         terms: p and μ along the log, corrected as the observer's are.
-        free: Motion that nobody touched, corrected likewise; none where nothing is known of it.
+        free: Motion that nobody touched, corrected alike, less a load that it carries; none
+            where nothing is known of it.
+        load: A load that the free motion carries, and with it the whole log; None without one.
         uncorrected: The same as the robot's model alone gives it, None where nothing is corrected.
     """
 
     terms: DynamicsTerms
     free: tuple[FreeTerms, ...]
+    load: FreeLoad | None = None
     uncorrected: "SmootherInput | None" = None
 
 
@@ -64,6 +69,7 @@ def plain_input(motion: FreeMotion, name: str = "") -> SmootherInput:  # noqa: A
 def corrected_input(
     motion: FreeMotion,
     pieces: Sequence[FreePiece],
+    load: FreeLoad | None,
     terms_of: Callable[[str, ModelledRun], DynamicsTerms],
     name: str,
 ) -> SmootherInput:
@@ -72,11 +78,12 @@ def corrected_input(
     Args:
         motion: The log.
         pieces: What of it, and of free runs, is believed to be free.
+        load: A load that the pieces carry; None for none.
         terms_of: An observer's p and μ of a recording; the run's own where nothing is corrected.
         name: The observer.
     """
-    plain = input_under(motion, pieces, lambda run: run.terms)
-    own = input_under(motion, pieces, partial(terms_of, name))
+    plain = input_under(motion, pieces, lambda run: run.terms, load)
+    own = input_under(motion, pieces, partial(terms_of, name), load)
     return plain if own.terms is plain.terms else own._replace(uncorrected=plain)
 
 
@@ -84,10 +91,15 @@ def input_under(
     motion: FreeMotion,
     pieces: Sequence[FreePiece],
     terms_of: Callable[[ModelledRun], DynamicsTerms],
+    load: FreeLoad | None = None,
 ) -> SmootherInput:
-    """The log and its free pieces under one correction."""
-    free = (FreeTerms(terms_of(piece.run), piece.run.recording.q, piece.inside) for piece in pieces)
-    return SmootherInput(terms_of(motion.log), tuple(free))
+    """The log and its free pieces under one correction, these less a load."""
+    free = []
+    for run, inside, _ in pieces:
+        terms = terms_of(run)
+        terms = terms if load is None else load.off(terms, run)
+        free.append(FreeTerms(terms, run.recording.q, inside))
+    return SmootherInput(terms_of(motion.log), tuple(free), load)
 
 
 def has_part(motion: FreeMotion) -> bool:
@@ -121,6 +133,18 @@ def known_free(motion: FreeMotion, found: SmootherInput, unloaded: Mask) -> tupl
 def less_torque(terms: DynamicsTerms, torque: Array | None) -> DynamicsTerms:
     """Terms whose disturbance is less by a torque; None for nothing. (T, n) [N·m]"""
     return terms if torque is None else replace(terms, mu=handed_over(terms.mu + torque))
+
+
+def carrying(found: SmoothedWrench, load: FreeLoad, run: ModelledRun) -> SmoothedWrench:
+    """A wrench that was found beside a load, with the load in it."""
+    q = resample_columns(found.t, run.recording.t, run.recording.q)
+    values, covariance = load.wrench(run.robot.chain, q)
+    return replace(
+        found,
+        values=found.values + values,
+        covariance=found.covariance + covariance,
+        load=load,
+    )
 
 
 def smoothed_wrench(
@@ -197,8 +221,12 @@ def smooth_input(
         # A free run takes the model's error off by itself; the correction would do it again.
         given, plain = plain, None
     if gate is not None:
-        free, terms = known_free(motion, given, unloaded), less_torque(given.terms, torque)
-        return smooth_wrench(terms, q, robot, free, gate.spans, gate.prior)
+        # What a zero takes off holds the load too.
+        load = given.load if torque is None else None
+        terms = given.terms if load is None else load.off(given.terms, motion.log)
+        free, terms = known_free(motion, given, unloaded), less_torque(terms, torque)
+        found = smooth_wrench(terms, q, robot, free, gate.spans, gate.prior)
+        return found if load is None else carrying(found, load, motion.log)
     if plain is not None:
         free = known_free(motion, plain, unloaded)
         prior = prior_of(plain.terms, q, robot, free)

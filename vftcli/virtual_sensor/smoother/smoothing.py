@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.repetition.free_load import FreeLoad
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.robot import Robot
@@ -49,6 +50,10 @@ BENT = 0.25
 """Share of the bend, of a block less the mean of its neighbours, that the blocks may hide: what
 their mean loses of a peak and what lies between two of them."""
 
+UNLISTED = 0.6
+"""Outside of the listed contacts the band is that of a contact which lasts so long, as long as
+those that the list makes up in free motion to find the smallest force it can see. [s]"""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SmoothedWrench:
@@ -58,15 +63,17 @@ class SmoothedWrench:
         t: Middle of each block. (K,) [s]
         values: Force and moment on the robot. (K, 6) [N, N·m]
         covariance: Their covariance, widened by `WIDENED`, and in contacts by what the drives and
-            the blocks may hide. (K, 6, 6)
+            the blocks may hide; outside of the listed ones that of `unlisted`. (K, 6, 6)
         model_error: What the model errs by, as far as it can be told from the wrench. (K, n) [N·m]
         model_error_sd: Its standard deviation. (K, n) [N·m]
-        inside: Blocks in which there may be a wrench; zero with certainty in the others. (K,)
+        inside: Blocks in which there may be a wrench; zero, as far as the pose can show, in the
+            others. (K,)
         seconds: Length of a block. [s]
         prior: How the wrench may move.
         noise: What counts as noise.
         gate: Whether contacts were listed; else the whole log is one.
         uncorrected: Whether a correction of the model's error was left out; see `InputOf`.
+        load: A load that the free motion carries, in the wrench with its weight; None without one.
     """
 
     t: Array
@@ -80,6 +87,7 @@ class SmoothedWrench:
     noise: TorqueNoise
     gate: bool
     uncorrected: bool = False
+    load: FreeLoad | None = None
 
     def __post_init__(self) -> None:
         seal(self, "t", "values", "covariance", "model_error", "model_error_sd")
@@ -88,6 +96,11 @@ class SmoothedWrench:
     def sd(self) -> Array:
         """Standard deviation in base axes. (K, 6) [N, N·m]"""
         return deviations(self.covariance)
+
+    def unlisted(self, t: Array) -> Mask:
+        """Which of some times lie outside of every listed contact; none without a list. (T,)"""
+        block = np.searchsorted(self.t + 0.5 * self.seconds, t)
+        return ~self.inside[np.minimum(block, len(self.t) - 1)]
 
     def at(self, t: Array) -> "MovedWrench":
         """Values and covariance at other times, straight between blocks. (T, 6), (T, 6, 6)"""
@@ -112,6 +125,7 @@ class SmoothedWrench:
             "free_s": noise.free_seconds,
             "gated": self.gate,
             "correction_left_out": self.uncorrected,
+            "load_kg": None if self.load is None else self.load.mass,
         }
 
     def remarks(self, name: str) -> tuple[Remark, ...]:
@@ -134,6 +148,10 @@ class SmoothedWrench:
             found.append(caution("wrench-noise-assumed", where))
         if self.uncorrected:
             found.append(fact("wrench-uncorrected", where))
+        if self.load is not None:
+            found.append(
+                fact("wrench-holds-load", where, load_kg=self.load.mass, sd_kg=self.load.sd)
+            )
         return tuple(found)
 
 
@@ -161,7 +179,7 @@ class MovedWrench(NamedTuple):
 
 def deviations(covariance: Array) -> Array:
     """Standard deviations of covariances. (T, k)"""
-    # A pinned state's variance is zero, which rounding may leave on either side.
+    # A model error that is known has no variance, which rounding may leave on either side.
     variances = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)
     return np.asarray(np.sqrt(variances))
 
@@ -182,8 +200,8 @@ def smooth_wrench(
         robot: The arm.
         free: Motion that nobody touched, which tells the noise; none to take it from the drives'
             dry friction.
-        gate: From and to of every contact [s], the wrench being zero outside of them; None where
-            the whole log is one.
+        gate: From and to of every contact [s], outside of which the wrench is zero, as far as the
+            pose can show; None where the whole log is one.
         prior: How the wrench may move; None to choose it by the log's likelihood.
 
     Raises:
@@ -201,7 +219,10 @@ def smooth_wrench(
     steps = evolution(blocks, noise, [prior], inside)
     single = Evolution(steps.decay[:, 0], steps.variance[:, 0])
     mean, covariance = smooth_backward(single, filter_forward(single, measured))
-    spread = covariance[:, :6, :6] * np.outer(WIDENED, WIDENED)
+    own = covariance[:, :6, :6]
+    if gate is not None:
+        own = np.where(inside[:, None, None], own, unlisted(blocks, measured, noise, prior))
+    spread = own * np.outer(WIDENED, WIDENED)
     if gate is not None:
         spread = spread + inside[:, None, None] * hidden_by_blocks(mean[:, :6])
     return SmoothedWrench(
@@ -216,6 +237,72 @@ def smooth_wrench(
         noise=noise,
         gate=gate is not None,
     )
+
+
+def unlisted(
+    blocks: Blocks, measured: Measurement, noise: TorqueNoise, prior: WrenchPrior
+) -> Array:
+    """Covariance that a contact of `UNLISTED` seconds about each block would have. (K, 6, 6)
+
+    The quiet blocks before it leave the model error b with the variance of a filter's steady state,
+
+        p⁺ = p⁻R/(p⁻ + R),    p⁻ = f²p⁺ + v(1 − f²).
+
+    From there to the middle of the contact it grows to a by f and v of a contact's blocks, that of
+    the blocks behind to a′, and to u where these say nothing. Together they leave
+    c = 1/(1/a + 1/a′ − 1/u), and the wrench has
+
+        (Σ⁻¹ + J (c̄ + R/m)⁻¹ Jᵀ)⁻¹,
+
+    Σ of the prior, c̄ the harmonic mean over the contact's m blocks: what some of them show holds
+    for all.
+
+    Args:
+        blocks: The log.
+        measured: Jacobians and white noise.
+        noise: Noise and model error.
+        prior: How the contacts' wrench moves.
+    """
+    # A log of one sample is a block without length.
+    R, length = measured.noise, float(np.median(blocks.length)) or FINE
+    count = len(blocks.t)
+    half = round(0.5 * UNLISTED / length)
+    kept = np.exp(-2.0 * length / noise.time(blocks))
+    added = noise.variance(blocks) * (1.0 - kept)
+    beta = R * (1.0 - kept) - added
+    ahead = 0.5 * (np.sqrt(beta**2 + 4.0 * added * R) - beta)
+    touched = np.ones(count, dtype=bool)
+    v, kept = noise.variance(blocks, touched), np.exp(-2.0 * length / noise.time(blocks, touched))
+    quiet = ahead * R / (ahead + R)
+    backward = v[::-1], kept[::-1], half
+    behind, nothing = (coasted(each[::-1], *backward)[::-1] for each in (quiet, v))
+    known = 1.0 / coasted(quiet, v, kept, half) + 1.0 / behind - 1.0 / nothing
+    first = np.maximum(np.arange(count) - half, 0)
+    last = np.minimum(np.arange(count) + half + 1, count)
+    total = np.vstack([np.zeros(known.shape[1]), np.cumsum(known, axis=0)])
+    known = (total[last] - total[first]) / (last - first)[:, None]
+    # In a gap of the clock nothing would be known of it.
+    weight = blocks.known[:, None] / (1.0 / known + R * min(length / UNLISTED, 1.0))
+    J = measured.jacobian
+    information = (J * weight[:, None, :]) @ J.swapaxes(1, 2) + np.diag(1.0 / prior.variance)
+    return np.linalg.inv(information)
+
+
+def coasted(quiet: Array, v: Array, kept: Array, count: int) -> Array:
+    """Variance of the model error `count` blocks after the last one that shows it. (K, n)
+
+    Args:
+        quiet: Its variance in a block that shows it; the log's start has v. (K, n)
+        v: What it tends to. (K, n)
+        kept: Share of its variance that is kept from the block before. (K, n)
+        count: How many blocks show nothing of it.
+    """
+    blocks = np.arange(len(v))
+    found = np.where((blocks >= count)[:, None], quiet[np.maximum(blocks - count, 0)], v)
+    for back in range(count - 1, -1, -1):
+        at = np.maximum(blocks - back, 0)
+        found = kept[at] * found + (1.0 - kept[at]) * v[at]
+    return found
 
 
 def hidden_by_blocks(values: Array, bent: float = BENT) -> Array:
