@@ -286,3 +286,12 @@ def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap() -> None:
     assert {remark.code for row in slow.contacts for remark in row.remarks} == {"peak-cut-by-rate"}
     fast = list_contacts(motion(whole, "ur5", "0.3:4"))
     assert not {remark.code for row in fast.contacts for remark in row.remarks}
+
+
+@pytest.mark.parametrize("name", ["press_1", "press_4"])
+def test_a_press_on_a_resting_arm_is_one_contact_and_no_load(logs: Path, name: str) -> None:
+    """Pressed for most of the log, with free motion before and behind."""
+    columns = "t=t,q=q{i},dq=dq{i},tau=tau{i},tau_ext=tau_ext{i}"
+    recording = read(logs / "panda_press" / f"{name}.csv.gz", columns=columns)
+    (row,) = list_contacts(motion(recording, "panda")).contacts
+    assert not row.is_load
