@@ -379,14 +379,28 @@ def json_rows(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def csv_rows(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:
-    """Rows as CSV under a line of keys; what is not known is empty, truth in small letters."""
+    """Rows as CSV under a line of keys; what is not known is empty, truth in small letters.
+
+    A text that a spreadsheet would run as a formula, as a file's name may be, begins with "'".
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(keys)
     for row in rows:
         values = (known_or_none(row[key]) for key in keys)
-        writer.writerow(str(v).lower() if isinstance(v, bool) else v for v in values)
+        writer.writerow(csv_cell(value) for value in values)
     return text.getvalue()
+
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""How a text begins that spreadsheets run: the list of OWASP's "CSV Injection"."""
+
+
+def csv_cell(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
+    """A value as a cell of CSV holds it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
 
 
 def known_or_none(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds

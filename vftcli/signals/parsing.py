@@ -50,6 +50,11 @@ def interval(text: str) -> tuple[float, float]:
     return start, stop
 
 
+def interval_text(start: float, stop: float) -> str:
+    """The ``A:B`` that `interval` reads as these times, an infinite end left out. [s]"""
+    return ":".join("" if abs(end) == float("inf") else f"{end:g}" for end in (start, stop))
+
+
 def numbers(text: str) -> tuple[float, ...] | None:
     """The numbers of ``A,B,C``, None where a part is no number: the caller says what was due."""
     try:
