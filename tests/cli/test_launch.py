@@ -112,7 +112,7 @@ def test_a_limit_on_memory_that_holds_no_library_is_one_line(tmp_path: Path) -> 
     )
     assert done.returncode == 1
     assert done.stderr == (
-        "error: the memory limit of 0.7 GB (ulimit -v) is less than the 2 GB that the libraries "
+        "error: the memory limit of 0.7 GB (ulimit -v) is less than the 3 GB that the libraries "
         "reserve; raise it\n"
     )
 

@@ -233,4 +233,5 @@ def test_a_name_that_a_spreadsheet_would_run_is_a_text_in_csv(first: str) -> Non
     name = f"{first}cmd|' /C calc'!A0.csv"
     text = csv_rows([{"log": name, "value": -1.5, "at": "-"}], ["log", "value", "at"])
     (row,) = csv.DictReader(io.StringIO(text, newline=""))
-    assert row == {"log": f"'{name}", "value": "-1.5", "at": "'-"}
+    shown = name.replace("\r", r"\r")
+    assert row == {"log": f"'{shown}", "value": "-1.5", "at": "'-"}

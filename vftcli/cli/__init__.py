@@ -129,8 +129,8 @@ def launch() -> None:
     os._exit(code if isinstance(code, int) else int(code is not None))
 
 
-ROOM = 2e9
-"""Address space that the libraries reserve, whatever the log: with 1.4 GiB they abort. [B]"""
+ROOM = 3e9
+"""Address space that the libraries reserve, whatever the log: `identify` ends with 2.1e9. [B]"""
 
 
 def check_room() -> None:

@@ -400,7 +400,10 @@ def csv_cell(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
     """A value as a cell of CSV holds it."""
     if isinstance(value, bool):
         return str(value).lower()
-    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULA) else value
+    if not isinstance(value, str):
+        return value
+    text = value.replace("\r", r"\r")  # unquoted before Python 3.13: it would end the row
+    return f"'{text}" if value.startswith(FORMULA) else text
 
 
 def known_or_none(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
