@@ -133,6 +133,15 @@ def test_a_run_goes_on_where_it_was_cut_off(
         assert (copy / name).read_bytes() == (tmp_path / "unbroken" / name).read_bytes()
 
 
+def test_a_link_out_of_a_dataset_is_refused_before_anything_is_computed(
+    dataset: Path, tmp_path: Path
+) -> None:
+    (dataset / "meta" / "leak.txt").symlink_to("/etc/hostname")
+    with pytest.raises(LogError, match=r"leak\.txt is a link to /etc/hostname"):
+        made(dataset, tmp_path / "copy")
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
+
+
 def test_frames_without_a_number_stop_it_or_are_marked(dataset: Path, tmp_path: Path) -> None:
     def spoil(values: np.ndarray) -> None:
         values[[50, 51], 3] = np.nan  # of episode 0

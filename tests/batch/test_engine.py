@@ -3,12 +3,17 @@
 import math
 import os
 import signal
+import socket
+import subprocess
+import sys
 import time
 
+import psutil
 import pytest
+from distributed import LocalCluster
 
 from vftcli.batch.choice import WorkersChoice
-from vftcli.batch.cluster import REPLACED, Workers
+from vftcli.batch.cluster import REPLACED, Workers, connected
 from vftcli.batch.engine import EngineError, Failure, Outcome, begin, run_tasks
 from vftcli.batch.outcome import failure_of, perform
 
@@ -110,3 +115,60 @@ def test_workers_that_stay_away_are_replaced_so_often_and_only_on_this_machine(
     now[0] = 655
     with pytest.raises(EngineError, match="no worker is left for 60 s"):
         workers.look()
+
+
+ATTACK = """
+import os, sys
+from distributed import Client
+from distributed.security import Security
+if os.getuid() == 0:
+    os.setuid(65534)  # nobody: as any other user of this machine
+for address in sys.argv[1:]:
+    security = Security.temporary() if address.startswith("tls") else None
+    try:
+        with Client(address, security=security, timeout=1) as client:
+            print("ran as", client.submit(os.getuid, pure=False).result(timeout=5))
+    except OSError:
+        print("refused")
+"""
+"""What another user of the machine tries: without a certificate, or with one of their own."""
+
+
+def answer_to_http(port: int) -> bytes:
+    """What a port says to who asks it for a page."""
+    with socket.create_connection(("127.0.0.1", port), timeout=5) as connection:
+        connection.sendall(b"GET /health HTTP/1.0\r\n\r\n")
+        try:
+            return connection.recv(100)
+        except ConnectionError:
+            return b""
+
+
+def test_nobody_without_the_run_s_certificate_reaches_its_workers() -> None:
+    """Every port that the processes of a run listen on; the attack itself works on an open one."""
+    own = psutil.Process()
+    before = {where.laddr for where in own.net_connections("tcp")}
+    with (
+        connected(WorkersChoice(workers=1), (), silent) as client,
+        LocalCluster(
+            n_workers=1, processes=False, protocol="tcp://", dashboard_address="127.0.0.1:0"
+        ) as opened,
+    ):
+        place = client.scheduler.address.removeprefix("tls://")
+        attack = [f"tcp://{place}", f"tls://{place}", opened.scheduler_address]
+        script = [sys.executable, "-c", ATTACK, *attack]
+        said = subprocess.run(script, capture_output=True, text=True, timeout=60, check=False)
+        assert said.stdout.splitlines() == ["refused", "refused", f"ran as {os.getuid()}"]
+        # The one who has the certificate works on.
+        assert client.submit(math.sqrt, 4.0).result(timeout=20) == 2.0
+        opened.close()
+        ports = {
+            where.laddr
+            for process in (own, *own.children(recursive=True))
+            for where in process.net_connections("tcp")
+            if where.status == "LISTEN"
+        } - before
+        assert {port.ip for port in ports} == {"127.0.0.1"}
+        # The scheduler, the worker and its nanny.
+        assert len(ports) == 3
+        assert not any(b"HTTP" in answer_to_http(port.port) for port in ports)

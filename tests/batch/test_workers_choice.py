@@ -45,3 +45,21 @@ def test_what_does_not_go_together_is_refused(words: dict[str, object]) -> None:
 
 def test_a_worker_s_memory_is_in_gigabytes() -> None:
     assert WorkersChoice.parsed(workers=1, worker_memory=0.6).memory == 600_000_000
+
+
+def test_a_cluster_that_asks_nobody_for_a_certificate_is_refused_unless_accepted() -> None:
+    opened = WorkersChoice(scheduler="tcp://host:8786")
+    with pytest.raises(ParameterError, match=r"run code as you; use tls://.* or --anyway"):
+        opened.check_closed(anyway=False)
+    opened.check_closed(anyway=True)
+    WorkersChoice(scheduler="tls://host:8786", tls=(KEY, KEY, KEY)).check_closed(anyway=False)
+    WorkersChoice(workers=0).check_closed(anyway=False)
+
+
+def test_workers_without_what_makes_certificates_are_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(choice, "find_spec", lambda name: None if name == "cryptography" else name)
+    assert WorkersChoice().in_process
+    with pytest.raises(ParameterError, match=r"cryptography: pip install 'vftcli\[cluster\]'"):
+        WorkersChoice(workers=2)

@@ -193,7 +193,12 @@ def test_what_describes_logs_is_passed_over_and_said_once(
 @pytest.mark.statistical
 def test_an_address_that_does_not_answer_is_one_line(run, tmp_path: Path) -> None:
     address = ("--scheduler", "tcp://127.0.0.1:1")
-    code, _, err = run("batch", CIRCLE, "--do", "estimate", *ONE, *address, "-o", tmp_path / "out")
+    asked = ("batch", CIRCLE, "--do", "estimate", *ONE, *address, "-o", tmp_path / "out")
+    code, _, err = run(*asked)
+    assert code == 1
+    assert err.count("\n") == 1
+    assert "use tls://" in err
+    code, _, err = run(*asked, "--anyway")
     assert code == 1
     assert "no Dask scheduler answers at tcp://127.0.0.1:1 within 10 s" in err
 

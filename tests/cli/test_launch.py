@@ -1,5 +1,6 @@
 """The program as the shell calls it: it leaves at once, all written, with the right code."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -97,3 +98,36 @@ def test_a_stopped_command_says_so_and_leaves_nothing(tmp_path: Path, number: in
     lines = [line for line in done.stderr.splitlines() if not line.startswith("note: ")]
     assert lines == ["log health: sound", "error: interrupted; run the command again"]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_limit_on_memory_that_holds_no_library_is_one_line(tmp_path: Path) -> None:
+    """Libraries ended the program with words of their own, thousands of lines at some limits."""
+    resource = pytest.importorskip("resource")
+    done = subprocess.run(
+        [sys.executable, "-m", "vftcli", "estimate", FIXTURE, "-o", tmp_path / "out"],
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (700_000_000,) * 2),
+    )
+    assert done.returncode == 1
+    assert done.stderr == (
+        "error: the memory limit of 0.7 GB (ulimit -v) is less than the 3 GB that the libraries "
+        "reserve; raise it\n"
+    )
+
+
+def test_the_caller_s_threads_of_linear_algebra_change_no_byte(tmp_path: Path) -> None:
+    """The order of sums moved the last digits of the estimates."""
+    made = []
+    for threads in ("1", "4"):
+        folder = tmp_path / threads
+        words = ["estimate", FIXTURE, "--robot", "ur5", "--observer", "best", "-o", folder]
+        subprocess.run(
+            [sys.executable, "-m", "vftcli", *map(str, words)],
+            env={**os.environ, "OPENBLAS_NUM_THREADS": threads, "OMP_NUM_THREADS": threads},
+            capture_output=True,
+            check=True,
+        )
+        made.append((folder / "estimates.parquet").read_bytes())
+    assert made[0] == made[1]

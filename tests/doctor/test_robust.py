@@ -34,7 +34,11 @@ def test_a_contact_in_a_quarter_of_the_windows_is_set_aside() -> None:
     found = solve(target, terms(columns))
     np.testing.assert_allclose(found.values, values, atol=1e-9)
     assert not found.kept[:50].any()
-    assert found.kept.sum() == 140  # seven in ten
+    # Without noise all that is left over is rounding, in which windows tie.
+    noise = np.random.default_rng(2).normal(scale=1e-6, size=target.shape)
+    kept = solve(target + noise, terms(columns)).kept
+    assert not kept[:50].any()
+    assert kept.sum() == 140  # seven in ten
 
 
 def test_what_must_be_positive_is_left_out_where_it_is_not() -> None:

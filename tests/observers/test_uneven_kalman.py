@@ -19,12 +19,18 @@ def steps(gaps: int = 0) -> np.ndarray:
     return dt
 
 
-def looped(observer: KalmanObserver, dt: np.ndarray, prior: Covariance) -> Gains:
-    """The covariance recursion as it is written, Joseph's form, sample by sample."""
+def looped(
+    observer: KalmanObserver, dt: np.ndarray, prior: Covariance, before: Covariance | None = None
+) -> Gains:
+    """The covariance recursion as it is written, Joseph's form, sample by sample.
+
+    With the covariances of another recursion `before` it, every sample is one step from these:
+    rounding does not add up over the samples.
+    """
     model = observer.model(dt[:, None], len(prior.p11))
     found = [update(prior, model.r[0])]
     for k in range(1, len(dt)):
-        p11, p12, p22 = found[-1].posterior
+        p11, p12, p22 = found[-1].posterior if before is None else (p[k - 1] for p in before)
         moved = p12 + model.a12[k] * p22
         prior = Covariance(
             p11 + model.a12[k] * (p12 + moved) + model.q11[k],
@@ -57,8 +63,8 @@ def test_gains_are_those_of_the_plain_loop(setting: str, scheme: str) -> None:
     prior = settled.prior
     if first is not None:
         prior = Covariance(np.full(2, first), np.zeros(2), np.full(2, first))
-    expected = looped(observer, dt, prior)
     found = gain_sequence(observer.model(dt[:, None], 2), prior, settled.gains.posterior)
+    expected = looped(observer, dt, prior, found.posterior)
     for one, other in (
         (found.l1, expected.l1),
         (found.l2, expected.l2),

@@ -13,17 +13,16 @@ from vftcli.outputs.grid import (
     Column,
     Grid,
     GridCell,
-    csv_rows,
     escape_latex,
     html,
     joint_columns,
-    json_rows,
     latex,
     markdown,
     signed,
     significant,
     terminal,
 )
+from vftcli.outputs.plain_rows import csv_rows, json_rows
 
 HOSTILE = '<b>&_%|*$#"\\{a}'
 
@@ -225,3 +224,13 @@ def test_rows_for_machines_read_back() -> None:
     assert float(read[0]["a"]) == 1.5e-7
     assert read[0] | {"a": ""} == {"a": "", "b": "x,y", "c": "true"}
     assert read[1] == {"a": "", "b": "", "c": "false"}
+
+
+@pytest.mark.parametrize("first", ["=", "+", "-", "@", "\t", "\r"])
+def test_a_name_that_a_spreadsheet_would_run_is_a_text_in_csv(first: str) -> None:
+    """OWASP's list for "CSV Injection"; numbers stay numbers."""
+    name = f"{first}cmd|' /C calc'!A0.csv"
+    text = csv_rows([{"log": name, "value": -1.5, "at": "-"}], ["log", "value", "at"])
+    (row,) = csv.DictReader(io.StringIO(text, newline=""))
+    shown = name.replace("\r", r"\r")
+    assert row == {"log": f"'{shown}", "value": "-1.5", "at": "'-"}

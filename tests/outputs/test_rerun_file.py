@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from pathlib import Path
 from uuid import UUID
 
@@ -9,13 +11,11 @@ from rerun_rows import rows_of
 from vftcli.outputs.plots import Lines, LogLine, PlotLine, PlotPoints, Tab
 from vftcli.outputs.rerun_file import (
     drawable,
-    finish,
     recording_id,
     rerun_file,
     time_panel,
     title_of,
 )
-from vftcli.signals.errors import OutputError
 
 
 def lines(path: str, values: np.ndarray) -> Lines:
@@ -82,16 +82,37 @@ def test_the_time_panel_marks_a_span_in_nanoseconds() -> None:
     assert time_panel(None).time_selection is None
 
 
-def test_a_recording_without_its_footer_is_no_recording(tmp_path: Path) -> None:
-    """What a full disk leaves: Rerun's writer may end without an error."""
+FULL = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+from vftcli.outputs.plots import Lines, PlotLine, Tab
+from vftcli.outputs.rerun_file import rerun_file
+from vftcli.signals.errors import OutputError
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
+values = np.random.default_rng(1).normal(size=20000)
+lines = Lines("/one", "what [N]", [PlotLine("line", values, "#102030")])
+try:
+    with rerun_file(Path(sys.argv[1]), "r", [Tab("one", np.arange(20000.0), [lines])], {"S": "w"}):
+        pass
+except OutputError as error:
+    print(error)
+"""
+"""Write a recording of 300 kB where a file may have so many bytes."""
 
-    class Stream:
-        def flush(self) -> None: ...
-        def disconnect(self) -> None: ...
 
-    (tmp_path / "cut.rrd").write_bytes(b"RRF2" + bytes(1000))
-    with pytest.raises(OutputError, match=r"cut\.rrd cannot be written whole"):
-        finish(Stream(), tmp_path / "cut.rrd")
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows limits no file's size")
+@pytest.mark.parametrize("room", [4096, 60_000])
+def test_a_full_disk_is_one_error_at_once_and_nothing_is_said_beside_it(
+    tmp_path: Path, room: int
+) -> None:
+    """Rerun's own writer logged four lines and was waited for without end, its output piped."""
+    script = [sys.executable, "-c", FULL, str(tmp_path / "r.rrd"), str(room)]
+    ended = subprocess.run(script, capture_output=True, text=True, timeout=60, check=False)
+    assert (ended.stdout, ended.stderr) == (
+        "r.rrd cannot be written: file too large; give another -o\n",
+        "",
+    )
 
 
 def test_a_recording_is_known_by_what_it_holds() -> None:

@@ -30,6 +30,13 @@ def test_only_paths_that_exist_are_printed(tmp_path: Path) -> None:
     assert any(line.startswith("Open: ") for line in lines)
 
 
+def test_a_page_that_this_run_did_not_write_is_not_offered(tmp_path: Path) -> None:
+    for name in ("index.html", "run.json"):
+        (tmp_path / name).write_text("")
+    lines = written_lines(tmp_path, ["run.json"], Canvas(width=100))
+    assert "index.html" not in "".join(lines)
+
+
 def test_a_thousand_samples_a_second_are_written_out(analysis: Analysis) -> None:
     t = np.arange(analysis.recording.samples) * 1e-3
     fast = replace(analysis.recording, t=t)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from made_urdfs import arm, fixed, link, robot, written
 
-from vftcli.robots import load_robot
+from vftcli.robots import load_robot, xacro_text
 from vftcli.signals.errors import ParameterError, RobotError
 
 HEAD = """<robot name="$(arg name)" xmlns:xacro="http://www.ros.org/wiki/xacro">
@@ -76,6 +76,18 @@ def test_packages_beside_the_file_and_above_it_are_found(tmp_path: Path) -> None
         (xacro("${1 / 0}"), ["name=made"], "cannot be expanded: .*division by zero"),
         (xacro("${__import__('os')}"), ["name=made"], "cannot be expanded: "),
         (xacro('<xacro:include filename="arm.xacro"/>'), ["name=made"], "cannot be expanded: "),
+        (xacro("${'a' * 10 ** 12}"), ["name=made"], r"cannot be expanded: .*10 \*\* 12"),
+        (xacro("$(env HOME)"), ["name=made"], "it reads the environment variable HOME"),
+        (
+            xacro("${xacro.load_yaml('/etc/passwd')}"),
+            ["name=made"],
+            "it loads /etc/passwd, which is outside of its folder",
+        ),
+        (
+            xacro("${load_yaml('../beside.yaml')}"),
+            ["name=made"],
+            r"it loads \.\./beside\.yaml, which is outside of its folder",
+        ),
     ],
 )
 def test_a_xacro_that_cannot_be_expanded_says_why_on_one_line(
@@ -89,6 +101,52 @@ def test_a_xacro_that_cannot_be_expanded_says_why_on_one_line(
         load_robot(written(tmp_path, text, "arm.xacro"), arguments=arguments)
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.usefixtures("_xacro_installed")
+@pytest.mark.parametrize("name", ["arm.xacro", "arm.urdf"])
+def test_a_xacro_that_never_ends_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """9^9^9 has 370 million digits: hours of a processor, in one step of the interpreter."""
+    monkeypatch.setattr(xacro_text, "SECONDS", 1)
+    path = written(tmp_path, xacro("${9**9**9}"), name)
+    with pytest.raises(RobotError, match="cannot be expanded within 1 s of a processor"):
+        load_robot(path, arguments=["name=made"])
+
+
+@pytest.mark.usefixtures("_xacro_installed")
+def test_a_maker_s_package_loads_its_tables_and_those_of_a_package_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As UR's description does: arguments name the files, a macro of another folder loads them."""
+    monkeypatch.setenv("ARM_MASS", "9.0")
+    own, other = tmp_path / "own_description", tmp_path / "other_description"
+    for folder in (own / "urdf" / "inc", own / "config", other / "config"):
+        folder.mkdir(parents=True)
+    for package in (own, other):
+        written(package, f"<package><name>{package.name}</name></package>", "package.xml")
+    written(own / "config", "masses: {link: !degrees 57.29577951308232}\n", "physical.yaml")
+    written(other / "config", "tool: 0.25\n", "tool.yaml")
+    macro = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:macro name="read" params="physical tool">
+<xacro:property name="table" value="${xacro.load_yaml(physical)}" scope="parent"/>
+<xacro:property name="tool" value="${xacro.load_yaml(tool)['tool']}" scope="parent"/>
+</xacro:macro></robot>"""
+    written(own / "urdf" / "inc", macro, "common.xacro")
+    hand = fixed("hand", "link5", 0.5).replace('mass value="0.5"', 'mass value="${tool}"')
+    body = link("base") + arm(5).replace(
+        'mass value="5.0"', "mass value=\"${table['masses']['link'] * $(optenv ARM_MASS 2)}\""
+    )
+    text = f"""<robot name="made" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="physical" default="$(find own_description)/config/physical.yaml"/>
+<xacro:include filename="$(find own_description)/urdf/inc/common.xacro"/>
+<xacro:read physical="$(arg physical)" tool="$(find other_description)/config/tool.yaml"/>
+{body}{hand}</robot>"""
+    robot = load_robot(written(own / "urdf", text, "own.urdf.xacro"))
+    # The table's own number, and the default of what the environment may hold.
+    assert robot.chain.mass[0] == pytest.approx(2.0)
+    assert robot.chain.mass[-1] == pytest.approx(1.0 + 0.25)
 
 
 def test_without_the_package_the_line_that_expands_it_is_told(

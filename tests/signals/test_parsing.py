@@ -10,7 +10,9 @@ from vftcli.signals.parsing import (
     check_known,
     did_you_mean,
     interval,
+    interval_text,
     numbers,
+    toml_tables,
 )
 
 
@@ -26,6 +28,19 @@ def test_intervals(text: str, span: tuple[float, float]) -> None:
 def test_intervals_that_are_none(text: str) -> None:
     with pytest.raises(ParameterError, match="A:B with A < B"):
         interval(text)
+
+
+@pytest.mark.parametrize("text", ["1.5:3", ":3", "2:", ":"])
+def test_a_span_is_said_as_it_is_typed(text: str) -> None:
+    """An open end was "-inf"."""
+    assert interval_text(*interval(text)) == text
+
+
+def test_an_endless_line_of_toml_is_refused_before_it_is_parsed() -> None:
+    """50 000 dots took 15 s; so many letters in lines of their own are fine."""
+    with pytest.raises(ParameterError, match="line 2 has 50001 letters; a line of TOML has at mos"):
+        toml_tables(f"a = 1\n{'.' * 50_000}a")
+    assert len(toml_tables("".join(f"a{k} = 1\n" for k in range(2_000)))) == 2_000
 
 
 def test_numbers_or_none() -> None:

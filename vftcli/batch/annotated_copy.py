@@ -25,6 +25,7 @@ from vftcli.batch.datasets.copying import (
     WORK,
     check_copy,
     copy_others,
+    files_within,
     finished,
     stored_rows,
     unfinished,
@@ -104,7 +105,7 @@ def annotate(
         What ``meta/vftcli.json`` holds.
 
     Raises:
-        LogError: If an episode tells nothing and none may be missing.
+        LogError: If an episode tells nothing and none may be missing, or a link leaves the dataset.
         OutputError: If the copy cannot be written.
         ParameterError: If workers are not to see the folders.
     """
@@ -114,6 +115,8 @@ def annotate(
         )
     dataset = open_dataset(path, choice.read.columns)
     check_copy(path, copy, force=how.force)
+    for _ in files_within(path):
+        pass  # a link that leaves it is refused before anything is computed
     beside = [Path(n) for n in (choice.robot.name, choice.observers.gains_file) if n is not None]
     files_beside = " ".join(digest(file) for file in beside if file.is_file())
     key = hashlib.sha256(f"{path.resolve()} {choice.key(files_beside)}".encode()).hexdigest()

@@ -50,7 +50,9 @@ class WorkersChoice:
                 "--ship and --tls-… are for the workers of a cluster; add --scheduler ADDRESS"
             )
         if not self.in_process and not is_installed():
-            raise ParameterError(f"--workers and --scheduler need Dask: {EXTRA}, or --workers 0")
+            raise ParameterError(
+                f"--workers and --scheduler need Dask and cryptography: {EXTRA}, or --workers 0"
+            )
 
     def _check_address(self, address: str) -> None:
         if not ADDRESS.fullmatch(address):
@@ -92,6 +94,19 @@ class WorkersChoice:
             ship=ship,
         )
 
+    def check_closed(self, *, anyway: bool) -> None:
+        """Refuse a cluster that does not ask who connects to it, unless the user accepts that.
+
+        Raises:
+            ParameterError: If its address is tcp://.
+        """
+        if self.scheduler is not None and self.scheduler.startswith("tcp") and not anyway:
+            raise ParameterError(
+                f"--scheduler {self.scheduler}: anyone who reaches a tcp:// cluster can run code "
+                "as you; use tls:// with --tls-ca, --tls-cert and --tls-key, or --anyway where "
+                "you trust everyone on its network"
+            )
+
     @property
     def in_process(self) -> bool:
         """Whether the work is done here, one piece after the other."""
@@ -101,5 +116,5 @@ class WorkersChoice:
 
 
 def is_installed() -> bool:
-    """Whether Dask's scheduler is there."""
-    return find_spec("distributed") is not None
+    """Whether Dask is there, and what makes the certificates of its workers."""
+    return all(find_spec(module) is not None for module in ("distributed", "cryptography"))

@@ -106,25 +106,30 @@ def connected(
 
 @contextmanager
 def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Client"]:
-    """A cluster of processes on this machine, which nobody else can reach."""
-    from distributed import Client, LocalCluster
+    """A cluster of processes on this machine, behind a certificate of this run.
+
+    Raises:
+        EngineError: If no certificate can be made.
+    """
+    from distributed import Client
+    from distributed.security import Security
     from distributed.system import MEMORY_LIMIT
+
+    from vftcli.batch.nodes import closed_cluster
 
     workers = choice.workers or most_workers()
     memory = choice.memory or int(MEMORY_LIMIT / workers)
+    try:
+        security = Security.temporary()
+    except ImportError as error:
+        raise EngineError(
+            f"workers need a certificate, which cannot be made here ({error}); --workers 0 does "
+            "one log after the other"
+        ) from None
     tell(f"{workers} worker{'s' * (workers > 1)} of {memory / 1e9:.1f} GB")
     with (
-        LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            # Without an address of its own Dask's HTTP server is open to every network.
-            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-            memory_limit=memory,
-            silence_logs=logging.CRITICAL + 1,
-        ) as cluster,
-        Client(cluster) as client,
+        closed_cluster(workers, memory, security, logging.CRITICAL + 1) as cluster,
+        Client(cluster, security=security) as client,
     ):
         yield client
 

@@ -77,8 +77,9 @@ def vftcli(
 def main() -> None:
     """Run the app; turn what a user can mend into one line on stderr and exit code 1."""
     for library in ("OPENBLAS", "OMP", "MKL"):
-        # The matrices here are small: threads of a linear algebra library only wait for each other.
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+        # The matrices here are small: threads of a linear algebra library only wait for each other,
+        # and the order of their sums would move the last digits, whatever the caller has set.
+        os.environ[f"{library}_NUM_THREADS"] = "1"
     gc.set_threshold(200_000)  # a command is short: collecting while it imports is a tenth of it
     try:
         make_app(asked_for())(prog_name="vftcli")
@@ -112,6 +113,7 @@ def launch() -> None:
             if signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, stop)
         open_streams()
+        check_room()
         main()
         code: object = 0
     except SystemExit as end:
@@ -125,6 +127,23 @@ def launch() -> None:
         with suppress(OSError, ValueError, AttributeError):
             stream.flush()
     os._exit(code if isinstance(code, int) else int(code is not None))
+
+
+ROOM = 3e9
+"""Address space that the libraries reserve, whatever the log: `identify` ends with 2.1e9. [B]"""
+
+
+def check_room() -> None:
+    """Refuse a limit on memory within which libraries end this process with words of their own."""
+    with suppress(ImportError):  # Windows has no such limit
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit != resource.RLIM_INFINITY and limit < ROOM:
+            fail(
+                f"the memory limit of {limit / 1e9:.1f} GB (ulimit -v) is less than the "
+                f"{ROOM / 1e9:.0f} GB that the libraries reserve; raise it"
+            )
 
 
 class Stopped(BaseException):

@@ -81,13 +81,15 @@ def annotate_dataset(
         contact=columns.contact,
         anyway=anyway.anyway,
     )
+    engine = workers.choice()
+    engine.check_closed(anyway=anyway.anyway)
     how = CopyChoice(allow_missing=columns.allow_missing, link=not columns.copy, force=force)
     record = annotate(
         dataset,
         output,
         asked,
         how,
-        workers.choice(),
+        engine,
         command=command_line(),
         tell=detail,
         progress=stages(),

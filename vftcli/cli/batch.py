@@ -47,7 +47,7 @@ class WorkerOptions(ChoiceBundle["WorkersChoice"]):
     scheduler: str | None = option(
         "--scheduler",
         "ADDRESS",
-        "A Dask cluster that stands. As tcp://host:8786 or tls://host:8786.",
+        "A running Dask cluster. As tls://host:8786; tcp://, open to everyone, needs --anyway.",
     )
     ship: bool = flag(
         "--ship",
@@ -130,6 +130,7 @@ def batch(
     choice = replace(choice, library=Library(), examiner=Examiner(), progress=no_stage)
     job = LogJob(do=do, choice=choice, anyway=analysis.anyway.anyway, written=also.choice())
     engine = workers.choice()
+    engine.check_closed(anyway=analysis.anyway.anyway)
     collection = LogCollection(choice.read, output)
     found = list(collection.find(logs))[: resume.limit]
     say_passed([path.name for path in collection.passed])

@@ -5,11 +5,8 @@ what must be escaped: names and words come from files, and may hold any letter. 
 whose values are not rounded, are written by `csv_rows` and `json_rows`.
 """
 
-import csv
-import io
-import json
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from typing import Any, NamedTuple
@@ -370,25 +367,3 @@ def escape_latex(text: str) -> str:
     # A blank behind the sign of a bound is a thin one: "< 6" is one number.
     text = "".join(LATEX_LETTERS.get(letter, letter) for letter in text)
     return text.replace("$<$ ", r"$<$\,")
-
-
-def json_rows(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Rows as a JSON array of objects; what is not known is null."""
-    known = [{k: known_or_none(v) for k, v in row.items()} for row in rows]
-    return json.dumps(known, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def csv_rows(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:
-    """Rows as CSV under a line of keys; what is not known is empty, truth in small letters."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(keys)
-    for row in rows:
-        values = (known_or_none(row[key]) for key in keys)
-        writer.writerow(str(v).lower() if isinstance(v, bool) else v for v in values)
-    return text.getvalue()
-
-
-def known_or_none(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
-    """A value, None for a number that is not finite."""
-    return None if isinstance(value, float) and not np.isfinite(value) else value

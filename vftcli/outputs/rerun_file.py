@@ -5,7 +5,6 @@ first sample; words are Markdown documents.
 """
 
 import hashlib
-import os
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,18 +15,14 @@ from uuid import UUID
 import numpy as np
 
 from vftcli.outputs.arm import ArmPoses
-from vftcli.outputs.files import one_line
+from vftcli.outputs.files import unwritable
 from vftcli.outputs.palette import rgb
 from vftcli.outputs.plots import Lines, LogLine, Tab
 from vftcli.signals.arrays import Array
-from vftcli.signals.errors import OutputError
 from vftcli.signals.packages import check_installed
 
 CONTACTS = "/contacts"
 """Below it stand the contacts: `/contacts/1` is that of number 1."""
-
-FOOTER, TRAILER = b"RRF2FOOT", 64
-"""A whole recording has this mark in its last bytes."""
 
 Stream = Any
 
@@ -86,7 +81,7 @@ def rerun_file(
         marked: The span that the time panel marks, None if there is none. [s]
 
     Raises:
-        OutputError: If the file is not whole in the end.
+        OutputError: If the file cannot be written.
         PackageError: If Rerun is not installed.
     """
     check_installed("rerun", path.name)
@@ -99,7 +94,10 @@ def rerun_file(
     stream = rr.RecordingStream(
         "vftcli", recording_id=identity, send_properties=False, batcher_config=untimed
     )
-    stream.save(str(path), default_blueprint=blueprint(tabs, list(words), view, marked))
+    # Into memory: Rerun writes a file in a thread, which on a full disk stops and is waited for.
+    made = stream.memory_recording()
+    shown = blueprint(tabs, list(words), view, marked)
+    stream.send_blueprint(shown, make_active=False, make_default=True)
     stream.send_recording_name(drawable(title))
     for tab in tabs:
         for lines in tab.plots:
@@ -111,7 +109,10 @@ def rerun_file(
     if view is not None:
         stream.log("/robot", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     yield stream
-    finish(stream, path)
+    try:
+        path.write_bytes(made.drain_as_bytes())
+    except OSError as error:
+        raise unwritable(Path(path.name), error) from None
 
 
 def recording_id(title: str, tabs: Sequence[Tab], words: Mapping[str, str]) -> UUID:
@@ -125,24 +126,6 @@ def recording_id(title: str, tabs: Sequence[Tab], words: Mapping[str, str]) -> U
             found.update("\0".join([lines.path, *(line.name for line in lines.lines)]).encode())
             found.update(lines.values.tobytes())
     return UUID(bytes=found.digest()[:16])
-
-
-def finish(stream: Stream, path: Path) -> None:
-    """Write what is still in memory, and the footer.
-
-    Raises:
-        OutputError: If the file is not whole: Rerun writes in a thread of its own.
-    """
-    try:
-        stream.flush()
-        stream.disconnect()
-    except RuntimeError as error:
-        raise OutputError(f"{path.name} cannot be written: {one_line(error)}") from None
-    with path.open("rb") as file:
-        file.seek(-min(TRAILER, path.stat().st_size), os.SEEK_END)
-        # Rerun writes in a thread, whose error on a full disk reaches nobody.
-        if FOOTER not in file.read():
-            raise OutputError(f"{path.name} cannot be written whole: is the disk full?")
 
 
 def blueprint(

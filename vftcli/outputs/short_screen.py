@@ -64,8 +64,8 @@ def written_lines(
     there = [name for name in names if (folder / name).exists()]
     there += ["one folder a log"] * several
     lines = canvas.wrapped(printable(f"{folder}/  {'  '.join(there)}"), 2)
-    page = folder / "index.html"
-    if open_with or page.exists():
-        what = f"{open_with} {folder}" if open_with else str(page)
+    # A page that this run did not write is another run's.
+    if open_with or "index.html" in there:
+        what = f"{open_with} {folder}" if open_with else str(folder / "index.html")
         lines.append(f"Open: {printable(what)}        More here: --details")
     return lines

@@ -12,6 +12,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.readers.table import JACOBIAN, Cell, JacobianError, Pick, Picks
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ClockError, LogError
+from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import Remark
 
 UNIT = 1e-3
@@ -74,7 +75,7 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
     start, stop = choice.interval or (-np.inf, np.inf)
     inside = (t >= start) & (t <= stop)
     if np.count_nonzero(inside) < 2:
-        raise ClockError(f"{path}: fewer than two samples between {start:g} and {stop:g} s")
+        raise ClockError(f"{path}: fewer than two samples in {interval_text(start, stop)} [s]")
     jacobian = velocity_first(raw.signals["jacobian"].reshape(-1, 6, n), path)
     wrench = raw.signals.get("wrench")
     return JacobianLog(

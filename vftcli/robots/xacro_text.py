@@ -1,14 +1,17 @@
 """Xacro, a program that writes a URDF: expanded by the package xacro, which needs no ROS.
 
 Packages that a xacro names with $(find NAME) are looked for beside the file and above it, by their
-`package.xml`.
+`package.xml`. A process of its own expands it, since a program need not end.
 """
 
-import io
+import json
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import redirect_stderr, redirect_stdout, suppress
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as ET
 
 from vftcli.robots.robot_file import robot_text
@@ -32,6 +35,15 @@ FORM = "NAME=VALUE"
 ABOVE = 5
 """Folders above the file in which packages are looked for."""
 
+SECONDS = 10
+"""Time of a processor in which a xacro must be expanded; large ones take below one. [s]"""
+
+WAITED = 6
+"""How many times as long it may take where others keep the processors busy."""
+
+MEMORY = 1 << 30
+"""Memory in which it must be expanded; large ones take a tenth. [B]"""
+
 
 def has_macros(root: ET.Element) -> bool:
     """Whether a description still has to be expanded."""
@@ -52,16 +64,11 @@ def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
     given = dict(assignment(word, "--robot-arg", FORM) for word in arguments)
     line = " ".join(["xacro", path.name, *(f"{k}:={v}" for k, v in given.items())])
     otherwise = f"; or give the URDF that it writes: {line} > {path.name.split('.')[0]}.urdf"
-    xacro = needed("xacro", f"{path}: a xacro", otherwise, RobotError)
-    packages = needed("xacrodoc.packages", f"{path}: a xacro", otherwise, RobotError)
-    packages.update_package_cache(dict(packages_near(path)))
-    text, why = "", ""
-    try:
-        with redirect_stderr(io.StringIO()), redirect_stdout(io.StringIO()):
-            text = str(xacro.process_file(str(path), mappings=dict(given)).toxml())
-    except Exception as error:  # noqa: BLE001 - a xacro is a program: it may raise anything
-        why = " ".join(f"{type(error).__name__}: {error}".split())[:400]
-    sources = [robot_text(Path(file)) for file in (path, *dict.fromkeys(xacro.all_includes))]
+    for module in ("xacro", "xacrodoc"):
+        needed(module, f"{path}: a xacro", otherwise, RobotError)
+    made = expanded(path, given)
+    why: str = made["why"]
+    sources = [robot_text(Path(file)) for file in (path, *made["files"])]
     declared = {name: "" for source in sources for name in DECLARED.findall(source)}
     used = {name: "" for source in sources for name in USED.findall(source)}
     takes = f"it takes {', '.join({**used, **declared}) or 'none'}"
@@ -77,7 +84,41 @@ def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
         )
     if why:
         raise RobotError(f"{path}: the xacro cannot be expanded: {why}; as --robot-arg {takes}")
+    text: str = made["text"]
     return text
+
+
+def expanded(path: Path, arguments: Mapping[str, str]) -> dict[str, Any]:
+    """What `vftcli.robots.xacro_child` makes of a xacro, within its limits.
+
+    Raises:
+        RobotError: If it does not end within them.
+    """
+    asked = {
+        "path": str(path),
+        "arguments": arguments,
+        "packages": dict(packages_near(path)),
+        "seconds": SECONDS,
+        "memory": MEMORY,
+    }
+    # By its path and without the current folder, in which anything may be called xacro.
+    command = [sys.executable, "-P", str(Path(__file__).with_name("xacro_child.py"))]
+    try:
+        ended = subprocess.run(
+            command,
+            input=json.dumps(asked),
+            capture_output=True,
+            encoding="utf-8",
+            timeout=WAITED * SECONDS,
+            check=True,
+        )
+    except (subprocess.CalledProcessError, subprocess.TimeoutExpired):
+        raise RobotError(
+            f"{path}: the xacro cannot be expanded within {SECONDS} s of a processor and "
+            f"{MEMORY / 2**30:.0f} GiB of memory; give the URDF that it writes"
+        ) from None
+    made: dict[str, Any] = json.loads(ended.stdout)
+    return made
 
 
 def packages_near(path: Path) -> Iterator[tuple[str, str]]:

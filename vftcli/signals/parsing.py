@@ -50,6 +50,11 @@ def interval(text: str) -> tuple[float, float]:
     return start, stop
 
 
+def interval_text(start: float, stop: float) -> str:
+    """The ``A:B`` that `interval` reads as these times, an infinite end left out. [s]"""
+    return ":".join("" if abs(end) == float("inf") else f"{end:g}" for end in (start, stop))
+
+
 def numbers(text: str) -> tuple[float, ...] | None:
     """The numbers of ``A,B,C``, None where a part is no number: the caller says what was due."""
     try:
@@ -95,12 +100,22 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
+LONGEST = 10_000
+"""Letters of a line of TOML; 50 000 dots in one take Python's parser 15 s."""
+
+
 def toml_tables(text: str) -> dict[str, Any]:
     """The tables of a TOML text.
 
     Raises:
-        ParameterError: If it is none.
+        ParameterError: If it is none, or a line is too long.
     """
+    for number, line in enumerate(text.split("\n"), start=1):
+        if len(line) > LONGEST:
+            raise ParameterError(
+                f"line {number} has {len(line)} letters; a line of TOML has at most {LONGEST}: "
+                "break it up"
+            )
     try:
         return tomllib.loads(text)
     except RecursionError:

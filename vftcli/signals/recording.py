@@ -9,6 +9,7 @@ import numpy as np
 from vftcli.signals.arrays import Array, check_clock, check_series, check_shape, handed_over, seal
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
 from vftcli.signals.names import COLUMN_NAMES, EFFORTS, JOINT_SIGNALS, MEANINGS
+from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import fact
 from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown, frame_of, per_joint
@@ -314,7 +315,7 @@ class Recording(Shown):
         keep = (self.t >= start) & (self.t <= stop)
         if np.count_nonzero(keep) < 2:
             raise ClockError(
-                f"{self.name}: fewer than two samples between {start:g} and {stop:g} s; "
+                f"{self.name}: fewer than two samples in {interval_text(start, stop)}; "
                 f"the log runs from {self.t[0]:g} to {self.t[-1]:g} s"
             )
         kept = {name: getattr(self, name)[keep] for name in ("t", *self.signals)}

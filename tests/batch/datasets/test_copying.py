@@ -9,12 +9,13 @@ from vftcli.batch.datasets.copying import (
     WORK,
     check_copy,
     copy_others,
+    files_within,
     partial_of,
     put_rows,
     stored_rows,
     unfinished,
 )
-from vftcli.signals.errors import OutputError
+from vftcli.signals.errors import LogError, OutputError
 
 
 @pytest.fixture
@@ -123,3 +124,34 @@ def test_rows_are_whole_or_not_there(tmp_path: Path) -> None:
     held = stored_rows(tmp_path / "rows.npz")
     assert (str(held["told"]), held["a"].tolist()) == ("{}", [1.0, 1.0])
     assert [path.name for path in tmp_path.iterdir()] == ["rows.npz"]
+
+
+@pytest.mark.parametrize("folder", [False, True])
+def test_a_link_that_leaves_the_dataset_is_refused(dataset: Path, folder: bool) -> None:
+    """Its file became one of the copy, which may be published."""
+    secret = dataset.parent / "private" / "secret.txt"
+    secret.parent.mkdir()
+    secret.write_text("mine")
+    (dataset / "leak").symlink_to(secret.parent if folder else secret)
+    with pytest.raises(LogError, match=r"leak.* is a link to .*secret\.txt, outside of the data"):
+        copy_others(dataset, dataset.parent / "copy", set(), link=True)
+    assert not list((dataset.parent / "copy").rglob("*leak*"))
+
+
+def test_links_within_a_dataset_and_into_a_hub_s_store_are_followed(tmp_path: Path) -> None:
+    """The layout of Hugging Face's cache: snapshots/REVISION/… → ../../blobs/HASH."""
+    snapshot = tmp_path / "datasets--me--arm" / "snapshots" / "abc"
+    blobs = snapshot.parents[1] / "blobs"
+    for made in (snapshot / "meta", blobs):
+        made.mkdir(parents=True)
+    (blobs / "0a1b").write_text("info")
+    (snapshot / "meta" / "info.json").symlink_to("../../../blobs/0a1b")
+    (snapshot / "same.json").symlink_to("meta/info.json")
+    copy_others(snapshot, tmp_path / "copy", set(), link=True)
+    for name in ("meta/info.json", "same.json"):
+        path = tmp_path / "copy" / name
+        assert (path.read_text(), path.is_symlink()) == ("info", False)
+    (snapshot / "leak").symlink_to("../../refs")
+    (snapshot.parents[1] / "refs").write_text("main")
+    with pytest.raises(LogError, match="leak is a link to"):
+        list(files_within(snapshot))

@@ -40,6 +40,15 @@ def test_what_the_log_does_not_determine_is_said(found):
     assert all(line.endswith("  (not determined)") for line in lines[1:])
 
 
+def test_what_is_no_number_is_a_dash(found):
+    """A profile without a term read "nan", a spread that nothing bounds "inf"."""
+    result, _ = found
+    unknown = result.parameters.with_columns(profile=pl.lit(float("nan")), sd=pl.lit(float("inf")))
+    lines = terminal(parameter_grid(replace(result, parameters=unknown))).splitlines()[1:]
+    assert all(line.count(" –") == 2 for line in lines)
+    assert not any(word in line for line in lines for word in ("nan", "inf"))
+
+
 def test_the_chosen_friction_is_marked():
     choices = pl.DataFrame(
         {

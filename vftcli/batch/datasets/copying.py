@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vftcli.outputs.files import unwritable
 from vftcli.outputs.partial import check_writable, held
-from vftcli.signals.errors import OutputError
+from vftcli.signals.errors import LogError, OutputError
 
 RECORD = Path("meta", "vftcli.json")
 """What a copy tells of how it was made."""
@@ -152,18 +152,39 @@ def copy_others(folder: Path, partial: Path, done: Collection[Path], *, link: bo
         partial: The copy's.
         done: Files that are there already, or will be, by their paths in the folder.
         link: Whether a film may be a second name of the dataset's file.
+
+    Raises:
+        LogError: If a link leaves the dataset.
     """
-    for place, _, names in os.walk(folder, followlinks=True):
-        inside = Path(place).relative_to(folder)
-        for name in sorted(names):
-            if inside / name in done:
+    for inside, source in files_within(folder):
+        if inside in done:
+            continue
+        target = partial / inside
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.unlink(missing_ok=True)
+        if link and target.suffix.lower() in FILMS:
+            with suppress(OSError):  # another file system, or one without links
+                os.link(source, target)
                 continue
-            target = partial / inside / name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.unlink(missing_ok=True)
-            source = (Path(place) / name).resolve()
-            if link and target.suffix.lower() in FILMS:
-                with suppress(OSError):  # another file system, or one without links
-                    os.link(source, target)
-                    continue
-            shutil.copyfile(source, target)
+        shutil.copyfile(source, target)
+
+
+def files_within(folder: Path) -> Iterator[tuple[Path, Path]]:
+    """Every file of a dataset by its path in the folder, and where it really is.
+
+    Raises:
+        LogError: If a link leaves the dataset: a copy, which may be published, would hold its file.
+    """
+    top = folder.resolve()
+    # A hub's cache keeps the files of all snapshots once, beside these.
+    tops = (top, top.parents[1] / "blobs") if top.parent.name == "snapshots" else (top,)
+    for place, _, names in os.walk(folder, followlinks=True):
+        for name in sorted(names):
+            path = Path(place, name)
+            source = path.resolve()
+            if not any(source.is_relative_to(one) for one in tops):
+                raise LogError(
+                    f"{path} is a link to {source}, outside of the dataset; put the file itself "
+                    "there, or remove the link"
+                )
+            yield path.relative_to(folder), source

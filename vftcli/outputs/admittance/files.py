@@ -19,8 +19,8 @@ from vftcli.outputs.admittance.tables import comparison_csv, latency_rows
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.figures.paper import figure_files, write_figures
 from vftcli.outputs.files import OutputFolder, table_file
-from vftcli.outputs.grid import json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
+from vftcli.outputs.plain_rows import json_rows
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.packages import installed
 from vftcli.signals.recording import Recording

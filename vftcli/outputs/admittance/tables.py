@@ -10,7 +10,8 @@ from vftcli.admittance.closed_loop import ClosedLoop
 from vftcli.admittance.latency import latencies
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.grid import Column, Grid, csv_rows, latex, terminal
+from vftcli.outputs.grid import Column, Grid, latex, terminal
+from vftcli.outputs.plain_rows import csv_rows
 from vftcli.signals.arrays import Array
 
 

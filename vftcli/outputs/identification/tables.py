@@ -1,9 +1,11 @@
 """Tables of an identification: residuals of every log, identified numbers."""
 
+from math import isfinite
+
 import polars as pl
 
 from vftcli.identification.result import Identification
-from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, signed, terminal
+from vftcli.outputs.grid import DASH, Column, Entry, Grid, joint_columns, signed, terminal
 
 
 def tables_text(found: Identification) -> str:
@@ -39,8 +41,11 @@ def parameter_grid(found: Identification) -> Grid:
     rows = []
     for row in found.parameters.iter_rows(named=True):
         unit = row["unit"] + ("" if row["determined"] else "  (not determined)")
-        # What the profile does not have is "nan" here, so that it is not taken for a zero.
-        texts = [f"{row[k]:{f}}" for k, f in (("value", ".5g"), ("sd", ".2g"), ("profile", ".5g"))]
+        # A dash for what the profile does not have, or the log does not determine: it is no zero.
+        texts = [
+            f"{row[key]:{form}}" if isfinite(row[key]) else DASH
+            for key, form in (("value", ".5g"), ("sd", ".2g"), ("profile", ".5g"))
+        ]
         rows.append((row["parameter"], row["joint"], *texts, unit))
     return Grid(
         columns=(

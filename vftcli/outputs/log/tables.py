@@ -10,10 +10,8 @@ from vftcli.evaluation.pooling import POOLED
 from vftcli.outputs.grid import (
     Column,
     Grid,
-    csv_rows,
     escape_markdown,
     joint_columns,
-    json_rows,
     latex,
     markdown,
     significant,
@@ -29,6 +27,7 @@ from vftcli.outputs.log.rmse_tables import (
     rmse_grid,
 )
 from vftcli.outputs.log.wrench_tables import PaperBounds, axis_grids, contact_grids
+from vftcli.outputs.plain_rows import csv_rows, json_rows
 from vftcli.signals.letters import printable
 
 if TYPE_CHECKING:

@@ -1,0 +1,51 @@
+"""Nodes of a cluster of this machine: Dask's own, without the HTTP server that each would have."""
+
+from typing import Any
+
+import distributed
+
+
+class Scheduler(distributed.Scheduler):  # type: ignore[misc, unused-ignore]
+    """Dask's scheduler, which listens for those with the run's certificate and nobody else."""
+
+    def start_http_server(self, *_routes: object, **_where: object) -> None:
+        """Start none: it answers whoever asks."""
+
+
+class Worker(distributed.Worker):  # type: ignore[misc, unused-ignore]
+    """Dask's worker, which listens for those with the run's certificate and nobody else."""
+
+    def start_http_server(self, *_routes: object, **_where: object) -> None:
+        """Start none: it answers whoever asks."""
+
+
+def closed_cluster(workers: int, memory: int, security: Any, silence: int) -> Any:  # noqa: ANN401
+    """A cluster of processes on this machine that only holders of its certificate reach.
+
+    Args:
+        workers: How many processes, of one thread each.
+        memory: What each may take before it is ended. [B]
+        security: The run's certificate and its key.
+        silence: Level of Python's logging below which Dask says nothing.
+    """
+    where = {"host": "127.0.0.1", "protocol": "tls://", "security": security}
+    worker = {
+        "cls": distributed.Nanny,
+        "options": {
+            **where,
+            "nthreads": 1,
+            "memory_limit": memory,
+            "worker_class": Worker,
+            "silence_logs": silence,
+        },
+    }
+    return distributed.SpecCluster(
+        workers=dict.fromkeys(range(workers), worker),
+        scheduler={
+            "cls": Scheduler,
+            "options": {**where, "port": 0, "dashboard": False},
+        },
+        worker=worker,
+        security=security,
+        silence_logs=silence,
+    )

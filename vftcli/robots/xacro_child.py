@@ -1,0 +1,85 @@
+"""What a process of its own does to expand a xacro: it ends when its time or its memory is used up.
+
+Run by its path with what is asked on standard input, as JSON; nothing of vftcli is loaded here.
+"""
+
+import io
+import json
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import redirect_stderr, redirect_stdout, suppress
+from pathlib import Path
+from typing import Any
+
+
+def limit(seconds: int, memory: int) -> None:
+    """Have the system end this process after so much of a processor's time [s] or memory [B]."""
+    with suppress(ImportError):  # Windows has no such limits
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+
+
+def refuse_variable(name: str) -> str:
+    """Refuse a variable of the user's environment.
+
+    Raises:
+        PermissionError: Always.
+    """
+    raise PermissionError(
+        f"it reads the environment variable {name}, which may hold anything; write its value there"
+    )
+
+
+def default_of(_name: str, default: str = "") -> str:
+    """The default of a variable, whatever the user's environment holds."""
+    return default
+
+
+def guarded(load: Callable[[str], Any], xacro: Any, folders: list[Path]) -> Callable[[str], Any]:  # noqa: ANN401
+    """A `load_yaml` that reads below these folders only."""
+
+    def load_yaml(filename: str) -> Any:  # noqa: ANN401
+        place = Path(xacro.abs_filename_spec(filename)).resolve()
+        if not any(place.is_relative_to(folder) for folder in folders):
+            raise PermissionError(
+                f"it loads {filename}, which is outside of its folder and of the packages around "
+                "it; copy that file beside it"
+            )
+        return load(filename)
+
+    return load_yaml
+
+
+def expand(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Text of the URDF, the files that were read, and why it failed, "" where it did not."""
+    import xacro
+    from xacro import substitution_args
+    from xacrodoc import packages
+
+    packages.update_package_cache(asked["packages"])
+    folders = [Path(asked["path"]).resolve().parent, *map(Path, asked["packages"].values())]
+    xacro.load_yaml = guarded(xacro.load_yaml, xacro, [folder.resolve() for folder in folders])
+    xacro._global_symbols = xacro.create_global_symbols()
+    substitution_args._eval_env, substitution_args._eval_optenv = refuse_variable, default_of
+    text = why = ""
+    try:
+        document = xacro.process_file(asked["path"], mappings=dict(asked["arguments"]))
+        text = document.toxml()
+    except Exception as error:  # noqa: BLE001 - a xacro is a program: it may raise anything
+        why = " ".join(f"{type(error).__name__}: {error}".split())[:400]
+    return {"text": text, "why": why, "files": list(dict.fromkeys(xacro.all_includes))}
+
+
+def main() -> None:
+    """Expand what standard input asks for, and write the outcome to standard output."""
+    asked = json.load(sys.stdin)
+    limit(asked["seconds"], asked["memory"])
+    with redirect_stderr(io.StringIO()), redirect_stdout(io.StringIO()):
+        made = expand(asked)
+    json.dump(made, sys.stdout)
+
+
+if __name__ == "__main__":
+    main()
