@@ -136,7 +136,7 @@ def test_states_as_json_lines(tmp_path: Path) -> None:
     path = libfranka_json(tmp_path / "x")
     recording = read(path)
     np.testing.assert_array_equal(recording.q, motion(7)["q"])
-    assert recording.wrench_frame == WrenchFrame("base", "stiffness", "by-robot")
+    assert recording.wrench_frame == WrenchFrame("base", "base", "by-robot")
     lines = path.read_text().splitlines()
     lines[50] = lines[50].replace('"q": [', '"q": [nan, ', 1)
     path.write_text("\n".join(lines))

@@ -23,18 +23,18 @@ UNSTATED = WrenchFrame("sensor", "sensor")
 
 
 class Placement(NamedTuple):
-    """Where a log's wrench is measured, in the flange frame.
+    """Where a log's wrench is measured.
 
     Attributes:
         frame: Its axes, point and sign.
         axes: Orientation of its axes in the flange frame, None for the base's axes. (3, 3)
-        point: The point of its moment. (3,) [m]
+        point: The point of its moment in the flange frame, None for the base's origin. (3,) [m]
         remarks: What had to be assumed.
     """
 
     frame: WrenchFrame
     axes: Array | None
-    point: Array
+    point: Array | None
     remarks: tuple[Remark, ...]
 
 
@@ -50,20 +50,20 @@ def placement(frame: WrenchFrame | None, mounting: Mounting) -> Placement:
     """
     remarks = [caution("wrench-frame-unstated")] if frame is None else []
     frame = frame or UNSTATED
-    # The stiffness frame of libfranka is the tool's unless the user moved it, which no log tells.
     tool, sensor = mounting.tool or IDENTITY, mounting.sensor or IDENTITY
-    poses = {"flange": IDENTITY, "tool": tool, "stiffness": tool, "sensor": sensor}
-    if frame.axes not in FRAMES or frame.point not in poses:
+    poses = {"flange": IDENTITY, "tool": tool, "sensor": sensor}
+    if frame.axes not in FRAMES or frame.point not in {*poses, "base"}:
         raise ParameterError(
             f"the log's wrench is in {frame}, which is no frame known here; there is "
             f"{', '.join(FRAMES)}, as in --columns wrench[base]=…"
         )
     if mounting.sensor is None and "sensor" in (frame.axes, frame.point):
         remarks.append(caution("sensor-pose-unstated"))
-    if mounting.tool is None and {"tool", "stiffness"} & {frame.axes, frame.point}:
+    if mounting.tool is None and "tool" in (frame.axes, frame.point):
         remarks.append(caution("tool-pose-unstated", frame=str(frame)))
     axes = None if frame.axes == "base" else np.asarray(poses[frame.axes].rotation)
-    return Placement(frame, axes, np.asarray(poses[frame.point].translation), tuple(remarks))
+    point = None if frame.point == "base" else np.asarray(poses[frame.point].translation)
+    return Placement(frame, axes, point, tuple(remarks))
 
 
 def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wrench:
@@ -79,13 +79,15 @@ def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wre
             f"{recording.name}: the log's wrench is zero in every sample, so it measures nothing"
         )
     where = placement(recording.wrench_frame, mounting)
-    flange = link_poses(chain, recording.q).rotation[:, -1]
+    poses = link_poses(chain, recording.q)
+    flange = poses.rotation[:, -1]
     force, moment = where.frame.factor * values[:, :3], where.frame.factor * values[:, 3:]
     if where.axes is not None:
         turn = flange @ where.axes
         force, moment = (np.einsum("tij,tj->ti", turn, part) for part in (force, moment))
     # The force acts at the point, so about the flange it has the moment of its lever besides.
-    moment = moment + np.cross(flange @ where.point, force)
+    lever = -poses.translation[:, -1] if where.point is None else flange @ where.point
+    moment = moment + np.cross(lever, force)
     return Wrench(
         name="log",
         t=recording.t,
