@@ -54,8 +54,8 @@ def in_base(frame: WrenchFrame | None, mounting: Mounting = MOUNTED) -> np.ndarr
 )
 def test_axes_and_point_of_the_flange_are_pinocchios_action(frame, pose) -> None:
     there = pin.SE3(pose.rotation, pose.translation)
-    for found, R, read in zip(in_base(frame), FLANGE, READ, strict=True):
-        expected = (pin.SE3(R, np.zeros(3)) * there).act(pin.Force(read[:3], read[3:])).vector
+    for found, R, given in zip(in_base(frame), FLANGE, READ, strict=True):
+        expected = (pin.SE3(R, np.zeros(3)) * there).act(pin.Force(given[:3], given[3:])).vector
         np.testing.assert_allclose(found, expected, atol=ROUNDING)
 
 
@@ -78,8 +78,8 @@ def test_a_moment_about_the_bases_origin_is_pinocchios_action() -> None:
     """What libfranka's O_F_ext_hat_K is: the base's placement moves it to the flange's point."""
     origins = link_poses(UR5.chain, Q).translation[:, -1]
     found = in_base(WrenchFrame("base", "base"), Mounting())
-    for mine, p, read in zip(found, origins, READ, strict=True):
-        expected = pin.SE3(np.eye(3), -p).act(pin.Force(read[:3], read[3:])).vector
+    for mine, p, given in zip(found, origins, READ, strict=True):
+        expected = pin.SE3(np.eye(3), -p).act(pin.Force(given[:3], given[3:])).vector
         np.testing.assert_allclose(mine, expected, atol=ROUNDING)
 
 

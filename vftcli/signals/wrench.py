@@ -22,6 +22,7 @@ POINTS = {
     "flange": "the flange point",
     "tool": "the tool's point",
     "base": "the base's origin",
+    "controller": "the flange point or the tool's, by which sensor the controller has",
     "sensor": "the sensor's origin",
 }
 """Point that a moment refers to → its words; a log may name another, as a link of its own."""

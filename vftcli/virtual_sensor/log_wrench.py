@@ -4,6 +4,7 @@ A log may state its wrench's axes, the point of its moment and its sign (`Wrench
 leaves open is assumed, and the assumption is a remark.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from vftcli.signals.pose import IDENTITY
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.wrench import Wrench, WrenchFrame
+from vftcli.virtual_sensor.controller_point import controller_point
 from vftcli.virtual_sensor.frames import FRAMES, Mounting
 
 UNSTATED = WrenchFrame("sensor", "sensor")
@@ -78,7 +80,12 @@ def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wre
         raise MissingSignalError(
             f"{recording.name}: the log's wrench is zero in every sample, so it measures nothing"
         )
-    where = placement(recording.wrench_frame, mounting)
+    frame, why = recording.wrench_frame, tuple[Remark, ...]()
+    if frame is not None and frame.point == "controller":
+        tool = None if mounting.tool is None else np.asarray(mounting.tool.translation)
+        point, why = controller_point(recording, chain, tool)
+        frame = replace(frame, point=point)
+    where = placement(frame, mounting)
     poses = link_poses(chain, recording.q)
     flange = poses.rotation[:, -1]
     force, moment = where.frame.factor * values[:, :3], where.frame.factor * values[:, 3:]
@@ -93,7 +100,7 @@ def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wre
         t=recording.t,
         values=np.concatenate([force, moment], axis=1),
         frame="base",
-        remarks=where.remarks,
+        remarks=(*why, *where.remarks),
     )
 
 
