@@ -15,7 +15,6 @@ from vftcli.outputs.log.rmse_tables import (
     blocks,
     detail_grids,
     marks_on_page,
-    mean_of,
     rmse_grid,
 )
 from vftcli.outputs.log.run_record import observer_record
@@ -38,9 +37,11 @@ def errors_section(analysis: Analysis) -> str:
         )
         return section(title, soft(words), "none given", name="errors")
     best = found[0]
-    means = [mean_of(row) for row in best.rmse]
-    k = min(range(len(means)), key=lambda i: (means[i] != means[i], means[i]))
-    state = f"{significant(means[k])} N·m ({best.observers[k]}) against {best.reference}"
+    lead = best.means.least
+    state = "no sample in common with the estimates"
+    if lead is not None:
+        state = f"{significant(lead[1])} N·m ({lead[0]}) against {best.reference}"
+        state += best.means.left_out
     parts = [
         *(html(rmse_grid(block)) for block in found),
         soft(marks_on_page(found)),
