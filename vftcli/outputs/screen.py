@@ -6,7 +6,6 @@ against a reference, and what was written: forty lines at most, whatever the num
 
 from collections.abc import Iterator, Mapping, Sequence
 
-
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
 from vftcli.outputs.believability import (
