@@ -75,11 +75,21 @@ def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wre
         MissingSignalError: If the log has none, or one that is zero throughout.
         ParameterError: If its frame is not one that is known here.
     """
-    values = recording.require("wrench")
-    if not np.any(values):
+    if not np.any(recording.require("wrench")):
         raise MissingSignalError(
             f"{recording.name}: the log's wrench is zero in every sample, so it measures nothing"
         )
+    return in_base_axes(recording, chain, mounting)
+
+
+def in_base_axes(recording: Recording, chain: Chain, mounting: Mounting) -> Wrench:
+    """A recording's wrench as force on the robot, in base axes about the flange point.
+
+    Raises:
+        MissingSignalError: If it has none.
+        ParameterError: If its frame is not one that is known here.
+    """
+    values = recording.require("wrench")
     frame, why = recording.wrench_frame, tuple[Remark, ...]()
     if frame is not None and frame.point == "controller":
         tool = None if mounting.tool is None else np.asarray(mounting.tool.translation)

@@ -43,6 +43,12 @@ def test_bold_is_only_where_the_reference_can_tell() -> None:
     assert not block.best.any()
 
 
+def test_an_observer_that_fails_is_named_with_the_share() -> None:
+    (block,) = blocks(errors({"missing": 0.12}, {"missing": 0.03}))
+    assert "fdo: no answer in up to 12 %" in marks_in_words([block])
+    assert "no answer" not in marks_in_words(blocks(errors()))
+
+
 def test_every_output_has_one_mean_and_says_what_it_leaves_out() -> None:
     """J2's reference is not to be trusted: terminal, Markdown, LaTeX and page show J1's error."""
     rests = {"reference_trusted": False}

@@ -32,6 +32,7 @@ class Block(NamedTuple):
         floor: The reference's own error, NaN where it is not known. (joints,) [N·m]
         samples: Fewest and most samples an entry is made of.
         means: What the joints are in one number.
+        missing: Observer → largest share of a joint's samples without its answer, where there is.
         untrusted: Joints whose reference is not to be trusted, because they rest.
     """
 
@@ -43,6 +44,7 @@ class Block(NamedTuple):
     floor: Array
     samples: tuple[int, int]
     means: JointMeans
+    missing: dict[str, float]
     untrusted: tuple[int, ...] = ()
 
     @property
@@ -124,6 +126,13 @@ def block(rows: pl.DataFrame) -> Block:
         floor=floor,
         samples=(int(min(counts)), int(max(counts))),
         means=joint_means(rows),
+        missing={
+            str(name): float(share)
+            for name, share in rows.group_by("observer", maintain_order=True)
+            .agg(pl.col("missing").max())
+            .iter_rows()
+            if share
+        },
         untrusted=tuple(int(j) for j in doubtful),
     )
 
@@ -205,8 +214,13 @@ def marks_in_words(found: Sequence[Block]) -> str:
     if any(table.untrusted for table in found):
         lines.append(f"{DAGGER}: {RESTS}")
     lines += dict.fromkeys(f"mean:{t.means.left_out}" for t in found if t.means.without)
+    lines += dict.fromkeys(
+        f"{name}: no answer in up to {100.0 * share:.2g} % of a joint's samples, each counted as 0"
+        for table in found
+        for name, share in table.missing.items()
+    )
     if any(not np.all(np.isfinite(table.rmse)) for table in found):
-        lines.append("–: no sample where both the estimate and the reference are known")
+        lines.append("–: no sample where the reference is known")
     return "".join(f"{text}\n" for text in lines)
 
 
