@@ -1,6 +1,7 @@
 """RMSE of joint torques as grids: observers down, joints across, and how sure each number is."""
 
 from collections.abc import Iterator, Sequence
+from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,7 +64,7 @@ class Block(NamedTuple):
         shown = [[significant(value) for value in row] for row in self.rmse]
         best = np.array([significant(value) for value in least])
         tells = ~np.isin(self.joints, self.untrusted) & (np.sum(self.at_floor, axis=0) < 2)
-        return np.asarray(np.array(shown) == best) & np.isfinite(self.rmse) & tells
+        return np.asarray((np.array(shown) == best) & np.isfinite(self.rmse) & tells)
 
     @property
     def has_floor(self) -> bool:
@@ -214,14 +215,20 @@ def marks_in_words(found: Sequence[Block]) -> str:
     if any(table.untrusted for table in found):
         lines.append(f"{DAGGER}: {RESTS}")
     lines += dict.fromkeys(f"mean:{t.means.left_out}" for t in found if t.means.without)
-    lines += dict.fromkeys(
+    lines += without_answer(found)
+    if any(not np.all(np.isfinite(table.rmse)) for table in found):
+        lines.append("–: no sample where the reference is known")
+    return "".join(f"{text}\n" for text in lines)
+
+
+def without_answer(found: Sequence[Block]) -> list[str]:
+    """Observers that leave samples without an answer, and their share of a joint's samples."""
+    lines = (
         f"{name}: no answer in up to {100.0 * share:.2g} % of a joint's samples, each counted as 0"
         for table in found
         for name, share in table.missing.items()
     )
-    if any(not np.all(np.isfinite(table.rmse)) for table in found):
-        lines.append("–: no sample where the reference is known")
-    return "".join(f"{text}\n" for text in lines)
+    return list(dict.fromkeys(lines))
 
 
 def marks_on_page(found: Sequence[Block]) -> str:
@@ -237,4 +244,4 @@ def marks_on_page(found: Sequence[Block]) -> str:
         )
     if any(block.untrusted for block in found):
         text += f" {DAGGER}: {RESTS}."
-    return text
+    return " ".join([text, *(f"{escape(line)}." for line in without_answer(found))])

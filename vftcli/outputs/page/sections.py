@@ -18,7 +18,7 @@ from vftcli.outputs.log.rmse_tables import (
     rmse_grid,
 )
 from vftcli.outputs.log.run_record import observer_record
-from vftcli.outputs.log.wrench_tables import axis_grids, paper_bounds
+from vftcli.outputs.log.wrench_tables import axis_grids, nothing_to_compare, paper_bounds
 from vftcli.outputs.page.charts import legend, pictures_of
 from vftcli.outputs.page.comparisons import selection_guide
 from vftcli.outputs.page.shell import section, soft
@@ -46,6 +46,7 @@ def errors_section(analysis: Analysis) -> str:
         *(html(rmse_grid(block)) for block in found),
         soft(marks_on_page(found)),
         *map(html, axis_grids(table, paper_bounds([analysis]))),
+        *(soft(escape(line)) for line in nothing_to_compare(table)),
         section(
             "Confidence intervals, lags and significance", "".join(map(html, detail_grids(table)))
         ),
