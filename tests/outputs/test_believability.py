@@ -77,8 +77,9 @@ def test_a_reference_that_a_warning_speaks_against_is_a_caution(
     without_reference: Analysis,
 ) -> None:
     t, q = without_reference.recording.t, without_reference.recording.q
-    values = {"start_s": 8.5, "stop_s": 8.7, "torque_Nm": 7.0, "quiet_Nm": 0.8, "spans": 2}
-    touched = warning("reference-zero-touched", begin_s=8.7, end_s=18.6, **values)
+    where = Where(joints=(6,), span=(8.5, 8.7))
+    values = {"torque_Nm": 7.0, "quiet_Nm": 0.8, "spans": 2, "begin_s": 8.7, "end_s": 18.6}
+    touched = warning("reference-zero-touched", where, **values)
     reference = ExternalTorque(name="zero", t=t, tau=np.zeros(q.shape), remarks=(touched,))
     (ground,) = of(replace(without_reference, reference=reference), "reference")
     assert ground.standing == "caution"

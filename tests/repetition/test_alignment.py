@@ -71,7 +71,9 @@ def test_whose_clock_is_wrong_is_said() -> None:
     log = replace(log, source=replace(log.source, label="a"))
     slow = replace(log, t=1.05 * log.t, source=replace(log.source, label="b"))
     for own, free in ((log, slow), (slow, log)):
-        with pytest.raises(ReferenceTorqueError, match=r"velocities in b say that its clock"):
+        with pytest.raises(
+            ReferenceTorqueError, match=r"velocities in b say.* at (100|99\.99|100\.\d) Hz"
+        ):
             align(own, free)
 
 

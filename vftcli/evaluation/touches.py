@@ -92,9 +92,9 @@ def touched_remarks(run: ModelledRun) -> tuple[Remark, ...]:
     spans = list(zip(edges[::2], edges[1::2], strict=True))
     begin, end = max(spans, key=lambda span: span[1] - span[0])
     values = {
-        "start_s": worst.start, "stop_s": worst.stop,
         "torque_Nm": worst.torque, "quiet_Nm": worst.quiet, "spans": len(found),
         # Rounded inwards, so that the span that is offered holds nothing of what it leaves out.
         "begin_s": np.ceil(10.0 * begin) / 10.0, "end_s": np.floor(10.0 * end) / 10.0,
     }  # fmt: skip
-    return (warning("reference-zero-touched", Where(joints=(worst.joint + 1,)), **values),)
+    where = Where(joints=(worst.joint + 1,), span=(worst.start, worst.stop))
+    return (warning("reference-zero-touched", where, **values),)

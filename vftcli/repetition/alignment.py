@@ -112,12 +112,12 @@ def why_slower(recording: Recording, free: Recording, rate: float) -> str:
         "friction and inertia differ with the speed, so record it as fast as the log (on a UR: the "
         "same speed slider)"
     )
-    clock = "correct its time stamps, or state them with --columns (t[ms], t[ns], t@125Hz)"
     paces = [pace(log) for log in (recording, free)]
     if None in paces:
         return (
             f"{longer} as in {recording.name}: it ran {speed}, or a clock is wrong, which only "
-            f"logged velocities tell. If slower: {again}. If a clock: {clock}"
+            f"logged velocities tell. If its speed: {again}. If a clock: correct the time stamps, "
+            "or state them with --columns (t@125Hz, t[ms], t[ns])"
         )
     own, theirs = (float(np.log(each)) for each in paces if each is not None)
     if abs(theirs - own) < 0.5 * abs(float(np.log(rate))):
@@ -125,10 +125,12 @@ def why_slower(recording: Recording, free: Recording, rate: float) -> str:
             f"{free.name} is the motion of {recording.name}, but ran {speed}, as its own "
             f"velocities say too: {again}"
         )
-    wrong = free if abs(theirs) > abs(own) else recording
+    off, wrong = (theirs, free) if abs(theirs) > abs(own) else (own, recording)
+    true = float(np.exp(off)) / wrong.median_step
     return (
         f"the clocks of {recording.name} and {free.name} run at different rates: {longer}, and the "
-        f"velocities in {wrong.name} say that its clock is wrong; {clock}"
+        f"velocities in {wrong.name} say that its clock is wrong: its rows come at {true:.4g} Hz; "
+        f"correct its time stamps, or state them with --columns (t@{true:.4g}Hz, t[ms], t[ns])"
     )
 
 
