@@ -166,7 +166,14 @@ def test_the_flange_stands_for_a_tool_that_is_not_known() -> None:
     np.testing.assert_array_equal(in_base(WrenchFrame("tool", "tool"), Mounting()), flange)
 
 
-@pytest.mark.parametrize("frame", [WrenchFrame("world", "flange"), WrenchFrame("base", "wrist")])
+@pytest.mark.parametrize(
+    "frame",
+    [
+        WrenchFrame("world", "flange"),
+        WrenchFrame("base", "wrist"),
+        WrenchFrame("base", "stiffness"),
+    ],
+)
 def test_a_frame_that_is_not_known_is_refused(frame: WrenchFrame) -> None:
     with pytest.raises(ParameterError, match=r"no frame known here.*flange, base, tool, sensor"):
         placement(frame, MOUNTED)

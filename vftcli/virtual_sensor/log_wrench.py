@@ -54,10 +54,12 @@ def placement(frame: WrenchFrame | None, mounting: Mounting) -> Placement:
     frame = frame or UNSTATED
     tool, sensor = mounting.tool or IDENTITY, mounting.sensor or IDENTITY
     poses = {"flange": IDENTITY, "tool": tool, "sensor": sensor}
-    if frame.axes not in FRAMES or frame.point not in {*poses, "base"}:
+    points = (*poses, "base")
+    if frame.axes not in FRAMES or frame.point not in points:
         raise ParameterError(
-            f"the log's wrench is in {frame}, which is no frame known here; there is "
-            f"{', '.join(FRAMES)}, as in --columns wrench[base]=…"
+            f"the log's wrench is in {frame}, which is no frame known here; say which with "
+            f"--columns wrench[AXES@POINT], of the axes {', '.join(FRAMES)} and the points "
+            f"{', '.join(points)}, as in wrench[base@tool]"
         )
     if mounting.sensor is None and "sensor" in (frame.axes, frame.point):
         remarks.append(caution("sensor-pose-unstated"))
