@@ -37,7 +37,7 @@ def test_a_controller_s_wrench_comes_after_a_difference_of_cycles() -> None:
         t=t,
         q=np.zeros((3, 6)),
         wrench=np.zeros((3, 6)),
-        wrench_frame=WrenchFrame("base", "stiffness", "by-robot"),
+        wrench_frame=WrenchFrame("base", "base", "by-robot"),
     )
     assert list(reasons(stated)) == ["two-cycle", "sensor", "vendor"]
     assert "estimate" in reasons(stated)["sensor"]

@@ -39,8 +39,8 @@ def test_the_floor_is_over_the_samples_that_are_compared() -> None:
     file = torque("file", WAVE, sd=sd, floor=np.array([7.0]))
     whole = rows_of(evaluate("log", [torque("fdo", WAVE)], file))["fdo", 1]
     assert whole["reference_floor_Nm"] == pytest.approx(np.sqrt(5.0))  # (1 + 9)/2
-    known = np.where(T[750] > T, WAVE, np.nan)
-    half = rows_of(evaluate("log", [torque("fdo", known)], file))["fdo", 1]
+    known = torque("file", np.where(T[750] > T, WAVE, np.nan), sd=sd, floor=np.array([7.0]))
+    half = rows_of(evaluate("log", [torque("fdo", WAVE)], known))["fdo", 1]
     assert half["reference_floor_Nm"] == pytest.approx(1.0)
     # one number is all that a reference without sd knows
     plain = torque("file", WAVE, floor=np.array([7.0]))
@@ -87,12 +87,25 @@ def test_joints_at_rest_are_marked() -> None:
     assert [table["fdo", j]["rmse_Nm"] for j in (1, 2)] == pytest.approx(wanted)
 
 
-def test_an_unstable_observer_spoils_no_other() -> None:
-    broken = np.where(T < 1.0, WAVE, np.nan)
-    found = rows_of(evaluate("log", [torque("gmo", broken), torque("fdo", WAVE)], torque("x", 0.0)))
-    assert found["gmo", 1]["rmse_Nm"] is None
-    assert found["gmo", 1]["samples"] == 0
-    assert found["fdo", 1]["samples"] == len(T)
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 1.0])
+def test_a_sample_without_an_answer_counts_as_zero_and_spoils_no_other(share: float) -> None:
+    """Perfect where it answers, it misses the whole reference where it does not."""
+    missing = np.arange(len(T)) < share * len(T)
+    broken = np.where(missing, np.nan, WAVE)
+    estimates = [torque("gmo", broken), torque("fdo", WAVE + 0.5)]
+    found = rows_of(evaluate("log", estimates, torque("x", WAVE)))
+    assert found["gmo", 1]["rmse_Nm"] == pytest.approx(np.sqrt(np.mean((WAVE * missing) ** 2)))
+    assert found["gmo", 1]["missing"] == pytest.approx(share)
+    assert found["gmo", 1]["samples"] == found["fdo", 1]["samples"] == len(T)
+    assert found["fdo", 1]["rmse_Nm"] == pytest.approx(0.5)
+    assert found["fdo", 1]["missing"] == 0.0
+
+
+def test_a_sample_without_an_answer_is_in_no_band() -> None:
+    half = np.where(np.arange(len(T)) < len(T) // 2, 0.1, np.nan)
+    estimate = torque("gmo", half, error_sd=np.ones((len(T), 1)))
+    row = rows_of(evaluate("log", [estimate], torque("x", 0.0)))["gmo", 1]
+    assert row["coverage_95"] == 0.5
 
 
 def test_no_sample_in_common() -> None:
@@ -140,17 +153,6 @@ def test_a_coverage_rests_on_ten_samples(count: int, share: float | None) -> Non
 def test_without_a_band_there_is_no_coverage() -> None:
     row = rows_of(evaluate("log", [torque("gmo", 0.0)], torque("x", 0.0)))["gmo", 1]
     assert row["coverage_95"] is None
-
-
-def test_an_observer_known_in_half_the_samples_is_compared_with_the_others() -> None:
-    """Known in exactly half as many: the rows of all are over that half; in fewer: it has none."""
-    half = np.where(np.arange(len(T)) < len(T) // 2, WAVE, np.nan)
-    less = np.where(np.arange(len(T)) < len(T) // 2 - 1, WAVE, np.nan)
-    whole = torque("fdo", WAVE)
-    found = rows_of(evaluate("log", [torque("gmo", half), whole], torque("x", 0.0)))
-    assert found["fdo", 1]["samples"] == found["gmo", 1]["samples"] == len(T) // 2
-    found = rows_of(evaluate("log", [torque("gmo", less), whole], torque("x", 0.0)))
-    assert (found["fdo", 1]["samples"], found["gmo", 1]["samples"]) == (len(T), 0)
 
 
 def test_the_best_observer_is_the_one_compared_with() -> None:

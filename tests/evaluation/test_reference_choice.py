@@ -88,6 +88,15 @@ def test_a_wrench_alone_gives_the_torque_of_its_transposed_jacobian(tmp_path) ->
     np.testing.assert_allclose(tau[7], J[7].T @ WRENCH[7], atol=1e-12)
 
 
+def test_a_file_may_say_that_nobody_touched_the_arm(tmp_path) -> None:
+    """Zero throughout is a truth; of a log's own wrench it means that nothing was measured."""
+    zero = np.zeros((300, 6))
+    both = make_reference(SOURCE, write_wrench(tmp_path / "x.parquet", zero, tau_ext=zero))
+    assert not both.torque.tau.any()
+    assert both.wrench is not None
+    assert not both.wrench.values.any()
+
+
 def test_torques_of_a_file_go_before_its_wrench(tmp_path) -> None:
     tau = RNG.standard_normal((300, 6))
     choice = write_wrench(tmp_path / "truth.parquet", WRENCH, tau_ext=tau)

@@ -35,8 +35,8 @@ def test_the_difference_is_the_first_less_the_second() -> None:
 def test_a_joint_without_two_known_samples_has_no_row() -> None:
     unknown = np.full(500, np.nan)
     unknown[3] = 1.0
-    two = [estimate(n, unknown, np.ones(500)) for n in ("a", "b")]
-    assert paired_significance("log", two, estimate("z", *np.zeros((2, 500))))[
+    two = [estimate(n, *np.ones((2, 500))) for n in ("a", "b")]
+    assert paired_significance("log", two, estimate("z", unknown, np.zeros(500)))[
         "joint"
     ].to_list() == [2]
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from vftcli import readers
-from vftcli.evaluation.touches import check_untouched, touches
+from vftcli.evaluation.reference import zero_reference
+from vftcli.evaluation.touches import touched_remarks, touches
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
-from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.remarks import sentence
 
 ROOT = Path(__file__).parent.parent.parent
 FIXTURE = readers.read(ROOT / "fixtures" / "ur5_circle.csv")
@@ -22,18 +23,31 @@ def test_a_simulated_push_is_found_where_it_was() -> None:
     found = touches(ModelledRun(recording=FIXTURE, robot=UR5))
     assert found
     assert min(touch.start for touch in found) > 4.0
-    with pytest.raises(ReferenceTorqueError) as error:
-        check_untouched(ModelledRun(recording=FIXTURE, robot=UR5))
-    assert "--interval 0.0:" in str(error.value)
+    remarks = touched_remarks(ModelledRun(recording=FIXTURE, robot=UR5))
+    (warned,) = remarks
+    assert (warned.code, warned.level) == ("reference-zero-touched", "warning")
+    assert "--interval 0.0:" in sentence(warned)
     free = ModelledRun(recording=FIXTURE.between(0.0, 4.0), robot=UR5)
     assert touches(free) == ()
-    check_untouched(free)
+    assert touched_remarks(free) == ()
 
 
 def test_the_span_that_is_offered_is_free() -> None:
-    found = touches(ModelledRun(recording=FIXTURE, robot=UR5))
-    first = min(touch.start for touch in found)
-    assert touches(ModelledRun(recording=FIXTURE.between(0.0, first - 0.1), robot=UR5)) == ()
+    (warned,) = touched_remarks(ModelledRun(recording=FIXTURE, robot=UR5))
+    span = (float(warned.values[name]) for name in ("begin_s", "end_s"))  # type: ignore[arg-type]
+    assert touches(ModelledRun(recording=FIXTURE.between(*span), robot=UR5)) == ()
+
+
+def test_a_free_log_is_judged_against_zero_though_it_shows_contact(logs: Path) -> None:
+    """That nobody touched this UR10 is its authors' word; 7 N·m of J6's friction are open."""
+    path = logs / "salerno_ur10" / "ur10_exciting.db3"
+    recording = readers.read(path, columns="tau=effort")
+    made = zero_reference(ModelledRun(recording=recording, robot=load_robot("ur10")))
+    assert not made.torque.tau.any()
+    assert [remark.code for remark in made.torque.remarks] == [
+        "reference-zero",
+        "reference-zero-touched",
+    ]
 
 
 def test_without_friction_a_current_tells_no_contact() -> None:

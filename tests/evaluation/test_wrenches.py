@@ -41,20 +41,23 @@ def test_the_band_holds_1_96_deviations(error: float, share: float) -> None:
     assert {row["band_share"] for row in found.values()} == {share}
 
 
-def test_the_share_is_of_the_known_samples() -> None:
-    """A quarter unknown, half of the rest outside: one half."""
+def test_a_sample_without_an_answer_is_zero_and_in_no_band() -> None:
+    """A quarter without an answer, three eighths outside: three eighths are left within."""
     values = WAVE.copy()
     values[:50] = np.nan
     values[50:125] += 9.0
     found = rows(wrench(values, sd=np.ones((200, 6))), wrench(WAVE, "sensor"))
-    assert found["mz"]["band_share"] == pytest.approx(0.5)
-    assert found["mz"]["samples"] == 150
+    assert found["mz"]["band_share"] == pytest.approx(0.375)
+    assert found["mz"]["missing"] == pytest.approx(0.25)
+    assert found["mz"]["samples"] == 200
+    wanted = np.sqrt((np.sum(WAVE[:50, 5] ** 2) + 75 * 81.0) / 200)
+    assert found["mz"]["rmse_Nm"] == pytest.approx(wanted)
 
 
 def test_without_a_deviation_or_a_known_sample_there_is_no_share() -> None:
     assert rows(wrench(WAVE), wrench(WAVE, "sensor"))["fx"]["band_share"] is None
     nothing = wrench(np.full((200, 6), np.nan), sd=np.ones((200, 6)))
-    row = rows(nothing, wrench(WAVE, "sensor"))["fx"]
+    row = rows(wrench(WAVE, sd=np.ones((200, 6))), nothing)["fx"]
     assert row["band_share"] is None
     assert row["rmse_N"] is None
     assert row["samples"] == 0

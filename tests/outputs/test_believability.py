@@ -73,6 +73,19 @@ def test_without_a_match_the_arm_is_not_checked(without_reference: Analysis) -> 
     assert ground.standing == "unknown"
 
 
+def test_a_reference_that_a_warning_speaks_against_is_a_caution(
+    without_reference: Analysis,
+) -> None:
+    t, q = without_reference.recording.t, without_reference.recording.q
+    where = Where(joints=(6,), span=(8.5, 8.7))
+    values = {"torque_Nm": 7.0, "quiet_Nm": 0.8, "spans": 2, "begin_s": 8.7, "end_s": 18.6}
+    touched = warning("reference-zero-touched", where, **values)
+    reference = ExternalTorque(name="zero", t=t, tau=np.zeros(q.shape), remarks=(touched,))
+    (ground,) = of(replace(without_reference, reference=reference), "reference")
+    assert ground.standing == "caution"
+    assert "somebody may have touched the arm" in ground.sentence
+
+
 def test_a_load_nobody_told_stands_first_with_its_command(without_reference: Analysis) -> None:
     load = warning("light-load", load_kg=1.2, sd_kg=0.1, robot="ur5")
     first = grounds(examined(without_reference, load))[0]

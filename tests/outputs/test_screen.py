@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 from contact_rows import contact, contact_list
 
@@ -14,8 +15,6 @@ from vftcli.outputs.screen import (
     against,
     log_screen,
     logs_screen,
-    mean_errors,
-    mean_of,
 )
 from vftcli.outputs.short_screen import facts, short_screen
 from vftcli.signals.remarks import caution, fact, warning
@@ -105,7 +104,7 @@ def test_a_load_has_no_rest(analysis: Analysis) -> None:
 
 def test_against_tells_the_lead_the_others_and_the_floor(analysis: Analysis) -> None:
     (block,) = blocks(analysis.errors)
-    means = mean_errors(block)
+    means = block.means.errors
     text = against(block, analysis)
     assert text.startswith("Against vendor (floor 0.50): ")
     assert f"({next(iter(means))})" in text
@@ -114,17 +113,19 @@ def test_against_tells_the_lead_the_others_and_the_floor(analysis: Analysis) -> 
     assert means["best"] == pytest.approx(rows["rmse_Nm"].mean())
     paper = replace(analysis, remarks=(fact("paper-gains-measured"),))
     assert "the paper's gains" in against(block, paper)
-    assert np.isnan(mean_of(np.array([np.nan])))
 
 
 def test_a_joint_whose_reference_rests_counts_in_no_mean(analysis: Analysis) -> None:
     (block,) = blocks(analysis.errors)
-    floor = np.array([9.0, *[0.2] * (len(block.joints) - 1)])
-    left = block._replace(untrusted=(1,), floor=floor)
+    first = pl.col("joint") == 1
+    rests = analysis.errors.with_columns(
+        reference_trusted=~first, reference_floor_Nm=pl.when(first).then(9.0).otherwise(0.2)
+    )
+    (left,) = blocks(rests)
     assert against(left, analysis).startswith("Against vendor without J1 (floor 0.20): ")
-    assert mean_errors(left)["best"] == pytest.approx(mean_of(block.rmse[0, 1:]))
-    every = block._replace(untrusted=block.joints)
-    assert mean_errors(every) == mean_errors(block)
+    assert left.means.errors["best"] == pytest.approx(block.rmse[0, 1:].mean())
+    (every,) = blocks(analysis.errors.with_columns(reference_trusted=pl.lit(value=False)))
+    assert every.means == block.means
 
 
 def test_results_made_anyway_say_so(analysis: Analysis) -> None:

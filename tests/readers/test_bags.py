@@ -232,6 +232,26 @@ def test_a_wrench_of_another_rate_is_interpolated(tmp_path: Path) -> None:
     assert any("interpolated wrench of /wrench (1000 Hz)" in r for r in recording.source.repairs)
 
 
+def test_columns_state_the_frame_and_sign_of_a_bags_wrench(tmp_path: Path) -> None:
+    """What a refused frame asks for, "--columns wrench[base]=…", without a field's name."""
+    messages = [ur_message(k) for k in range(50)]
+    for k in range(50):
+        time = START + k * 8_000_000
+        messages.append({"topic": "/wrench", "time": time, "force": (1.0, 0, -5.0), "frame": "ft"})
+    messages.sort(key=lambda message: message["time"])
+    bag = write_joint_states(tmp_path / "x", messages)
+    plain = read(bag).wrench
+    stated = read(bag, columns="wrench[base@tool,by-robot]")
+    assert stated.wrench_frame == WrenchFrame("base", "tool", "by-robot")
+    np.testing.assert_array_equal(stated.wrench, plain)
+    turned = read(bag, columns="-wrench[sensor],-dq")
+    assert turned.wrench_frame == WrenchFrame("sensor", "sensor")
+    np.testing.assert_array_equal(turned.wrench, -plain)
+    without = write_joint_states(tmp_path / "y", [ur_message(k) for k in range(20)])
+    with pytest.raises(LogError, match="no topic has one"):
+        read(without, columns="wrench[base]")
+
+
 def test_a_converted_log_of_an_earlier_version_reads_without_a_frame(tmp_path: Path) -> None:
     """Its frame_id is a sentence, which was refused as the user's mistake."""
     more = {"topic": "/vftcli/wrench", "force": (1.0, 0.0, 0.0)}

@@ -56,15 +56,15 @@ def test_ur_rtde_is_told_by_its_commas(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("field", "shift", "point"),
     [
-        ("ft_raw_wrench_0", 0.0, "flange"),  # only e-Series has it
+        ("ft_raw_wrench_0", 0.0, "controller"),  # only e-Series has it
         ("joint_mode_0", 0.0, "tool"),  # CB3 counts cycles of 8 ms
-        ("joint_mode_0", 0.002, "flange"),
+        ("joint_mode_0", 0.002, "controller"),
     ],
 )
 def test_the_point_of_the_controllers_moment(
     tmp_path: Path, field: str, shift: float, point: str
 ) -> None:
-    """Of actual_TCP_force: the flange on e-Series, the TCP on CB3, told by fields or clock."""
+    """Of actual_TCP_force: the TCP on CB3, by its sensor on e-Series, told by fields or clock."""
     path = ur_csv(tmp_path / "x", separator=",", end="\n")
     lines = path.read_text().splitlines()
     clock = lines[0].split(",").index("timestamp")
@@ -76,6 +76,9 @@ def test_the_point_of_the_controllers_moment(
         out.append(",".join([*cells, "1,2,3,.1,.2,.3", "0"]))
     path.write_text("\n".join(out) + "\n")
     assert read(path).wrench_frame == WrenchFrame("base", point)
+    stated = read(path, columns="wrench[base@tool]")
+    assert stated.wrench_frame == WrenchFrame("base", "tool")
+    np.testing.assert_array_equal(stated.wrench, read(path).wrench)
 
 
 def test_payload_that_the_controller_was_told_of(tmp_path: Path) -> None:
@@ -136,7 +139,7 @@ def test_states_as_json_lines(tmp_path: Path) -> None:
     path = libfranka_json(tmp_path / "x")
     recording = read(path)
     np.testing.assert_array_equal(recording.q, motion(7)["q"])
-    assert recording.wrench_frame == WrenchFrame("base", "stiffness", "by-robot")
+    assert recording.wrench_frame == WrenchFrame("base", "base", "by-robot")
     lines = path.read_text().splitlines()
     lines[50] = lines[50].replace('"q": [', '"q": [nan, ', 1)
     path.write_text("\n".join(lines))

@@ -56,6 +56,41 @@ def test_rates_that_differ_much_are_refused(rate: float) -> None:
         align(log, replace(log, t=rate * log.t))
 
 
+@pytest.mark.parametrize(
+    ("rate", "said"), [(1.02, "2 % slower"), (1.3, "30 % slower"), (0.9, "10 % faster")]
+)
+def test_the_same_motion_at_another_speed_is_no_wrong_clock(rate: float, said: str) -> None:
+    """A speed slider: stamps and velocities agree with each other."""
+    log = wandering()
+    with pytest.raises(ReferenceTorqueError, match=rf"ran {said}.*speed slider"):
+        align(log, replace(log, t=rate * log.t, dq=log.dq / rate))
+
+
+def test_whose_clock_is_wrong_is_said() -> None:
+    log = wandering()
+    log = replace(log, source=replace(log.source, label="a"))
+    slow = replace(log, t=1.05 * log.t, source=replace(log.source, label="b"))
+    for own, free in ((log, slow), (slow, log)):
+        with pytest.raises(
+            ReferenceTorqueError, match=r"velocities in b say.* at (100|99\.99|100\.\d) Hz"
+        ):
+            align(own, free)
+
+
+def test_without_velocities_both_causes_are_named() -> None:
+    log = replace(wandering(), dq=None)
+    with pytest.raises(ReferenceTorqueError, match=r"5 % slower, or a clock is wrong.*t@125Hz"):
+        align(log, replace(log, t=1.05 * log.t))
+
+
+def test_another_small_motion_is_neither_slower_nor_on_another_clock() -> None:
+    """Both stay within the .05 rad of one trajectory, at any rate that is tried."""
+    log, other = wandering(seed=3), wandering(seed=5)
+    small, still = (replace(x, q=0.08 * x.q, dq=0.08 * x.dq) for x in (log, other))
+    with pytest.raises(ReferenceTorqueError, match="not a free run of the trajectory"):
+        align(small, still)
+
+
 def test_other_trajectories_are_refused() -> None:
     with pytest.raises(ReferenceTorqueError, match="not a free run of the trajectory"):
         align(wandering(seed=3), wandering(seed=4))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.signals.errors import ParameterError, ShapeError
-from vftcli.signals.wrench import STIFFNESS_FRAME, Wrench, WrenchFrame
+from vftcli.signals.wrench import FRANKA_FRAME, Wrench, WrenchFrame
 
 
 @pytest.mark.parametrize(
@@ -14,7 +14,7 @@ from vftcli.signals.wrench import STIFFNESS_FRAME, Wrench, WrenchFrame
         ("sensor", WrenchFrame("sensor", "sensor")),
         ("tool", WrenchFrame("tool", "tool")),
         ("base@tool", WrenchFrame("base", "tool")),
-        (" base@stiffness , by-robot ", STIFFNESS_FRAME),
+        (" base@base , by-robot ", FRANKA_FRAME),
         ("ft_link,on-robot", WrenchFrame("ft_link", "ft_link")),
     ],
 )
@@ -36,8 +36,8 @@ def test_a_converted_log_of_an_earlier_version_states_no_frame(notation: object)
 
 
 def test_a_frame_in_words() -> None:
-    assert str(STIFFNESS_FRAME) == (
-        "base axes at the stiffness frame K, as force BY the robot ON the environment"
+    assert str(FRANKA_FRAME) == (
+        "base axes at the base's origin, as force BY the robot ON the environment"
     )
     assert (
         str(WrenchFrame("base", "tool")) == "base axes at the tool's point, as force on the robot"
@@ -45,7 +45,7 @@ def test_a_frame_in_words() -> None:
 
 
 def test_the_factor_turns_to_force_on_the_robot() -> None:
-    assert STIFFNESS_FRAME.factor == -1.0
+    assert FRANKA_FRAME.factor == -1.0
     assert WrenchFrame("base", "flange").factor == 1.0
 
 

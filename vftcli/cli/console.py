@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from vftcli.readers.library import Library
     from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
+    from vftcli.signals.remarks import Remark
     from vftcli.virtual_sensor.sensor_reading import SensorReading
 
 QUIET, USUAL, DETAILS = range(3)
@@ -202,8 +203,9 @@ def say_analysis(analysis: "Analysis") -> None:
     say_recording(analysis.recording)
     reference = analysis.reference.remarks if analysis.reference is not None else ()
     own = [f"{e.name}: {note}" for e in analysis.estimates for note in e.remarks]
-    for note in (*analysis.robot.remarks, *analysis.remarks, *own, *reference):
+    for note in (*analysis.robot.remarks, *analysis.remarks, *own):
         detail(f"note: {note}")
+    say_remarks(reference)
     if analysis.virtual_sensor is not None:
         say_wrenches(analysis.virtual_sensor)
 
@@ -217,7 +219,12 @@ def say_wrenches(sensed: "SensorReading") -> None:
     detail(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.solver}")
     if sensed.drifts:
         detail(terminal(drift_grid(sensed.drifts)).rstrip())
-    for remark in sensed.remarks:
+    say_remarks(sensed.remarks)
+
+
+def say_remarks(remarks: "Iterable[Remark]") -> None:
+    """What can make a result wrong, and in details the rest."""
+    for remark in remarks:
         if remark.level == "warning":
             say(f"warning: {remark}")
         else:

@@ -34,11 +34,13 @@ SCHEMA: dict[str, type[pl.DataType]] = {
     "at_rest": pl.Float64,
     "rmse_moving_Nm": pl.Float64,
     "coverage_95": pl.Float64,
+    "missing": pl.Float64,
     "samples": pl.Int64,
 }
 """Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the samples.
 
-`coverage_95` is the share of samples within the estimate's 95 % band, where it has one.
+`coverage_95` is the share of samples within the estimate's 95 % band, where it has one; `missing`
+the share without an answer, which counts as the answer 0, so that nothing hides by failing.
 """
 
 TRUSTED_SHARE = 0.5
@@ -74,12 +76,13 @@ def correlation(x: Array, y: Array) -> float:
 
 
 class Scored(NamedTuple):
-    """Estimates of one joint against one reference, over the samples where all are known.
+    """Estimates of one joint against one reference, over the samples where that is known.
 
     Attributes:
         names: The observers' names.
         joint: Joint number, from 1.
-        estimates: One column an observer. (T, m) [N·m]
+        estimates: One column an observer, 0 where it has no answer. (T, m) [N·m]
+        missing: Samples of each observer without an answer. (m,)
         reference: (T,) [N·m]
         moving: Whether the joint moves, so that the reference may be relied on. (T,)
         floor: The reference's own error, NaN where it is not known. [N·m]
@@ -95,6 +98,7 @@ class Scored(NamedTuple):
     names: tuple[str, ...]
     joint: int
     estimates: Array
+    missing: Array
     reference: Array
     moving: Mask
     floor: float
@@ -113,7 +117,9 @@ class Scored(NamedTuple):
 def evaluate(
     recording: str, estimates: Iterable[ExternalTorque], reference: ExternalTorque
 ) -> pl.DataFrame:
-    """One row per observer and joint, over the samples where all observers are known.
+    """One row per observer and joint, over the samples where the reference is known.
+
+    A sample without an answer counts as the answer 0.
 
     Args:
         recording: The log's name, for the first column.
@@ -150,18 +156,19 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
     covered = [covered_samples(e, reference) for e in estimates]
     moving = reference.moving if reference.moving is not None else reference.known
     for j in steps(range(reference.joints if estimates else 0)):
-        x, y = np.column_stack([e.tau[:, j] for e in estimates]), reference.tau[:, j]
-        known = comparable(x, y)
-        if not known.all():
-            x, y = x[known], y[known]
+        y = reference.tau[:, j]
+        known = np.isfinite(y)
+        x = np.column_stack([e.tau[known, j] for e in estimates])
+        y, answered = y[known], np.isfinite(x)
+        x[~answered] = 0.0
         squares = x - y[:, None]
         squares *= squares
-        np.nan_to_num(squares, copy=False)
         paired, own = draw_blocks(squares)
         yield Scored(
             names=names,
             joint=j + 1,
             estimates=x,
+            missing=np.count_nonzero(~answered, axis=0).astype(np.float64),
             reference=y,
             moving=moving[known, j],
             floor=floor_over(reference, j, known),
@@ -206,31 +213,20 @@ def covered_samples(estimate: ExternalTorque, reference: ExternalTorque) -> tupl
     """Samples within ±1.96 `error_sd` of the estimate, and samples that were asked. (n,), (n,)
 
     Samples in which the joint rests do not count: stiction hides there what the band cannot know.
-    Without a band none counts.
+    Without a band none counts; a sample without an answer is in no band.
     """
     if estimate.error_sd is None:
         return np.zeros(estimate.joints), np.zeros(estimate.joints)
     error = estimate.tau - reference.tau
-    counted = np.isfinite(error)
+    counted = np.isfinite(reference.tau)
     for torque in (estimate, reference):
         if torque.moving is not None:
             counted &= torque.moving
-    within = counted & (np.abs(np.nan_to_num(error)) <= COVERS * estimate.error_sd)
+    within = counted & (np.abs(error) <= COVERS * estimate.error_sd)
     return (
         np.count_nonzero(within, axis=0).astype(np.float64),
         np.count_nonzero(counted, axis=0).astype(np.float64),
     )
-
-
-def comparable(estimates: Array, reference: Array) -> Mask:
-    """Samples at which the reference and every observer that mostly works are known. (T,)
-
-    An observer that is known for less than half as many samples as the others (an unstable one)
-    does not spoil their comparison; it has no row of errors.
-    """
-    finite = np.isfinite(estimates) & np.isfinite(reference)[:, None]
-    count = finite.sum(axis=0)
-    return np.asarray(finite[:, count >= 0.5 * count.max()].all(axis=1))
 
 
 def table(recording: str, reference: str, joints: Iterable[Scored]) -> pl.DataFrame:
@@ -244,7 +240,7 @@ def table(recording: str, reference: str, joints: Iterable[Scored]) -> pl.DataFr
 def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object]]:
     """One row an observer on one joint."""
     error, found = joint.error, []
-    best = int(np.nanargmin(np.mean(error**2, axis=0))) if known_anywhere(error) else 0
+    best = int(np.argmin(np.mean(error**2, axis=0))) if len(error) else 0
     for k, name in enumerate(joint.names):
         here: dict[str, object] = {
             "recording": recording,
@@ -254,17 +250,12 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
             "reference_floor_Nm": number(joint.floor),
             "samples": len(joint.reference),
         }
-        own = np.ascontiguousarray(error[:, k])
-        if not len(own) or not np.isfinite(own).all():
-            found.append(here | {"samples": 0})
-        else:
-            found.append(here | sizes(joint, k, own, best) | trust(joint, k, own))
+        if len(error):
+            own = np.ascontiguousarray(error[:, k])
+            here |= {"missing": joint.missing[k] / len(own)}
+            here |= sizes(joint, k, own, best) | trust(joint, k, own)
+        found.append(here)
     return found
-
-
-def known_anywhere(error: Array) -> bool:
-    """Whether any observer's error is known throughout."""
-    return bool(len(error) and np.isfinite(error).all(axis=0).any())
 
 
 def sizes(joint: Scored, k: int, error: Array, best: int) -> dict[str, object]:

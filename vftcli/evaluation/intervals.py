@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
 from vftcli.signals.lag import sliding
 
 REPETITIONS = 1000
@@ -119,8 +119,3 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
     quantile = float(stdtrit(blocks - 1, 0.5 + 0.5 * LEVEL)) * np.sqrt(blocks / (blocks - 1.0))
     half = min(quantile * float(np.std(draws)) / mean_square, WIDEST)
     return float(np.sqrt(mean_square * np.exp(-half))), float(np.sqrt(mean_square / (1.0 - half)))
-
-
-def known_rows(errors: Array) -> Mask:
-    """Samples in which every column is known. (T,)"""
-    return np.asarray(np.isfinite(errors).all(axis=1))

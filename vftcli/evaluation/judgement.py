@@ -6,6 +6,7 @@ from typing import NamedTuple
 import polars as pl
 
 from vftcli.evaluation.errors import evaluate
+from vftcli.evaluation.joint_means import joint_means
 from vftcli.evaluation.reference_choice import ReferenceChoice, ReferenceSource, make_reference
 from vftcli.evaluation.reference_wrench import reference_wrench
 from vftcli.evaluation.wrenches import with_contacts, with_wrenches
@@ -45,8 +46,7 @@ def with_measured_gap(
         errors: The errors of the run's observers.
         tunings: What their gains mean, by name; they are those of the robot's file.
     """
-    rows = errors.filter(pl.col("joint").is_not_null() & pl.col("rmse_Nm").is_finite())
-    means = dict(rows.group_by("observer").agg(pl.col("rmse_Nm").mean()).iter_rows())
+    means = joint_means(errors).errors
     delays = {name: tunings[name].delay for name in PAPER if name in means}
     if not delays or BEST not in means:
         return tuple(remarks)

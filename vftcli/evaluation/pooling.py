@@ -57,6 +57,7 @@ def together(parts: Sequence[Scored]) -> Scored:
     mean_lag = np.nansum(lag * weights, axis=0) / np.where(total > 0, total, np.nan)
     return parts[0]._replace(
         estimates=np.concatenate([p.estimates for p in parts]),
+        missing=np.sum([p.missing for p in parts], axis=0),
         reference=np.concatenate([p.reference for p in parts]),
         moving=np.concatenate([p.moving for p in parts]),
         floor=float(np.sqrt(np.sum(share * np.array([p.floor for p in parts]) ** 2))),

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.evaluation.touches import check_untouched
+from vftcli.evaluation.touches import touched_remarks
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
@@ -29,19 +29,16 @@ class ReferenceLoad:
 def zero_reference(log: ModelledRun) -> ReferenceLoad:
     """No contact at all: the reference of a free motion.
 
-    How free it was cannot be known from the log alone, so neither can its error.
-
-    Raises:
-        ReferenceTorqueError: If the log shows contact.
+    How free it was cannot be known from the log alone, so neither can its error; where the log
+    shows contact a warning says so.
     """
-    check_untouched(log)
     recording = log.recording
     return ReferenceLoad(
         torque=ExternalTorque(
             name="zero",
             t=recording.t,
             tau=np.zeros(recording.q.shape),
-            remarks=(caution("reference-zero"),),
+            remarks=(caution("reference-zero"), *touched_remarks(log)),
         )
     )
 

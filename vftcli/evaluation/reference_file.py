@@ -17,7 +17,7 @@ from vftcli.signals.remarks import caution
 from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import WrenchFrame
 from vftcli.virtual_sensor.frames import Mounting
-from vftcli.virtual_sensor.log_wrench import logged_wrench
+from vftcli.virtual_sensor.log_wrench import in_base_axes
 
 
 def file_reference(
@@ -52,7 +52,8 @@ def file_reference(
         values = on_the_logs_clock(t, table.wrench, recording, path)
         frame = table.wrench_frame or WrenchFrame("base", "flange")
         given = replace(recording, wrench=values, wrench_frame=frame)
-        wrench = logged_wrench(given, robot.chain, mounting)
+        # Zero throughout is an answer here: a truth of a log that nobody touched.
+        wrench = in_base_axes(given, robot.chain, mounting)
     if table.tau is None:
         if wrench is None:
             raise ReferenceTorqueError(f"{path}: it holds neither a torque nor a wrench")

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
+from vftcli.evaluation.joint_means import joint_means
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.terms import DynamicsTerms
@@ -117,12 +118,8 @@ def step_response(observer: Observer, step: float, joints: int) -> Array:
 
 
 def mean_rmse(name: str, errors: pl.DataFrame | None) -> float:
-    """Mean of the joints' RMSE of an observer, NaN where there is none. [N·m]"""
-    if errors is None:
-        return float("nan")
-    wanted = pl.col("joint").is_not_null() & (pl.col("observer") == name)
-    values = errors.filter(wanted)["rmse_Nm"].drop_nulls()
-    return float(np.mean(values.to_numpy())) if len(values) else float("nan")
+    """An observer's mean RMSE over the joints, NaN where there is none. [N·m]"""
+    return float("nan") if errors is None else joint_means(errors).errors.get(name, float("nan"))
 
 
 def advice(found: Sequence[Facts]) -> tuple[Advice, ...]:

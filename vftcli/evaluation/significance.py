@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.intervals import LEVEL, block_lengths, known_rows, resample
+from vftcli.evaluation.intervals import LEVEL, block_lengths, resample
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 
@@ -32,12 +32,14 @@ def paired_significance(
     """Every pair of observers on every joint: difference of RMSE, its interval, and p.
 
     Both observers' errors are resampled in the same blocks, so that what they share (contacts,
-    the reference's own error) cancels.
+    the reference's own error) cancels. A sample without an answer counts as the answer 0.
     """
     rows = []
     for j in range(reference.joints):
-        errors = np.column_stack([e.tau[:, j] - reference.tau[:, j] for e in estimates])
-        errors = errors[known_rows(errors)]
+        known = np.isfinite(reference.tau[:, j])
+        answers = np.column_stack([e.tau[known, j] for e in estimates])
+        answers[~np.isfinite(answers)] = 0.0
+        errors = answers - reference.tau[known, j, None]
         if len(errors) < 2:
             continue
         squares = errors**2

@@ -10,8 +10,8 @@ import numpy as np
 
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.signals.arrays import Array
-from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
+from vftcli.signals.remarks import Remark, Where, warning
 from vftcli.signals.series import runs_of
 
 CUTOFF = 2.0
@@ -84,23 +84,24 @@ def touch_in(
     return ShownContact(joint, begin, end, torque, float(quiet[joint]), float(excess[joint]))
 
 
-def check_untouched(run: ModelledRun) -> None:
-    """Raise an error if a log that is to be free shows contact.
+def touched_remarks(run: ModelledRun) -> tuple[Remark, ...]:
+    """A warning where a log that is to be free shows contact, with the longest span without.
 
-    Raises:
-        ReferenceTorqueError: With when and where, and the longest span without.
+    What the model leaves open may be friction as well: who says that nobody touched the arm is
+    believed, and reads what speaks against it.
     """
     found = touches(run)
     if not found:
-        return
+        return ()
     worst = max(found, key=lambda touch: touch.torque / max(touch.quiet, LEAST))
     t = run.recording.t
     edges = [float(t[0]), *(x for touch in found for x in (touch.start, touch.stop)), float(t[-1])]
     spans = list(zip(edges[::2], edges[1::2], strict=True))
     begin, end = max(spans, key=lambda span: span[1] - span[0])
-    raise ReferenceTorqueError(
-        f"{run.recording.name}: --reference zero needs motion that nobody touches, but from "
-        f"{worst.start:.1f} to {worst.stop:.1f} s J{worst.joint + 1} shows {worst.torque:.3g} N·m "
-        f"where {worst.quiet:.2g} is usual ({len(found)} contact{'s' * (len(found) > 1)}). Leave "
-        f"them out, as with --interval {begin:.1f}:{end:.1f}, or take another --reference"
-    )
+    values = {
+        "torque_Nm": worst.torque, "quiet_Nm": worst.quiet, "spans": len(found),
+        # Rounded inwards, so that the span that is offered holds nothing of what it leaves out.
+        "begin_s": np.ceil(10.0 * begin) / 10.0, "end_s": np.floor(10.0 * end) / 10.0,
+    }  # fmt: skip
+    where = Where(joints=(worst.joint + 1,), span=(worst.start, worst.stop))
+    return (warning("reference-zero-touched", where, **values),)

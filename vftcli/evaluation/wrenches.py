@@ -22,14 +22,15 @@ WRENCH_SCHEMA: dict[str, type[pl.DataType]] = {
 }
 """Columns where wrenches are compared: `axis` fx…mz, `joint` null; forces fill rmse_N.
 
-`band_share` is the share of the samples whose 95 % band holds the reference.
+`band_share` is the share of the samples whose 95 % band holds the reference; `missing` that without
+an answer where the pose can tell one, which counts as the answer 0.
 """
 
 
 def evaluate_wrenches(
     recording: str, wrenches: Iterable[Wrench], reference: Wrench
 ) -> pl.DataFrame:
-    """One row per observer and axis, over the samples where the pose can tell both.
+    """One row per observer and axis, over the samples where the reference is known.
 
     Args:
         recording: The log's name, for the first column.
@@ -38,10 +39,12 @@ def evaluate_wrenches(
     """
     rows: list[dict[str, object]] = []
     for wrench in wrenches:
-        overall = rmse(wrench.known, reference.known)
+        answered = np.isfinite(wrench.known)
+        answers = np.where(answered, wrench.known, 0.0)
+        overall = rmse(answers, reference.known)
         for k, axis in enumerate(AXES):
-            x, y = wrench.known[:, k], reference.known[:, k]
-            known = np.isfinite(x) & np.isfinite(y)
+            x, y = answers[:, k], reference.known[:, k]
+            known = np.isfinite(y)
             error, unit = (x - y)[known], "N" if k < 3 else "Nm"
             some = len(error) > 0
             rows.append(
@@ -52,9 +55,10 @@ def evaluate_wrenches(
                     f"rmse_{unit}": number(overall[k]),
                     f"bias_{unit}": number(error.mean()) if some else None,
                     f"max_{unit}": number(np.max(np.abs(error))) if some else None,
-                    "band_share": band_share(wrench, k, x - y, known),
+                    "band_share": band_share(wrench, k, wrench.known[:, k] - y, known),
                     "correlation": number(correlation(x[known], y[known])) if some else None,
                     "reference": reference.name,
+                    "missing": float(np.mean(~answered[known, k])) if some else None,
                     "samples": len(error),
                 }
             )
@@ -62,7 +66,10 @@ def evaluate_wrenches(
 
 
 def band_share(wrench: Wrench, k: int, error: Array, known: Mask) -> float | None:
-    """Share of the known samples whose error lies within 1.96 standard deviations."""
+    """Share of the known samples whose error lies within 1.96 standard deviations.
+
+    A sample without an answer, whose error is NaN, lies in no band.
+    """
     if wrench.sd is None or not known.any():
         return None
     return float(np.mean(np.abs(error[known]) <= COVERS * wrench.sd[known, k]))

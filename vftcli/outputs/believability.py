@@ -352,10 +352,11 @@ def reference_ground(analysis: Analysis) -> Ground:
     if analysis.reference is not None:
         floor = analysis.reference.floor
         known = "" if floor is None else f", its own error {np.nanmean(floor):.2g} N·m a joint"
+        doubts = [sentence(r) for r in analysis.reference.remarks if r.level == "warning"]
         return Ground(
-            standing="good",
+            standing="caution" if doubts else "good",
             subject="reference",
-            sentence=f"{analysis.reference.name}{known}",
+            sentence="; ".join(doubts) or f"{analysis.reference.name}{known}",
             of_log=False,
         )
     contacts = analysis.contacts.contacts if analysis.contacts is not None else ()

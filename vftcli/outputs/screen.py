@@ -6,8 +6,6 @@ against a reference, and what was written: forty lines at most, whatever the num
 
 from collections.abc import Iterator, Mapping, Sequence
 
-import numpy as np
-
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
 from vftcli.outputs.believability import (
@@ -183,15 +181,12 @@ def against_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
 
 def against(block: Block, analysis: Analysis) -> str:
     """One line on the errors: the observer in the lead, and the range of the others."""
-    means = mean_errors(block)
-    if not means:
+    means = block.means
+    if not means.errors:
         return f"Against {block.reference}: no sample in common with the estimates"
-    (name, least), *others = means.items()
-    use = trusted(block)
-    floor = f" (floor {significant(mean_of(block.floor[use]), 2)})" if block.has_floor else ""
-    left = [f"J{j}" for j, used in zip(block.joints, use, strict=True) if not used]
-    without = f" without {', '.join(left)}" if left else ""
-    text = f"Against {printable(block.reference)}{without}{floor}: "
+    (name, least), *others = means.errors.items()
+    floor = f" (floor {significant(means.floor, 2)})" if block.has_floor else ""
+    text = f"Against {printable(block.reference)}{means.left_out}{floor}: "
     text += f"{significant(least, 2)} N·m ({name})"
     if others:
         low, high = min(value for _, value in others), max(value for _, value in others)
@@ -201,25 +196,6 @@ def against(block: Block, analysis: Analysis) -> str:
         size += f"–{significant(high, 2)}" if significant(high, 2) != size else ""
         text += f"; {whose} {size}"
     return f"{text} → --details"
-
-
-def mean_errors(block: Block) -> dict[str, float]:
-    """RMSE of each observer, mean of the joints whose reference is to be trusted. [N·m]"""
-    rows = block.rmse[:, trusted(block)]
-    means = {name: mean_of(row) for name, row in zip(block.observers, rows, strict=True)}
-    return {name: value for name, value in means.items() if np.isfinite(value)}
-
-
-def trusted(block: Block) -> list[bool]:
-    """The joints whose reference is to be trusted, all where none is. (n,)"""
-    use = [j not in block.untrusted for j in block.joints]
-    return use if any(use) else [True] * len(use)
-
-
-def mean_of(values: np.ndarray) -> float:
-    """Mean of the numbers that are known, NaN without any."""
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else float("nan")
 
 
 def logs_screen(
@@ -332,7 +308,7 @@ def log_row(analysis: Analysis, *, judged: bool) -> list[str]:
     row = [recording.name, f"{recording.duration:.1f} s", count, hardest, rest]
     if judged:
         means = (
-            [m for b in blocks(analysis.errors)[:1] for m in mean_errors(b).values()]
+            [m for b in blocks(analysis.errors)[:1] for m in b.means.errors.values()]
             if (analysis.errors is not None)
             else []
         )

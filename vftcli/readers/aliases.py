@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from vftcli.readers.columns import SIGNALS, Item
 from vftcli.readers.joints import effort_of, kinematic_order
+from vftcli.readers.rtde_names import JOINT_COLUMNS
 from vftcli.readers.table import (
     Cell,
     Pick,
@@ -182,8 +183,12 @@ def stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
     """
     if item.pattern is None:
         signal = SIGNALS.get(item.signal, item.signal)
-        found = _clock(table) if signal == "t" else _wrench(table) if signal == "wrench" else None
+        found = _clock(table) if signal == "t" else None
         found = _pick_of(table, signal, groups) if signal in ALIASES else found
+        if signal == "wrench":
+            controllers = groups.get(JOINT_COLUMNS[signal].lower())
+            own = None if controllers is None else vendor_pick(signal, signal, controllers.cells)
+            found = _wrench(table) or own
         if found is None:
             raise missing_column(table, item.signal, item.signal)
         pick = pick_of(item, found.cells)

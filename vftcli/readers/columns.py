@@ -105,7 +105,8 @@ def parse_columns(text: str) -> ColumnSpec:
     items = tuple(_parse_item(part) for part in parts)
     signals = {item.signal for item in items}
     # Nothing can be counted without positions: what is left says a unit or a sign.
-    alone = all(item.count == 1 for item in items) and not signals & {"q", "_"}
+    single = all(item.count == 1 or item.signal == "wrench" for item in items)
+    alone = single and not signals & {"q", "_"}
     named = alone or any(item.pattern is not None for item in items)
     for item in items:
         if named and not alone and item.pattern is None and item.rate is None:

@@ -15,7 +15,7 @@ from vftcli.readers.table import Cell, Column, Pick, Picks, Table, checked
 from vftcli.readers.tables import ArrayTable
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
-from vftcli.signals.wrench import STIFFNESS_FRAME
+from vftcli.signals.wrench import FRANKA_FRAME
 
 JOINTS = 7
 CLOCK = "robot clock (milliseconds since start)"
@@ -61,7 +61,7 @@ def read_fields(
     signals = tuple(vendor_pick(FIELDS[name], name, cells) for name, cells in fields.items())
     clock = Pick(signal="t", cells=(time,), factor=1e-3, unit="ms")
     picks = checked(table, Picks(signals=signals, clock=clock))
-    frame = STIFFNESS_FRAME if WRENCH in fields else None
+    frame = FRANKA_FRAME if WRENCH in fields else None
     return picked(table, picks, request, clock_name=CLOCK, wrench_frame=frame, **more)
 
 

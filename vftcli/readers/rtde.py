@@ -64,11 +64,12 @@ def read_rtde(table: Table, request: ReadChoice) -> RawLog:
 
 
 def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:
-    """Frame of actual_TCP_force: base axes, about the flange on e-Series, about the TCP on CB3.
+    """Frame of actual_TCP_force: base axes, about the TCP on CB3; on e-Series by its sensor.
 
-    Measured on three e-Series logs: about the TCP its moment misses the joints' torque by four
-    times as much. An e-Series log that has no such field and whose stamps all happen to be
-    multiples of 8 ms cannot be told from a CB3's.
+    The sensor in an e-Series' flange gives the moment about the flange: on three logs about the
+    TCP it misses the joints' torque by four times as much. A sensor that a URCap brings gives it
+    about the TCP. No field says which of the two is mounted. An e-Series log that has no
+    `ft_raw_wrench` and whose stamps all happen to be multiples of 8 ms reads as a CB3's.
 
     Args:
         names: Columns of the log.
@@ -77,7 +78,7 @@ def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:
     steps = stamps[np.isfinite(stamps)] / CB3_CYCLE
     # Half a millisecond: stamps may be written with three decimals.
     cb3 = bool(np.all(np.abs(steps - np.round(steps)) < 5e-4 / CB3_CYCLE))
-    return WrenchFrame("base", "tool" if cb3 and E_SERIES_FIELD not in names else "flange")
+    return WrenchFrame("base", "tool" if cb3 and E_SERIES_FIELD not in names else "controller")
 
 
 class BinaryTable:

@@ -34,6 +34,15 @@ RIVALS = 40
 COARSE = 300
 """Instants at which a recording is compared while the shared part is looked for."""
 
+SAME_PATH = 0.1
+"""At another speed or on another clock a motion lies within this share of its own spread.
+
+Of true pairs .003 is left, of other motions that a rate seemed to explain 1.3 and more.
+"""
+
+TRAVEL = 1.0
+"""Length of the pieces over which logged velocities are compared with the way travelled. [s]"""
+
 RATES = np.concatenate([np.linspace(0.5, 2.0, 61), [1e-3, 1e3]])
 """Clock rates tried to explain why two logs do not fit."""
 
@@ -63,28 +72,83 @@ def align(recording: Recording, free: Recording) -> Alignment:
     that repeats fits at every whole period alike: of these shifts the one with most overlap counts.
 
     Raises:
-        ReferenceTorqueError: If the two logs are of other arms, not of the same trajectory, or
-            their clocks run at rates that differ by more than `SAME_RATE`.
+        ReferenceTorqueError: If the two logs are of other arms, not of the same trajectory, or of
+            speeds or clocks that differ by more than `SAME_RATE`.
     """
     check_same_arm(recording, free)
     closest = lying_at(recording, free, *best_fit(recording, free))
     fits = closest.deviation <= SAME_TRAJECTORY
     found = closest if fits else shared_part(recording, free)
-    rate = found.rate if found is not None else explaining_rate(recording, free)
-    if rate is None:
+    if found is not None and abs(found.rate - 1.0) <= SAME_RATE:
+        return found
+    found = found or explained_by_rate(recording, free)
+    if found is None or not is_same_path(recording, found):
+        # A rate that explains nothing is none: how far they are apart is said of equal clocks.
+        middle = 0.5 * (recording.t[0] + recording.t[-1])
+        shift = closest.shift + (closest.rate - 1.0) * middle
+        apart_by = lying_at(recording, free, float(shift), 1.0).deviation
         raise ReferenceTorqueError(
             f"{free.name} is not a free run of the trajectory in {recording.name}: at the best "
-            f"shift ({closest.shift:.3f} s) the joint positions still differ by "
-            f"{closest.deviation:.3g} rad rms (at most {SAME_TRAJECTORY:g}); give a log of the "
-            "same motion with --free"
+            f"shift ({shift:.3f} s) the joint positions still differ by {apart_by:.3g} rad rms; "
+            "give a log of the same motion with --free"
         )
-    if found is None or abs(rate - 1.0) > SAME_RATE:
-        raise ReferenceTorqueError(
-            f"the clocks of {recording.name} and {free.name} run at different rates: the same "
-            f"motion takes {rate:.4g} times as long in {free.name}; correct its time stamps, or "
-            "name their unit with --columns (t[ms], t[ns])"
+    raise ReferenceTorqueError(why_slower(recording, free, found.rate))
+
+
+def is_same_path(recording: Recording, found: Alignment) -> bool:
+    """Whether what overlaps at some rate is one path, and not two small motions near each other."""
+    spread = np.sqrt(np.mean(np.var(recording.q[found.overlap], axis=0)))
+    return bool(found.deviation <= SAME_PATH * spread)
+
+
+def why_slower(recording: Recording, free: Recording, rate: float) -> str:
+    """Why one motion takes `rate` times as long in the free run: its speed, or a clock; a remedy.
+
+    The logged velocities tell: a wrong clock disagrees with them, a slower motion does not.
+    """
+    longer = f"the same motion takes {rate:.4g} times as long in {free.name}"
+    speed = f"{100.0 * abs(rate - 1.0):.2g} % {'slower' if rate > 1.0 else 'faster'}"
+    again = (
+        "friction and inertia differ with the speed, so record it as fast as the log (on a UR: the "
+        "same speed slider)"
+    )
+    paces = [pace(log) for log in (recording, free)]
+    if None in paces:
+        return (
+            f"{longer} as in {recording.name}: it ran {speed}, or a clock is wrong, which only "
+            f"logged velocities tell. If its speed: {again}. If a clock: correct the time stamps, "
+            "or state them with --columns (t@125Hz, t[ms], t[ns])"
         )
-    return found
+    own, theirs = (float(np.log(each)) for each in paces if each is not None)
+    if abs(theirs - own) < 0.5 * abs(float(np.log(rate))):
+        return (
+            f"{free.name} is the motion of {recording.name}, but ran {speed}, as its own "
+            f"velocities say too: {again}"
+        )
+    off, wrong = (theirs, free) if abs(theirs) > abs(own) else (own, recording)
+    true = float(np.exp(off)) / wrong.median_step
+    return (
+        f"the clocks of {recording.name} and {free.name} run at different rates: {longer}, and the "
+        f"velocities in {wrong.name} say that its clock is wrong: its rows come at {true:.4g} Hz; "
+        f"correct its time stamps, or state them with --columns (t@{true:.4g}Hz, t[ms], t[ns])"
+    )
+
+
+def pace(recording: Recording) -> float | None:
+    """Way by logged velocities over way by positions, 1 on a right clock; None without either.
+
+    Over pieces of `TRAVEL`, in which the noise of neither counts.
+    """
+    if recording.dq is None or "dq" in recording.source.derived:
+        return None
+    t = recording.t
+    steps = 0.5 * (recording.dq[1:] + recording.dq[:-1]) * np.diff(t)[:, None]
+    summed = np.vstack([np.zeros(recording.joints), np.cumsum(steps, axis=0)])
+    ends = np.searchsorted(t, np.arange(t[0], t[-1], TRAVEL))
+    by_position, by_velocity = (np.diff(x[ends], axis=0) for x in (recording.q, summed))
+    power = float(np.sum(by_position**2))
+    along = float(np.sum(by_position * by_velocity))
+    return along / power if power > 0.0 and along > 0.0 else None
 
 
 def check_same_arm(recording: Recording, free: Recording) -> None:
@@ -141,8 +205,11 @@ def near(t: Array, q: Array, free: Recording) -> Mask:
     return np.asarray(np.max(np.abs(apart(t, q, free)), axis=1) <= SAME_TRAJECTORY)
 
 
-def explaining_rate(recording: Recording, free: Recording) -> float | None:
-    """A ratio of clock rates at which the two logs are the same trajectory, None without one."""
+def explained_by_rate(recording: Recording, free: Recording) -> Alignment | None:
+    """How the two logs lie at the ratio of rates that makes them one trajectory, if there is one.
+
+    The first of `RATES` that leaves half of what two trajectories may be apart.
+    """
     for rate in RATES[np.abs(RATES - 1.0) > SAME_RATE]:
         lengths = (recording.duration * rate, free.duration)
         if min(lengths) < LEAST_OVERLAP * max(lengths):
@@ -150,8 +217,8 @@ def explaining_rate(recording: Recording, free: Recording) -> float | None:
         step = max(recording.median_step * rate, free.median_step, free.duration / 4000.0)
         fit = lag_fit(uniform(free, step), uniform(recording, step / rate), LEAST_OVERLAP)
         shift = fit.closest * step + float(free.t[0] - rate * recording.t[0])
-        shift, found = refined(recording, free, shift, float(rate))
-        if lying_at(recording, free, shift, found).deviation <= 0.5 * SAME_TRAJECTORY:
+        found = lying_at(recording, free, *refined(recording, free, shift, float(rate)))
+        if found.deviation <= 0.5 * SAME_TRAJECTORY and is_same_path(recording, found):
             return found
     return None
 

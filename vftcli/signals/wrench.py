@@ -21,7 +21,8 @@ AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 POINTS = {
     "flange": "the flange point",
     "tool": "the tool's point",
-    "stiffness": "the stiffness frame K",
+    "base": "the base's origin",
+    "controller": "the flange point or the tool's, by which sensor the controller has",
     "sensor": "the sensor's origin",
 }
 """Point that a moment refers to → its words; a log may name another, as a link of its own."""
@@ -94,8 +95,11 @@ class WrenchFrame:
         return f"{self.axes} axes at {point}, as force {whose}"
 
 
-STIFFNESS_FRAME = WrenchFrame("base", "stiffness", "by-robot")
-"""O_F_ext_hat_K of libfranka and what is built on it."""
+FRANKA_FRAME = WrenchFrame("base", "base", "by-robot")
+"""O_F_ext_hat_K of libfranka and what is built on it.
+
+On a log of an FR3 it equals pinv(Jᵀ)·tau_ext_hat_filtered with J about the base's origin.
+"""
 
 
 def unit_of(axis: str | int) -> str:

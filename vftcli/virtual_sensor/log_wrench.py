@@ -4,6 +4,7 @@ A log may state its wrench's axes, the point of its moment and its sign (`Wrench
 leaves open is assumed, and the assumption is a remark.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from vftcli.signals.pose import IDENTITY
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.wrench import Wrench, WrenchFrame
+from vftcli.virtual_sensor.controller_point import controller_point
 from vftcli.virtual_sensor.frames import FRAMES, Mounting
 
 UNSTATED = WrenchFrame("sensor", "sensor")
@@ -23,18 +25,18 @@ UNSTATED = WrenchFrame("sensor", "sensor")
 
 
 class Placement(NamedTuple):
-    """Where a log's wrench is measured, in the flange frame.
+    """Where a log's wrench is measured.
 
     Attributes:
         frame: Its axes, point and sign.
         axes: Orientation of its axes in the flange frame, None for the base's axes. (3, 3)
-        point: The point of its moment. (3,) [m]
+        point: The point of its moment in the flange frame, None for the base's origin. (3,) [m]
         remarks: What had to be assumed.
     """
 
     frame: WrenchFrame
     axes: Array | None
-    point: Array
+    point: Array | None
     remarks: tuple[Remark, ...]
 
 
@@ -50,20 +52,22 @@ def placement(frame: WrenchFrame | None, mounting: Mounting) -> Placement:
     """
     remarks = [caution("wrench-frame-unstated")] if frame is None else []
     frame = frame or UNSTATED
-    # The stiffness frame of libfranka is the tool's unless the user moved it, which no log tells.
     tool, sensor = mounting.tool or IDENTITY, mounting.sensor or IDENTITY
-    poses = {"flange": IDENTITY, "tool": tool, "stiffness": tool, "sensor": sensor}
-    if frame.axes not in FRAMES or frame.point not in poses:
+    poses = {"flange": IDENTITY, "tool": tool, "sensor": sensor}
+    points = (*poses, "base")
+    if frame.axes not in FRAMES or frame.point not in points:
         raise ParameterError(
-            f"the log's wrench is in {frame}, which is no frame known here; there is "
-            f"{', '.join(FRAMES)}, as in --columns wrench[base]=…"
+            f"the log's wrench is in {frame}, which is no frame known here; say which with "
+            f"--columns wrench[AXES@POINT], of the axes {', '.join(FRAMES)} and the points "
+            f"{', '.join(points)}, as in wrench[base@tool]"
         )
     if mounting.sensor is None and "sensor" in (frame.axes, frame.point):
         remarks.append(caution("sensor-pose-unstated"))
-    if mounting.tool is None and {"tool", "stiffness"} & {frame.axes, frame.point}:
+    if mounting.tool is None and "tool" in (frame.axes, frame.point):
         remarks.append(caution("tool-pose-unstated", frame=str(frame)))
     axes = None if frame.axes == "base" else np.asarray(poses[frame.axes].rotation)
-    return Placement(frame, axes, np.asarray(poses[frame.point].translation), tuple(remarks))
+    point = None if frame.point == "base" else np.asarray(poses[frame.point].translation)
+    return Placement(frame, axes, point, tuple(remarks))
 
 
 def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wrench:
@@ -73,25 +77,42 @@ def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wre
         MissingSignalError: If the log has none, or one that is zero throughout.
         ParameterError: If its frame is not one that is known here.
     """
-    values = recording.require("wrench")
-    if not np.any(values):
+    if not np.any(recording.require("wrench")):
         raise MissingSignalError(
             f"{recording.name}: the log's wrench is zero in every sample, so it measures nothing"
         )
-    where = placement(recording.wrench_frame, mounting)
-    flange = link_poses(chain, recording.q).rotation[:, -1]
+    return in_base_axes(recording, chain, mounting)
+
+
+def in_base_axes(recording: Recording, chain: Chain, mounting: Mounting) -> Wrench:
+    """A recording's wrench as force on the robot, in base axes about the flange point.
+
+    Raises:
+        MissingSignalError: If it has none.
+        ParameterError: If its frame is not one that is known here.
+    """
+    values = recording.require("wrench")
+    frame, why = recording.wrench_frame, tuple[Remark, ...]()
+    if frame is not None and frame.point == "controller":
+        tool = None if mounting.tool is None else np.asarray(mounting.tool.translation)
+        point, why = controller_point(recording, chain, tool)
+        frame = replace(frame, point=point)
+    where = placement(frame, mounting)
+    poses = link_poses(chain, recording.q)
+    flange = poses.rotation[:, -1]
     force, moment = where.frame.factor * values[:, :3], where.frame.factor * values[:, 3:]
     if where.axes is not None:
         turn = flange @ where.axes
         force, moment = (np.einsum("tij,tj->ti", turn, part) for part in (force, moment))
     # The force acts at the point, so about the flange it has the moment of its lever besides.
-    moment = moment + np.cross(flange @ where.point, force)
+    lever = -poses.translation[:, -1] if where.point is None else flange @ where.point
+    moment = moment + np.cross(lever, force)
     return Wrench(
         name="log",
         t=recording.t,
         values=np.concatenate([force, moment], axis=1),
         frame="base",
-        remarks=where.remarks,
+        remarks=(*why, *where.remarks),
     )
 
 

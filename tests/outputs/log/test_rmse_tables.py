@@ -3,14 +3,13 @@ import polars as pl
 import pytest
 
 from vftcli.evaluation import SCHEMA
-from vftcli.outputs.grid import GridCell
+from vftcli.outputs.grid import GridCell, html, latex, markdown, terminal
 from vftcli.outputs.log.rmse_tables import (
     blocks,
     detail_grids,
     details,
     logs_of,
     marks_in_words,
-    mean_of,
     rmse_grid,
 )
 
@@ -34,8 +33,33 @@ def errors(*changed: dict[str, object]) -> pl.DataFrame:
 
 
 def test_values_that_print_alike_are_both_the_best() -> None:
-    (block,) = blocks(errors())
+    (block,) = blocks(errors(*[{"reference_floor_Nm": 0.1}] * 4))
     assert block.best.tolist() == [[True, False], [True, True]]
+
+
+def test_bold_is_only_where_the_reference_can_tell() -> None:
+    """J1: both at the floor of .5; J2: it rests most of the time."""
+    (block,) = blocks(errors({}, {"reference_trusted": False}, {}, {"reference_trusted": False}))
+    assert not block.best.any()
+
+
+def test_an_observer_that_fails_is_named_with_the_share() -> None:
+    (block,) = blocks(errors({"missing": 0.12}, {"missing": 0.03}))
+    assert "fdo: no answer in up to 12 %" in marks_in_words([block])
+    assert "no answer" not in marks_in_words(blocks(errors()))
+
+
+def test_every_output_has_one_mean_and_says_what_it_leaves_out() -> None:
+    """J2's reference is not to be trusted: terminal, Markdown, LaTeX and page show J1's error."""
+    rests = {"reference_trusted": False}
+    (block,) = blocks(errors({}, rests, {"rmse_Nm": 0.9}, rests))
+    grid = rmse_grid(block)
+    assert block.means.errors == {"fdo": 0.6, "gmo": 0.9}
+    for text in (terminal(grid), markdown(grid), latex(grid), html(grid)):
+        assert "0.600" in text
+        assert "1.30" not in text  # the mean of .6 and 2
+    assert "mean: without J2" in terminal(grid) + marks_in_words([block])
+    assert "mean: without J2" in latex(grid)
 
 
 def test_at_the_floor_is_within_a_fifth_of_it() -> None:
@@ -73,8 +97,7 @@ def test_a_joint_that_rests_bears_a_dagger() -> None:
 def test_an_unknown_error_is_not_the_best_and_does_not_count_in_the_mean() -> None:
     (block,) = blocks(errors({"rmse_Nm": None}))
     assert block.best.tolist() == [[False, False], [True, True]]
-    assert mean_of(block.rmse[0]) == 2.0
-    assert np.isnan(mean_of(np.array([np.nan])))
+    assert block.means.errors["fdo"] == 2.0
     assert "no sample" in marks_in_words([block])
 
 

@@ -44,7 +44,7 @@ def test_terminal_table(errors: pl.DataFrame) -> None:
         "floor     0.500   1.00   0.750\n"
         "floor: RMSE that the reference itself is known to have\n"
         "*: within 1.2 × the floor; the reference can tell no more\n"
-        "–: no sample where both the estimate and the reference are known\n"
+        "–: no sample where the reference is known\n"
     )
 
 

@@ -11,6 +11,7 @@ from vftcli.outputs.log.wrench_tables import (
     axis_grids,
     contact_grids,
     drift_grid,
+    nothing_to_compare,
     paper_bounds,
 )
 from vftcli.signals.wrench import AXES
@@ -42,6 +43,20 @@ def test_forces_in_newtons_beside_moments_in_newton_metres(errors: pl.DataFrame)
         "observer  fx [N]  fy [N]  fz [N]  mx [N·m]  my [N·m]  mz [N·m]",
         "gmo         1.50    1.50    1.50     0.250     0.250     0.250",
     ]
+
+
+def test_a_pose_that_hides_every_wrench_is_said_in_one_line(errors: pl.DataFrame) -> None:
+    """It was a table of dashes over "0 unmasked samples"."""
+    none = errors.with_columns(
+        samples=pl.lit(0, pl.Int64),
+        rmse_N=pl.lit(None, pl.Float64),
+        rmse_Nm=pl.lit(None, pl.Float64),
+    )
+    assert list(axis_grids(none)) == []
+    (line,) = nothing_to_compare(none)
+    assert line.startswith("run.csv against sensor, wrench: nothing to compare: ")
+    assert "below 0.05" in line
+    assert list(nothing_to_compare(errors)) == []
 
 
 def test_the_paper_s_bounds_stand_below_its_own_arm_only(

@@ -1,11 +1,13 @@
 """RMSE of joint torques as grids: observers down, joints across, and how sure each number is."""
 
 from collections.abc import Iterator, Sequence
+from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
 
+from vftcli.evaluation.joint_means import JointMeans, joint_means
 from vftcli.outputs.grid import DASH, Column, Grid, GridCell, joint_columns, significant
 from vftcli.signals.arrays import Array, Mask
 
@@ -30,6 +32,8 @@ class Block(NamedTuple):
         rmse: NaN where it is not known. (observers, joints) [N·m]
         floor: The reference's own error, NaN where it is not known. (joints,) [N·m]
         samples: Fewest and most samples an entry is made of.
+        means: What the joints are in one number.
+        missing: Observer → largest share of a joint's samples without its answer, where there is.
         untrusted: Joints whose reference is not to be trusted, because they rest.
     """
 
@@ -40,6 +44,8 @@ class Block(NamedTuple):
     rmse: Array
     floor: Array
     samples: tuple[int, int]
+    means: JointMeans
+    missing: dict[str, float]
     untrusted: tuple[int, ...] = ()
 
     @property
@@ -49,12 +55,16 @@ class Block(NamedTuple):
 
     @property
     def best(self) -> Mask:
-        """The smallest RMSE of each joint, and what prints the same. (observers, joints)"""
+        """The smallest RMSE of each joint, and what prints the same. (observers, joints)
+
+        None where the reference cannot tell: of a joint that rests, and of several at the floor.
+        """
         # Compared as printed, so that two equal texts in one column are both bold.
         least = np.where(np.isfinite(self.rmse), self.rmse, np.inf).min(axis=0)
         shown = [[significant(value) for value in row] for row in self.rmse]
         best = np.array([significant(value) for value in least])
-        return np.asarray(np.array(shown) == best) & np.isfinite(self.rmse)
+        tells = ~np.isin(self.joints, self.untrusted) & (np.sum(self.at_floor, axis=0) < 2)
+        return np.asarray((np.array(shown) == best) & np.isfinite(self.rmse) & tells)
 
     @property
     def has_floor(self) -> bool:
@@ -116,14 +126,16 @@ def block(rows: pl.DataFrame) -> Block:
         rmse=rmse,
         floor=floor,
         samples=(int(min(counts)), int(max(counts))),
+        means=joint_means(rows),
+        missing={
+            str(name): float(share)
+            for name, share in rows.group_by("observer", maintain_order=True)
+            .agg(pl.col("missing").max())
+            .iter_rows()
+            if share
+        },
         untrusted=tuple(int(j) for j in doubtful),
     )
-
-
-def mean_of(values: Array) -> float:
-    """The mean over the joints that are known, NaN if none is."""
-    finite = values[np.isfinite(values)]
-    return float(finite.mean()) if finite.size else float("nan")
 
 
 def rmse_grid(table: Block) -> Grid:
@@ -137,9 +149,9 @@ def rmse_grid(table: Block) -> Grid:
             # A star where the reference can tell no more.
             mark, page = ("*", text + ON_PAGE) if at_floor else ("", "")
             cells.append(GridCell(text, bool(best), mark, page))
-        rows.append((name, *cells, mean_of(values)))
+        rows.append((name, *cells, table.means.errors.get(name, float("nan"))))
     if table.has_floor:
-        rows.append(("floor", *map(float, table.floor), mean_of(table.floor)))
+        rows.append(("floor", *map(float, table.floor), table.means.floor))
     joints = tuple(
         Column(head, symbol=f"$J_{{{j}}}${LATEX_DAGGER * (j in table.untrusted)}")
         for j, head in zip(table.joints, table.joint_heads, strict=True)
@@ -202,16 +214,28 @@ def marks_in_words(found: Sequence[Block]) -> str:
         lines.append(f"*: within {AT_FLOOR:g} × the floor; the reference can tell no more")
     if any(table.untrusted for table in found):
         lines.append(f"{DAGGER}: {RESTS}")
+    lines += dict.fromkeys(f"mean:{t.means.left_out}" for t in found if t.means.without)
+    lines += without_answer(found)
     if any(not np.all(np.isfinite(table.rmse)) for table in found):
-        lines.append("–: no sample where both the estimate and the reference are known")
+        lines.append("–: no sample where the reference is known")
     return "".join(f"{text}\n" for text in lines)
+
+
+def without_answer(found: Sequence[Block]) -> list[str]:
+    """Observers that leave samples without an answer, and their share of a joint's samples."""
+    lines = (
+        f"{name}: no answer in up to {100.0 * share:.2g} % of a joint's samples, each counted as 0"
+        for table in found
+        for name, share in table.missing.items()
+    )
+    return list(dict.fromkeys(lines))
 
 
 def marks_on_page(found: Sequence[Block]) -> str:
     """What the marks of the RMSE table mean, as HTML."""
     text = (
         "Torque on the robot about each joint's own axis; bold is the best of its joint; "
-        "the mean is over the joints."
+        "the mean is over the joints whose reference can be trusted."
     )
     if any(block.has_floor for block in found):
         text += (
@@ -220,4 +244,4 @@ def marks_on_page(found: Sequence[Block]) -> str:
         )
     if any(block.untrusted for block in found):
         text += f" {DAGGER}: {RESTS}."
-    return text
+    return " ".join([text, *(f"{escape(line)}." for line in without_answer(found))])

@@ -20,13 +20,17 @@ from vftcli.outputs.grid import (
 from vftcli.outputs.log.rmse_tables import (
     DAGGER,
     LATEX_DAGGER,
-    RESTS,
     blocks,
     detail_grids,
     marks_in_words,
     rmse_grid,
 )
-from vftcli.outputs.log.wrench_tables import PaperBounds, axis_grids, contact_grids
+from vftcli.outputs.log.wrench_tables import (
+    PaperBounds,
+    axis_grids,
+    contact_grids,
+    nothing_to_compare,
+)
 from vftcli.outputs.plain_rows import csv_rows, json_rows
 from vftcli.signals.letters import printable
 
@@ -87,6 +91,7 @@ def to_terminal(
     if not found:
         return "no errors to show: the estimates and the reference have no sample in common\n"
     joints = "\n".join(terminal(rmse_grid(table)) for table in found) + marks_in_words(found)
+    joints += "".join(f"{printable(line)}\n" for line in nothing_to_compare(errors))
     below = [*axis_grids(errors, bounds), *contact_grids(errors)]
     below = [*(detail_grids(errors) if every else ()), *below]
     above = "".join(f"{printable(line)}\n" for line in doubts_of(errors))
@@ -96,7 +101,8 @@ def to_terminal(
 def to_markdown(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
     """All tables of the errors as GitHub Markdown, best value of each joint bold."""
     found = blocks(errors)
-    marks = [f"{DAGGER} {RESTS}\n"] if any(table.untrusted for table in found) else []
+    lines = [*marks_in_words(found).splitlines(), *nothing_to_compare(errors)]
+    marks = [f"{escape_markdown(line)}\n" for line in lines]
     below = [*detail_grids(errors), *axis_grids(errors, bounds)]
     above = [markdown(rmse_grid(table)) for table in found]
     doubts = [f"> **{escape_markdown(line)}**\n" for line in doubts_of(errors)]
@@ -108,7 +114,8 @@ def to_latex(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
 
     Logs of arms with as many joints share a table.
     """
-    doubts = "".join(f"% {printable(line)}\n" for line in doubts_of(errors))
+    lines = [*doubts_of(errors), *nothing_to_compare(errors)]
+    doubts = "".join(f"% {printable(line)}\n" for line in lines)
     arms = groupby(blocks(errors), key=lambda table: table.joints)
     found = [alike([rmse_grid(table) for table in tables]) for _, tables in arms]
     if axes := list(axis_grids(errors, bounds)):

@@ -8,6 +8,7 @@ import polars as pl
 from vftcli.outputs.grid import Column, Grid
 from vftcli.outputs.log.rmse_tables import logs_of
 from vftcli.signals.wrench import AXES, unit_of
+from vftcli.virtual_sensor.solvers import LEAST_SIGMA
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
@@ -28,7 +29,7 @@ def paper_bounds(analyses: "Iterable[Analysis]") -> PaperBounds:
 
 
 def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Iterator[Grid]:
-    """RMSE of the wrenches, one table for each recording and reference that has wrench rows."""
+    """RMSE of the wrenches, one table for each recording and reference that has any."""
     for group in logs_of(errors, "axis"):
         recording, reference = str(group["recording"][0]), str(group["reference"][0])
         found: dict[str, dict[str, float | None]] = {}
@@ -43,7 +44,9 @@ def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Itera
         if reference == "sensor" and (limits := (bounds or {}).get(recording)):
             force, moment = limits
             rows.append(("paper, UR5", *[f"< {force:g}"] * 3, *[f"< {moment:g}"] * 3))
-        samples = max(group["samples"].drop_nulls().to_list() or [0])
+        samples = compared_samples(group)
+        if not samples:
+            continue
         yield Grid(
             title=f"{recording} against {reference}, wrench, {samples} unmasked samples",
             quantity="RMSE",
@@ -54,6 +57,22 @@ def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Itera
             rows=tuple(rows),
             swatches=True,
         )
+
+
+def compared_samples(rows: pl.DataFrame) -> int:
+    """Most samples that an axis of a log's wrenches is compared in."""
+    return int(max(rows["samples"].drop_nulls().to_list(), default=0))
+
+
+def nothing_to_compare(errors: pl.DataFrame) -> Iterator[str]:
+    """A line for each log and reference whose wrenches have no sample to compare, and why."""
+    for rows in logs_of(errors, "axis"):
+        if not compared_samples(rows):
+            yield (
+                f"{rows['recording'][0]} against {rows['reference'][0]}, wrench: nothing to "
+                "compare: in no sample of the reference can the pose tell a wrench (σ_min of J is "
+                f"below {LEAST_SIGMA:g} all along); the joints' torques are compared"
+            )
 
 
 CONTACTS = {

@@ -52,18 +52,15 @@ def batch_lines(table: "pl.DataFrame", pages: Mapping[str, str]) -> Iterator[Ind
         table: All rows of some logs, as ``batch.parquet`` holds them.
         pages: Label of a log → its own page, relative to the batch's.
     """
-    import polars as pl
+    from vftcli.evaluation.joint_means import joint_means
 
     if table.is_empty():
         return
-    means = (
-        table.filter(pl.col("joint").is_not_null() & pl.col("rmse_Nm").is_not_null())
-        .group_by("log", "observer", maintain_order=True)
-        .agg(pl.col("rmse_Nm").mean())
-        .sort("rmse_Nm", maintain_order=True)
-        .unique("log", keep="first", maintain_order=True)
-    )
-    best = {log: f"{significant(rmse)} N·m ({name})" for log, name, rmse in means.iter_rows()}
+    best = {
+        str(log): f"{significant(least[1])} N·m ({least[0]})"
+        for (log,), rows in table.group_by("log")
+        if (least := joint_means(rows).least) is not None
+    }
     for row in table.unique("log", keep="first", maintain_order=True).iter_rows(named=True):
         yield batch_line(row, pages.get(row["log"], ""), best.get(row["log"], DASH))
 

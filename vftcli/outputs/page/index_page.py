@@ -10,7 +10,7 @@ from vftcli.analysis import Analysis
 from vftcli.outputs.believability import MARKS, SEVERITY, Ground, Standing, grounds, health
 from vftcli.outputs.contacts import by_force, hardest_words
 from vftcli.outputs.grid import DASH, Column, Grid, GridCell, html, significant
-from vftcli.outputs.log.rmse_tables import blocks, mean_of, rmse_grid
+from vftcli.outputs.log.rmse_tables import blocks, rmse_grid
 from vftcli.outputs.page.shell import alarms, document, lead, section, soft, top
 
 HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Not told below", "Mean RMSE", "Health")
@@ -120,10 +120,8 @@ def index_line(folder: str, analysis: Analysis, ground: Ground) -> IndexLine:
         hardest = hardest_words(found)
     best, errors = DASH, blocks(analysis.errors) if analysis.errors is not None else ()
     if errors:
-        means = [mean_of(row) for row in errors[0].rmse]
-        # A mean that is not known comes last.
-        k = min(range(len(means)), key=lambda i: (means[i] != means[i], means[i]))
-        best = f"{significant(means[k])} N·m ({errors[0].observers[k]})"
+        lead = errors[0].means.least
+        best = DASH if lead is None else f"{significant(lead[1])} N·m ({lead[0]})"
     most = None if found is None else found.hardest
     return IndexLine(
         name=analysis.recording.name,

@@ -15,11 +15,10 @@ from vftcli.outputs.log.rmse_tables import (
     blocks,
     detail_grids,
     marks_on_page,
-    mean_of,
     rmse_grid,
 )
 from vftcli.outputs.log.run_record import observer_record
-from vftcli.outputs.log.wrench_tables import axis_grids, paper_bounds
+from vftcli.outputs.log.wrench_tables import axis_grids, nothing_to_compare, paper_bounds
 from vftcli.outputs.page.charts import legend, pictures_of
 from vftcli.outputs.page.comparisons import selection_guide
 from vftcli.outputs.page.shell import section, soft
@@ -38,13 +37,16 @@ def errors_section(analysis: Analysis) -> str:
         )
         return section(title, soft(words), "none given", name="errors")
     best = found[0]
-    means = [mean_of(row) for row in best.rmse]
-    k = min(range(len(means)), key=lambda i: (means[i] != means[i], means[i]))
-    state = f"{significant(means[k])} N·m ({best.observers[k]}) against {best.reference}"
+    lead = best.means.least
+    state = "no sample in common with the estimates"
+    if lead is not None:
+        state = f"{significant(lead[1])} N·m ({lead[0]}) against {best.reference}"
+        state += best.means.left_out
     parts = [
         *(html(rmse_grid(block)) for block in found),
         soft(marks_on_page(found)),
         *map(html, axis_grids(table, paper_bounds([analysis]))),
+        *(soft(escape(line)) for line in nothing_to_compare(table)),
         section(
             "Confidence intervals, lags and significance", "".join(map(html, detail_grids(table)))
         ),

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from vftcli.signals.wrench import STIFFNESS_FRAME, WrenchFrame
+from vftcli.signals.wrench import FRANKA_FRAME, WrenchFrame
 
 VECTORS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
@@ -56,7 +56,7 @@ KINDS: dict[str, Kind] = {
         },
         rank=2,
         turned=frozenset({"tau_ext"}),
-        wrench_frame=STIFFNESS_FRAME,
+        wrench_frame=FRANKA_FRAME,
     ),
     "franka_msgs/FrankaRobotState": Kind(
         signals={
@@ -72,7 +72,7 @@ KINDS: dict[str, Kind] = {
         constants={"mass": ("inertia_load.inertia.m", "m_load"), "com": ("f_x_cload",)},
         rank=2,
         turned=frozenset({"tau_ext"}),
-        wrench_frame=STIFFNESS_FRAME,
+        wrench_frame=FRANKA_FRAME,
     ),
     "geometry_msgs/WrenchStamped": Kind(signals={"wrench": ("wrench",)}, frame="header.frame_id"),
 }

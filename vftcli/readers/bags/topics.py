@@ -10,7 +10,7 @@ import numpy as np
 from vftcli.readers.aliases import RESIDUAL_TURNED
 from vftcli.readers.bags.container import Integers
 from vftcli.readers.bags.decode import Stream
-from vftcli.readers.columns import SIGNALS, parse_columns
+from vftcli.readers.columns import SIGNALS, Item, parse_columns
 from vftcli.readers.joints import effort_of, robot_of
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
@@ -49,7 +49,7 @@ def aligned(
     gathering.take_lead(path)
     for stream in streams:
         gathering.take(stream)
-    frame = gathering.take_wrench(streams)
+    frame = gathering.take_wrench(streams, path)
     gathering.tell_left(streams, others)
     lead, signals = gathering.lead, gathering.signals
     names, hint = lead.names, robot_of(lead.names)
@@ -96,6 +96,7 @@ class Gathering:
         lead: The topic with the joints' positions.
         clock: Its clock.
         chosen: Signal → message field and factor, as --columns says.
+        said_of_wrench: What --columns says of the wrench, None for nothing.
         signals: Field of Recording → values at the leading topic's times. (T, k)
         taken: Topics beside the leading one of which a signal was taken.
         remarks: What was chosen, and what looks suspicious.
@@ -105,6 +106,7 @@ class Gathering:
         self.lead = lead
         self.clock = clock_of(lead)
         self.chosen = chosen_fields(request)
+        self.said_of_wrench = next((i for i in said(request) if i.signal == "wrench"), None)
         self.signals: dict[str, Array] = {}
         self.taken: set[str] = set()
         self.remarks: list[Remark] = []
@@ -190,7 +192,24 @@ class Gathering:
                     del self.signals[other]  # /joint_states' effort said the same without its kind
         self.signals[field_name] = value
 
-    def take_wrench(self, streams: Sequence[Stream]) -> WrenchFrame | None:
+    def take_wrench(self, streams: Sequence[Stream], path: Path) -> WrenchFrame | None:
+        """Take the wrench of a sensor or of the vendor; return what --columns or the bag states.
+
+        Raises:
+            LogError: If --columns says something of a wrench and the bag has none.
+        """
+        frame, said = self._usual_wrench(streams), self.said_of_wrench
+        if said is None:
+            return frame
+        if "wrench" not in self.signals:
+            raise LogError(
+                f"{path}: --columns says something of a wrench, and no topic has one; leave it out."
+            )
+        if said.pattern is None:
+            self.signals["wrench"] = self.signals["wrench"] * said.factor + 0.0
+        return frame if said.unit is None else WrenchFrame.parsed(said.unit)
+
+    def _usual_wrench(self, streams: Sequence[Stream]) -> WrenchFrame | None:
         """Put a sensor's wrench in place of the vendor's estimate; return what is stated of it.
 
         A sensor's topic goes before the vendor's, the fullest before the others.
@@ -270,13 +289,20 @@ FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}
 
 
 def chosen_fields(request: ReadChoice) -> dict[str, tuple[str, float]]:
-    """Signal → message field, "" for its own, and factor: -tau=effort, current[mA]=effort, -tau."""
-    items = parse_columns(request.columns).items if request.columns is not None else ()
+    """Signal → message field, "" for its own, and factor: -tau=effort, current[mA]=effort, -tau.
+
+    A wrench without a field is the one that is taken anyway, of whichever topic.
+    """
     return {
         SIGNALS[item.signal]: (item.pattern or "", item.factor)
-        for item in items
-        if item.signal in SIGNALS
+        for item in said(request)
+        if item.signal in SIGNALS and (item.signal != "wrench" or item.pattern)
     }
+
+
+def said(request: ReadChoice) -> tuple[Item, ...]:
+    """The items of --columns, none without."""
+    return parse_columns(request.columns).items if request.columns is not None else ()
 
 
 def same_arm(stream: Stream, lead: Stream) -> bool:

@@ -195,7 +195,10 @@ def franka_values(simulation: Simulation) -> dict[str, Array]:
         "dtau": rate,
         "tau_ext": -simulation.vendor.tau_ext,
         "k_force": np.hstack(in_flange),
-        "o_force": force,
+        # Its moment is about the base's origin.
+        "o_force": np.hstack(
+            [force[:, :3], force[:, 3:] + np.cross(actual.position, force[:, :3])]
+        ),
         "position": actual.position,
         "turn": turn,
         "target_position": target.position,
