@@ -1,4 +1,4 @@
-"""The one mean over joints: only of those whose reference can be trusted."""
+"""The one mean over joints: only of those with a reference to be trusted."""
 
 import numpy as np
 import polars as pl

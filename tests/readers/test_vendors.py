@@ -64,7 +64,7 @@ def test_ur_rtde_is_told_by_its_commas(tmp_path: Path) -> None:
 def test_the_point_of_the_controllers_moment(
     tmp_path: Path, field: str, shift: float, point: str
 ) -> None:
-    """Of actual_TCP_force: the TCP on CB3, by its sensor on e-Series, told by fields or clock."""
+    """Of actual_TCP_force: the TCP on CB3, by its sensor on e-Series; fields or clock say which."""
     path = ur_csv(tmp_path / "x", separator=",", end="\n")
     lines = path.read_text().splitlines()
     clock = lines[0].split(",").index("timestamp")

@@ -66,7 +66,7 @@ def test_the_same_motion_at_another_speed_is_no_wrong_clock(rate: float, said: s
         align(log, replace(log, t=rate * log.t, dq=log.dq / rate))
 
 
-def test_whose_clock_is_wrong_is_said() -> None:
+def test_the_log_with_the_wrong_clock_is_named() -> None:
     log = wandering()
     log = replace(log, source=replace(log.source, label="a"))
     slow = replace(log, t=1.05 * log.t, source=replace(log.source, label="b"))

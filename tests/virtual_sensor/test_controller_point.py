@@ -73,7 +73,7 @@ def test_a_log_without_pushes_tells_nothing() -> None:
         ROBOT.chain,
         TOOL,
     )
-    assert [remark.code for remark in found.remarks] == ["controller-point-untold"]
+    assert [remark.code for remark in found.remarks] == ["controller-point-open"]
 
 
 def test_without_a_tool_or_target_currents_it_is_the_flange_aloud() -> None:

@@ -1,4 +1,4 @@
-"""One number for several joints: the mean of the errors whose reference can be trusted."""
+"""One number for several joints: the mean of the errors that can be trusted."""
 
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ class JointMeans(NamedTuple):
 
 
 def joint_means(errors: pl.DataFrame) -> JointMeans:
-    """The mean RMSE of every observer, over the joints whose reference can be trusted.
+    """The mean RMSE of every observer, over the joints with a reference to be trusted.
 
     Where none can, over all: a mean is wanted, and every joint of it is marked.
 

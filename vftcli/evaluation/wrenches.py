@@ -22,8 +22,8 @@ WRENCH_SCHEMA: dict[str, type[pl.DataType]] = {
 }
 """Columns where wrenches are compared: `axis` fx…mz, `joint` null; forces fill rmse_N.
 
-`band_share` is the share of the samples whose 95 % band holds the reference; `missing` that without
-an answer where the pose can tell one, which counts as the answer 0.
+`band_share` is the share of the samples with a 95 % band that holds the reference, `missing` that
+without an answer where the pose can tell one, which counts as the answer 0.
 """
 
 
@@ -66,9 +66,9 @@ def evaluate_wrenches(
 
 
 def band_share(wrench: Wrench, k: int, error: Array, known: Mask) -> float | None:
-    """Share of the known samples whose error lies within 1.96 standard deviations.
+    """Share of the known samples with an error within 1.96 standard deviations.
 
-    A sample without an answer, whose error is NaN, lies in no band.
+    A sample without an answer has an error of NaN, which lies in no band.
     """
     if wrench.sd is None or not known.any():
         return None

@@ -69,7 +69,7 @@ def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:
     The sensor in an e-Series' flange gives the moment about the flange: on three logs about the
     TCP it misses the joints' torque by four times as much. A sensor that a URCap brings gives it
     about the TCP. No field says which of the two is mounted. An e-Series log that has no
-    `ft_raw_wrench` and whose stamps all happen to be multiples of 8 ms reads as a CB3's.
+    `ft_raw_wrench`, with stamps that all happen to be multiples of 8 ms, reads as a CB3's.
 
     Args:
         names: Columns of the log.

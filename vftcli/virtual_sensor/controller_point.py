@@ -20,12 +20,12 @@ SURE = 4.5
 def controller_point(
     recording: Recording, chain: Chain, tool: Array | None
 ) -> tuple[str, tuple[Remark, ...]]:
-    """The point of a controller's moment, "flange" or "tool", and why it is taken.
+    """The point of a controller's moment, "flange" or "tool", and why.
 
     The controller knows its payload and its arm: what the measured currents have beyond its target
     currents is what touches the arm, each joint with a factor and an offset of its own. It is
     explained by Jᵀ of the wrench, once about the flange and once about the tool's point. The one
-    that leaves less is taken if it is likelier by `SURE`; the flange is taken where nothing tells,
+    that leaves less is used if it is likelier by `SURE`; the flange is used where nothing tells,
     as an e-Series' own sensor has it.
 
     Args:
@@ -52,7 +52,7 @@ def controller_point(
     pieces = recording.duration / PIECE
     evidence = 0.5 * pieces * float(np.sum(np.log(left["flange"] / left["tool"])))
     if abs(evidence) <= SURE:
-        return "flange", (caution("controller-point-untold", **values),)
+        return "flange", (caution("controller-point-open", **values),)
     point = "tool" if evidence > 0.0 else "flange"
     return point, (fact(f"controller-point-{point}", **values),)
 

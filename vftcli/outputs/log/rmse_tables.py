@@ -235,7 +235,7 @@ def marks_on_page(found: Sequence[Block]) -> str:
     """What the marks of the RMSE table mean, as HTML."""
     text = (
         "Torque on the robot about each joint's own axis; bold is the best of its joint; "
-        "the mean is over the joints whose reference can be trusted."
+        "the mean is over the joints with a reference to be trusted."
     )
     if any(block.has_floor for block in found):
         text += (

@@ -65,7 +65,7 @@ def compared_samples(rows: pl.DataFrame) -> int:
 
 
 def nothing_to_compare(errors: pl.DataFrame) -> Iterator[str]:
-    """A line for each log and reference whose wrenches have no sample to compare, and why."""
+    """A line for each log and reference without a sample to compare wrenches in, and why."""
     for rows in logs_of(errors, "axis"):
         if not compared_samples(rows):
             yield (

@@ -291,7 +291,7 @@ FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}
 def chosen_fields(request: ReadChoice) -> dict[str, tuple[str, float]]:
     """Signal → message field, "" for its own, and factor: -tau=effort, current[mA]=effort, -tau.
 
-    A wrench without a field is the one that is taken anyway, of whichever topic.
+    A wrench without a field is the one that is read anyway, of whichever topic.
     """
     return {
         SIGNALS[item.signal]: (item.pattern or "", item.factor)
