@@ -143,7 +143,7 @@ def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tu
 
 
 def read_as(convention: str, setup: Setup) -> Setup:
-    """A setup with the R and Q of its file under this noise convention unless one is named."""
+    """A setup with its file's R and Q under this convention unless one is named."""
     if "kfo" not in setup.gains:
         return setup
     file = {"noise_convention": convention, **setup.gains["kfo"]}
@@ -197,7 +197,7 @@ def build_rts(setup: Setup) -> Built:
 
 
 def build_auto(name: str, by_hand: Callable[[Setup], Built]) -> Callable[[Setup], Built]:
-    """The builder of an observer whose gains come from the log, else from `by_hand`'s densities."""
+    """The builder of an observer with the log's gains, else `by_hand`'s as densities."""
 
     def build(setup: Setup) -> Built:
         from vftcli.observers.auto_tuning import AutoTuned, tune_to_spectra

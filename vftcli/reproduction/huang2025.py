@@ -337,7 +337,7 @@ HUANG2025 = Paper(
         "a scenario of vftcli simulate with the seeds that are stated.",
         "“As printed” computes by the printed formulas (--as-printed), errors of the print "
         "included; “corrected” by the ones that docs/errata.md gives, R and Q as covariances of "
-        "samples; “R density” likewise, R and Q as densities; “floor” is the error of the "
+        "samples; “R density” by the same with R and Q as densities; “floor” is the error of the "
         "reference itself.",
         "Beside a mean over the seeds stands its range, least to greatest.",
     ),

@@ -98,7 +98,7 @@ def comparison_lines(advance: str, axis: str) -> tuple[PrintedLine, ...]:
             f"{words}, α {alpha}, phase {'I' * k}",
             "s",
             number if alpha == "1.9" else "",
-            # A drag's peak goes with dips of the record; what like is set beside like is the turn.
+            # Dips of the record move the peak of a whole drag: only the turn compares.
             key == "turn",
         )
         for key, words, wanted, number in (
