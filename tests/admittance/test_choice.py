@@ -36,6 +36,16 @@ def test_xi_and_threshold_mode_are_settings() -> None:
     assert parameters.threshold_mode == "soft"
 
 
+def test_as_printed_the_whole_force_enters_unless_a_mode_is_named() -> None:
+    def mode(*assignments: str, **words: str) -> str:
+        choice = ControlChoice.parsed(assignments=assignments, as_printed=True, **words)
+        return choice.parameters(UR5).threshold_mode
+
+    assert mode() == "literal"
+    assert mode(threshold_mode="hard") == mode("threshold_mode=hard") == "hard"
+    assert ControlChoice.parsed().parameters(UR5).threshold_mode == "hard"
+
+
 def test_xi_from_the_drag_phase_is_the_default() -> None:
     from_damping = ControlChoice.parsed(xi="from-B").parameters(UR5)
     np.testing.assert_array_equal(

@@ -52,6 +52,19 @@ def test_a_push_is_seen_followed_and_withdrawn() -> None:
     assert found.rested
 
 
+def test_the_paper_times_from_detection_and_from_the_estimate_s_fall() -> None:
+    """Seen in row 310, 10 mm on in 320; gone in 515, and the way ends in 518 at 199 · 10 mm."""
+    moved = np.zeros((ROWS, 6))
+    moved[:, 1] = np.clip((np.arange(ROWS) - 319) * 0.01, 0.0, 1.99)
+    (found,) = latencies(loop(moved=moved))
+    assert found.reaction == pytest.approx(10 * PERIOD)
+    assert found.turn == pytest.approx(3 * PERIOD)
+    never = latencies(loop(estimate=np.zeros((ROWS, 6))))[0]
+    assert never.reaction is None
+    away = np.where(np.arange(ROWS)[:, None] < 300, 0.0, moved + np.arange(ROWS)[:, None])
+    assert latencies(loop(moved=away))[0].turn is None
+
+
 def test_what_does_not_happen_is_none() -> None:
     (found,) = latencies(loop(estimate=np.zeros((ROWS, 6)), moved=np.zeros((ROWS, 6))))
     assert found.detection is None

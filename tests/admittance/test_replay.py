@@ -86,6 +86,20 @@ def test_rows_say_what_happened() -> None:
     assert found.rows[2]["peak_advance_s"] > 0.0  # the release's brake acts sooner
 
 
+def test_as_printed_a_force_below_the_threshold_moves_the_arm() -> None:
+    """5 N of 20 for 20 s: to F/K_d and F/(αK_d); as corrected not at all.
+
+    The slower decays with B/2M = .83 1/s: after 20 s 6e-8 is left. W may rise: a force enters.
+    """
+    record, q = push(5.0, length=21.0)
+    values = np.where(record.t[:, None] >= 1.0, record.values[200], 0.0)
+    literal = run((replace(record, values=values), q), "threshold_mode=literal")
+    np.testing.assert_allclose(literal.motion.x[-1, :, 1], [5 / 8, 5 / (1.6 * 8)], rtol=1e-6)
+    assert not literal.phases.dragged.any()
+    assert "energy-rises" not in codes(literal)
+    assert not run((record, q)).motion.x.any()
+
+
 def test_work_of_a_constant_force_is_force_times_way() -> None:
     found = run(push(), "threshold_mode=soft")
     x = found.motion.x[:, 0, 1]

@@ -39,6 +39,13 @@ def test_hard_passes_the_whole_force_and_soft_the_excess() -> None:
     np.testing.assert_array_equal(soft.force[:, 0], [0, 0, 1, -5, 0])
 
 
+def test_as_printed_the_threshold_chooses_the_parameters_and_the_whole_force_enters() -> None:
+    force = column(3.0, 4.0, 5.0, -9.0, 1.0)
+    literal = phases(force, parameters("literal"))
+    np.testing.assert_array_equal(literal.dragged, phases(force, parameters()).dragged)
+    np.testing.assert_array_equal(literal.force, force)
+
+
 def test_hysteresis_holds_on() -> None:
     force = column(3.5, 4.5, 3.5, 2.5, 1.9, 3.5, 4.5)
     held = phases(force, parameters(hysteresis=0.5)).dragged[:, 0]

@@ -47,7 +47,9 @@ def made(
 
 
 def observed_by(name: str) -> ForceChoice:
-    return ForceChoice(observers=ObserverChoice(names=(name,)))
+    """One observer, the Kalman filters' R and Q read as densities."""
+    settings = {"kfo": {"noise_convention": "density"}}
+    return ForceChoice(observers=ObserverChoice(names=(name,), settings=settings))
 
 
 def torques(copy: Path) -> pl.DataFrame:
@@ -86,8 +88,8 @@ def test_the_whole_copy(tmp_path: Path) -> None:
     assert (record["robot"]["name"], record["observer"]["name"]) == ("panda", "kfo-zoh")
     assert set(record["sources"]) == set(FILES)
     assert [e["frames"] for e in record["episodes"]] == [200, 160, 180]
-    # kfo-zoh's double pole at 25 Hz: .39 a frame; 1 % is left after some five
-    assert {e["transient_frames"] for e in record["episodes"]} == {5}
+    # kfo-zoh's slowest pole at 25 Hz: .24 a frame; 1 % is left after some four
+    assert {e["transient_frames"] for e in record["episodes"]} == {4}
     table = torques(tmp_path / "copy")
     assert len(table) == 540
     assert not any(table[name].explode().is_nan().any() for name in table.columns[-3:])

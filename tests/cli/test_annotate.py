@@ -18,7 +18,7 @@ def test_it_says_what_was_written(tmp_path: Path) -> None:
     assert "3 episodes (3 done), 540 frames, panda, kfo-zoh, causal" in result.stderr
     assert "wrench: N, N·m, flange axes" in result.stderr
     assert "contact: 1 in a contact of the list, else 0" in result.stderr
-    assert "the first 5 frames of an episode still show" in result.stderr
+    assert "the first 4 frames of an episode still show" in result.stderr
     again = CliRunner().invoke(app, [*words, "--force", "--json", "--observer", "kfo-rts"])
     assert json.loads(again.stdout)["causal"] is False
 

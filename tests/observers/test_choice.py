@@ -78,9 +78,10 @@ def test_gains_of_the_log_go_between_the_robot_and_set(spectra: Spectra) -> None
     assert remarks == ()
     both = ObserverChoice.parsed(gains="auto", observer=["gmo"], assignments=["gmo.gain=33"])
     assert np.all(both.build(UR5, STEP, shown)[0][0].gain == 33.0)
-    # A log without a free part has none to give.
-    (gmo, _), remarks = asked.build(UR5, STEP)
+    # A log without a free part has none to give: those of the file, read as what it would give.
+    (gmo, zoh), remarks = asked.build(UR5, STEP)
     np.testing.assert_array_equal(gmo.gain, UR5.gains["gmo"]["gain"])
+    assert zoh.noise_convention == "density"
     assert [remark.code for remark in remarks] == ["gains-without-free-part"]
 
 

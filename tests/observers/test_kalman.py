@@ -82,8 +82,15 @@ def test_decay_agrees_with_the_dense_textbook_filter(scheme: str, wandering: Ter
     np.testing.assert_allclose(observer.estimate(log).tau, tau, atol=1e-9)
 
 
-def test_as_printed_agrees_with_the_dense_filter_on_mu_alone(wandering: TermsOf) -> None:
-    observer, log = paper("fe", as_printed=True), wandering(samples=600)
+@pytest.mark.parametrize("scheme", ["fe", "zoh"])
+def test_as_printed_agrees_with_the_dense_filter_on_mu_alone(
+    scheme: str, wandering: TermsOf
+) -> None:
+    """With the noise as printed, but for (44): its block is the corrected one, as density's."""
+    observer, log = paper(scheme, as_printed=True), wandering(samples=600)
+    noise = paper(scheme, {"fe": "literal", "zoh": "density"}[scheme]).model(STEP, 6)
+    for ours, named in zip(observer.model(STEP, 6), noise, strict=True):
+        np.testing.assert_array_equal(ours, named)
     tau, _ = dense(observer, log)
     np.testing.assert_allclose(observer.estimate(log).tau, tau, atol=1e-10)
 
@@ -116,6 +123,26 @@ def test_hold_is_van_loans_matrix_exponential(decay: float, step: float) -> None
         rtol=1e-9,
         atol=1e-13 * 5000,
     )
+
+
+def test_the_printed_44_is_unsymmetric_indefinite_and_a_quarter_sample_faster() -> None:
+    """docs/errata.md: lower-right block −A_c, run all the same. 1e-6 s: the iteration's rest."""
+    A_c, Q_c = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.01, 5000.0])
+    A = np.eye(2) + STEP * A_c
+    delay = []
+    for block in (-A_c.T, -A_c):
+        M = expm(np.block([[A_c, Q_c], [np.zeros((2, 2)), block]]) * STEP)
+        Q, P = M[:2, 2:] @ M[:2, :2].T, 100.0 * np.eye(2)
+        for _ in range(2000):
+            P = A @ P @ A.T + Q
+            L = P[:, :1] / (P[0, 0] + 0.5 / STEP)
+            rest = np.eye(2) - L @ np.array([[1.0, 0.0]])
+            P = rest @ P @ rest.T + 0.5 / STEP * L @ L.T
+        delay.append(L[0, 0] / L[1, 0] - 0.5 * STEP)
+    assert Q[1, 0] == pytest.approx(2.0 * Q[0, 1], rel=1e-4)  # printed: 2 to Q_p/Q_τ
+    assert np.linalg.eigvalsh(0.5 * (Q + Q.T))[0] < 0.0
+    assert delay[0] == pytest.approx(paper("zoh").tuning(STEP, 6).delay[0], abs=1e-6)
+    assert delay[1] == pytest.approx(delay[0] - 0.25 * STEP, abs=1e-5)
 
 
 @pytest.mark.parametrize("convention", NOISE_CONVENTIONS)

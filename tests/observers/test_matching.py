@@ -89,7 +89,8 @@ def test_goals_out_of_reach(goal: str, message: str) -> None:
 def test_one_joint_out_of_reach_is_refused() -> None:
     """Two joints could have the delay; on the third R = 1e12 and the largest Q_τ, 1e18, make
     ω_n = (Q_τ/R)^¼ = 32 rad/s and so √2/ω_n = 45 ms."""
-    gains = {**GAINS, "kfo": {**GAINS["kfo"], "r_diag": [0.5, 0.5, 1e12]}}
+    density = {"r_diag": [0.5, 0.5, 1e12], "noise_convention": "density"}
+    gains = {**GAINS, "kfo": {**GAINS["kfo"], **density}}
     how = setup(gains=gains)
     observers, _ = build_observers(["kfo-zoh"], how)
     with pytest.raises(ParameterError, match=r"no gain gives kfo-zoh a delay of 0\.02 s"):

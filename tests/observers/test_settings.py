@@ -50,7 +50,8 @@ def test_the_command_line_wins_over_the_profile() -> None:
 
 def test_gains_nobody_gave_take_the_kalman_filters_delay_and_say_so() -> None:
     (fdo, gmo, fe), remarks = build_observers(
-        ["fdo", "gmo", "kfo-fe"], setup("panda", joints=7, step=0.001)
+        ["fdo", "gmo", "kfo-fe"],
+        setup("panda", "kfo.noise_convention=density", joints=7, step=0.001),
     )
     delay = fe.tuning(0.001, 7).delay
     np.testing.assert_allclose(gmo.tuning(0.001, 7).delay, delay, rtol=1e-12)
@@ -58,6 +59,45 @@ def test_gains_nobody_gave_take_the_kalman_filters_delay_and_say_so() -> None:
     assert any(str(remark).startswith("gmo.gain was not given") for remark in remarks)
     given = {remark.values.get("parameter"): remark.code for remark in remarks}
     assert given["gmo.gain"] == "gain-from-kalman-delay"
+
+
+@pytest.mark.parametrize("name", ["kfo-fe", "kfo-zoh", "kfo-rts"])
+def test_a_file_s_noise_is_a_sample_s_and_a_bare_robot_s_a_density(name: str) -> None:
+    """ω_n of R .5 and Q_τ 5000 at 125 Hz: (Q_τ/R)^¼ of densities, (Q_τ/(R·Ts))^¼ of samples."""
+    expected = {"ur5": (5000 / 0.5 / 0.008) ** 0.25, "": 10.0}
+    for robot, omega in expected.items():
+        (observer,), _ = build_observers([name], setup(robot))
+        assert observer.tuning(0.008, 6).omega_n[0] == pytest.approx(omega, rel=1e-12)
+        (observer,), _ = build_observers([name], setup(robot, "kfo.noise_convention=density"))
+        assert observer.tuning(0.008, 6).omega_n[0] == pytest.approx(10.0, rel=1e-12)
+
+
+def test_a_file_that_names_a_convention_has_it() -> None:
+    own = {"kfo": {**load_robot("ur5").gains["kfo"], "noise_convention": "density"}}
+    (fe,), _ = build_observers(["kfo-fe"], setup("ur5")._replace(gains=own))
+    assert fe.tuning(0.008, 6).omega_n[0] == pytest.approx(10.0, rel=1e-12)
+
+
+def test_the_print_runs_its_own_convention_and_says_so() -> None:
+    (fe,), _ = build_observers(["kfo-fe"], setup("ur5")._replace(as_printed=True))
+    assert isinstance(fe, KalmanObserver)
+    assert fe.noise_convention == "literal"
+
+
+def test_what_a_log_would_tune_and_first_order_gains_keep_to_densities() -> None:
+    """Delay of the Panda's density reading at 1 kHz: 41.8 and 24.7 ms, not 7.1 and 4.1 ms."""
+    panda = setup("panda", joints=7, step=0.001)
+    names = ["best", "kfo-auto", "rts-auto", "fdo", "gmo"]
+    (best, auto, smoother, fdo, gmo), _ = build_observers(names, panda)
+    (density,), _ = build_observers(
+        ["kfo-zoh"], setup("panda", "kfo.noise_convention=density", joints=7, step=0.001)
+    )
+    wanted = density.tuning(0.001, 7)
+    for observer in (best, auto, smoother):
+        np.testing.assert_array_equal(observer.tuning(0.001, 7).omega_n, wanted.omega_n)
+    delay = np.array([0.0418] * 4 + [0.0247] * 3)
+    np.testing.assert_allclose(1.0 / gmo.gain, delay, atol=5e-5)  # printed to 0.1 ms
+    assert 1.0 / fdo.omega == pytest.approx(delay.mean(), abs=5e-5)
 
 
 def test_a_bare_robot_gets_ten_per_second_and_is_told() -> None:

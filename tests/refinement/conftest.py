@@ -13,7 +13,11 @@ from vftcli.refinement.choice import RefinementChoice
 from vftcli.robots.choice import RobotChoice
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
-OBSERVERS = ("gmo", "kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto")
+OBSERVERS = ObserverChoice(
+    names=("gmo", "kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto"),
+    settings={"kfo": {"noise_convention": "density"}},
+)
+"""Bounds are shares of what filter and smoother reach with R and Q read as densities."""
 
 
 @pytest.fixture(scope="session")
@@ -21,7 +25,7 @@ def request_() -> AnalysisChoice:
     truth = f"file:{FIXTURE}.truth.parquet"
     return AnalysisChoice(
         robot=RobotChoice(name="ur5"),
-        observers=ObserverChoice(names=OBSERVERS),
+        observers=OBSERVERS,
         reference=ReferenceChoice(name=truth),
     )
 

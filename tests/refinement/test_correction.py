@@ -19,6 +19,10 @@ from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import MissingSignalError
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
+BY_DENSITY = ObserverChoice.parsed(
+    observer=["kfo-rts"], assignments=["kfo.noise_convention=density"]
+)
+"""What `best` falls back to."""
 MOVING = [0, 1, 2, 3, 5]
 """Joint 5 of the circle rests."""
 
@@ -109,7 +113,7 @@ def test_a_log_without_a_free_part_leans_on_what_the_fit_takes_for_free(
     assert analysis.refinement.baseline.by_fit
     assert analysis.refinement.baseline.untouched == ()
     assert all(estimate.error_sd is not None for estimate in analysis.estimates)
-    by_hand = ObserverChoice(names=("kfo-rts",))
+    by_hand = BY_DENSITY
     smoothed = analyse_log(FIXTURE, replace(pushed, observers=by_hand))
     assert rmse(analysis, "best") < 0.5 * rmse(smoothed, "kfo-rts")
 
@@ -137,7 +141,7 @@ def test_a_short_log_takes_what_is_left(request_: AnalysisChoice) -> None:
     assert "whole-log-too-short" in codes(six)
     np.testing.assert_array_equal(six.estimates[0].tau, six.estimates[2].tau)
     assert run_record(six, "")["complete_log"]["best"]["whole_log_bias"] is None
-    names = ObserverChoice(names=("best", "kfo-rts"))
+    names = replace(BY_DENSITY, names=("best", "kfo-rts"))
     tiny = analyse_log(
         FIXTURE, replace(request_, read=ReadChoice(interval=(4.5, 6.0)), observers=names)
     )

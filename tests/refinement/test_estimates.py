@@ -24,6 +24,10 @@ FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 FREE_CYCLE, MODEL = (RefinementChoice(remove_bias=name) for name in ("free-cycle", "model"))
 SHORT = ReadChoice(interval=(4.5, 6.0))
 """Less than one lap of the circle: nothing repeats."""
+DENSITIES = ObserverChoice.parsed(
+    observer=["rts-auto", "kfo-rts"], assignments=["kfo.noise_convention=density"]
+)
+"""A tuned smoother, and what it falls back to."""
 MOVING = np.array([1, 2, 3, 4, 6])
 """Joint 5 of the circle rests."""
 
@@ -178,7 +182,7 @@ def test_a_log_that_repeats_nothing_falls_back_and_says_so() -> None:
     request = AnalysisChoice(
         read=ReadChoice(interval=(4.5, 6.0)),
         robot=RobotChoice(name="ur5"),
-        observers=ObserverChoice(names=("rts-auto", "kfo-rts")),
+        observers=DENSITIES,
     )
     analysis = analyse_log(FIXTURE, request)
     assert any("rts-auto: no free part to tune on" in str(note) for note in analysis.remarks)
@@ -227,7 +231,7 @@ def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: Analys
     always = replace(
         request_,
         read=ReadChoice(interval=(4.3, 20.0)),
-        observers=ObserverChoice(names=("rts-auto", "kfo-rts")),
+        observers=DENSITIES,
     )
     analysis = analyse_log(FIXTURE, always)
     assert "free-part-not-quiet" in codes(analysis)

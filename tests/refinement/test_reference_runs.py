@@ -36,7 +36,10 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
     run = simulate(load_scenario("ur5-circle", settings), seed)
     log, robot, truth = run.recording, run.robot, run.truth.tau_ext
     asked = AnalysisChoice(
-        observers=ObserverChoice(names=("kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto")),
+        observers=ObserverChoice(
+            names=("kfo-zoh", "kfo-rts", "kfo-auto", "rts-auto"),
+            settings={"kfo": {"noise_convention": "density"}},
+        ),
     )
     motion = read(log, robot, asked, Models())
     terms, found = motion.log.terms, model(motion, asked)

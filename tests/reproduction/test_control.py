@@ -5,8 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vftcli.reproduction.control import ALPHAS, released, turn_after
+from vftcli.admittance.choice import ControlChoice
+from vftcli.admittance.replay import Replay, replay
+from vftcli.reproduction.control import ALPHAS, latest_turns, released, turn_after, ungated
 from vftcli.reproduction.paper import CORRECTED
+from vftcli.robots import load_robot
+from vftcli.signals.remarks import fact
+from vftcli.signals.wrench import Wrench
 
 
 def test_releases_of_the_ur5_are_those_of_the_law() -> None:
@@ -29,3 +34,38 @@ def test_the_turn_is_where_the_velocity_changes_its_sign() -> None:
     )
     turned = turn_after(SimpleNamespace(motion=motion), 0, {"axis": "y", "release_s": 1.0})
     assert turned == pytest.approx(1.0, abs=0.01)  # a sample
+
+
+def test_the_traditional_law_turns_within_arccos_zeta_over_omega_d() -> None:
+    """Table III: M 3, B 5, K 8 and .1, .3, .5, so ζ .510, .671 and .737, .504 s.
+
+    How much earlier the variable law can be is an independent run's: .43–.47 and .29–.31 s.
+    """
+    values = {key: found[CORRECTED] for key, found in latest_turns(0).values.items()}
+    assert values["latest/x"] == pytest.approx(0.737, abs=5e-4)
+    assert values["latest/rx"] == pytest.approx(0.504, abs=5e-4)
+    assert 0.43 <= values["most/x/1.9"] <= 0.47
+    assert 0.29 <= values["most/rx/1.9"] <= 0.31
+
+
+def pushed(mode: str) -> Replay:
+    """30 N for .4 s and 10 N for 1 s more, of a threshold of 20 N."""
+    t = np.arange(0.0, 3.0, 0.008)
+    force = np.zeros((len(t), 6))
+    force[:, 1] = np.select([t < 0.4, t < 1.4], [30.0, 10.0], 0.0)
+    arm = load_robot("ur5")
+    control = ControlChoice.parsed(alpha="1.9", threshold_mode=mode)
+    parameters = control.parameters(arm)
+    q = np.tile(arm.admittance["start"], (len(t), 1))
+    wrench = Wrench(name="push", t=t, values=force, frame="base")
+    laws = control.controllers(parameters)
+    return replay(wrench, q, arm, parameters, laws, source=fact("force-of-loop"))
+
+
+def test_without_a_threshold_the_traditional_one_alone_feels_the_rest_of_the_force() -> None:
+    found = pushed("hard")
+    other = ungated(found)
+    np.testing.assert_array_equal(other.motion.x[:, 1], found.motion.x[:, 1])
+    np.testing.assert_array_equal(other.motion.x[:, 0], pushed("literal").motion.x[:, 0])
+    advance = [one.rows[1]["peak_advance_s"] for one in (found, other)]
+    assert advance[1] > advance[0] > 0.0

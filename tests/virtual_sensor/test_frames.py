@@ -43,6 +43,16 @@ def test_adjoint_is_pinocchios_action_on_forces(pose: Pose, wrench: np.ndarray) 
     np.testing.assert_allclose(adjoint(pose) @ wrench, moved.vector, atol=1e-11)
 
 
+def test_the_printed_56_turns_the_rotation_round_in_its_lower_left_block() -> None:
+    """docs/errata.md: 20 mm off, turned by .5 rad, 20 N across: 20·.02·2 sin .5 = .38 N·m."""
+    c, s = np.cos(0.5), np.sin(0.5)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    right = adjoint(Pose(turn, np.array([0.0, 0.0, 0.02])))
+    cross = right[3:, :3] @ turn.T
+    error = (cross @ turn.T - right[3:, :3]) @ np.array([20.0, 0.0, 0.0])
+    assert np.linalg.norm(error) == pytest.approx(20.0 * 0.02 * 2.0 * np.sin(0.5), rel=1e-12)
+
+
 @settings(max_examples=50, deadline=None)
 @given(poses, poses)
 def test_adjoints_compose_and_invert(first: Pose, second: Pose) -> None:

@@ -62,6 +62,7 @@ class ControlChoice:
         threshold_mode: str | None = None,
         parameters: Path | None = None,
         force_unstable: bool = False,
+        as_printed: bool = False,
     ) -> "ControlChoice":
         """The choice that the options of a command state.
 
@@ -70,14 +71,17 @@ class ControlChoice:
             alpha: Values of α, comma-separated.
             controller: The kinds of every ``--controller``.
             xi: Damping ratio of the recovery, or "from-B" for the drag phase's.
-            threshold_mode: "hard" or "soft".
+            threshold_mode: "hard", "soft" or "literal".
             parameters: See `file`.
             force_unstable: See the attribute.
+            as_printed: Whether Algorithm 1 runs as printed, where no mode is named.
 
         Raises:
             ParameterError: If a word is malformed or names nothing there is.
         """
-        given = list(assignments)
+        # What is named comes later, and so goes before it.
+        given = ["admittance.threshold_mode=literal"] if as_printed else []
+        given += assignments
         if xi is not None and xi != FROM_DAMPING:
             given.append(f"admittance.xi={xi}")
         if threshold_mode is not None:

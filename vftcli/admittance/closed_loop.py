@@ -17,7 +17,7 @@ from vftcli.admittance.motion import Recursion
 from vftcli.admittance.online import OnlineKalman
 from vftcli.admittance.replay import deviation_of
 from vftcli.admittance.stability import check_stable
-from vftcli.admittance.thresholds import passing_force
+from vftcli.admittance.thresholds import entering_force
 from vftcli.observers.kalman import KalmanObserver
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
@@ -163,7 +163,7 @@ class Loop:
         release = p.threshold * (1.0 - np.asarray(p.hysteresis))
         self.dragged = (size > p.threshold) | (self.dragged & (size > release))
         x, v, turn = self.law.x.copy(), self.law.v.copy(), self.law.turn.copy()
-        self.law.step(np.where(self.dragged, passing_force(wrench, p), 0.0), self.dragged)
+        self.law.step(entering_force(wrench, self.dragged, p), self.dragged)
         q, self.reached = self.solve(self.law.x[0])
         if self.reached:
             self.q_before, self.q_command = self.q_command, q

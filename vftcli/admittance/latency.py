@@ -1,4 +1,8 @@
-"""Latencies of a closed loop as the paper reports them: force, detection, motion, withdrawal."""
+"""Latencies of a closed loop: of the sensor, from the true force, and as the paper times them.
+
+The paper's sensor knows no true force: its Figs 6 and 9 time from detection to motion, and from the
+estimate's fall below the threshold to the turn.
+"""
 
 from dataclasses import dataclass
 
@@ -30,7 +34,9 @@ class Latency:
         detection: Time from then until the estimate passes it.
         motion: Time from `force` until the flange has moved by `STARTED` (or `TURNED`).
         withdrawal: Time from the true force's fall below the threshold to the estimate's.
-        rested: Whether the flange was at rest when the force came; the time to a displacement says
+        reaction: Time from detection until the flange has moved by as much from where it was then.
+        turn: Time from the estimate's fall below the threshold until the flange goes no farther.
+        rested: Whether the flange was at rest when the force came; a time to a displacement says
             nothing of one that was moving already.
     """
 
@@ -39,6 +45,8 @@ class Latency:
     detection: float | None
     motion: float | None
     withdrawal: float | None
+    reaction: float | None
+    turn: float | None
     rested: bool
 
 
@@ -62,17 +70,26 @@ def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
     limit, t = threshold[axis], run.t
     felt, there = np.abs(run.estimate[:, axis]) > limit, np.abs(run.truth[:, axis]) > limit
     part = slice(0, 3) if axis < 3 else slice(3, 6)
-    way = np.linalg.norm(run.moved[:, part] - run.moved[k, part], axis=1)
-    far = way > (STARTED if axis < 3 else TURNED)
+    start = STARTED if axis < 3 else TURNED
+
+    def far(since: int) -> Mask:
+        way = np.linalg.norm(run.moved[:, part] - run.moved[since, part], axis=1)
+        return np.asarray(way > start)
+
     before = run.moved[max(k - 3, 0) : k + 1, part]
     speed = np.linalg.norm(before[-1] - before[0]) / max(t[k] - t[max(k - 3, 0)], 1e-9)
-    ends = first_true(~there, k)
+    seen, ends = first_true(felt, k), first_true(~there, k)
+    lost = None if ends is None else first_true(~felt, ends)
+    out = np.linalg.norm(run.moved[:, part], axis=1)
+    turned = np.append(np.diff(out) <= 0.0, False)
     return Latency(
         axis=axis,
         force=float(t[k]),
         detection=time_until(felt, k, t),
-        motion=time_until(far, k, t),
+        motion=time_until(far(k), k, t),
         withdrawal=None if ends is None else time_until(~felt, ends, t),
+        reaction=None if seen is None else time_until(far(seen), seen, t),
+        turn=None if lost is None else time_until(turned, lost, t),
         rested=bool(speed < STILL[0 if axis < 3 else 1]),
     )
 

@@ -75,7 +75,7 @@ class Recursion:
         """Move one control period on under the force that enters the law.
 
         Args:
-            force: Force and moment, zero on axes that recover. (6,) [N, N·m]
+            force: Force and moment that enter the law. (6,) [N, N·m]
             dragged: Which axes are in the drag phase. (6,)
         """
         x, v, period = self.x, self.v, self.period

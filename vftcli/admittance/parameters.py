@@ -50,7 +50,7 @@ LETTERS = {
 }
 """The paper's letters, accepted beside the words."""
 
-THRESHOLD_MODES = ("hard", "soft")
+THRESHOLD_MODES = ("hard", "soft", "literal")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,8 +73,7 @@ class Admittance:
         speed_limit: Ẋ_tsd; infinite for none.
         speed_scale: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
         period: Control period. [s]
-        threshold_mode: "hard" passes the whole force above the threshold, "soft" only what exceeds
-            it.
+        threshold_mode: What of the force enters, see `vftcli.admittance.thresholds`.
         source: Where the numbers come from, in words.
     """
 

@@ -39,7 +39,7 @@ class Lyapunov:
     """Energies of the recovery phases along a run. All (T+1, N, 6), NaN in a drag phase.
 
     Attributes:
-        corrected: W, which must not rise inside one recovery phase. [J]
+        corrected: W, which must not rise in a recovery phase into which no force enters. [J]
         printed: V of (52). [J]
         rises: Steps in which W rises by more than `RISE` of its value at the phase's start, for
             each controller; the three axes of a rotation that recover together count together. (N,)
@@ -206,7 +206,7 @@ def judge_motion(
         force: Force on the robot, NaN where unknown. (T, 6) [N, N·m]
     """
     path = follow(solver, start, motion.x, parameters.period)
-    lyapunov = lyapunov_along(controllers, motion, split.dragged)
+    lyapunov = lyapunov_along(controllers, motion, split)
     return Replay(
         robot=solver.robot,
         parameters=parameters,
@@ -268,9 +268,10 @@ def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
 
 
 def lyapunov_along(
-    controllers: Sequence[Controller], motion: AxisMotion, dragged: Mask
+    controllers: Sequence[Controller], motion: AxisMotion, split: Phases
 ) -> Lyapunov:
-    """Energies along a run, and where the corrected one rises inside a recovery phase."""
+    """Energies along a run, and where the corrected one rises while no force enters."""
+    dragged = split.dragged
     shape = motion.x.shape
     corrected, printed = np.empty(shape), np.empty(shape)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -278,7 +279,8 @@ def lyapunov_along(
             corrected[:, n] = energy(controller, motion.x[:, n], motion.v[:, n])
             printed[:, n] = printed_energy(controller, motion.x[:, n], motion.v[:, n])
     recovering = np.concatenate([~dragged[:1], ~dragged]) if len(dragged) else np.ones((1, 6), bool)
-    rises = np.array([count_rises(corrected[:, n], ~dragged) for n in range(shape[1])])
+    left_alone = ~dragged & (split.force == 0.0)
+    rises = np.array([count_rises(corrected[:, n], left_alone) for n in range(shape[1])])
     for values in (corrected, printed):
         values[~np.broadcast_to(recovering[:, None, :], shape)] = np.nan
     return Lyapunov(corrected=corrected, printed=printed, rises=rises)

@@ -1,4 +1,4 @@
-"""Which axis is dragged when, and the force that moves it: hard and soft thresholds, hysteresis."""
+"""Which axis is dragged when, and the force that enters the law: threshold modes, hysteresis."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ class Phases(NamedTuple):
 
     Attributes:
         dragged: Whether each axis is in the drag phase. (T, 6)
-        force: Force and moment that enter the law; zero in the recovery phase. (T, 6) [N, N·m]
+        force: Force and moment that enter the law, see `entering_force`. (T, 6) [N, N·m]
     """
 
     dragged: Mask
@@ -23,9 +23,8 @@ class Phases(NamedTuple):
 def phases(wrench: Array, parameters: Admittance) -> Phases:
     """Split a record into drag and recovery phases, axis by axis.
 
-    An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i. "hard" passes
-    the whole force, "soft" only what exceeds the threshold, F − F_tsd·sign(F), so that
-    the force that enters starts from zero. An unknown (NaN) force counts as none.
+    An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i. An unknown (NaN)
+    force counts as none.
 
     Args:
         wrench: Force and moment on the flange. (T, 6) [N, N·m]
@@ -35,15 +34,21 @@ def phases(wrench: Array, parameters: Admittance) -> Phases:
     size = np.abs(wrench)
     release = parameters.threshold * (1.0 - np.asarray(parameters.hysteresis))
     dragged = held(size > parameters.threshold, size <= release)
-    return Phases(dragged, np.where(dragged, passing_force(wrench, parameters), 0.0))
+    return Phases(dragged, entering_force(wrench, dragged, parameters))
 
 
-def passing_force(wrench: Array, parameters: Admittance) -> Array:
-    """The force that enters the law on a dragged axis, by the threshold's mode. (…, 6) [N, N·m]"""
-    if parameters.threshold_mode == "hard":
+def entering_force(wrench: Array, dragged: Mask, parameters: Admittance) -> Array:
+    """The force that enters (49), by the threshold's mode. (…, 6) [N, N·m]
+
+    "hard" passes the whole force of a dragged axis, "soft" what exceeds its threshold,
+    F − F_tsd·sign(F), so that it starts from zero; an axis that recovers has none. "literal" is
+    Algorithm 1 as printed: the threshold chooses the parameters, and the whole force always enters.
+    """
+    if parameters.threshold_mode == "literal":
         return wrench
-    excess: Array = np.sign(wrench) * np.maximum(np.abs(wrench) - parameters.threshold, 0.0)
-    return excess
+    soft = parameters.threshold_mode == "soft"
+    over = np.abs(wrench) - (parameters.threshold if soft else 0.0)
+    return np.where(dragged, np.sign(wrench) * np.maximum(over, 0.0), 0.0)
 
 
 def held(on: Mask, off: Mask) -> Mask:

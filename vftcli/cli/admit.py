@@ -56,7 +56,10 @@ class ControllerOptions(Bundle):
         seldom=True,
     )
     threshold_mode: str | None = option(
-        "--threshold-mode", "hard|soft", "The whole force above it, or the excess.", seldom=True
+        "--threshold-mode",
+        "hard|soft|literal",
+        "The whole force above it, the excess, or all of it always (--as-printed).",
+        seldom=True,
     )
     parameters: Path | None = option(
         "--parameters",
@@ -165,7 +168,9 @@ def admit(
         raise typer.BadParameter("give one of LOG, --release AXIS=VALUE, --closed-loop SCENARIO")
     check_installed("pinocchio", "vftcli admit")
     own, others = split_settings(analysis.observers.assignments or ())
-    control = ControlChoice.parsed(assignments=own, **controllers.words())
+    control = ControlChoice.parsed(
+        assignments=own, as_printed=analysis.observers.as_printed, **controllers.words()
+    )
     observers = analysis.observers.changed(assignments=others)
     analysis = analysis.changed(observers=observers)
     form = shown.form()

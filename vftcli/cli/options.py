@@ -98,7 +98,7 @@ class ObserverOptions(ChoiceBundle["ObserverChoice"]):
     assignments: Words = option(
         "--set",
         "OBSERVER.PARAMETER=VALUE",
-        "Repeatable: gmo.gain=30, gmo.gain=5,3,4,10,10,10, kfo.noise_convention=discrete.",
+        "Repeatable: gmo.gain=30, gmo.gain=5,3,4,10,10,10, kfo.noise_convention=density.",
         seldom=True,
     )
     gains: str | None = option(

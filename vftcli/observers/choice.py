@@ -18,6 +18,7 @@ from vftcli.observers.table import (
     Setup,
     build_observers,
     observer_settings,
+    read_as,
     sections,
 )
 from vftcli.robots.robot import Robot
@@ -173,6 +174,8 @@ class ObserverChoice:
             as_printed=self.as_printed,
             shown=shown,
         )
+        if self.gains_of_log:
+            setup = read_as("density", setup)  # what a log tunes, and so what it falls back to
         observers, remarks = build_observers(self.names, setup)
         if self.gains_of_log and shown.gains is None:
             remarks = (*remarks, caution("gains-without-free-part"))

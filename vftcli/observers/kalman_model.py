@@ -111,8 +111,8 @@ Discretisation = Callable[[Array, Densities], Discrete]
 DISCRETISATIONS: dict[str, Discretisation] = {"fe": forward_euler, "zoh": zero_order_hold}
 
 NOISE_CONVENTIONS = {
-    "density": "Q = Q̂, R = R/Ts: densities, the same filter at every rate (default)",
-    "discrete": "Q = Q̂, R = R: R is the variance of one sample",
+    "density": "Q = Q̂, R = R/Ts: densities, the same filter at every rate",
+    "discrete": "Q = Q̂, R = R: R is the variance of one sample (default of a file's gains)",
     "literal": "fe: Q = Ts·Q̂, R = R/Ts as (42) prints it; zoh: as density",
 }
 """How R and Q are read; (42) as printed counts Ts twice, (44) does not."""

@@ -127,7 +127,7 @@ def build_gmo(setup: Setup) -> Built:
 def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tuple[str, ...]]:
     """A first-order observer's gain (n,) [1/s], and where it was not given its remark's code.
 
-    It is then the inverse of the Kalman filter's delay, so that the observers lag alike;
+    It is then the inverse of the Kalman filter's delay, a file's R and Q read as densities;
     `FALLBACK_RATE` where no gains are given at all; and on a slow clock at most 2/Ts, which takes
     each sample's raw disturbance as it is: from there on the observer would overshoot.
     """
@@ -136,14 +136,25 @@ def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tu
         return joint_values(given[parameter], setup.joints, f"{name}.{parameter}"), ()
     rate, origin = per_joint(FALLBACK_RATE, setup.joints), "gain-from-default"
     if "kfo" in setup.gains or "kfo" in setup.settings:
-        kalman, _ = build_kfo("fe")(setup)
+        kalman, _ = build_kfo("fe")(read_as("density", setup))
         rate = 1.0 / kalman.tuning(setup.step, setup.joints).delay
         origin = "gain-from-kalman-delay"
     return np.minimum(rate, 2.0 / setup.step), (origin,)
 
 
+def read_as(convention: str, setup: Setup) -> Setup:
+    """A setup with its file's R and Q under this convention unless one is named."""
+    if "kfo" not in setup.gains:
+        return setup
+    file = {"noise_convention": convention, **setup.gains["kfo"]}
+    return setup._replace(gains={**setup.gains, "kfo": file})
+
+
 def build_kfo(scheme: str, section: str | None = None) -> Callable[[Setup], Built]:
     """The builder of a Kalman observer with one discretisation.
+
+    R and Q of a file are read as "discrete" unless a convention is named: with that reading the
+    paper's gains win joints 1 to 3, as its Table I says. Without a file they are densities.
 
     Args:
         scheme: "fe" or "zoh".
@@ -151,8 +162,10 @@ def build_kfo(scheme: str, section: str | None = None) -> Callable[[Setup], Buil
     """
 
     def build(setup: Setup) -> Built:
-        given = parameters_given("kfo", section or f"kfo-{scheme}", setup.gains, setup.settings)
+        file = read_as("discrete", setup).gains
+        given = parameters_given("kfo", section or f"kfo-{scheme}", file, setup.settings)
         convention = str(given.pop("noise_convention", "density"))
+        convention = "literal" if setup.as_printed else convention
         values = {
             key: joint_values(value, setup.joints, f"kfo.{key}")
             for key, value in given.items()
@@ -184,14 +197,14 @@ def build_rts(setup: Setup) -> Built:
 
 
 def build_auto(name: str, by_hand: Callable[[Setup], Built]) -> Callable[[Setup], Built]:
-    """The builder of an observer whose gains come from the log, else from `by_hand`."""
+    """The builder of an observer with the log's gains, else `by_hand`'s as densities."""
 
     def build(setup: Setup) -> Built:
         from vftcli.observers.auto_tuning import AutoTuned, tune_to_spectra
 
         if (spectra := setup.shown.under(name)) is not None:
             return tune_to_spectra(name, spectra), ()
-        observer, remarks = by_hand(setup)
+        observer, remarks = by_hand(read_as("density", setup))
         fallback = caution("tuning-without-free-part", Where(name), observer=observer.name)
         return AutoTuned(name=name, observer=observer), (*remarks, fallback)
 

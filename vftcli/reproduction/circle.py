@@ -12,7 +12,7 @@ from vftcli.outputs.page.torque_part import torque_chart
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_run import Models
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, FLOOR, RunResult, Values
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, RunResult, Values
 from vftcli.robots import load_robot
 from vftcli.simulation import load_scenario, simulate
 
@@ -24,7 +24,7 @@ EQUAL = "at 1.59 Hz"
 VARIANTS = {
     AS_PRINTED: ObserverChoice(names=PAPER, as_printed=True),
     CORRECTED: ObserverChoice(names=PAPER),
-    DISCRETE: ObserverChoice.parsed(observer=PAPER, assignments=["kfo.noise_convention=discrete"]),
+    DENSITY: ObserverChoice.parsed(observer=PAPER, assignments=["kfo.noise_convention=density"]),
     EQUAL: ObserverChoice.parsed(observer=PAPER, match="bandwidth=1.59"),
 }
 """Variant → its observers."""

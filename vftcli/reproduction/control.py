@@ -1,6 +1,7 @@
 """Figs. 6, 7, 9, 10 with Tables III and IV: the controller in the loop, and the same force anew."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -8,8 +9,9 @@ import numpy as np
 from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.closed_loop import UNLOADED, ClosedLoop, run_closed_loop
 from vftcli.admittance.latency import Latency, latencies
-from vftcli.admittance.metrics import releases_of, rows_of
+from vftcli.admittance.metrics import drags_of, releases_of, rows_of
 from vftcli.admittance.motion import release
+from vftcli.admittance.motion import run as follow_force
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay, replay, settling
 from vftcli.admittance.stability import UnstableError
@@ -17,14 +19,17 @@ from vftcli.observers import KalmanObserver
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.admittance.page import charts as replay_charts
 from vftcli.outputs.page.charts import Chart, ChartLine
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, RunResult, Values
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, RunResult, Values
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact
 from vftcli.simulation import load_scenario
 from vftcli.simulation.sensing import log_rate
 
-CONVENTIONS = {AS_PRINTED: "literal", CORRECTED: "density", DISCRETE: "discrete"}
-"""Variant → how the sensor's Kalman filter reads R and Q_p."""
+CONVENTIONS = {AS_PRINTED: "literal", CORRECTED: "discrete", DENSITY: "density"}
+"""Variant → how the sensor's Kalman filter reads R and Q."""
+
+UNGATED = {CORRECTED: "no threshold", DENSITY: "no threshold, R density"}
+"""Variant → the same with a traditional controller that the whole force always drives."""
 
 ALPHAS = (1.0, 1.3, 1.6, 1.9)
 """Values of α that Figs. 7 and 10 compare."""
@@ -34,6 +39,9 @@ CONTACTS = 2
 
 HOLD = 2.5
 """A drag of a contact begins within this time of its force. [s]"""
+
+FARTHEST_RELEASE = 0.5
+"""Deviations up to which a release is tried: from .1 on the turn comes ever sooner. [m, rad]"""
 
 
 def closed_loop(scenario: str, figures: tuple[str, str], seed: int) -> RunResult:
@@ -49,11 +57,16 @@ def closed_loop(scenario: str, figures: tuple[str, str], seed: int) -> RunResult
     """
     values: Values = {}
     charts: dict[str, Chart] = {}
-    for variant, convention in CONVENTIONS.items():
-        run, found = looped(scenario, convention, seed)
+    for variant in CONVENTIONS:
+        run, found = looped(scenario, variant, seed)
         held = latencies(run)[:CONTACTS]
         add_latencies(values, variant, held)
+        other = slice(3, 6) if all(one.axis < 3 for one in held) else slice(0, 3)
+        astray = np.linalg.norm(run.moved[:, other], axis=1)
+        values.setdefault("astray", {})[variant] = float(astray.max())
         add_returns(values, variant, found, held)
+        if variant in UNGATED:
+            add_returns(values, UNGATED[variant], ungated(found), held)
         if variant == CORRECTED:
             axes = range(3) if all(one.axis < 3 for one in held) else range(3, 6)
             charts[figures[0]] = loop_chart(figures[0], run, found, axes)
@@ -65,26 +78,42 @@ drag = partial(closed_loop, "ur5-drag", ("fig6", "fig7"))
 twist = partial(closed_loop, "ur5-twist", ("fig9", "fig10"))
 
 
-def looped(name: str, convention: str, seed: int) -> tuple[ClosedLoop, Replay]:
+def looped(name: str, variant: str, seed: int) -> tuple[ClosedLoop, Replay]:
     """A scenario with Table III's controller in the loop, and its force through all controllers."""
     scenario = load_scenario(name, ())
     arm = load_robot(scenario.robot)
-    control = ControlChoice(alphas=ALPHAS)
+    alone = ControlChoice.parsed(as_printed=variant == AS_PRINTED)
+    control = replace(alone, alphas=ALPHAS)
     parameters = control.parameters(arm)
     observers = ObserverChoice.parsed(
-        observer=["kfo-fe"], assignments=[f"kfo.noise_convention={convention}"]
+        observer=["kfo-fe"], assignments=[f"kfo.noise_convention={CONVENTIONS[variant]}"]
     )
     observer = observers.build(arm, 1.0 / log_rate(scenario.sensing, arm))[0][0]
     assert isinstance(observer, KalmanObserver)
-    inner = ControlChoice().controllers(parameters)[-1]
+    inner = alone.controllers(parameters)[-1]
     run = run_closed_loop(scenario, inner, observer, seed=seed, zero=UNLOADED)
     if not run.stable:
         raise UnstableError(f"{name}, seed {seed}: the arm ran away at {run.t[-1]:.2f} s")
-    # Only what passed the threshold enters, whoever is driven by it: no controller has a tail of
-    # the force that another does not see.
+    # The same enters, whoever is driven by it: no controller has a tail of the force that another
+    # does not see.
     everything = control.controllers(parameters)
     source = fact("force-of-loop")
     return run, replay(run.wrench, run.q, arm, parameters, everything, source=source)
+
+
+def ungated(found: Replay) -> Replay:
+    """A replay with a traditional controller that has no threshold: (45) under the whole force."""
+    force, motion = np.nan_to_num(found.wrench), found.motion
+    alone = follow_force(found.controllers[:1], force, found.phases.dragged)
+    x, v = (
+        np.concatenate([one, all_[:, 1:]], axis=1)
+        for one, all_ in ((alone.x, motion.x), (alone.v, motion.v))
+    )
+    motion = replace(motion, x=x, v=v)
+    drags = drags_of(found.phases, found.parameters.period)
+    return replace(
+        found, motion=motion, rows=tuple(rows_of(found.controllers, motion, drags, force))
+    )
 
 
 def add_latencies(values: Values, variant: str, held: Sequence[Latency]) -> None:
@@ -94,6 +123,8 @@ def add_latencies(values: Values, variant: str, held: Sequence[Latency]) -> None
             ("detection", one.detection),
             ("motion", one.motion if one.rested else None),
             ("withdrawal", one.withdrawal),
+            ("reaction", one.reaction if one.rested else None),
+            ("stop", one.turn),
         ):
             values.setdefault(f"{key}/{k}", {})[variant] = value
 
@@ -136,6 +167,33 @@ def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
     start = int(np.searchsorted(t, float(str(row["release_s"])) - 1e-9))
     outward = np.sign(found.motion.x[start, n, axis]) * found.motion.v[start:, n, axis]
     return float(t[start + int(np.argmax(outward <= 0.0))] - t[start])
+
+
+def latest_turns(_seed: int) -> RunResult:
+    """How late the UR5 turns after a release at most, and how much earlier the variable law is.
+
+    Without force x(t) and v(t) of the traditional law turn at the latest where x = 0 at the
+    release: after arccos(ζ)/ω_d. The advance is the largest over deviations from 0 on, released at
+    the speed limit, in steps of the control period.
+    """
+    control = ControlChoice(alphas=ALPHAS)
+    parameters = control.parameters(load_robot("ur5"))
+    omega = np.sqrt(parameters.stiffness / parameters.mass)
+    zeta = parameters.damping / (2.0 * parameters.mass * omega)
+    latest = np.arccos(zeta) / (omega * np.sqrt(1.0 - zeta**2))
+    laws, values = control.controllers(parameters), Values()
+    places = np.repeat(np.arange(0.0, FARTHEST_RELEASE, 0.01), len(laws))
+    many = [law for _ in range(len(places) // len(laws)) for law in laws]
+    for axis in (0, 3):
+        x, v = np.zeros((2, len(places), 6))
+        x[:, axis], v[:, axis] = places, np.asarray(parameters.speed_limit)[axis]
+        motion = release(many, x, 1.1 * float(latest[axis]), v)
+        turned = motion.t[np.argmax(motion.v[:, :, axis] <= 0.0, axis=0)].reshape(-1, len(laws))
+        values[f"latest/{AXES[axis]}"] = {CORRECTED: float(latest[axis])}
+        for n, alpha in enumerate(ALPHAS, start=1):
+            most = float(np.max(turned[:, 0] - turned[:, n]))
+            values[f"most/{AXES[axis]}/{alpha:g}"] = {CORRECTED: most}
+    return RunResult(values)
 
 
 def released(

@@ -11,9 +11,9 @@ from typing import NamedTuple
 from vftcli.outputs.page.charts import Chart
 from vftcli.signals.errors import ParameterError
 
-AS_PRINTED, CORRECTED, DISCRETE, FLOOR = "as printed", "corrected", "R discrete", "floor"
-"""Variants of a value: by the printed formulas; by the corrected ones; these with R and Q_p read as
-covariances of samples; the reference's own error."""
+AS_PRINTED, CORRECTED, DENSITY, FLOOR = "as printed", "corrected", "R density", "floor"
+"""Variants of a value: by the printed formulas; by the corrected ones; these with R and Q read as
+densities; the reference's own error."""
 
 Values = dict[str, dict[str, float | None]]
 """Key of a line → variant → value, None where it did not happen."""

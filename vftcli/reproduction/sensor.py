@@ -6,6 +6,7 @@ import numpy as np
 
 from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.driving_force import stored_force
+from vftcli.admittance.metrics import SHARES, Drag, return_time
 from vftcli.admittance.replay import Replay, replay
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import correlation
@@ -16,14 +17,16 @@ from vftcli.outputs.page.wrench_part import wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.repetition.free_run import Models
 from vftcli.reproduction.control import deviation_chart
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DISCRETE, FLOOR, RunResult, Values
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, RunResult, Values
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import link_poses
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import AXES, Wrench
 from vftcli.simulation import Simulation, load_scenario, simulate
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
+from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 KFO = ("kfo-fe",)
 """The observer that the paper's virtual sensor takes."""
@@ -31,14 +34,18 @@ KFO = ("kfo-fe",)
 VARIANTS = {
     AS_PRINTED: ObserverChoice(names=KFO, as_printed=True),
     CORRECTED: ObserverChoice(names=KFO),
+    DENSITY: ObserverChoice.parsed(observer=KFO, assignments=["kfo.noise_convention=density"]),
 }
 """Variant → its observer."""
 
-FAST = ObserverChoice.parsed(observer=KFO, assignments=["kfo.noise_convention=discrete"])
-"""The same, R and Q_p read as covariances of samples."""
-
 ZEROED = "zero removed"
 """Corrected, and the mean of an unloaded span taken off."""
+
+SOFT = "soft servo"
+"""Corrected, on an arm with a soft position loop: its joints slide where a stiff one holds them."""
+
+UNTOUCHED = 0.5
+"""True force on the flange below which nothing touches the arm. [N]"""
 
 SENSOR_POSE = "0,0,0.02,0,0,0.5"
 """Where the simulated sensor sits on the flange, as its scenario says. [m, rad]"""
@@ -59,15 +66,16 @@ SAMPLED = 0.001
 def dragged_sensor(seed: int) -> RunResult:
     """RMSE of the virtual sensor against the real one, axis by axis, in flange axes."""
     run = simulate(load_scenario("ur5-sensor", ()), seed)
+    soft = simulate(load_scenario("ur5-sensor", ("servo.stiffness=soft",)), seed)
     zero = ZeroChoice(spans=(UNLOADED["ur5"],))
     asked = {
-        **{name: (chosen, ZeroChoice()) for name, chosen in VARIANTS.items()},
-        ZEROED: (VARIANTS[CORRECTED], zero),
-        DISCRETE: (FAST, ZeroChoice()),
+        **{name: (run, chosen, ZeroChoice()) for name, chosen in VARIANTS.items()},
+        ZEROED: (run, VARIANTS[CORRECTED], zero),
+        SOFT: (soft, VARIANTS[CORRECTED], ZeroChoice()),
     }
     values: Values = {}
     models, charts = Models(), {}
-    for variant, (observers, off) in asked.items():
+    for variant, (run, observers, off) in asked.items():
         choice = AnalysisChoice(
             observers=observers,
             contacts=False,
@@ -80,6 +88,7 @@ def dragged_sensor(seed: int) -> RunResult:
         for row in rows.iter_rows(named=True):
             known = row["rmse_N"] if row["rmse_N"] is not None else row["rmse_Nm"]
             values.setdefault(row["axis"], {})[variant] = known
+        add_causes(values, variant, run, made)
         if variant == CORRECTED:
             for axis, error in zip(AXES, sensor_error(run, made), strict=True):
                 values[axis][FLOOR] = error
@@ -87,11 +96,39 @@ def dragged_sensor(seed: int) -> RunResult:
     return RunResult(values, charts)
 
 
-def sensor_error(run: Simulation, made: Analysis) -> Array:
-    """How far the real sensor itself is from the simulation's truth, rms. (6,) [N, N·m]"""
+def add_causes(values: Values, variant: str, run: Simulation, made: Analysis) -> None:
+    """Errors of f_y, touched and not, and of m_x, m_y by the observer's lag alone."""
+    true = run.truth.wrench[: len(made.recording.q)]
+    touched = np.linalg.norm(true[:, :3], axis=1) > UNTOUCHED
+    error = (made.wrenches[0].known - real_sensor(made).known)[: len(true)]
+    for name, rows in (("untouched", ~touched), ("touched", touched)):
+        values.setdefault(f"fy/{name}", {})[variant] = rms(error[rows, 1])
+    # What the observer makes of the true torque and of nothing else: p is 0, μ is −τ_ext.
+    tau = run.truth.tau_ext[: len(true)]
+    ideal = DynamicsTerms(t=made.recording.t[: len(true)], p=np.zeros_like(tau), mu=-tau)
+    late = made.observers[0].estimate(ideal)
+    missed = replace(late, tau=late.tau - tau)
+    wrench = VirtualSensor().wrench(missed, made.recording.q[: len(true)], made.robot.chain)
+    for axis in ("mx", "my"):
+        values.setdefault(f"{axis}/lag", {})[variant] = rms(wrench.known[:, AXES.index(axis)])
+
+
+def rms(values: Array) -> float:
+    """Root mean square of what is known."""
+    return float(np.sqrt(np.nanmean(values**2)))
+
+
+def real_sensor(made: Analysis) -> Wrench:
+    """The reference that was asked for."""
     assert made.virtual_sensor is not None, "a wrench was asked for"
     reference = made.virtual_sensor.reference
     assert reference is not None, "the sensor is the reference"
+    return reference
+
+
+def sensor_error(run: Simulation, made: Analysis) -> Array:
+    """How far the real sensor itself is from the simulation's truth, rms. (6,) [N, N·m]"""
+    reference = real_sensor(made)
     turn = link_poses(made.robot.chain, made.recording.q).rotation[:, -1]
     known = run.truth.wrench[: len(turn)].reshape(-1, 2, 3)
     true = np.einsum("tji,tkj->tki", turn[: len(known)], known).reshape(-1, 6)
@@ -123,11 +160,11 @@ def assembled_bearing(seed: int) -> RunResult:
         add_weights(values, variant, wrench, drift)
         zeroed = replace(wrench, values=wrench.values - drift)
         add_phases(values, variant, zeroed, run, vendor)
-        controlled = replay_bearing(zeroed, made)
+        controlled = replay_bearing(zeroed, made, as_printed=variant == AS_PRINTED)
         add_motion(values, variant, controlled)
         if variant == CORRECTED:
             add_weights(values, FLOOR, vendor, mean_of(vendor, UNLOADED["panda"]))
-            add_motion(values, "control at 1 ms", replay_bearing(zeroed, made, SAMPLED))
+            add_motion(values, "control at 1 ms", replay_bearing(zeroed, made, period=SAMPLED))
             charts["fig12"] = beside_vendor(zeroed, vendor)
             charts["fig13"] = deviation_chart("fig13", controlled, range(6))
     return RunResult(values, charts)
@@ -169,10 +206,12 @@ def add_phases(
     values.setdefault("agreement", {})[variant] = float(agreed)
 
 
-def replay_bearing(wrench: Wrench, made: Analysis, period: float | None = None) -> Replay:
+def replay_bearing(
+    wrench: Wrench, made: Analysis, *, period: float | None = None, as_printed: bool = False
+) -> Replay:
     """The same force through the traditional and the variable controller of Table IV."""
     words = [] if period is None else [f"admittance.period={period}"]
-    control = ControlChoice.parsed(assignments=words)
+    control = ControlChoice.parsed(assignments=words, as_printed=as_printed)
     parameters = control.parameters(made.robot)
     return replay(
         wrench,
@@ -189,11 +228,14 @@ def add_motion(values: Values, variant: str, found: Replay) -> None:
     t, (start, stop) = found.motion.t, PHASES["knocked"]
     for n, controller in enumerate(found.controllers):
         own = [row for row in found.rows if row["controller"] == controller.kind]
-        guided = next(row for row in own if row["axis"] == "x")
+        guided = max((row for row in own if row["axis"] == "x"), key=lambda row: abs(row["peak"]))
+        # Noise beyond the threshold begins drags of its own, which are no end of this one's return.
+        begin, end = np.searchsorted(t, (guided["release_s"] - 1e-9, start)).tolist()
+        led = Drag(axis=0, number=1, begin=begin, release=begin, end=end)
         before = found.motion.x[t <= start, n, :3][-1]
         moved = np.linalg.norm(found.motion.x[(t > start) & (t < stop), n, :3] - before, axis=1)
         for key, value in (
-            ("back", guided["return_10_s"]),
+            ("back", return_time(t, found.motion.x[:, n, 0], led, SHARES["return_10_s"])),
             ("left", 1e3 * float(np.linalg.norm(before))),
             ("knocked", 1e3 * float(moved.max())),
         ):

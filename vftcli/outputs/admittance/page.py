@@ -122,13 +122,13 @@ def chart_section(chart: Chart) -> str:
 
 
 def closed_loop_section(run: ClosedLoop | None) -> str:
-    """Latencies of the loop, as the paper reports them, or nothing without one."""
+    """Latencies of the loop, or nothing without one."""
     if run is None:
         return ""
     state = "" if run.stable else f"<p>The arm ran away at {run.t[-1]:.2f} s.</p>"
     words = soft(
-        "The paper measured 0.24 and 0.28 s to motion, 0.26 and 0.12 s to withdrawal on its UR5; "
-        "its sensor's noise convention decides (docs/admittance.md)."
+        "The paper measured 0.24 and 0.28 s from detection to motion, 0.26 and 0.12 s from "
+        "withdrawal to the turn on its UR5 (docs/admittance.md)."
     )
     return f"<h2>Closed loop in simulation</h2>{state}{html(latency_grid(run))}{words}"
 
