@@ -23,16 +23,13 @@ from vftcli.refinement.model_error import (
 from vftcli.refinement.normal_equations import Rows
 from vftcli.refinement.robust_fit import WholeLogFit, fit_robustly
 from vftcli.refinement.slow_load import slow_loads
-from vftcli.refinement.unseen import Guarded, guarded
+from vftcli.refinement.unseen import MOVES, Guarded, guarded
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask, handed_over, seal
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import median_step, resample_columns
-
-MOVES = 0.02
-"""The arm moves where a joint is faster than this. [rad/s]"""
 
 LEAST_MOTION = 10.0
 """From its first to its last motion a log has to take this long: a shorter one tells friction and
@@ -117,7 +114,7 @@ def whole_log_bias(run: ModelledRun) -> WholeLogBias:
                 stride * median_step(t),
                 usual_friction(run.robot).dry,
             )
-            found = bias_of(run, motion, fit, guarded(fit), stride)
+            found = bias_of(run, motion, fit, guarded(fit, motion.dq[::stride]), stride)
         except np.linalg.LinAlgError:
             return untouched(terms, caution("whole-log-without-solution"))
     known = np.all(np.isfinite(found.bias)) and np.all(np.isfinite(found.sd))
