@@ -15,7 +15,18 @@ from vftcli.refinement.model_error import (
 from vftcli.refinement.normal_equations import Rows
 from vftcli.refinement.robust_fit import fit_robustly
 from vftcli.refinement.slow_load import slow_loads
-from vftcli.refinement.unseen import FOLDS, LARGEST, MOVES, SCALES, fold_spans, guarded, mask_of
+from vftcli.refinement.unseen import (
+    FOLDS,
+    LARGEST,
+    MOVES,
+    SCALES,
+    WORTH,
+    WORTHLESS,
+    faded,
+    fold_spans,
+    guarded,
+    mask_of,
+)
 
 STRIDE = 3
 
@@ -41,14 +52,14 @@ def wrong():
 
 def test_an_error_that_is_there_is_applied(wrong):
     found = guarded(*wrong)
-    assert found.applied.all()
+    np.testing.assert_array_equal(found.weight, 1.0)
     assert np.all(found.share < 0.5)
 
 
 def test_noise_is_left_alone():
     """White noise of .3 N·m and no error: nothing is predicted."""
     found = guarded(*fit_of(0.0))
-    assert not found.applied.any()
+    assert not found.weight.any()
     assert np.all(found.share > 0.9)
 
 
@@ -99,8 +110,8 @@ def test_a_joint_that_gains_too_little_is_left_alone(wrong):
     d = fit.rows.d.copy()
     d[:, 2] = np.random.default_rng(3).normal(0.0, 0.3, len(d))
     found = guarded(replace(fit, rows=replace(fit.rows, d=d)), dq)
-    assert found.applied.tolist()[2] is False
-    assert found.applied[:2].any()
+    assert found.weight[2] == 0.0
+    assert found.weight[:2].any()
 
 
 def in_turn(fit, dq, joint, shares, level=2.0):
@@ -122,7 +133,7 @@ def test_a_joint_is_judged_while_it_moves(wrong):
     fit, dq = in_turn(*wrong, joint=0, shares=0.5, level=9.0)
     found = guarded(fit, dq)
     everywhere = guarded(fit, np.ones_like(dq))
-    assert found.applied.all()
+    np.testing.assert_array_equal(found.weight, 1.0)
     assert found.share[0] < 0.5 * everywhere.share[0]
 
 
@@ -131,6 +142,14 @@ def test_a_joint_that_seldom_moves_is_judged_by_all_samples(wrong):
     rests = np.abs(dq) < MOVES
     np.testing.assert_array_equal(
         guarded(fit, dq).share[0], guarded(fit, np.where(rests, 1.0, dq)).share[0]
+    )
+
+
+def test_between_worth_it_and_not_a_part_is_used():
+    """.9 of the unseen error left: all of the correction; .95: none; between in proportion."""
+    share = np.array([0.3, 0.9, 0.91, 0.94, 0.95, 1.2])
+    np.testing.assert_allclose(
+        faded(share, WORTH, WORTHLESS), [1.0, 1.0, 0.8, 0.2, 0.0, 0.0], atol=1e-12
     )
 
 

@@ -33,7 +33,11 @@ SELDOM = 0.2
 """A joint that moves in less than this share of the free samples is judged by all of them."""
 
 WORTH = 0.9
-"""A joint is corrected if at most this share of its unseen error is left."""
+"""A joint is corrected in full if at most this share of its unseen error is left, …"""
+
+WORTHLESS = 0.95
+"""… not at all if so much is left, and between the two in part: no sample switches it. A load of
+2.8 kg that the fit cannot hold apart from the model leaves .95."""
 
 
 class Guarded(NamedTuple):
@@ -42,13 +46,14 @@ class Guarded(NamedTuple):
     Attributes:
         solution: From all free samples, held back as far as predicts best; None if not at all.
         share: Unseen error with it over that without, while the joint moves. (n,)
-        applied: Joints on which it is worth having. (n,)
+        weight: How much of it each joint gets: 0 where it is not worth having, 1 where it clearly
+            is. (n,)
         loads: Slow loads that are believed beside it, in standard deviations. (L,)
     """
 
     solution: FittedError | None
     share: Array
-    applied: Mask
+    weight: Array
     loads: Array
 
 
@@ -77,10 +82,14 @@ def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
     best = int(np.argmin(squares.mean(axis=1)))
     share = np.sqrt(squares[best] / np.maximum(squares[0], np.finfo(float).tiny))
     if not SCALES[best]:
-        none = np.zeros(fit.rows.joints, dtype=bool)
-        return Guarded(None, share, none, fit.solved(whole).loads)
+        return Guarded(None, share, np.zeros_like(share), fit.solved(whole).loads)
     solution = fit.solved(whole, SCALES[best])
-    return Guarded(solution, share, share <= WORTH, solution.loads)
+    return Guarded(solution, share, faded(share, WORTH, WORTHLESS), solution.loads)
+
+
+def faded(value: Array, full: float, none: float) -> Array:
+    """How much of something is used: 1 up to a value, 0 from another on, straight between."""
+    return np.asarray(np.clip((none - value) / (none - full), 0.0, 1.0))
 
 
 def judging(moves: Mask, free: Mask) -> Mask:
