@@ -31,7 +31,7 @@ def corrected(found: Baseline, free, sd: float = 0.0, load: float = 0.0) -> Base
     """The baseline with a correction off that changes nothing but says this of the log."""
     shape = found.terms.p.shape
     off = WholeLogBias(
-        applied=np.zeros(6, dtype=bool),
+        weight=np.zeros(6),
         bias=np.zeros(shape),
         sd=np.full(shape, sd),
         free=free,

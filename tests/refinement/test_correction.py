@@ -16,6 +16,7 @@ from vftcli.refinement import correction
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
+from vftcli.robots.friction import dry_friction
 from vftcli.signals.errors import MissingSignalError
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
@@ -129,7 +130,10 @@ def test_a_free_part_that_does_not_do_is_dropped_with_a_reason(request_: Analysi
 
 
 def test_a_short_log_takes_what_is_left(request_: AnalysisChoice) -> None:
-    """6 s tell no bias: the free part tunes. 1.5 s tell nothing: the gains of the robot file."""
+    """6 s tell friction alone, the free part tunes. 1.5 s tell nothing: the robot file's gains.
+
+    The band of the best is there in any case, at rest no narrower than what stiction holds.
+    """
     six = analyse_log(
         FIXTURE,
         replace(
@@ -138,15 +142,21 @@ def test_a_short_log_takes_what_is_left(request_: AnalysisChoice) -> None:
             free=FreeChoice(spans=((0.0, 4.0),)),
         ),
     )
-    assert "whole-log-too-short" in codes(six)
-    np.testing.assert_array_equal(six.estimates[0].tau, six.estimates[2].tau)
-    assert run_record(six, "")["complete_log"]["best"]["whole_log_bias"] is None
+    assert "whole-log-friction-alone" in codes(six)
+    assert rmse(six, "best") < rmse(six, "rts-auto")
     names = replace(BY_DENSITY, names=("best", "kfo-rts"))
     tiny = analyse_log(
         FIXTURE, replace(request_, read=ReadChoice(interval=(4.5, 6.0)), observers=names)
     )
     np.testing.assert_array_equal(tiny.estimates[0].tau, tiny.estimates[1].tau)
     assert {"no-free-part", "tuning-without-free-part", "no-band"} <= set(codes(tiny))
+    band, log = tiny.estimates[0].error_sd, tiny.motion.log
+    assert band is not None
+    assert tiny.estimates[1].error_sd is None
+    dry = dry_friction(log.robot.friction, 6)
+    # a fifth of the dry friction and .05 N·m is what is expected of its sign alone
+    assert np.all(band[~log.rests] >= np.broadcast_to(0.19 * dry, band.shape)[~log.rests])
+    assert np.all(band[log.rests] >= np.broadcast_to(0.45 * dry, band.shape)[log.rests])
     made = run_record(tiny, "")["complete_log"]["best"]
     assert (made["observer"], made["gains"], made["free_part"]) == ("kfo-rts", "robot", None)
 

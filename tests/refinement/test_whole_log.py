@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from known_errors import STEP, drawn_error, motion, shortened, ur10e, wrong_run
 
-from vftcli.refinement.model_error import smooth_motion
+from vftcli.refinement.model_error import smooth_motion, usual_friction
 from vftcli.refinement.whole_log import stride_of, whole_log_bias
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
@@ -143,16 +143,49 @@ def test_seven_joints_behind_gears_work_too():
 
 
 def test_a_short_log_is_refused():
-    run = wrong_run(shortened(ur10e(), 3), seconds=9.0)
+    run = wrong_run(shortened(ur10e(), 3), seconds=2.5)
     found = whole_log_bias(run)
     (remark,) = found.remarks
     assert remark.code == "whole-log-too-short"
-    assert remark.values["duration_s"] == pytest.approx(9.0, abs=STEP)  # it moved all the while
+    assert remark.values["duration_s"] == pytest.approx(2.5, abs=STEP)  # it moved all the while
     assert found.free.all()
     for nothing in (found.applied, found.bias, found.sd):
         assert not nothing.any()
     assert found.corrected(run.terms) is run.terms
     assert found.of(run) is run.terms
+
+
+def by_friction(robot, seconds, external=None):
+    """A log of an arm that slides by a fifth of its dry friction more than its model knows."""
+    error = drawn_error(robot, size=0.0)
+    friction = np.array(error.friction)
+    friction[0] = 0.2 * usual_friction(robot).dry
+    return wrong_run(robot, replace(error, friction=friction), external, seconds, noise=0.3)
+
+
+def test_a_short_log_loses_friction_alone():
+    """6 s: dry friction .2 of itself too low, which 3 N·m and more of bias must show."""
+    robot = shortened(ur10e(), 3)
+    run = by_friction(robot, 6.0)
+    found = whole_log_bias(run)
+    assert [r.code for r in found.remarks][:2] == ["whole-log-friction-alone", "whole-log-applied"]
+    for unfitted in ("inertial", "rotor", "drive", "offset"):
+        assert not getattr(found.error, unfitted).any()
+    truth = 0.2 * usual_friction(robot).dry * np.tanh(run.recording.dq / 0.003)
+    left = rms(found.bias - truth)[found.applied]
+    # the fit's prior and 6 Hz filter at friction's turns leave a part
+    assert found.applied.any()
+    assert np.all(left < 0.6 * rms(truth)[found.applied])
+
+
+def test_a_hand_that_leads_is_no_friction():
+    """25 N·m along the motion of every joint, as a hand that guides the arm: nothing comes off."""
+    robot = shortened(ur10e(), 3)
+    dq = wrong_run(robot, seconds=6.0).recording.dq
+    run = by_friction(robot, 6.0, lambda _t, _q: 25.0 * np.tanh(dq / 0.1))
+    found = whole_log_bias(run)
+    assert [r.code for r in found.remarks] == ["whole-log-friction-unclear"]
+    assert not found.bias.any()
 
 
 def held(seconds, moving):

@@ -39,3 +39,8 @@ def test_a_stray_sample_is_no_contact() -> None:
 def test_there_is_no_verdict_without_a_channel_or_a_free_part() -> None:
     assert contact_elsewhere(wrench(None), FREE) is None
     assert contact_elsewhere(wrench(np.ones(1000)), np.zeros(1000, dtype=bool)) is None
+
+
+def test_there_is_no_verdict_where_the_free_part_knows_no_sample() -> None:
+    residual = np.where(FREE, np.nan, 2.0)
+    assert contact_elsewhere(wrench(residual), FREE) is None

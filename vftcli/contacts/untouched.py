@@ -57,6 +57,9 @@ Basis = Literal["free motion", "whole log", "friction", "none"]
 """What tells a contact from an error of the model: motion that is known to be free; the samples
 that the fit of the whole log calls free; the drives' dry friction; or nothing."""
 
+SHORT_LOG = {"whole-log-too-short", "whole-log-friction-unclear"}
+"""What the fit of the whole log says of one that is too short for it."""
+
 LEAST_CYCLES = 2
 """Fewest whole cycles of which free ones can be found: one alone cannot be compared."""
 
@@ -156,7 +159,7 @@ def inferred_motion(log: ModelledRun, bias: WholeLogBias, seconds: float) -> Unt
     if not (dry_torques(log.robot).any() or bias.applied.any()):
         return None
     corrected = log.with_terms(bias.corrected(log.terms))
-    short = any(remark.code == "whole-log-too-short" for remark in bias.remarks)
+    short = any(remark.code in SHORT_LOG for remark in bias.remarks)
     # An arm that holds one pose does not tell a mass from a push.
     weighed = free_load([FreePiece(corrected, bias.free, ())]) if bias.fitted or short else None
     corrected = unloaded(corrected, weighed)

@@ -34,6 +34,12 @@ FASTEST = 2.0
 TRIED = 96
 """Natural frequencies tried, on a logarithmic scale."""
 
+LEAST_SHARE = 1e-3
+"""R stands for at least this share of the noise in the free part. [1]"""
+
+FINEST = 1e-6
+"""And for at least this torque: a log in single precision keeps 1e-5 of 100 N·m. [N·m]"""
+
 
 class Curve(NamedTuple):
     """The expected error of one kind of filter against its natural frequency.
@@ -129,7 +135,10 @@ def noise_level(omega_n: Array, spectra: Spectra) -> Array:
     """R with which the filter's innovations have the variance that it expects. (n,)
 
     Gains depend on Q/R alone; R sets the scale of the covariance. The innovation is what the
-    estimate jumps by, ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂, so its variance follows from S_d.
+    estimate jumps by, ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂, so its variance follows from S_d. That may come out as
+    nothing, or as less where S_d was extrapolated from a few impacts, and no filter runs on R = 0:
+    R is held above `LEAST_SHARE` of what S_n makes of it and above the noise of `FINEST`, a torque
+    that is constant over a sample.
     """
     n = len(omega_n)
     unit = kalman_filter(omega_n)
@@ -137,10 +146,12 @@ def noise_level(omega_n: Array, spectra: Spectra) -> Array:
     response = unit.frequency_response(spectra.frequency, spectra.step, n)
     jump = 2.0 * np.sin(np.pi * spectra.frequency * spectra.step)[:, None]
     share = (np.abs(response) * jump / settled.gains.l2) ** 2
-    variance = np.sum(share * spectra.loaded, axis=0) * spectra.width
-    scale = variance / (settled.prior.p11 + model.r)
-    # A log without any noise would make R zero, and the filter singular.
-    return np.asarray(np.maximum(scale, np.finfo(float).tiny))
+    both, noise = (
+        np.sum(share * density, axis=0) * spectra.width
+        for density in (spectra.loaded, spectra.free)
+    )
+    scale = np.maximum(both, LEAST_SHARE**2 * noise) / (settled.prior.p11 + model.r)
+    return np.asarray(np.maximum(scale, FINEST**2 * spectra.step**3))
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -158,8 +169,9 @@ class AutoTuned(Shown):
     curve: Curve | None = field(default=None, repr=False)
 
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
-        """Run over a whole log."""
-        return replace(self.observer.estimate(terms), name=self.name)
+        """Run over a whole log; a joint of which gains and log make no number is not finite."""
+        with np.errstate(all="ignore"):
+            return replace(self.observer.estimate(terms), name=self.name)
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """What the gains mean at a sample time; where the log tuned them, none is left to. [s]"""

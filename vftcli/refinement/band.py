@@ -4,13 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.observers.error_band import ENOUGH, FreeError, error_band, free_error
+from vftcli.observers.error_band import ENOUGH, HELD, FreeError, error_band, free_error
+from vftcli.observers.table import BEST
 from vftcli.refinement.baseline import Baseline, FreeReading
-from vftcli.refinement.whole_log import WholeLogBias
+from vftcli.refinement.model_error import expected_spread, friction_alone, smooth_motion
+from vftcli.refinement.whole_log import WholeLogBias, stride_of
 from vftcli.robots.friction import dry_friction
-from vftcli.signals.arrays import handed_over
+from vftcli.signals.arrays import Array, handed_over
+from vftcli.signals.errors import ClockError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.series import resample_columns
 
 
 def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
@@ -26,11 +30,40 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
     """
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
     if spectra is None or not len(reading.samples):
-        return estimate
+        sd = stated_band(found, reading) if estimate.name == BEST else None
+        return estimate if sd is None else replace(estimate, error_sd=sd, moving=~found.standing)
     free = known_error(found, reading)
     response = reading.observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
     sd = error_band(free, spectra.missed(response), run.rests, found.correction_sd)
     return replace(estimate, error_sd=handed_over(sd), moving=~found.standing)
+
+
+def stated_band(found: Baseline, reading: FreeReading) -> Array | None:
+    """The band of `best` where the log has no spectra, from what the robot's own numbers state.
+
+    Friction is as wrong as is usual, by a fifth (`model_error.expected_error`); where a bias was
+    fitted it is what that leaves of it, and what is read where its fit sees no contact. What the
+    gains leave out of the torque is not known. None for a log of a few samples.
+
+    Returns:
+        Standard deviation. (T, n) [N·m]
+    """
+    run, off = found.motion.log, found.correction
+    friction = dry_friction(run.robot.friction, reading.estimate.joints)
+    nothing = np.zeros_like(friction)
+    if off is not None and np.count_nonzero(off.free) >= ENOUGH:
+        fitted = read_where_free(found, reading, off)
+        called = free_error(fitted.samples, fitted.resting, friction)
+        return handed_over(error_band(called, nothing, run.rests, off.sd))
+    held = FreeError(nothing, (HELD * friction) ** 2, unseen=nothing > 0.0)
+    t = run.recording.t
+    try:
+        motion, stride = smooth_motion(run), stride_of(t)
+    except ClockError:
+        return None
+    spread = expected_spread(run, motion, friction_alone(run.robot), stride)
+    sd = resample_columns(t, t[::stride], spread)
+    return handed_over(error_band(held, nothing, run.rests, sd))
 
 
 def known_error(found: Baseline, reading: FreeReading) -> FreeError:

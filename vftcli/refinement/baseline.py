@@ -244,8 +244,11 @@ class FreeReading(NamedTuple):
 
     @property
     def rms(self) -> Array:
-        """Root mean square over the free samples, bias included. (n,) [N·m]"""
-        return np.asarray(np.sqrt(np.nanmean(self.samples**2, axis=0)))
+        """Root mean square over the free samples, bias included; NaN where none is known. (n,)"""
+        known = np.isfinite(self.samples)
+        square = np.sum(np.where(known, self.samples, 0.0) ** 2, axis=0)
+        count = np.count_nonzero(known, axis=0)
+        return np.where(count, np.sqrt(square / np.maximum(count, 1)), np.nan)
 
 
 def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:

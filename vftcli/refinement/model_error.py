@@ -6,7 +6,7 @@ of every joint. Each δx has mean zero and a standard deviation that follows fro
 numbers: a maker's table is good to some percent, friction to a fifth.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -229,6 +229,28 @@ def expected_error(robot: Robot) -> ModelError:
         ),
         offset=0.15 * friction.dry + 0.02,
     )
+
+
+def friction_alone(robot: Robot) -> ModelError:
+    """The expected error of the shapes of friction, and none of anything else."""
+    expected = expected_error(robot)
+    none = {name: 0.0 * value for name, value in vars(expected).items() if name != "friction"}
+    return replace(expected, **none)
+
+
+def expected_spread(
+    run: ModelledRun, motion: SmoothMotion, expected: ModelError, stride: int
+) -> Array:
+    """Standard deviation of the torque that such an error makes, each column by chance. (S, n)
+
+    Args:
+        run: The log.
+        motion: Its smooth motion.
+        expected: The standard deviations.
+        stride: Every how many samples are taken.
+    """
+    columns = error_columns(run, motion, expected, stride)
+    return np.column_stack([np.sqrt(np.sum(c**2, axis=1)) for c in columns])
 
 
 def error_columns(

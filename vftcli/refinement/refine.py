@@ -12,6 +12,7 @@ from vftcli.refinement.bias import REMOVALS, remove_nothing
 from vftcli.refinement.budget import Budget, budget, limits_remark
 from vftcli.refinement.choice import NOTHING
 from vftcli.refinement.consistency import Consistency, consistency
+from vftcli.refinement.fallback import with_spare
 from vftcli.refinement.paper_gap import expected_gap
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, fact
@@ -61,9 +62,10 @@ def refine(
     Raises:
         ParameterError: If the bias cannot be removed as asked.
     """
-    pairs = list(zip(observers, estimates, strict=True))
     # Not every observer need run on the same terms: each is measured on those that it runs on.
     under = [found.under(observer.name) for observer in observers]
+    spared = [with_spare(*each) for each in zip(under, observers, estimates, strict=True)]
+    pairs = [(observer, estimate) for observer, estimate, _ in spared]
     readings = [free_reading(on, *pair) for on, pair in zip(under, pairs, strict=True)]
     finished = REMOVALS.get(removal, remove_nothing)(found, readings)
     budgets = [
@@ -86,6 +88,7 @@ def refine(
         removed=removal,
         remarks=(
             *found.remarks,
+            *(remark for _, _, said in spared for remark in said),
             *(
                 fact(
                     "tuned",

@@ -2,6 +2,7 @@
 
 A correction is worth having where it predicts; what only fits is left alone. The free samples are
 cut into contiguous folds; each is predicted from the others, with the model held back more or less.
+A joint is judged by the samples in which it moves: at rest stiction rules, which no model predicts.
 """
 
 from typing import NamedTuple
@@ -25,8 +26,18 @@ SCALES = (0.0, 0.1, 0.3, 1.0)
 LARGEST = 6.0
 """A residual counts at most so many scales."""
 
+MOVES = 0.02
+"""A joint moves where it is faster than this. [rad/s]"""
+
+SELDOM = 0.2
+"""A joint that moves in less than this share of the free samples is judged by all of them."""
+
 WORTH = 0.9
-"""A joint is corrected if at most this share of its unseen error is left."""
+"""A joint is corrected in full if at most this share of its unseen error is left, …"""
+
+WORTHLESS = 0.95
+"""… not at all if so much is left, and between the two in part: no sample switches it. A load of
+2.8 kg that the fit cannot hold apart from the model leaves .95."""
 
 
 class Guarded(NamedTuple):
@@ -34,19 +45,26 @@ class Guarded(NamedTuple):
 
     Attributes:
         solution: From all free samples, held back as far as predicts best; None if not at all.
-        share: Unseen error with it over that without. (n,)
-        applied: Joints on which it is worth having. (n,)
+        share: Unseen error with it over that without, while the joint moves. (n,)
+        weight: How much of it each joint gets: 0 where it is not worth having, 1 where it clearly
+            is. (n,)
         loads: Slow loads that are believed beside it, in standard deviations. (L,)
     """
 
     solution: FittedError | None
     share: Array
-    applied: Mask
+    weight: Array
     loads: Array
 
 
-def guarded(fit: WholeLogFit) -> Guarded:
-    """Try a fit on folds of its free samples, and keep what predicts."""
+def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
+    """Try a fit on folds of its free samples, and keep what predicts.
+
+    Args:
+        fit: The fit.
+        dq: Joint velocities at its samples. (S, n) [rad/s]
+    """
+    judged = judging(np.abs(dq) > MOVES, fit.free)
     folds = fold_spans(np.flatnonzero(fit.free), round(MARGIN / fit.step))
     left_out = [mask_of(len(fit.free), outer) for _, outer in folds]
     whole, *parts = fit.rows.all_sums(fit.weight, fit.free, left_out)
@@ -60,14 +78,29 @@ def guarded(fit: WholeLogFit) -> Guarded:
                 found = fit.solved(rest, scale).model
                 residual = residual + fit.rows.modelled(found, inner)
             held = np.minimum(np.abs(residual[free]) / fit.scale, LARGEST)
-            squares[k] += np.sum(held**2, axis=0)
+            squares[k] += np.sum(held**2 * judged[inner][free], axis=0)
     best = int(np.argmin(squares.mean(axis=1)))
     share = np.sqrt(squares[best] / np.maximum(squares[0], np.finfo(float).tiny))
     if not SCALES[best]:
-        none = np.zeros(fit.rows.joints, dtype=bool)
-        return Guarded(None, share, none, fit.solved(whole).loads)
+        return Guarded(None, share, np.zeros_like(share), fit.solved(whole).loads)
     solution = fit.solved(whole, SCALES[best])
-    return Guarded(solution, share, share <= WORTH, solution.loads)
+    return Guarded(solution, share, faded(share, WORTH, WORTHLESS), solution.loads)
+
+
+def faded(value: Array, full: float, none: float) -> Array:
+    """How much of something is used: 1 up to a value, 0 from another on, straight between."""
+    return np.asarray(np.clip((none - value) / (none - full), 0.0, 1.0))
+
+
+def judging(moves: Mask, free: Mask) -> Mask:
+    """By which samples each joint is judged. (S, n)
+
+    Args:
+        moves: Where a joint moves. (S, n)
+        free: The samples free of contact. (S,)
+    """
+    seldom: Mask = moves[free].mean(axis=0) < SELDOM
+    return moves | seldom
 
 
 def fold_spans(free: NDArray[np.intp], margin: int) -> list[tuple[slice, slice]]:

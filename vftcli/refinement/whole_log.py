@@ -17,13 +17,14 @@ from vftcli.refinement.model_error import (
     error_columns,
     error_of,
     expected_error,
+    friction_alone,
     smooth_motion,
     usual_friction,
 )
 from vftcli.refinement.normal_equations import Rows
 from vftcli.refinement.robust_fit import WholeLogFit, fit_robustly
 from vftcli.refinement.slow_load import slow_loads
-from vftcli.refinement.unseen import Guarded, guarded
+from vftcli.refinement.unseen import MOVES, Guarded, faded, guarded
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask, handed_over, seal
@@ -31,15 +32,30 @@ from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import median_step, resample_columns
 
-MOVES = 0.02
-"""The arm moves where a joint is faster than this. [rad/s]"""
-
 LEAST_MOTION = 10.0
-"""From its first to its last motion a log has to take this long: a shorter one tells friction and
-inertia from a push no more. [s]"""
+"""From its first to its last motion a log has to take this long: a shorter one tells inertia from a
+push no more, and friction alone is fitted. [s]"""
+
+LEAST_FRICTION = 3.0
+"""A log that moves for less tells nothing: ten times the `CORRELATED` of a residual. [s]"""
 
 LEAST_SHARE = 0.1
 """An arm that moves less of the time, and less than `LEAST_MOTION` in all, is held in a pose."""
+
+USUAL = 1.1
+"""Up to so many times the error of friction that is expected, rms over a short log, its fit is used
+in full, … Pieces of 5 s of UR10e logs reach 1.2 on their worst joint. [1]"""
+
+LED = 1.4
+"""… and from so many times on not at all: a hand leads the arm. With a hand of 20 N along the
+flange's path the worst joint reads 1.2 to 2.5. [1]"""
+
+CLEAR = 0.45
+"""In a short log a joint's friction is corrected in full if so much of its error is left, …"""
+
+UNCLEAR = 0.6
+"""… and not at all if so much is: pieces of 5 s of UR10e logs leave .3 to .9, the same led by a
+hand .4 to .9, and with both limits they are no worse than a momentum observer. [1]"""
 
 RATE = 30.0
 """Samples a second that are fitted, …"""
@@ -59,9 +75,11 @@ class WholeLogBias:
     """The model's bias along a log.
 
     Attributes:
-        applied: Joints on which the correction is used. (n,)
-        bias: Torque by which the model is wrong, zero on joints left alone. (T, n) [N·m]
-        sd: Standard deviation of the model's error as it was fitted. (T, n) [N·m]
+        weight: How much of the model's error is taken off each joint: 0 on joints left alone, 1
+            where it clearly predicts what it had not seen. (n,)
+        bias: Torque that is taken off, zero on joints left alone. (T, n) [N·m]
+        sd: Standard deviation of the model's error as it was fitted, and of what is taken off where
+            that is a part of it: taken off or left alone, by chance. (T, n) [N·m]
         free: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
         load: External torque of the slow loads that the fit believes in, which stays in the
             estimates; zero where it believes in none. (T, n) [N·m]
@@ -70,7 +88,7 @@ class WholeLogBias:
         error: The model's error on the joints left alone too, None where nothing was fitted.
     """
 
-    applied: Mask
+    weight: Array
     bias: Array
     sd: Array
     free: Mask
@@ -80,9 +98,13 @@ class WholeLogBias:
     error: ModelError | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        seal(self, "bias", "sd", "load")
-        for name in ("applied", "free"):
-            object.__setattr__(self, name, frozen_mask(getattr(self, name)))
+        seal(self, "weight", "bias", "sd", "load")
+        object.__setattr__(self, "free", frozen_mask(self.free))
+
+    @property
+    def applied(self) -> Mask:
+        """Joints on which the correction is used. (n,)"""
+        return np.asarray(self.weight > 0.0)
 
     def corrected(self, terms: DynamicsTerms) -> DynamicsTerms:
         """The log's own terms without the bias, μ ← μ − b."""
@@ -94,7 +116,7 @@ class WholeLogBias:
         """The terms of another recording of the arm without the same model error."""
         if self.error is None or not self.applied.any():
             return other.terms
-        bias = np.where(self.applied, self.error.torque(other, smooth_motion(other)), 0.0)
+        bias = self.weight * self.error.torque(other, smooth_motion(other))
         return replace(other.terms, mu=handed_over(other.terms.mu - bias))
 
 
@@ -106,51 +128,79 @@ def whole_log_bias(run: ModelledRun) -> WholeLogBias:
         RobotError: If the number of joints differs.
     """
     terms, t = run.terms, run.recording.t
-    if (refused := refusal(run)) is not None:
+    span, refused = motion_of(run)
+    if refused is not None:
         return untouched(terms, refused)
+    expected = (expected_error if span >= LEAST_MOTION else friction_alone)(run.robot)
     # What no arm does overflows, and is refused.
     with np.errstate(all="ignore"):
         try:
             motion, stride = smooth_motion(run), stride_of(t)
             fit = fit_robustly(
-                rows_of(run, motion, stride),
+                rows_of(run, motion, expected, stride),
                 stride * median_step(t),
                 usual_friction(run.robot).dry,
             )
-            found = bias_of(run, motion, fit, guarded(fit), stride)
+            tried = guarded(fit, motion.dq[::stride])
+            if span < LEAST_MOTION:
+                tried = tried._replace(weight=weight_of_friction(fit, tried))
+                if not tried.weight.any():
+                    return untouched(terms, caution("whole-log-friction-unclear", motion_s=span))
+            found = bias_of(run, motion, expected, fit, tried, stride)
         except np.linalg.LinAlgError:
             return untouched(terms, caution("whole-log-without-solution"))
-    known = np.all(np.isfinite(found.bias)) and np.all(np.isfinite(found.sd))
-    return found if known else untouched(terms, caution("whole-log-without-solution"))
+    if not (np.all(np.isfinite(found.bias)) and np.all(np.isfinite(found.sd))):
+        return untouched(terms, caution("whole-log-without-solution"))
+    if span >= LEAST_MOTION:
+        return found
+    shorter = fact("whole-log-friction-alone", motion_s=span, least_s=LEAST_MOTION)
+    return replace(found, remarks=(shorter, *found.remarks))
 
 
-def rows_of(run: ModelledRun, motion: SmoothMotion, stride: int) -> Rows:
+def weight_of_friction(fit: WholeLogFit, tried: Guarded) -> Array:
+    """How much of a fit of friction alone each joint of a short log gets. (n,)
+
+    A hand that leads the arm pushes along the motion, which is what friction does the other way
+    round: what tells them apart in some seconds is that friction is about as wrong as is usual on
+    every joint, and predicts most of what was not seen.
+    """
+    if tried.solution is None:
+        return tried.weight
+    found = np.mean(fit.rows.modelled(tried.solution.model) ** 2, axis=0)
+    usual = np.array([np.mean(np.sum(column**2, axis=1)) for column in fit.rows.columns])
+    worst = np.max(np.sqrt(found / np.maximum(usual, np.finfo(float).tiny)))
+    return faded(worst, USUAL, LED) * faded(tried.share, CLEAR, UNCLEAR)
+
+
+def rows_of(run: ModelledRun, motion: SmoothMotion, expected: ModelError, stride: int) -> Rows:
     """What is fitted: every so many samples of the log."""
     t, terms = run.recording.t, run.terms
     d = zero_phase(t, derivative(t, terms.p) - terms.mu, CUTOFF)
     return Rows(
-        columns=error_columns(run, motion, expected_error(run.robot), stride),
+        columns=error_columns(run, motion, expected, stride),
         loads=slow_loads(run.robot.loaded_chain, t[::stride], motion.q[::stride]),
         d=d[::stride],
     )
 
 
-def refusal(run: ModelledRun) -> Remark | None:
-    """Why a log does not tell the model's error from a push, None where it may."""
+def motion_of(run: ModelledRun) -> tuple[float, Remark | None]:
+    """How long a log moves from first to last [s], and why it tells no error of the model."""
     t, dq = run.recording.t, run.recording.require("dq")
     duration = float(t[-1] - t[0])
-    if duration < LEAST_MOTION:
-        return caution("whole-log-too-short", duration_s=duration, least_s=LEAST_MOTION)
+    if duration < LEAST_FRICTION:
+        short = caution("whole-log-too-short", duration_s=duration, least_s=LEAST_FRICTION)
+        return duration, short
     # noise is no motion
     moves = np.any(np.abs(zero_phase(t, dq, CUTOFF)) > MOVES, axis=1)
     moving = float(np.count_nonzero(moves) * median_step(t))
     span = float(np.ptp(t[moves])) if moves.any() else 0.0
     share = moving / duration
     if not moves.any() or (moving < LEAST_MOTION <= span and share < LEAST_SHARE):
-        return caution("whole-log-at-rest", motion_s=moving, share=share)
-    if span < LEAST_MOTION:
-        return caution("whole-log-little-motion", motion_s=span, least_s=LEAST_MOTION)
-    return None
+        return span, caution("whole-log-at-rest", motion_s=moving, share=share)
+    if span < LEAST_FRICTION:
+        little = caution("whole-log-little-motion", motion_s=span, least_s=LEAST_FRICTION)
+        return span, little
+    return span, None
 
 
 def stride_of(t: Array) -> int:
@@ -163,7 +213,7 @@ def untouched(terms: DynamicsTerms, why: Remark) -> WholeLogBias:
     """No correction, and why."""
     none = np.zeros((terms.samples, terms.joints))
     return WholeLogBias(
-        applied=np.zeros(terms.joints, dtype=bool),
+        weight=np.zeros(terms.joints),
         bias=none,
         sd=none,
         free=np.ones(terms.samples, dtype=bool),
@@ -174,7 +224,12 @@ def untouched(terms: DynamicsTerms, why: Remark) -> WholeLogBias:
 
 
 def bias_of(
-    run: ModelledRun, motion: SmoothMotion, fit: WholeLogFit, found: Guarded, stride: int
+    run: ModelledRun,
+    motion: SmoothMotion,
+    expected: ModelError,
+    fit: WholeLogFit,
+    found: Guarded,
+    stride: int,
 ) -> WholeLogBias:
     """The bias on the log's own clock, with its uncertainty and what is said of it."""
     t, n = run.recording.t, run.robot.joints
@@ -184,16 +239,19 @@ def bias_of(
         said = remarks_of(found, np.zeros(n), float(fit.free.mean()))
         bare = untouched(run.terms, said[0])
         return replace(bare, free=free, load=load, remarks=said, fitted=True)
-    sds, expected = np.zeros(fit.rows.unknowns), expected_error(run.robot)
+    sds = np.zeros(fit.rows.unknowns)
     for j in range(n):
         sds[column_numbers(j, n)] = expected.own(j)
     error = error_of(sds * found.solution.model, n)
-    bias = np.where(found.applied, error.torque(run, motion), 0.0)
-    spread = fit.rows.spread(found.solution.covariance)
+    whole = error.torque(run, motion)
+    bias = found.weight * whole
+    spread = resample_columns(t, t[::stride], fit.rows.spread(found.solution.covariance))
+    # all of it with this probability, else nothing: w(1 − w) of its square
+    undecided = np.sqrt(found.weight * (1.0 - found.weight)) * whole
     return WholeLogBias(
-        applied=found.applied,
+        weight=found.weight,
         bias=handed_over(bias),
-        sd=handed_over(resample_columns(t, t[::stride], spread)),
+        sd=handed_over(np.hypot(spread, undecided)),
         free=free,
         load=load,
         remarks=remarks_of(found, np.sqrt(np.mean(bias**2, axis=0)), float(fit.free.mean())),
@@ -209,7 +267,8 @@ def remarks_of(found: Guarded, changed: Array, free_share: float) -> tuple[Remar
         changed: Root mean square of the correction. (n,) [N·m]
         free_share: Share of the log that the fit calls free of contact.
     """
-    groups = {"whole-log-applied": found.applied, "whole-log-left-alone": ~found.applied}
+    applied = found.weight > 0.0
+    groups = {"whole-log-applied": applied, "whole-log-left-alone": ~applied}
     remarks = []
     for code, joints in groups.items():
         values: dict[str, object] = {"unseen_share": found.share[joints].tolist()}

@@ -40,13 +40,18 @@ class NullSpaceVerdict(NamedTuple):
 def contact_elsewhere(wrench: Wrench, free: Mask) -> NullSpaceVerdict | None:
     """Judge a wrench's null-space channel by its free part, None for an arm of six joints.
 
+    None too where the channel is not known in any sample of the free part.
+
     Args:
         wrench: A virtual sensor's wrench.
         free: Samples of the unloaded part. (T,)
     """
-    if wrench.null_space is None or not np.any(free):
+    if wrench.null_space is None:
+        return None
+    known = wrench.null_space[free & np.isfinite(wrench.null_space)]
+    if not len(known):
         return None
     # The largest, not a quantile: the free part holds no contact, so all of it is error.
-    threshold = MARGIN * float(np.nanmax(wrench.null_space[free]))
+    threshold = MARGIN * float(known.max())
     share = float(np.mean(np.nan_to_num(wrench.null_space) > threshold))
     return NullSpaceVerdict(wrench.name, threshold, share)
