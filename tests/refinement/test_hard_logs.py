@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from known_errors import drawn_error, wrong_run
 
+from vftcli.doctor.examiner import Examiner
 from vftcli.observers import MomentumObserver
 from vftcli.observers.auto_tuning import noise_level
 from vftcli.observers.choice import ObserverChoice
@@ -92,6 +93,14 @@ def test_every_joint_of_the_best_is_a_number(slow, panda, seed, stale, jitter, g
     assert np.isfinite(best.tau).all()
     assert best.error_sd is None or np.all(best.error_sd > 0.0)
     assert "estimate-without-number" not in {r.code for r in analysis.remarks}
+
+
+def test_an_hour_without_samples_costs_no_band(slow, panda):
+    t = np.where(np.arange(len(slow.t)) < 200, slow.t, slow.t + 3600.0)
+    choice = replace(BEST, examiner=Examiner(anyway=True))
+    (best,) = analyse(replace(slow, t=t), panda, choice).estimates
+    assert np.isfinite(best.tau).all()
+    assert np.isfinite(best.error_sd).all()
 
 
 def test_no_noise_in_the_loaded_part_still_leaves_a_filter():

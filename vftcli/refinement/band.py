@@ -4,7 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.observers.error_band import ENOUGH, HELD, FreeError, error_band, free_error
+from vftcli.observers.error_band import (
+    ENOUGH,
+    HELD,
+    UNSEEN,
+    FreeError,
+    error_band,
+    free_error,
+)
 from vftcli.observers.table import BEST
 from vftcli.refinement.baseline import Baseline, FreeReading
 from vftcli.refinement.model_error import expected_spread, friction_alone, smooth_motion
@@ -30,20 +37,23 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
     """
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
     if spectra is None or not len(reading.samples):
-        sd = stated_band(found, reading) if estimate.name == BEST else None
-        return estimate if sd is None else replace(estimate, error_sd=sd, moving=~found.standing)
+        if estimate.name != BEST:
+            return estimate
+        stated = stated_band(found, reading)
+        return replace(estimate, error_sd=stated, moving=~found.standing)
     free = known_error(found, reading)
     response = reading.observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
     sd = error_band(free, spectra.missed(response), run.rests, found.correction_sd)
     return replace(estimate, error_sd=handed_over(sd), moving=~found.standing)
 
 
-def stated_band(found: Baseline, reading: FreeReading) -> Array | None:
+def stated_band(found: Baseline, reading: FreeReading) -> Array:
     """The band of `best` where the log has no spectra, from what the robot's own numbers state.
 
     Friction is as wrong as is usual, by a fifth (`model_error.expected_error`); where a bias was
     fitted it is what that leaves of it, and what is read where its fit sees no contact. What the
-    gains leave out of the torque is not known. None for a log of a few samples.
+    gains leave out of the torque is not known. In a log of a few samples, or with a gap that no
+    filter runs across, a moving joint has `UNSEEN` of its dry friction.
 
     Returns:
         Standard deviation. (T, n) [N·m]
@@ -60,7 +70,8 @@ def stated_band(found: Baseline, reading: FreeReading) -> Array | None:
     try:
         motion, stride = smooth_motion(run), stride_of(t)
     except ClockError:
-        return None
+        usual = held._replace(moving=(UNSEEN * friction) ** 2)
+        return handed_over(error_band(usual, nothing, run.rests))
     spread = expected_spread(run, motion, friction_alone(run.robot), stride)
     sd = resample_columns(t, t[::stride], spread)
     return handed_over(error_band(held, nothing, run.rests, sd))
