@@ -32,7 +32,7 @@ def test_a_load_is_sought_in_all_episodes_and_too_few_poses_are_refused(
         main()
     error = capsys.readouterr().err.splitlines()[-1]
     assert "panda_episodes episode 0, panda_episodes episode 1, panda_episodes episode 2" in error
-    assert "of them different; a load needs 4 different ones" in error
+    assert "the arm passes 2 different poses, and a load needs 4 at least" in error
 
 
 def test_refusals_are_one_line(

@@ -154,3 +154,23 @@ def test_a_bound_is_never_reached_in_silence() -> None:
     assert (slow.where.joints, fast.where.joints) == ((1, 4), (3,))
     assert (slow.values["rate_rad_s"], fast.values["rate_rad_s"]) == (1.0, 250.0)
     assert str(fast).startswith("kfo-auto: tuning ran to the fastest it tries, 250 rad/s, on J3")
+
+
+def test_best_keeps_a_push_where_the_log_shows_none(pushed: Pushed) -> None:
+    """Tuned on noise alone it keeps what 1/(1 + (ω/9)⁴) leaves of a half sine of .6 s."""
+    _, free = pushed()
+    t = free.terms.t
+    begin = t[len(t) // 2]
+    inside = (t >= begin) & (t < begin + 0.6)
+    push = np.where(inside, np.sin(np.pi * (t - begin) / 0.6), 0.0)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(len(t), STEP)
+    left = np.fft.irfft(np.fft.rfft(push) / (1.0 + (omega / 9.0) ** 4), len(t)).max()
+    p = np.cumsum(push[:, None] * np.ones(2), axis=0) * STEP
+    quiet = DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))
+    kept = {}
+    for name in ("best", "rts-auto"):
+        observer = tune_to_spectra(name, spectra_of(free, [free]))
+        kept[name] = float(observer.estimate(quiet).tau[:, 0].max())
+    # The grid of natural frequencies is 7 % fine, of which the peak moves by a third.
+    assert kept["best"] == pytest.approx(left, rel=0.025)
+    assert kept["rts-auto"] < kept["best"]

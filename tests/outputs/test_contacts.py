@@ -147,7 +147,7 @@ def test_the_answer_is_no_force_within_its_band() -> None:
         "2 contacts. The hardest of known size, at 4.7 s: 65 ± 7 N on the wrist."
     )
     assert answer(contact_list(wide)) == ("1 contact. How hard is unknown: below 258 N.")
-    assert hardest_words(contact_list(wide)) == "not told (88 ± 170 N at 4.7 s)"
+    assert hardest_words(contact_list(wide)) == "unknown (88 ± 170 N at 4.7 s)"
     assert [row.number for row in hardest_rows([wide, contact()], 1)] == [1]
     load = contact(peak_force=3.0, peak_band=5.0, is_load=True)
     assert answer(contact_list(load)).endswith("or a wrong model: below 8 N on average.")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.external_torque import COVERS
@@ -34,8 +35,11 @@ def erring():
 
 
 def sensed(recording, **zero):
+    # The file's R and Q as densities: as a sample's variances they let more of the noise through.
     request = AnalysisChoice(
-        wrench=WrenchChoice(frame="base", zero=ZeroChoice(**zero)), robot=RobotChoice(name="panda")
+        wrench=WrenchChoice(frame="base", zero=ZeroChoice(**zero)),
+        robot=RobotChoice(name="panda"),
+        observers=ObserverChoice.parsed(assignments=["kfo.noise_convention=density"]),
     )
     return analyse(recording, request.robot.load(recording), request)
 

@@ -15,7 +15,7 @@ import numpy as np
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.series import runs_of
-from vftcli.virtual_sensor.smoother.noise import LEAST_NOISE, fit_joints, resting, steps
+from vftcli.virtual_sensor.smoother.noise import LEAST_NOISE, TIE, fit_joints, resting, steps
 
 LEAST_STRETCH = 20
 """Fewest blocks in a row that a spectrum is learned from."""
@@ -281,7 +281,8 @@ def rested_within(rests: Mask, count: int) -> Mask:
 
 def near_motion(moving: Mask, blocks: Blocks) -> Mask:
     """Blocks within `SPIKE_REACH` of a joint's motion. (K, n)"""
-    count = max(round(SPIKE_REACH / float(np.median(blocks.length))), 1)
+    # 12.5 blocks of 24 ms: the clock's last digit decides nothing.
+    count = max(round(SPIKE_REACH / float(np.median(blocks.length)) - TIE), 1)
     total = np.vstack([np.zeros((1, moving.shape[1])), np.cumsum(moving, axis=0)])
     k = np.arange(len(moving))
     first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, len(moving))

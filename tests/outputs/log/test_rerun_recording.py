@@ -77,6 +77,8 @@ def test_every_plot_has_all_of_its_lines(rows: dict[str, dict[str, list]]) -> No
             "gmo",
             "kfo-fe",
             "kfo-zoh",
+            "best 95 % upper",
+            "best 95 % lower",
         ]
         assert f"/residual/J{j}" in rows
     assert {"/q", "/dq", "/drive_torque", "/summary", "/errors"} <= set(rows)
@@ -86,7 +88,7 @@ def test_torques_read_back(rows: dict[str, dict[str, list]], analysis: Analysis)
     values = np.array([v for v in column(rows, "/tau_ext/J2", "Scalars:scalars") if v])
     assert analysis.reference is not None
     expected = [analysis.reference.tau[:, 1], *(e.tau[:, 1] for e in analysis.estimates)]
-    np.testing.assert_array_equal(values, np.column_stack(expected))
+    np.testing.assert_array_equal(values[:, : len(expected)], np.column_stack(expected))
 
 
 def test_time_reads_back_in_seconds(rows: dict[str, dict[str, list]], analysis: Analysis) -> None:

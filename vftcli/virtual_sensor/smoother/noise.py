@@ -28,6 +28,9 @@ from vftcli.virtual_sensor.solvers import TORQUE_SD
 STILL = 0.01
 """A joint slower than this over a block rests: what holds it is stiction. [rad/s]"""
 
+TIE = 1e-6
+"""What rounding changes at most, of a speed as a share or of a number of blocks, up to 1e6 s."""
+
 REST_SHARE = 0.5
 """Standard deviation of the model error at rest, of the joint's dry friction F_c: on real UR10e
 logs the residual at rest is .31 to .61 of it."""
@@ -137,7 +140,8 @@ def steps(blocks: Blocks) -> Array:
 
 def resting(blocks: Blocks) -> Mask:
     """Blocks in which each joint rests. (K, n)"""
-    return np.asarray(np.abs(blocks.velocity) < STILL)
+    # Steps of an encoder make speeds of just `STILL`: they move, whatever rounding makes of them.
+    return np.asarray(np.abs(blocks.velocity) < (1.0 - TIE) * STILL)
 
 
 def dry_torques(robot: Robot) -> Array:

@@ -26,7 +26,7 @@ from vftcli.virtual_sensor.smoother.kalman import (
     filter_forward,
     smooth_backward,
 )
-from vftcli.virtual_sensor.smoother.noise import FreeTerms, TorqueNoise, torque_noise
+from vftcli.virtual_sensor.smoother.noise import TIE, FreeTerms, TorqueNoise, torque_noise
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior, choose_prior, evolution, gated
 
 COARSE = 0.1
@@ -266,7 +266,7 @@ def unlisted(
     # A log of one sample is a block without length.
     R, length = measured.noise, float(np.median(blocks.length)) or FINE
     count = len(blocks.t)
-    half = round(0.5 * UNLISTED / length)
+    half = round(0.5 * UNLISTED / length - TIE)  # 12.5 blocks of 24 ms: rounding decides nothing
     kept = np.exp(-2.0 * length / noise.time(blocks))
     added = noise.variance(blocks) * (1.0 - kept)
     beta = R * (1.0 - kept) - added
