@@ -242,10 +242,10 @@ def photograph_recording(recording: Path, path: Path) -> None:
     viewer = Path(sys.executable).parent / "rerun"
     words = ["--window-size", f"{width}x{height}", "--screenshot-to", str(path), str(recording)]
     place = ["xvfb-run", "-a", "-s", f"-screen 0 {width}x{height}x24"]
-    # Where the pointer rests in the middle it opens a box over the arm.
-    aside = f"xdotool mousemove {width - 1} {height - 1} && exec " + shlex.join(
-        [str(viewer), *words]
-    )
+    # Where the pointer rests in the middle it opens a box over the arm; the viewer may begin late.
+    corner = f"xdotool mousemove {width - 1} {height - 2} mousemove {width - 1} {height - 1}"
+    away = f"(while {corner}; do sleep 0.3; done) 2> /dev/null &"
+    aside = f"{corner}; {away} exec {shlex.join([str(viewer), *words])}"
     subprocess.run([*place, "sh", "-c", aside], check=True, capture_output=True)
 
 

@@ -142,7 +142,7 @@ def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList
     halted = {k for k in seen if is_stop(run, found, k, seconds)}
     stops = [float(found.log.blocks.t[found.runs[k][0]]) for k in sorted(halted) if passed[k]]
     kept = [k for k in seen if passed[k] and k not in halted]
-    measurer = Measurer.of(run, found.kept(kept).joined(), free)
+    measurer = Measurer.of(run, found.kept(kept), free)
     rows = measured_rows(free, measurer)
     others = [k for k in seen if not passed[k] and k not in halted]
     weak = measured_rows(free, measurer.beside(found.kept(others), free)) if others else []

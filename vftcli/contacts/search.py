@@ -55,21 +55,6 @@ class Found(NamedTuple):
             beyond=[self.beyond[i] for i in chosen],
         )
 
-    def joined(self) -> "Found":
-        """The candidates, those with no more than a block between them as one."""
-        groups: list[list[int]] = []
-        for i, (start, _) in enumerate(self.runs):
-            if groups and start - self.runs[groups[-1][-1]][1] <= 1:
-                groups[-1].append(i)
-            else:
-                groups.append([i])
-        evidence = [self.evidence[group].sum(axis=0) for group in groups]
-        return self._replace(
-            runs=[(self.runs[group[0]][0], self.runs[group[-1]][1]) for group in groups],
-            evidence=np.array(evidence).reshape(len(groups), len(self.places)),
-            beyond=[any(self.beyond[i] for i in group) for group in groups],
-        )
-
 
 def search(run: ModelledRun, noise: ErrorNoise, level: Array, seconds: float) -> Found:
     """Look for contacts along a log.

@@ -88,7 +88,7 @@ def test_few_joints_tell_when_but_not_how_hard(found: ContactList, pushed: Analy
     two = replace(found, contacts=tuple(map(bare, found.contacts[:2])), smallest_force=None)
     assert headline(two) == "Something pushed the arm twice."
     assert belief_words(two) == "Contacts <b>1</b> and <b>2</b> are weak." or not belief_words(two)
-    assert "not told" in contact_row(pushed, two.contacts[0], 1.0)
+    assert "unknown" in contact_row(pushed, two.contacts[0], 1.0)
     assert "–" in contact_details(two)
 
 

@@ -71,7 +71,7 @@ def batch_line(row: Mapping[str, Any], page: str, error: str) -> IndexLine:
     hardest = DASH
     if force is not None:
         hardest = f"{force:.0f} ± {row['hardest_band_N']:.0f} N at {row['hardest_s']:.1f} s"
-        hardest = hardest if force > row["hardest_band_N"] else f"not told ({hardest})"
+        hardest = hardest if force > row["hardest_band_N"] else f"unknown ({hardest})"
     return IndexLine(
         name=row["log"],
         page=page,

@@ -157,7 +157,7 @@ def contact_table(analysis: Analysis, found: ContactList) -> str:
 def contact_row(analysis: Analysis, contact: Contact, most: float) -> str:
     """One contact; its number leads to the chart."""
     number, lasts = contact.number, contact.stop - contact.start
-    hard = "not told" if contact.peak_force is None else size(contact) + range_bar(contact, most)
+    hard = "unknown" if contact.peak_force is None else size(contact) + range_bar(contact, most)
     pushed = "–" if contact.wrench is None else direction(contact.wrench[:3])
     mark = (
         f'<a class="n" href="#mark-{number}" title="show in the chart" '
@@ -208,7 +208,7 @@ def place(contact: Contact) -> str:
     if contact.where != "cannot tell":
         links = [f"link {link}" if link else "flange" for link in contact.places]
         return f"{escape(words)}<small>{', '.join(links)}</small>"
-    return f"not told<small>{escape(words)} fit</small>" if contact.places else "not told"
+    return f"unknown<small>{escape(words)} fit</small>" if contact.places else "unknown"
 
 
 def trust(contact: Contact) -> str:

@@ -57,7 +57,7 @@ def answer_part(analysis: Analysis, torques: Chart) -> str:
     found = analysis.contacts
     if found is None:
         reasons = [r for r in analysis.remarks if r.code == "contacts-not-told"]
-        words = [f"What touched the arm is not told: {sentence(r)}." for r in reasons]
+        words = [f"What touched the arm is unknown: {sentence(r)}." for r in reasons]
         first = top(eyebrow(analysis), headline(analysis), lead(*words))
         return first + torque_section(torques, opened=True)
     doubt = lead(load_doubt(analysis))
