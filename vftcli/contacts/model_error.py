@@ -31,7 +31,7 @@ DRY_SHARE, LEAST_ERROR, LEAST_TIME = 0.2, 0.1, 0.3
 much [N·m]; its correlation time is no shorter where it is this error. [s]"""
 
 QUIET, QUIET_SD = 0.6, 0.8416
-"""Where nothing was learned the quietest 60 % of the blocks in which a joint moves are taken for
+"""Where nothing was learned the quietest 60 % of the blocks in which a joint moves count as
 free; 60 % of a normal variable lie within so many standard deviations."""
 
 UNSEEN, UNSEEN_SHARE, UNSEEN_TIME = 0.2, 0.2, 1.0

@@ -116,7 +116,7 @@ class Measurer:
         )
 
     def beside(self, found: Found, free: Untouched) -> "Measurer":
-        """What measures other candidates of the same log likewise."""
+        """A measurer of other candidates of the same log."""
         other = Measurer.of(self.run, found, free, self)
         return replace(other, bent=self.bent)
 

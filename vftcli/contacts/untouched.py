@@ -149,14 +149,14 @@ def inferred_motion(log: ModelledRun, bias: WholeLogBias, seconds: float) -> Unt
     """What a log without known free motion lets infer of it, None where it lets infer nothing.
 
     The model error that the whole log shows is taken off where its guard allows it, then a load.
-    Nothing is inferred without dry friction where that error is taken off no joint.
+    Nothing is inferred without dry friction where that error is taken off no joint as a whole.
 
     Args:
         log: The log.
         bias: The model error that was fitted to the whole log.
         seconds: Length of a block. [s]
     """
-    if not (dry_torques(log.robot).any() or bias.applied.any()):
+    if not (dry_torques(log.robot).any() or (bias.weight >= 1.0).any()):
         return None
     corrected = log.with_terms(bias.corrected(log.terms))
     short = any(remark.code in SHORT_LOG for remark in bias.remarks)
