@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contact_logs import FIXTURES, UR10E, motion, true_wrench
+from contact_rows import contact
 from contact_scores import score, true_contacts
 
 from vftcli.contacts.contact_list import ContactList
-from vftcli.contacts.listing import list_contacts
+from vftcli.contacts.listing import adjoining, list_contacts
 from vftcli.readers import read
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion
@@ -295,3 +296,12 @@ def test_a_press_on_a_resting_arm_is_one_contact_and_no_load(logs: Path, name: s
     recording = read(logs / "panda_press" / f"{name}.csv.gz", columns=columns)
     (row,) = list_contacts(motion(recording, "panda")).contacts
     assert not row.is_load
+
+
+def test_a_row_without_a_size_belongs_to_the_one_that_it_adjoins() -> None:
+    """The tail of a push reads 13 ± 29 N; two pushes of different directions both have a size."""
+    hard, tail = contact(), contact(peak_force=13.0, peak_band=29.0)
+    runs = [(10, 40), (41, 80), (90, 120)]
+    assert adjoining(runs, [hard, tail, tail]) == [[0, 1], [2]]
+    assert adjoining(runs, [hard, hard, hard]) == [[0], [1], [2]]
+    assert adjoining([], []) == []

@@ -144,6 +144,10 @@ def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList
     kept = [k for k in seen if passed[k] and k not in halted]
     measurer = Measurer.of(run, found.kept(kept), free)
     rows = measured_rows(free, measurer)
+    groups = adjoining(measurer.found.runs, rows)
+    if len(groups) < len(rows):
+        measurer = Measurer.of(run, measurer.found.joined(groups), free)
+        rows = measured_rows(free, measurer)
     others = [k for k in seen if not passed[k] and k not in halted]
     weak = measured_rows(free, measurer.beside(found.kept(others), free)) if others else []
     weak += [row for row in rows if not row.is_told]
@@ -189,6 +193,18 @@ def carried(load: FreeLoad, run: ModelledRun) -> CarriedLoad:
 def start_of(row: Contact) -> float:
     """When a contact begins. [s]"""
     return row.start
+
+
+def adjoining(runs: Sequence[Run], rows: Sequence[Contact]) -> list[list[int]]:
+    """Numbers of the rows, those together of which one has no size of its own beside the other."""
+    groups: list[list[int]] = []
+    sized = [(row.peak_force or 0.0) > (row.place_band or 0.0) for row in rows]
+    for i, (start, _) in enumerate(runs):
+        if i and start - runs[i - 1][1] <= 1 and not (sized[i] and sized[i - 1]):
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    return groups
 
 
 def measured_rows(free: Untouched, measurer: Measurer) -> list[Contact]:

@@ -55,6 +55,14 @@ class Found(NamedTuple):
             beyond=[self.beyond[i] for i in chosen],
         )
 
+    def joined(self, groups: Sequence[Sequence[int]]) -> "Found":
+        """The candidates of each group as one, their evidence added."""
+        return self._replace(
+            runs=[(self.runs[group[0]][0], self.runs[group[-1]][1]) for group in groups],
+            evidence=np.array([self.evidence[list(group)].sum(axis=0) for group in groups]),
+            beyond=[any(self.beyond[i] for i in group) for group in groups],
+        )
+
 
 def search(run: ModelledRun, noise: ErrorNoise, level: Array, seconds: float) -> Found:
     """Look for contacts along a log.
