@@ -174,3 +174,17 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
 def those_that_fit(fits: list[PointFit]) -> list[PointFit]:
     """The fits within `ALIKE` of the best."""
     return [fit for fit in fits if fit.score <= fits[0].score + ALIKE]
+
+
+def from_flange(chain: Chain, q: Array, fit: PointFit) -> Array:
+    """A fitted point's position from the flange point, in base axes. (3,) [m]
+
+    Args:
+        chain: The arm.
+        q: Joint positions. (n,) [rad]
+        fit: The point.
+    """
+    frames = link_poses(chain, q[None]).translation[0]
+    start, end = frames[fit.link - 1], frames[fit.link]
+    offset: Array = start + fit.share * (end - start) - frames[-1]
+    return offset

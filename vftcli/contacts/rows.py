@@ -14,6 +14,7 @@ from vftcli.contacts.places import (
     ArmPart,
     PointFit,
     arm_parts,
+    from_flange,
     link_jacobian,
     point_fits,
     those_that_fit,
@@ -23,7 +24,6 @@ from vftcli.contacts.sizes import learn_prior, smooth_contacts
 from vftcli.contacts.untouched import SelfTest, Untouched, self_test
 from vftcli.contacts.windows import BlockLog, ContactPrior, WindowWrench, gate_of
 from vftcli.repetition.free_run import ModelledRun
-from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import median_step
@@ -33,6 +33,9 @@ from vftcli.virtual_sensor.smoother.smoothing import BENT, DRIVES, hidden_by_blo
 WIDENED = np.repeat([1.3, 2.0], 3)
 """What the model's own standard deviations of force and moment are multiplied by: the error of the
 friction is not Gaussian. Chosen on simulated seeds together, for all logs."""
+
+BESIDE = 0.1
+"""A cut this near to a row may have removed a part of it. [s]"""
 
 LOOSER = 1.5
 """What the force's own standard deviation is multiplied by where its size is told: peaks are larger
@@ -201,17 +204,23 @@ class Measurer:
         rate = 1.0 / median_step(self.run.recording.t)
         if length.sum() < SHORT and rate < SLOW:
             remarks = (*remarks, caution("peak-cut-by-rate", rate_hz=rate))
+        start = float(blocks.t[run[0]] - 0.5 * blocks.length[run[0]])
+        stop = float(blocks.t[run[1] - 1] + 0.5 * blocks.length[run[1] - 1])
+        for cut in self.run.recording.source.cuts_between(start - BESIDE, stop + BESIDE)[:1]:
+            remarks = (*remarks, caution("samples-cut-inside", at_s=cut.start))
         sd = np.sqrt(np.diag(covariance))
         J = site.jacobian[peak]
         torque_sd = np.sqrt(np.einsum("in,ij,jn->n", J, covariance, J))
         wrench = values.copy()
         if site.jacobian is not self.found.places[0].jacobian:
-            wrench[3:] += np.cross(from_flange(self.run, blocks.q[peak], site.fits[0]), values[:3])
+            wrench[3:] += np.cross(
+                from_flange(self.run.robot.loaded_chain, blocks.q[peak], site.fits[0]), values[:3]
+            )
         force = inside.values[:, :3]
         return Contact(
             number=number + 1,
-            start=float(blocks.t[run[0]] - 0.5 * length[0]),
-            stop=float(blocks.t[run[1] - 1] + 0.5 * length[-1]),
+            start=start,
+            stop=stop,
             peak=float(blocks.t[peak]),
             peak_force=size,
             peak_band=float(np.hypot(band, NORMAL * spread)),
@@ -363,20 +372,6 @@ def with_drives(force: Array, covariance: Array) -> Array:
     share: Array = DRIVES * force
     found: Array = covariance + share[:, :, None] * share[:, None, :]
     return found
-
-
-def from_flange(run: ModelledRun, q: Array, fit: PointFit) -> Array:
-    """A fitted point's position from the flange point, in base axes. (3,) [m]
-
-    Args:
-        run: The log with its robot.
-        q: Joint positions. (n,) [rad]
-        fit: The point.
-    """
-    frames = link_poses(run.robot.loaded_chain, q[None]).translation[0]
-    start, end = frames[fit.link - 1], frames[fit.link]
-    offset: Array = start + fit.share * (end - start) - frames[-1]
-    return offset
 
 
 def vendor_force(run: ModelledRun, J: Array, peak: int, t: Array) -> float | None:

@@ -81,6 +81,8 @@ def long_steps(recording: Recording) -> Iterator[Remark]:
     """Gaps, with the longest of them."""
     steps = recording.steps
     gaps = steps[steps[:, 0] > GAP_STEPS * recording.median_step]
+    for cut in recording.source.cuts:  # has a finding of its own
+        gaps = gaps[(gaps[:, 1] > cut.start) | (gaps.sum(axis=1) < cut.start)]
     if len(gaps):
         longest, at = gaps[np.argmax(gaps[:, 0])].tolist()
         level = warning if longest > LONG_GAP else fact

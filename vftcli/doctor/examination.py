@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from vftcli.doctor.arm import arm_findings
 from vftcli.doctor.clock import clock_findings
+from vftcli.doctor.cuts import cut_findings
 from vftcli.doctor.fit import RobotMatch, profiles
 from vftcli.doctor.lateness import LAGLESS, effort_lag
 from vftcli.doctor.load import controller_findings
@@ -108,7 +109,12 @@ def examine(recording: Recording, robot: Robot | None = None) -> Examination:
     if any(finding.code in READINGS for finding in by_arm):
         # Large numbers alone look like mA; the model knows better.
         by_signal = tuple(f for f in by_signal if f.code != "milliamperes")
-    findings = [*by_signal, *controller_findings(recording, best), *by_arm]
+    findings = [
+        *cut_findings(recording),
+        *by_signal,
+        *controller_findings(recording, best),
+        *by_arm,
+    ]
     said = {finding.code for finding in findings}
     if best is not None and not (LAGLESS | REFUSING) & said:
         findings += effort_lag(recording, best)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
+from vftcli.doctor.cuts import without_bad_samples
 from vftcli.doctor.examination import Examination, examine
 from vftcli.doctor.findings import in_words
 from vftcli.doctor.fit import guess_robot
@@ -93,12 +94,12 @@ class Examiner:
     def taken(self, recording: Recording, robot: Robot, choice: ReadChoice) -> Recording:
         """A log laid on its robot, its effort taken for what the model explains best if it is open.
 
-        Joints are taken by name, endless ones unwound.
+        Joints go by name, endless ones are unwound, samples that no arm can have made are cut out.
 
         Raises:
             RobotError: If the names of its joints are not the robot's.
         """
-        recording = unwound(paired(recording, robot), robot)
+        recording = without_bad_samples(unwound(paired(recording, robot), robot), robot)
         if choice.effort != "auto":
             return recording
         for finding in examine(recording, robot).findings:

@@ -42,6 +42,9 @@ FARTHEST_START = 9e9
 ONE_TURN, TWO_TURNS = 2 * np.pi + 0.1, 13.0
 """How far a joint goes from its zero, with a little to spare: of seven-joint arms, of any. [rad]"""
 
+BAD_SHARE = 0.05
+"""Share of samples below which positions of another size are errors, and not of another unit."""
+
 GAP_STEPS = 4.0
 """A step this many times the median is reported as a gap."""
 
@@ -380,8 +383,11 @@ def refuse_degrees(raw: RawLog, path: Path) -> None:
     goes further than two turns from its zero; those of the arms with seven stay within one.
     """
     q = raw.signals["q"]
-    largest, travel = float(np.max(np.abs(q))), float(np.max(np.ptp(q, axis=0)))
     limit = ONE_TURN if q.shape[1] == 7 else TWO_TURNS
+    beyond = np.any(np.abs(q) > limit, axis=1)
+    if 0 < np.mean(beyond) < BAD_SHARE:
+        q = q[~beyond]  # a few bad samples are no unit; the doctor cuts them out
+    largest, travel = float(np.max(np.abs(q))), float(np.max(np.ptp(q, axis=0)))
     if largest > limit or travel > TWO_TURNS:
         raise LogError(
             f"{path}: positions reach {largest:.4g} and travel {travel:.4g}, which looks like "

@@ -6,14 +6,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_clock, check_series, check_shape, handed_over, seal
+from vftcli.signals.arrays import (
+    Array,
+    Mask,
+    check_clock,
+    check_series,
+    check_shape,
+    handed_over,
+    seal,
+)
 from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
 from vftcli.signals.names import COLUMN_NAMES, EFFORTS, JOINT_SIGNALS, MEANINGS
 from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import fact
 from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown, frame_of, per_joint
-from vftcli.signals.source import IN_MEMORY, Source
+from vftcli.signals.source import IN_MEMORY, Cut, Source
 from vftcli.signals.timing import Timing
 from vftcli.signals.wrench import WrenchFrame, per_axis
 
@@ -306,6 +314,20 @@ class Recording(Shown):
             lambda: lambda block: block.behind_gear(gear, efficiency), source=source, **changed
         )
 
+    def without(self, rows: Mask, cuts: Iterable[Cut] = ()) -> "Recording":
+        """Return the recording without some samples; gaps of its clock stay in their place.
+
+        Args:
+            rows: The samples that go. (T,)
+            cuts: Why.
+        """
+        source, number = self.source, np.where(rows, -1, np.cumsum(~rows) - 1)
+        samples = source.row_samples
+        now = number if samples is None else np.where(samples < 0, -1, number[samples])
+        source = replace(source, cuts=(*source.cuts, *cuts), row_samples=now)
+        kept = {name: getattr(self, name)[~rows] for name in ("t", *self.signals)}
+        return replace(self, source=source, **kept)
+
     def between(self, start: float, stop: float) -> "Recording":
         """Return the samples with start ≤ t ≤ stop; their times stay those of the whole log. [s]
 
@@ -318,5 +340,4 @@ class Recording(Shown):
                 f"{self.name}: fewer than two samples in {interval_text(start, stop)}; "
                 f"the log runs from {self.t[0]:g} to {self.t[-1]:g} s"
             )
-        kept = {name: getattr(self, name)[keep] for name in ("t", *self.signals)}
-        return replace(self, **kept)
+        return self.without(~keep)

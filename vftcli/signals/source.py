@@ -3,10 +3,31 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from vftcli.signals.arrays import Indices
 from vftcli.signals.remarks import Remark
 from vftcli.signals.shown import Shown
+
+
+class Cut(NamedTuple):
+    """Samples that were cut out because no arm can have made them.
+
+    Attributes:
+        code: The finding that says why.
+        start: Time of the first. [s]
+        stop: Time of the last. [s]
+        rows: How many there are.
+        joints: The joints whose signals say so, from 1.
+        size: The largest of what says so, in the unit of the finding's words; else its length in s.
+    """
+
+    code: str
+    start: float
+    stop: float
+    rows: int
+    joints: tuple[int, ...]
+    size: float
 
 
 class Awaited:
@@ -51,6 +72,7 @@ class Source(Shown):
         remarks: Facts on what was dropped, turned or derived; cautions and warnings on what looks
             suspicious but was left as it is.
         part: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
+        cuts: Samples that were cut out because no arm can have made them.
         row_samples: The sample that each of the rows is, or repeats; −1 for one that was dropped
             otherwise. None where each row is the sample of its number. (rows,)
     """
@@ -67,6 +89,7 @@ class Source(Shown):
     derived: tuple[str, ...] = ()
     remarks: tuple[Remark, ...] = ()
     part: str = ""
+    cuts: tuple[Cut, ...] = ()
     row_samples: Indices | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -75,6 +98,10 @@ class Source(Shown):
 
     def _headline(self) -> str:
         return f"{self.path or 'in memory'}, {self.format}"
+
+    def cuts_between(self, start: float, stop: float) -> tuple[Cut, ...]:
+        """What was cut out between two times. [s]"""
+        return tuple(cut for cut in self.cuts if cut.start <= stop and cut.stop >= start)
 
     @property
     def repairs(self) -> tuple[str, ...]:
