@@ -38,6 +38,8 @@ class Table:
         tau_ext: The vendor's estimate, or None. (T, n) [N·m]
         robot: The profile of the arm that the log is from.
         given: The profile that the user names.
+        sound_t: Each row's time in the sound log, NaN of a row that it lacks; None for `t`. (T,)
+            [s]
     """
 
     t: Array
@@ -48,6 +50,7 @@ class Table:
     tau_ext: Array | None = None
     robot: str
     given: str
+    sound_t: Array | None = None
 
     @property
     def arm(self) -> Robot:
@@ -74,7 +77,8 @@ class Table:
     def taken(self, rows: Array) -> "Table":
         """The table with these rows, in this order."""
         signals = {name: value[rows] for name, value in self.series()}
-        return replace(self, t=self.t[rows], **signals)
+        sound_t = None if self.sound_t is None else self.sound_t[rows]
+        return replace(self, t=self.t[rows], sound_t=sound_t, **signals)
 
     def between(self, start: float, stop: float) -> "Table":
         """The rows from `start` to before `stop`, counted from the first. [s]"""

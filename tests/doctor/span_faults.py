@@ -1,0 +1,325 @@
+"""Bad samples, bad spans and bad drives through the whole way: what is said, and what it costs.
+
+Run by hand; some five minutes for all, seconds for a few::
+
+    VFT_LOGS=/path/to/logs python tests/doctor/span_faults.py
+    python tests/doctor/span_faults.py --only "one sample" --only brakes --log ur10e
+    python tests/doctor/span_faults.py --json after.json
+
+A cell is one fault in one log, given to `report` without an output, with the observers gmo and
+best. It is refused, warned (a warning that the sound log does not have), noted (a caution that it
+does not have, or a note of reader or doctor) or silent; whether a gain ran to its limit counts for
+nothing. It is harmful where gmo moves by more than 0.25 N·m or best by more than 0.6 N·m, the mean
+over joints of the rms over the samples that both logs have, or where a joint of either vanishes:
+HARM where that is silent or noted. A line says what gmo and best move by, the share of the rows
+that differ from the sound log's (`!` where so few are refused), the hardest new contact, how many
+true ones are lost, and the new codes.
+"""
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from planted_faults import Table
+from planted_spans import OF_THRESHOLDS, PATHS, SpanFault, SpanLog, span_faults, span_log
+
+from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import ContactList
+from vftcli.notebook import report, thresholds
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import VftError
+from vftcli.signals.remarks import Remark
+
+OBSERVERS = ("gmo", "best")
+
+HARM = {"gmo": 0.25, "best": 0.6, "thresholds": 0.6}
+"""What an estimate moves by where a fault is harmful. [N·m]"""
+
+OF_TUNING = "gain-at-"
+"""How codes of warnings begin that come and go with the noise and name nothing that is wrong."""
+
+FEW = 0.05
+"""Share of bad rows below which a log must be cut and never refused."""
+
+BROKEN = "BROKEN"
+"""How the words begin of a cell that ends in a traceback."""
+
+BARS = {"silent and harmful": 0.12, "refused": 0.45}
+"""Largest shares of the cells."""
+
+
+class Answer(NamedTuple):
+    """What comes of a log.
+
+    Attributes:
+        t: When, in the sound log's time. (T,) [s]
+        torques: Observer → its estimate; of thresholds one row of them. (T, n) each [N·m]
+        said: Level, code and joints of every remark.
+        contacts: First and last time, size [N] and words of every contact.
+        refused: Why there is nothing else, "" where there is.
+        python: Warnings of Python that reached the user.
+    """
+
+    t: Array = np.zeros(0)
+    torques: Mapping[str, Array] = {}
+    said: frozenset[tuple[str, str, tuple[int, ...]]] = frozenset()
+    contacts: tuple[tuple[float, float, float, str], ...] = ()
+    refused: str = ""
+    python: tuple[str, ...] = ()
+
+
+def answer(table: Table, learns: bool, path: Path) -> Answer:
+    """What `report` says of a table once it is a file, `thresholds` where it learns from it."""
+    table.write(path)
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        try:
+            made = (
+                of_thresholds(path, table)
+                if learns
+                else of_report(report(path, table.given, observers=OBSERVERS), table)
+            )
+        except VftError as error:
+            made = Answer(refused=str(error).removeprefix(f"{path.name}: "))
+        except Exception as error:  # noqa: BLE001 - a cell that breaks is a result
+            made = Answer(refused=f"{BROKEN} {type(error).__name__}: {error}")
+        finally:
+            path.unlink()
+    return made._replace(python=tuple(sorted({str(w.message) for w in heard})))
+
+
+def of_thresholds(path: Path, table: Table) -> Answer:
+    found = thresholds(path, table.given)
+    level = np.array([[one.value for one in found.joints]])
+    return Answer(np.zeros(1), {"thresholds": level}, kinds(found.remarks))
+
+
+def of_report(made: Analysis, table: Table) -> Answer:
+    """The estimates and contacts of an analysis, at the sound log's times."""
+    seconds = made.recording.source.t0 + made.t
+    order = np.argsort(table.t, kind="stable")
+    rows = order[nearest(table.t[order], seconds)]
+    assert table.sound_t is not None
+    t = table.sound_t[rows]
+    findings = [finding for one in made.examinations for finding in one.findings]
+    of_log = (*findings, *made.recording.source.remarks)
+    doubts = [remark for remark in made.remarks if remark.level != "fact"]
+    return Answer(
+        t,
+        {one.name: one.tau for one in made.estimates},
+        kinds((*of_log, *doubts)),
+        tuple(spans(made.contacts, made.t, t)) if made.contacts is not None else (),
+    )
+
+
+def nearest(grid: Array, values: Array) -> Array:
+    """Index of the grid's point that is nearest to each value."""
+    right = np.clip(np.searchsorted(grid, values), 1, len(grid) - 1)
+    return right - (values - grid[right - 1] < grid[right] - values)
+
+
+Span = tuple[float, float, float, str]
+"""First and last time [s], size [N] and words of a contact."""
+
+
+def spans(contacts: ContactList, t: Array, sound_t: Array) -> Iterator[Span]:
+    """Span in the sound log's time, size and words of each contact."""
+    for one in contacts.contacts:
+        within = sound_t[(t >= one.start) & (t <= one.stop)]
+        within = within[np.isfinite(within)]
+        first, last = (within.min(), within.max()) if len(within) else (-np.inf, -np.inf)
+        yield first, last, one.peak_force or 0.0, f"{one._size} {one.trust}"
+
+
+def kinds(remarks: Iterable[Remark]) -> frozenset[tuple[str, str, tuple[int, ...]]]:
+    """Level, code and joints of each remark but those of the tuning."""
+    codes = [remark for remark in remarks if not remark.code.startswith(OF_TUNING)]
+    return frozenset((remark.level, remark.code, remark.where.joints) for remark in codes)
+
+
+class Cell(NamedTuple):
+    """One fault in one log.
+
+    Attributes:
+        log: The log.
+        fault: The fault.
+        row: Its row in the list of kinds.
+        verdict: "refused", "warned", "noted" or "silent".
+        harmful: Whether an estimate moves or vanishes; False where the log is refused.
+        moved: Observer → what its estimate moves by. [N·m]
+        vanished: Joints of an observer that are nowhere known though the sound log's are.
+        codes: New warnings, else new notes; or why it is refused.
+        bad: Share of the rows that are bad.
+        contact: The hardest new contact [N], its words, and how many true ones are lost.
+        python: Warnings of Python.
+        seconds: Processor time. [s]
+    """
+
+    log: str
+    fault: str
+    row: int
+    verdict: str
+    harmful: bool
+    moved: dict[str, float]
+    vanished: list[str]
+    codes: list[str]
+    bad: float
+    contact: tuple[float, str, int]
+    python: tuple[str, ...]
+    seconds: float
+
+    @property
+    def counts_against(self) -> bool:
+        return self.harmful and self.verdict in {"silent", "noted"}
+
+    def __str__(self) -> str:
+        moved = " ".join(f"{self.moved[n]:8.3g}" for n in HARM if n in self.moved).rjust(17)
+        harm = "HARM" if self.counts_against else "harm" if self.harmful else ""
+        few = "!" if self.verdict == "refused" and 0 < self.bad < FEW else " "
+        size, words, lost = self.contact
+        new = f"new {size:.0f} N ({words}) " if words else ""
+        gone = f"{lost} lost " if lost else ""
+        broken = "".join(f"{word} vanishes " for word in self.vanished) + "".join(
+            f"[{word}] " for word in self.python
+        )
+        return (
+            f"{self.row} {self.fault:32} {self.log:9} {self.verdict:7}{few} {harm:4} {moved} "
+            f"{100 * self.bad:5.1f} %  {new}{gone}{broken}{' '.join(self.codes)[:150]}"
+        )
+
+
+def cell(log: str, name: str, fault: SpanFault, base: SpanLog, sound: Answer, path: Path) -> Cell:
+    """Plant a fault and judge what comes of it."""
+    begun = time.process_time()
+    table = fault.plant(base.table)
+    made = answer(table, fault.row == OF_THRESHOLDS, path)
+    seconds = time.process_time() - begun
+    new = sorted(made.said - sound.said)
+    warned = [shown(code, joints) for level, code, joints in new if level == "warning"]
+    noted = [shown(code, joints) for level, code, joints in new if level != "warning"]
+    verdict = "refused" if made.refused else "warned" if warned else "noted" if noted else "silent"
+    moved, vanished = moves(made, sound)
+    harmful = any(moved[n] > HARM[n] for n in moved) or bool(vanished)
+    fresh = [c for c in made.contacts if not any(meet(c, known) for known in sound.contacts)]
+    hardest = max(fresh, key=lambda one: one[2], default=(0.0, 0.0, 0.0, ""))
+    lost = sum(not any(meet(c, known) for c in made.contacts) for known in sound.contacts)
+    return Cell(
+        log, name, fault.row, verdict, harmful and not made.refused, moved, vanished,
+        [made.refused] if made.refused else warned or noted, bad_share(table, base.table),
+        (hardest[2], hardest[3], 0 if made.refused else lost), made.python, seconds,
+    )  # fmt: skip
+
+
+def shown(code: str, joints: tuple[int, ...]) -> str:
+    return code + (f"[{','.join(f'J{j}' for j in joints)}]" if joints else "")
+
+
+def meet(one: Span, other: Span) -> bool:
+    return one[0] <= other[1] and other[0] <= one[1]
+
+
+def moves(made: Answer, sound: Answer) -> tuple[dict[str, float], list[str]]:
+    """What each estimate moves by [N·m], mean over joints of the rms, and joints that vanish."""
+    if made.refused:
+        return {}, []
+    _, rows, known = np.intersect1d(made.t, sound.t, return_indices=True)
+    moved, vanished = {}, []
+    for name, before in sound.torques.items():
+        if name not in made.torques:
+            vanished.append(name)
+            continue
+        difference = made.torques[name][rows] - before[known]
+        there = np.isfinite(difference)
+        was = np.isfinite(before).any(axis=0)
+        vanished += [f"{name} J{j + 1}" for j in np.flatnonzero(was & ~there.any(axis=0))]
+        seen = there.any(axis=0)
+        rms = np.sqrt(np.nanmean(difference[:, seen] ** 2, axis=0))
+        moved[name] = float(np.mean(rms)) if seen.any() else np.inf
+    return moved, vanished
+
+
+def bad_share(table: Table, sound: Table) -> float:
+    """Share of a table's rows whose values or step of time differ from the sound log's."""
+    assert table.sound_t is not None
+    rows = np.searchsorted(sound.t, np.where(np.isfinite(table.sound_t), table.sound_t, sound.t[0]))
+    bad = ~np.isfinite(table.sound_t)
+    for (_, made), (_, good) in zip(table.series(), sound.series(), strict=True):
+        bad |= (made != good[rows]).any(axis=1)
+    jumps = np.abs(np.diff(table.t - table.sound_t, prepend=table.t[0] - table.sound_t[0])) > 1e-3
+    return float(np.mean(bad | jumps))
+
+
+def sums(cells: Sequence[Cell]) -> Iterator[str]:
+    """What the cells come to, each share beside its bar."""
+    count = len(cells)
+    against = [one for one in cells if one.counts_against]
+    refused = [one for one in cells if one.verdict == "refused"]
+    for name, found in (("silent and harmful", against), ("refused", refused)):
+        bar = BARS[name]
+        yield (
+            f"{name}: {len(found)} of {count} cells, {len(found) / count:.1%} (bar {bar:.0%}"
+            f"{', missed' if len(found) > bar * count else ''})"
+        )
+    for verdict in ("warned", "noted", "silent"):
+        of_it = [one for one in cells if one.verdict == verdict]
+        yield f"{verdict}: {len(of_it)}, {sum(one.harmful for one in of_it)} of them harmful"
+    few = [one for one in cells if 0 < one.bad < FEW]
+    wrong = [f"; {one.fault} in {one.log}" for one in few if one.verdict == "refused"]
+    yield f"below {FEW:.0%} bad rows: {len(wrong)} of {len(few)} refused{''.join(wrong)}"
+    without = [one for one in refused if "--anyway" not in one.codes[0]]
+    broken = [one for one in refused if one.codes[0].startswith(BROKEN)]
+    yield f"refusals that do not name --anyway: {len(without)}; tracebacks: {len(broken)}"
+    yield f"estimates of which a joint vanishes: {sum(bool(one.vanished) for one in cells)}"
+    fresh = [one.contact[0] for one in cells if one.contact[1]]
+    lost = sum(one.contact[2] > 0 for one in cells)
+    hardest = f", the hardest {max(fresh):.0f} N" if fresh else ""
+    yield f"new contacts in {len(fresh)} cells{hardest}; true ones lost in {lost}"
+    yield f"warnings of Python in {sum(bool(one.python) for one in cells)} cells"
+    for row in sorted({one.row for one in cells}):
+        own = [one for one in cells if one.row == row]
+        yield f"row {row}: {sum(o.counts_against for o in own)} of {len(own)} silent and harmful"
+    yield f"{np.mean([one.seconds for one in cells]):.2f} s of processor time a cell"
+
+
+def main(words: Sequence[str]) -> int:
+    """Print the cells and their sums; exit 1 where a bar is missed."""
+    parser = argparse.ArgumentParser(description="plant bad samples and spans in sound logs")
+    parser.add_argument("--log", action="append", choices=list(PATHS), help="only this log")
+    parser.add_argument("--only", action="append", help="only faults with this in their name")
+    parser.add_argument("--json", type=Path, help="file for the cells")
+    choice = parser.parse_args(words)
+    cells: list[Cell] = []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "planted.csv"
+        for log in choice.log or PATHS:
+            base = span_log(log, Path(os.environ["VFT_LOGS"]))
+            faults = {
+                name: fault
+                for name, fault in span_faults(base).items()
+                if not choice.only or any(word in name for word in choice.only)
+            }
+            kinds_of = {fault.row == OF_THRESHOLDS for fault in faults.values()}
+            sound = {learns: answer(base.table, learns, path) for learns in kinds_of}
+            for said in sound.values():
+                assert not said.refused, f"the sound log {log} is refused: {said.refused}"
+            for name, fault in faults.items():
+                known = sound[fault.row == OF_THRESHOLDS]
+                cells.append(cell(log, name, fault, base, known, path))
+                print(cells[-1], flush=True)
+    print(*sums(cells), sep="\n")
+    if choice.json is not None:
+        record: list[dict[str, Any]] = [one._asdict() for one in cells]
+        choice.json.write_text(json.dumps(record, indent=1, default=str), encoding="utf-8")
+    return int(any(line.endswith("missed)") for line in sums(cells)))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
