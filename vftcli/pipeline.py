@@ -169,7 +169,7 @@ def list_touches(
     examinations = examine(motion, choice)
     choice.progress(f"{recording.name}: listing contacts", 0.3, 1.0)
     made = Analysis(motion=motion, observers=(), estimates=(), tunings={})
-    found = list_contacts(motion).weighed(examinations[0].load)
+    found = list_contacts(motion).weighed(examinations[0].load, examinations[0].distrusts)
     return replace(made, contacts=found, examinations=examinations)
 
 
@@ -193,8 +193,8 @@ def check_logged(recording: Recording, why: str) -> None:
     """
     if recording.source.derived:
         raise MissingSignalError(
-            f"{recording.name}: the log has no joint velocities (dq), and those derived from its "
-            f"positions need the complete log; {why}. Record the velocities"
+            f"{recording.name}: joint velocities (dq) that are derived from positions need the "
+            f"complete log; {why}. Record the velocities"
         )
 
 
@@ -311,7 +311,8 @@ def find_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
         motion, made = unloaded_motion(analysis.motion, choice), analysis.refinement
         bias = None if made is None else made.baseline.under(BEST).correction
         found = list_contacts(motion, bias, referenced=choice.reference is not None)
-        return replace(analysis, contacts=found.weighed(analysis.examinations[0].load))
+        health = analysis.examinations[0]
+        return replace(analysis, contacts=found.weighed(health.load, health.distrusts))
     except VftError as error:
         reason = caution("contacts-not-told", reason=str(error))
         return replace(analysis, remarks=(*analysis.remarks, reason))

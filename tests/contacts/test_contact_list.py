@@ -24,6 +24,12 @@ def test_trust_goes_by_evidence_band_and_remarks(changed: dict[str, object], tru
     assert contact(**changed).trust == trust
 
 
+def test_no_size_by_velocities_in_doubt_is_good() -> None:
+    found = contact_list(contact(), contact(number=2))
+    assert [row.trust for row in found.weighed(None, doubted=False)] == ["good", "good"]
+    assert [row.trust for row in found.weighed(None, doubted=True)] == ["weak", "weak"]
+
+
 def test_the_hardest_is_the_one_with_the_largest_force() -> None:
     soft, hard = contact(peak_force=10.0), contact(number=2, peak_force=80.0)
     assert contact_list(soft, hard).hardest is hard

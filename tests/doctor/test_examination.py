@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from moving_arms import moving
 
 from vftcli.doctor import examine
@@ -54,3 +55,22 @@ def test_the_constants_of_another_joint_size_are_told() -> None:
 def test_too_short_a_log_is_told_and_not_judged() -> None:
     log = moving().between(0.0, 0.01)
     assert [finding.code for finding in examine(log, UR10E).findings] == ["too-short"]
+
+
+@pytest.mark.parametrize(
+    ("factor", "refusals", "distrusts"), [(1.0, 0, False), (1.3, 0, True), (1.6, 1, True)]
+)
+def test_velocities_far_off_refuse_and_nearer_ones_are_not_relied_on(
+    factor: float, refusals: int, distrusts: bool
+) -> None:
+    log = moving()
+    dq = log.require("dq") * np.array([1.0, factor, 1.0, 1.0, 1.0, 1.0])
+    made = examine(replace(log, dq=dq), UR10E)
+    assert len(made.refusals()) == refusals
+    assert made.distrusts == distrusts
+
+
+def test_a_clock_of_another_rate_refuses() -> None:
+    log = moving()
+    made = examine(replace(log, t=1.05 * log.t), UR10E)
+    assert [finding.code for finding in made.refusals()] == ["clock-rate"]

@@ -131,8 +131,37 @@ def test_velocities_off_by_degrees_on_every_joint_are_another_unit(factor: float
     assert findings["velocity-unit"].values["slope"] == pytest.approx(factor, rel=2e-4)
 
 
-def test_degrees_on_some_joints_only_are_a_mismatch() -> None:
-    assert found(dq=scaled(DQ, 57.3, 1, 2))["velocity-mismatch"].where.joints == (1, 2)
+@pytest.mark.parametrize(
+    ("factor", "quantity"),
+    [
+        (57.3, "deg/s"),
+        (1 / 57.3, "rad/s, beside positions in degrees"),
+        (50.0, "the motor's side of the gear"),
+        (101.0, "the motor's side of the gear"),
+        (1.55, "another motion or unit"),
+        (0.6, "another motion or unit"),
+    ],
+)
+def test_far_off_velocities_of_some_joints_are_another_quantity(
+    factor: float, quantity: str
+) -> None:
+    findings = found(dq=scaled(DQ, factor, 1, 2))
+    assert set(findings) == {"velocity-of-another-kind"}
+    said = findings["velocity-of-another-kind"]
+    assert (said.where.joints, said.values["quantity"]) == ((1, 2), quantity)
+
+
+def test_velocities_of_the_motors_are_no_clock() -> None:
+    findings = found(dq=101.0 * DQ)
+    assert set(findings) == {"velocity-of-another-kind"}
+    assert findings["velocity-of-another-kind"].where.joints == (1, 2, 3, 4, 5, 6)
+
+
+def test_accelerations_in_the_place_of_velocities_are_named() -> None:
+    """The motion holds whole swings, over which velocity and acceleration have nothing alike."""
+    findings = found(dq=-(RATES**2) * Q)
+    assert set(findings) == {"velocity-of-another-kind"}
+    assert findings["velocity-of-another-kind"].values["quantity"] == "the joint's acceleration"
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vftcli.readers import ReadChoice
 from vftcli.signals.derivation import is_fast, with_velocity
 from vftcli.signals.recording import Recording
 
@@ -51,3 +52,11 @@ def test_what_a_log_has_is_kept() -> None:
 @pytest.mark.parametrize(("rate", "fast"), [(1000.0, True), (50.0, True), (49.0, False)])
 def test_from_50_hz_on_it_is_done_unasked(rate: float, fast: bool) -> None:
     assert is_fast(swinging(rate)[0]) is fast
+
+
+def test_logged_velocities_give_way_where_that_is_asked_for() -> None:
+    """Velocities in deg/s beside positions in rad: what the finding about them advises."""
+    log, truth = swinging(100.0)
+    derived = ReadChoice(derive="dq").taken(replace(log, dq=np.rad2deg(truth)))
+    assert derived.source.derived == ("dq",)
+    np.testing.assert_array_equal(derived.require("dq"), with_velocity(log).require("dq"))

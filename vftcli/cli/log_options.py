@@ -61,8 +61,8 @@ class ReadOptions(ChoiceBundle["ReadChoice"]):
     derive: str | None = option(
         "--derive",
         "dq|none",
-        "Velocities of a log that has none, from its positions over the complete log; from 50 Hz "
-        "on they are derived unasked, and that is said.",
+        "Velocities from the positions over the complete log, in place of logged ones; where the "
+        "log has none, from 50 Hz on, they are derived unasked, and that is said.",
         seldom=True,
     )
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from vftcli.signals.arrays import Array, seal
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.shown import UNKNOWN, Shown, joined, value_text
 
 if TYPE_CHECKING:
@@ -355,11 +355,21 @@ class ContactList(Shown):
             return pl.DataFrame(schema=dict.fromkeys(FIRST_COLUMNS, pl.Float64))
         return pl.DataFrame([c.row() for c in self.contacts], infer_schema_length=None)
 
-    def weighed(self, load: tuple[float, float] | None) -> "ContactList":
-        """The list with its load's mass and standard deviation as they were weighed, if so. [kg]"""
-        if self.load is None or load is None:
-            return self
-        return replace(self, load=self.load._replace(mass=load[0], sd=load[1]))
+    def weighed(self, load: tuple[float, float] | None, doubted: bool) -> "ContactList":
+        """The list by what the log's examination says.
+
+        Args:
+            load: Mass and standard deviation of its load as weighed there, if so. [kg]
+            doubted: Whether the velocities that every size rests on are in doubt.
+        """
+        made = self
+        if self.load is not None and load is not None:
+            made = replace(self, load=self.load._replace(mass=load[0], sd=load[1]))
+        if not doubted:
+            return made
+        why = caution("size-by-wrong-velocity")
+        rows = tuple(replace(row, remarks=(*row.remarks, why)) for row in self.contacts)
+        return replace(made, contacts=rows)
 
     @property
     def tells_untouched(self) -> bool:

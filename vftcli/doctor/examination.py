@@ -6,7 +6,7 @@ from vftcli.doctor.arm import arm_findings
 from vftcli.doctor.clock import clock_findings
 from vftcli.doctor.cuts import cut_findings
 from vftcli.doctor.fit import RobotMatch, profiles
-from vftcli.doctor.lateness import LAGLESS, effort_lag
+from vftcli.doctor.lateness import LAGLESS, MISTIMED, effort_lag
 from vftcli.doctor.load import controller_findings
 from vftcli.doctor.signals import signal_findings, unusable_findings
 from vftcli.doctor.temperature import temperature_findings
@@ -25,7 +25,8 @@ REFUSING = NO_FIT | {
     "torque-without-gravity", "torque-with-gravity", "current-without-gravity",
     "current-as-torque", "torque-as-current", "milliamperes",
     "current-as-turned-torque", "torque-as-turned-current",
-    "upside-down", "tilted-base", "time-unit", "velocity-unit",
+    "upside-down", "tilted-base", "time-unit", "clock-rate",
+    "velocity-unit", "velocity-of-another-kind", "velocity-sign",
 }  # fmt: skip
 """Findings that make every result meaningless. A load or a contact is never one of them."""
 
@@ -80,6 +81,11 @@ class Examination(Shown):
     def warnings(self) -> tuple[Remark, ...]:
         """The findings that can make results wrong."""
         return tuple(finding for finding in self.findings if finding.level == "warning")
+
+    @property
+    def distrusts(self) -> bool:
+        """Whether no size of a contact can be relied on: the velocities are not the motion's."""
+        return any(finding.code in MISTIMED for finding in self.warnings)
 
     @property
     def load(self) -> tuple[float, float] | None:

@@ -48,7 +48,8 @@ AGREE, ENOUGH, NEAR = 0.65, 3, 0.35
 """Share and number of the joints whose own best lag is nearer to it than this share of it."""
 MISTIMED = frozenset(
     {"time-unit", "clock-rate", "velocity-unit", "velocity-sign", "velocity-mismatch"}
-    | {"velocity-order", "velocity-lag", "velocity-filtered", "velocity-held", "stuck-velocity"}
+    | {"velocity-of-another-kind", "velocity-order", "velocity-lag", "velocity-filtered"}
+    | {"velocity-held", "stuck-velocity"}
 )
 """Findings that the logged velocity is another motion's."""
 LAGLESS = MISTIMED | {"stuck-position", "stuck-effort"}

@@ -53,8 +53,13 @@ DAMPED = 0.01
 """Loss of a velocity's square by a filter that can be seen: sound logs lose up to 0.0065."""
 WIDE = 0.15
 """Deviation from a factor between units by which it still is that factor."""
-DEGREES = 180 / np.pi
-"""Degrees in a radian."""
+DEGREES, CLOSE = 180 / np.pi, 0.06
+"""Degrees in a radian; by which a factor still is that: gears of 50 and 51 are common."""
+BEYOND = 1.5
+"""Gain, or its inverse, from which a velocity is another quantity: no filter and no clock of a
+robot is so far off."""
+GEARED = 10.0
+"""Gain from which a gear, and no clock, makes the velocities too large: arms have 30 to 160."""
 UNITS = {1e3: "ms", 1e6: "us", 1e9: "ns"}
 """Ticks a second → the unit of the stamps that were read as seconds."""
 HELD = 0.55
@@ -235,7 +240,7 @@ def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator
     factor = common_factor(fit)
     if factor is not None and (time_unit(factor) or is_clock(factor)):
         return
-    if factor is not None and any(abs(factor / u - 1) < WIDE for u in (DEGREES, 1 / DEGREES)):
+    if factor is not None and in_degrees(factor):
         yield warning("velocity-unit", slope=factor)
         return
     if swapped := exchanged(fit):
@@ -260,10 +265,31 @@ def late_velocities(recording: Recording, fit: VelocityFit, joints: Array) -> It
         yield warning(code, on_joints(np.flatnonzero(late)), lags_ms=lags.tolist())
     wrong = told & ~late & (np.abs(fit.gain - 1) - SURE * fit.gain_error > GAIN)
     turned = wrong & (np.abs(fit.gain + 1) < 0.3)
-    for code, found in (("velocity-sign", turned), ("velocity-mismatch", wrong & ~turned)):
+    sure = SURE * fit.gain_error
+    beyond = wrong & ~turned & ((fit.gain - sure > BEYOND) | (fit.gain + sure < 1 / BEYOND))
+    kinds = (("velocity-sign", turned), ("velocity-mismatch", wrong & ~turned & ~beyond))
+    for code, found in kinds:
         if found.any():
             slopes = fit.gain[found].tolist()
             yield warning(code, on_joints(np.flatnonzero(found)), slopes=slopes)
+    seen = np.array([quantity_of(fit, j) if beyond[j] else "" for j in range(recording.joints)])
+    for quantity in sorted(set(seen[beyond])):
+        found = seen == quantity
+        slopes = fit.gain[found].tolist()
+        joints = on_joints(np.flatnonzero(found))
+        yield warning("velocity-of-another-kind", joints, slopes=slopes, quantity=quantity)
+
+
+def quantity_of(fit: VelocityFit, joint: int) -> str:
+    """What a joint's logged velocity is, by its gain, where it is no velocity in rad/s."""
+    gain = float(fit.gain[joint])
+    if abs(gain) * BEYOND < 1 and fit.share[joint, joint] > OPEN > fit.open[joint]:
+        return "the joint's acceleration"
+    if in_degrees(gain):
+        return "deg/s" if gain > 1 else "rad/s, beside positions in degrees"
+    if gain > GEARED:
+        return "the motor's side of the gear"
+    return "another motion or unit"
 
 
 def is_damped(fit: VelocityFit, late: Mask) -> bool:
@@ -306,8 +332,12 @@ def time_unit(factor: float) -> str:
 
 def is_clock(factor: float) -> bool:
     """Whether a gain that all joints share is that of a clock of another rate."""
-    in_degrees = any(abs(factor / unit - 1) < WIDE for unit in (DEGREES, 1 / DEGREES))
-    return factor > 0 and abs(factor - 1) > GAIN and not in_degrees
+    return GEARED > factor > 0 and abs(factor - 1) > GAIN and not in_degrees(factor)
+
+
+def in_degrees(factor: float) -> bool:
+    """Whether a gain is that of degrees beside radians."""
+    return any(abs(factor / unit - 1) < CLOSE for unit in (DEGREES, 1 / DEGREES))
 
 
 def exchanged(fit: VelocityFit) -> list[int]:

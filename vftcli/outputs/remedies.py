@@ -18,7 +18,7 @@ SUBJECTS = {
     "positions": ("degrees", "stuck-position", "coarse-positions", "absurd-values"),
     "velocity": ("no-velocity", "velocity-unit", "velocity-mismatch", "velocity-sign",
                  "velocity-order", "velocity-lag", "velocity-filtered", "velocity-held",
-                 "stuck-velocity", "zero-dq"),
+                 "velocity-of-another-kind", "stuck-velocity", "zero-dq"),
     "temperature": ("far-temperature", "far-temperature-assumed", "temperature-beyond-law",
                     "no-temperature", "temperature-gaps"),
     "wrench": ("zero-wrench", "zero-wrench-beside-tau-ext", "contact-elsewhere",

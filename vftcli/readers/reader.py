@@ -190,8 +190,8 @@ class ReadChoice:
         interval: The span that is used, from the first sample, None for all of it. [s]
         effort: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the
             robot; None to take what it is called.
-        derive: "dq" to derive velocities that a log lacks, "none" never to; None to do so where it
-            is fast enough.
+        derive: "dq" to derive the velocities even where the log has some, "none" never to; None to
+            do so where it has none and is fast enough.
         episode: Number of the episode of a file that holds several, None to leave it to the reader.
         all_episodes: Whether each episode is wanted, as a log of its own.
         arm: Which arm of a log of two, a member of `ARMS`; None for the only one.
@@ -274,7 +274,9 @@ class ReadChoice:
         kind = EFFORT[self.effort] if self.effort is not None else None
         if kind is not None:
             recording = recording.with_effort(kind)
-        if self.derive == "dq" or (self.derive is None and is_fast(recording)):
+        if self.derive == "dq":
+            recording = with_velocity(replace(recording, dq=None))
+        elif self.derive is None and is_fast(recording):
             recording = with_velocity(recording)
         return recording
 
