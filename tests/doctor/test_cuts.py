@@ -205,3 +205,13 @@ def test_rows_of_the_file_know_their_samples(circle: Recording) -> None:
     samples = twice.source.row_samples
     assert samples is not None
     assert samples[:8].tolist() == [-1, -1, 0, -1, 1, 2, 3, -1]
+
+
+def test_a_log_that_waits_a_minute_is_listed_like_one_that_does_not(circle: Recording) -> None:
+    """A cycle that lies in the gap has no residual, and no mode is certain behind it."""
+    later = np.where(np.arange(circle.samples) > AT, 60.0, 0.0)
+    made = contacts(replace(circle, t=circle.t + later), ROBOT)
+    known = [c for c in contacts(circle, ROBOT) if c.stop < circle.t[AT] - 1.0]
+    assert len(known) > 1
+    for one, other in zip(known, made, strict=False):
+        assert other.start == pytest.approx(one.start, abs=0.2)  # a block is .05 to .1 s long

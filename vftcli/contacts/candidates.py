@@ -176,7 +176,8 @@ def filtered_odds(
     blocks, count, n = d.shape
     time, lasts = (np.tile(each, count // len(SEARCHES)) for each in zip(*SEARCHES, strict=True))
     kept = np.exp(-dt[..., 0] / time)[..., None]
-    begins, ends = 1.0 - np.exp(-dt[..., 0] / BETWEEN), 1.0 - np.exp(-dt[..., 0] / lasts)
+    # Behind a long gap neither mode is certain: 1 exactly would leave 0/0 of a certain one.
+    begins, ends = (np.minimum(-np.expm1(-dt[..., 0] / s), 1.0 - 1e-9) for s in (BETWEEN, lasts))
     often = np.log(spikes) - 0.5 * np.log(SPIKE), np.log1p(-spikes)
     # A stretch begins with what b is like anywhere.
     added[0] /= np.maximum(1.0 - decay[0] ** 2, 1e-9)

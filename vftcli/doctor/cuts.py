@@ -11,11 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.windows import means
 from vftcli.robots.drive import effort_name
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array, Mask, median
+from vftcli.signals.arrays import Array, Indices, Mask, median
 from vftcli.signals.errors import ExaminationError
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
@@ -111,7 +110,7 @@ def sound_block(block: Recording, robot: Robot) -> Recording:
     sound = without_bad_samples(block, robot)
     if sound is block:
         return block
-    found = (*cut_findings(sound), sound.source.remarks[-1])[0]
+    found = next(iter((*cut_findings(sound), *reversed(sound.source.remarks))))
     raise ExaminationError(
         f"{block.name}: {found}. A log that is read in blocks cannot be mended: leave out "
         "--causal, or leave that part out with --interval."
@@ -258,37 +257,58 @@ def frozen_rows(recording: Recording) -> Mask:
     return found
 
 
-def slips_of(recording: Recording) -> tuple[Array, Mask]:
-    """Changes of position beyond what the velocities say, and which are jumps. (T-1, n) [rad]
+class Slips(NamedTuple):
+    """Changes of position beyond what the velocities say.
+
+    Attributes:
+        steps: The steps at which one may be a jump, by the sample before. (K,)
+        sizes: How large they are. (K, n) [rad]
+        jumps: Which are jumps. (K, n)
+    """
+
+    steps: Indices
+    sizes: Array
+    jumps: Mask
+
+
+def slips_of(recording: Recording) -> Slips:
+    """Where positions change otherwise than the velocities say, and which of it are jumps.
 
     A step of time may be off by what the steps around it are, and by a sample that was late.
     """
     t, q, dq = recording.t, recording.q, recording.require("dq")
     steps, usual = np.diff(t), recording.median_step
-    mean = 0.5 * (dq[1:] + dq[:-1])
-    slip = np.diff(q, axis=0) - mean * steps[:, None]
-    off = np.abs(steps - usual)
-    off = np.maximum(off, np.maximum(np.append(off[1:], 0.0), np.insert(off[:-1], 0, 0.0)))
-    slack = (
-        0.5 * np.abs(np.diff(dq, axis=0)) * steps[:, None]
-        + np.abs(mean) * np.maximum(off + usual, LATE)[:, None]
-    )
-    noise = FAR / 0.6745 * np.array([median(np.abs(column)) for column in slip.T])
-    jumps = np.abs(slip) > np.maximum(SLIPPED + slack, noise)
-    return slip, jumps & (steps <= GAP_STEPS * usual)[:, None]
+    near, noise = steps <= GAP_STEPS * usual, np.zeros(recording.joints)
+    large = np.zeros(len(steps), dtype=bool)
+    for j in range(recording.joints):
+        change = np.diff(q[:, j])
+        fastest = float(np.max(np.abs(dq[:, j]))) * GAP_STEPS * usual
+        if max(float(np.max(change)), -float(np.min(change))) + fastest > SLIPPED:
+            slip = np.abs(change - 0.5 * (dq[1:, j] + dq[:-1, j]) * steps)
+            large |= slip > SLIPPED
+            noise[j] = FAR / 0.6745 * median(slip)
+    at: Indices = np.flatnonzero(large & near)
+    mean, dt = 0.5 * (dq[at + 1] + dq[at]), steps[at][:, None]
+    slips = q[at + 1] - q[at] - mean * dt
+    around = np.clip(at[:, None] + np.arange(-1, 2), 0, len(steps) - 1)
+    off = np.max(np.abs(steps[around] - usual), axis=1, initial=0.0)[:, None]
+    slack = 0.5 * np.abs(dq[at + 1] - dq[at]) * dt + np.abs(mean) * np.maximum(off + usual, LATE)
+    return Slips(at, slips, np.abs(slips) > np.maximum(SLIPPED + slack, noise))
 
 
 def without_turns(recording: Recording) -> Recording:
     """The recording, positions that jump by whole turns unwrapped, which is said."""
-    slip, jumps = slips_of(recording)
-    turns = np.round(slip / TURN)
-    whole = jumps & (np.abs(slip - TURN * turns) < NEAR) & (turns != 0) & (np.abs(turns) <= TURNS)
-    if not whole.any() or np.mean(jumps.any(axis=1)) > SHARE:
+    found = slips_of(recording)
+    turns = np.round(found.sizes / TURN)
+    whole = found.jumps & (np.abs(found.sizes - TURN * turns) < NEAR)
+    whole &= (turns != 0) & (np.abs(turns) <= TURNS)
+    if not whole.any() or len(found.steps) > SHARE * recording.samples:
         return recording
     q = recording.q.copy()
-    q[1:] -= TURN * np.cumsum(np.where(whole, turns, 0.0), axis=0)
+    for k, row in enumerate(found.steps.tolist()):
+        q[row + 1 :] -= TURN * np.where(whole[k], turns[k], 0.0)
     joints = tuple(int(j) + 1 for j in np.flatnonzero(whole.any(axis=0)))
-    first = float(recording.t[np.flatnonzero(whole.any(axis=1))[0] + 1])
+    first = float(recording.t[found.steps[np.argmax(whole.any(axis=1))] + 1])
     said = fact("turn-unwrapped", Where(joints=joints), at_s=first)
     source = replace(recording.source, remarks=(*recording.source.remarks, said))
     return replace(recording, q=q, source=source)
@@ -296,21 +316,20 @@ def without_turns(recording: Recording) -> Recording:
 
 def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
     """Rows whose position is none of the motion's, and what lies around where recordings meet."""
-    slip, jumps = slips_of(recording)
-    jumps &= ~(frozen[1:] | frozen[:-1])[:, None]
-    steps = np.flatnonzero(jumps.any(axis=1))
+    found = slips_of(recording)
+    real = found.jumps.any(axis=1) & ~(frozen[found.steps] | frozen[found.steps + 1])
+    steps, slips, jumps = found.steps[real], found.sizes[real], found.jumps[real]
     if not steps.size or steps.size > max(2.0, SHARE * recording.samples):
         return
     t, q, dq = recording.t, recording.q, recording.require("dq")
     rows, meets = np.zeros(q.shape, dtype=bool), np.zeros(q.shape, dtype=bool)
     sizes = np.zeros(q.shape)
-    for group in np.split(steps, np.flatnonzero(np.diff(steps) > FEW) + 1):
-        first, last = int(group[0]), int(group[-1]) + 1
-        joints = jumps[first:last].any(axis=0)
+    for group in np.split(np.arange(len(steps)), np.flatnonzero(np.diff(steps) > FEW) + 1):
+        first, last = int(steps[group[0]]), int(steps[group[-1]]) + 1
+        joints, size = jumps[group].any(axis=0), np.max(np.abs(slips[group]), axis=0)
         over = q[last] - q[first] - 0.5 * (dq[last] + dq[first]) * (t[last] - t[first])
         slack = SLIPPED + np.abs(dq[last] - dq[first]) * (t[last] - t[first])
         slack += (np.abs(dq[last]) + np.abs(dq[first])) * max(recording.median_step, LATE)
-        size = np.max(np.abs(slip[first:last]), axis=0)
         if last - first > 1 and np.all((np.abs(over) < slack)[joints]):
             span, into = slice(first + 1, last), rows  # the motion goes on behind a few bad rows
         else:
@@ -330,9 +349,9 @@ def braked(recording: Recording, robot: Robot, torque: Array) -> Iterator[Bad]:
     middle = recording.q[first + length // 2]
     gravity = momentum_terms(robot.loaded_chain, middle, np.zeros_like(middle)).gravity
     weight = np.sum(gravity**2, axis=1)
-    given = means(recording.t, torque, first, first + length)
+    given = torque[: len(first) * length].reshape(len(first), length, -1).mean(axis=1)
     share = np.sum(given * gravity, axis=1) / np.maximum(weight, 1e-12)
-    fastest = np.max(np.abs(recording.require("dq")[: first[-1] + length]), axis=1)
+    fastest = np.max(np.abs(recording.require("dq")[: len(first) * length]), axis=1)
     speed = np.maximum.reduceat(fastest, first)
     heavy = weight > HEAVY**2
     held = heavy & (share > HELD)

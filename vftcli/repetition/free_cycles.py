@@ -93,7 +93,7 @@ def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
     first, last = np.searchsorted(motion.t, np.add(cycles.span(freest), (-SETTLES, SETTLES)))
     free = motion.taken(slice(int(first), int(last)))
     also = []
-    for cycle in range(cycles.whole):
+    for cycle in np.flatnonzero(np.isfinite(residual)).tolist():
         inside = np.flatnonzero(number == cycle)
         span = slice(int(inside[0]), int(inside[-1]) + 1)
         there = Pairing(free, pairing.times[span])
@@ -106,12 +106,20 @@ def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
 
 
 def residuals(motion: DriveRun, cycles: Cycles) -> Array:
-    """Mean over joints of each cycle's residual relative to the smallest. (cycles,)"""
+    """Mean over joints of each cycle's residual relative to the smallest. (cycles,)
+
+    A cycle of which a gap takes more than half has none: ∞.
+    """
     # Below 5 Hz a push stands out from the drives' ripple.
     cutoff = min(5.0, band(motion.step, None)[0])
     gap = low_pass(motion.t, motion.torque - motion.model, cutoff)
     number = cycles.number(motion.t)
-    square = np.array([np.mean(gap[number == c] ** 2, axis=0) for c in range(cycles.whole)])
+    inside = [number == c for c in range(cycles.whole)]
+    full = 0.5 * max(np.count_nonzero(rows) for rows in inside)
+    nothing = np.full(gap.shape[1], np.inf)
+    square = np.array(
+        [np.mean(gap[r] ** 2, axis=0) if np.count_nonzero(r) >= full else nothing for r in inside]
+    )
     relative = np.sqrt(square / np.maximum(square.min(axis=0), 1e-12))
     return np.asarray(relative.mean(axis=1))
 
