@@ -20,24 +20,28 @@ RATES = 0.9 + 0.3 * np.arange(6)
 """Every joint turns round every one to three seconds. [rad/s]"""
 
 
-def log_of(late: float = 0.0, push: float = 0.0, scale: float = 1.0) -> Recording:
+def log_of(
+    late: float = 0.0, push: float = 0.0, scale: float = 1.0, *, rate: float = 0.0, clock: Array = T
+) -> Recording:
     """20 s of motion under the arm's own torque, friction and noise of 0.3 N·m.
 
     Args:
         late: By how much the torque is logged later. [s]
         push: Height of a push of 0.8 s every 4 s on each joint. [N·m]
         scale: Factor of the torque.
+        rate: By how much it is later still with every second. [s/s]
+        clock: When the samples are. (T,) [s]
     """
-    angle = np.outer(T, RATES) + np.arange(6)
+    angle = np.outer(clock, RATES) + np.arange(6)
     q, dq = 0.6 * np.sin(angle), 0.6 * RATES * np.cos(angle)
-    t = T - late
+    t = clock - late - rate * clock
     angle = np.outer(t, RATES) + np.arange(6)
     x, dx, ddx = np.sin(angle), RATES * np.cos(angle), -(RATES**2) * np.sin(angle)
     torque = torque_regressor(ARM.chain, 0.6 * x, 0.6 * dx, 0.6 * ddx) @ chain_parameters(ARM.chain)
     torque += 4 * np.tanh(60 * dx) + 3 * dx
     torque += push * np.clip(np.sin(2 * np.pi * t / 4) - 0.6, 0, None)[:, None] / 0.4
     torque += np.random.default_rng(0).normal(0, 0.3, torque.shape)
-    return Recording(t=T, q=q, dq=dq, torque=scale * torque)
+    return Recording(t=clock, q=q, dq=dq, torque=scale * torque)
 
 
 def told(log: Recording) -> Remark | None:
@@ -70,6 +74,29 @@ def test_pushes_hide_no_lag_and_are_none() -> None:
     finding = told(log_of(0.06, push=5.0))
     assert finding is not None
     assert finding.values["lag_ms"] == pytest.approx(60.0, abs=10.1)
+
+
+@pytest.mark.parametrize("push", [0.0, 5.0])
+@pytest.mark.parametrize(("rate", "pace"), [(0.005, "slow"), (-0.01, "fast")])
+def test_a_clock_of_the_effort_is_told_by_its_rate(rate: float, pace: str, push: float) -> None:
+    """To half of the .05 s by which tried growths of the lag lie apart within 19.5 s: .13 %."""
+    finding = told(log_of(rate=rate, push=push))
+    assert finding is not None
+    assert (finding.code, finding.level) == ("effort-drift", "warning")
+    assert finding.values["drift_percent"] == pytest.approx(100 * abs(rate), abs=0.13)
+    assert finding.values["pace"] == pace
+
+
+def test_a_drift_in_a_long_log_is_told_by_its_first_minute() -> None:
+    """.5 % of 200 s is a second, more than any lag that is tried."""
+    finding = told(log_of(rate=0.005, clock=STEP * np.arange(20000)))
+    assert finding is not None
+    assert finding.code == "effort-drift"
+    assert finding.values["drift_percent"] == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_drift_within_what_real_drivers_lag_is_not_told() -> None:
+    assert told(log_of(rate=0.001)) is None
 
 
 def test_a_wrong_unit_sign_offset_or_load_is_no_lag() -> None:

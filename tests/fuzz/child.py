@@ -20,6 +20,7 @@ from container_mutants import (
     json_mutant,
     matlab_mutant,
 )
+from long_mutants import long_mutant, long_words
 from message_mutants import bag_mutant, folder_mutant, mcap_mutant
 from option_mutants import option_words
 from robot_mutants import toml_mutant, urdf_mutant
@@ -57,11 +58,13 @@ MUTATORS: dict[str, Callable[[Seed, Rng, Path], Mutant]] = {
     "scenario": toml_mutant,
     "urdf": urdf_mutant,
     "mjcf": urdf_mutant,
+    "long": long_mutant,
 }
 WEIGHTS = {
     "table": 15, "lines": 5, "parquet": 8, "npz": 6, "npy": 2, "pickle": 5, "records": 4,
     "mcap": 10, "bag": 6, "folder": 6, "arrow": 5, "json": 3, "mat": 4, "hdf5": 6,
     "dataset": 5, "robot": 5, "urdf": 3, "mjcf": 1, "gains": 1, "scenario": 1, "options": 4,
+    "long": 2,
 }  # fmt: skip
 """Family → inputs of a hundred."""
 
@@ -116,10 +119,14 @@ def attempt(
         rows = None
     else:
         seed = pick(rng, seeds[family])
-        place = folder / f"in{ENDINGS.get(family, '')}"
+        # A batch knows a file again by its name: that of each input is its own.
+        number = index if family == "long" else ""
+        place = folder / f"in{number}{ENDINGS.get(family, '')}"
         mutant = MUTATORS[family](seed, rng, place)
         place, how, rows = mutant.path or place, mutant.how, mutant.rows
-        if family in ENDINGS:
+        if family == "long":
+            words = long_words(seed, place, rng, folder)
+        elif family in ENDINGS:
             words = on_robot(family, seed, place, seeds)
         else:
             options = ["--columns", seed.columns] if seed.columns else []
@@ -135,7 +142,7 @@ def attempt(
         "estimate": ["-o", str(folder / "out"), "--anyway"],
         "compare": ["--reference", pick(rng, REFERENCES), "--anyway", "--json"],
         "simulate": ["-o", str(folder / "out.csv"), "--json"],
-    }[words[0]]
+    }.get(words[0], [])
     return Attempt(family, seed.name, how, tuple(words), rows)
 
 
@@ -159,7 +166,7 @@ def tried(made: Attempt, folder: Path) -> int:
     except BaseException:  # noqa: BLE001 - whatever it is, it is what is looked for
         (folder / "trace").write_text(traceback.format_exc(), encoding="utf-8", errors="replace")
         return BROKEN
-    if code == 0 and made.words[0] in {"estimate", "convert"}:
+    if code == 0 and made.words[0] in {"estimate", "convert", "report"}:
         (folder / "numbers").write_text(odd_numbers(made, folder), encoding="utf-8")
     return code
 
@@ -201,11 +208,14 @@ def odd_numbers(made: Attempt, folder: Path) -> str:
     """What is wrong with the numbers that were written, "" where nothing is."""
     import pyarrow.parquet as pq
 
-    path = folder / ("out/estimates.parquet" if made.words[0] == "estimate" else "out.parquet")
+    path = folder / ("out.parquet" if made.words[0] == "convert" else "out/estimates.parquet")
     table = pq.read_table(path, use_threads=False)
     for name in table.column_names:
         values = np.asarray(table.column(name).to_numpy(), dtype=float)
-        if np.isinf(values).any() or (name.startswith("tau_ext/") and np.isnan(values).any()):
+        unknown = np.isnan(values) & name.startswith("tau_ext/")
+        # A long log may have gaps; none of its joints may vanish.
+        vanishes = unknown.all() if made.family == "long" else unknown.any()
+        if np.isinf(values).any() or vanishes:
             return f"not finite: {name}"
         beyond = bool(np.any(np.abs(values) > LARGEST_TORQUE)) and name.startswith("tau_ext/")
         if beyond and made.family in {"robot", "urdf", "mjcf", "gains"}:

@@ -3,12 +3,14 @@
 Seeds are small sound files of every kind that a user may give (made in code, and where VFT_LOGS is
 set the heads of the samples beside it). An input is one of them taken apart, one thing changed, and
 put together again, with inspect, convert, estimate, compare or simulate on it; or words that an
-option does not take. They run in forked children of a parent that has everything imported.
+option does not take. The family "long" has logs of 16 s and a dataset, with the other commands. All
+run in forked children of a parent that has everything imported.
 
-An input fails if the command ends in a traceback or by a signal, takes more than 5 s of processor
-time or 1 GiB, prints JSON that is none, writes numbers that are not finite or that no robot has,
-reads fewer rows than there are without a word, says more than one line when it refuses, or leaves
-something behind then. The same seed and index make the same input, whatever the number of jobs.
+An input fails if the command ends in a traceback, a warning of Python or by a signal, takes more
+than 5 s of processor time or 1 GiB, prints JSON that is none, writes numbers that are not finite or
+that no robot has, loses a joint, reads fewer rows than there are without a word, says more than one
+line when it refuses, or leaves something behind then. The same seed and index make the same input,
+whatever the number of jobs.
 """
 
 import argparse
@@ -69,6 +71,12 @@ BATCH = 40
 
 OF_HEALTH = re.compile(r"(\S.*: )?log health: |MEANINGLESS |note: ")
 """How the lines begin that say what the examination of a log found."""
+
+OF_PYTHON = re.compile(r"Traceback \(most recent|^\S+:\d+: \w*Warning: ", re.MULTILINE)
+"""A traceback, or a warning that nobody filtered."""
+
+RESUMED = {"annotate", "batch"}
+"""Commands that keep what is done for the next run, and say a line a log."""
 
 ENDED_BY_LIMIT = (signal.SIGXCPU, signal.SIGALRM, signal.SIGKILL)
 
@@ -188,20 +196,21 @@ def failure(status: int, made: Attempt, folder: Path, said: str) -> tuple[str, s
         return (
             "hang" if -status in ENDED_BY_LIMIT else "signal"
         ), f"signal {-status} {said[-300:]}"
-    if status == BROKEN or "Traceback (most recent" in said:
+    if status == BROKEN or OF_PYTHON.search(said):
         return "traceback", text(folder / "trace") or said
     if (peak := peak_memory()) > MEMORY or "out of memory" in said:
         return "memory", f"{peak >> 20} MiB {said}"
     if status == 0:
         return of_result(made, folder)
     left = [p.name for p in folder.glob("out*")] + [p.name for p in folder.glob(".*")]
-    if left:
+    if left and made.words[0] not in RESUMED:
         return "left behind", f"{left} after: {said}"
     if status == 2:
         return ("usage", said) if made.family == "options" else ("exit code 2", said)
     # The health of a log that was read, and notes on it, stand before what cannot be done with it.
     lines = [line for line in said.splitlines() if line.strip() and not OF_HEALTH.match(line)]
-    if len(lines) != 1 or not lines[0].startswith("error: "):
+    several = len(lines) != 1 and made.words[0] not in RESUMED
+    if several or not lines[0].startswith("error: "):
         return "several lines", said
     return "refused", said
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
+from long_mutants import long_seeds
 from message_mutants import mcap_messages, shrunk_archive, shrunk_database, shrunk_mcap
 from tokens import Seed
 
@@ -88,7 +89,7 @@ def mjcf(joints: int = 6) -> str:
 
 def make_seeds(folder: Path) -> list[Seed]:
     """Write every seed into a folder; polars runs here, so call it in a process of its own."""
-    seeds = [*seeds_in_code(folder), *robot_seeds(folder)]
+    seeds = [*seeds_in_code(folder), *robot_seeds(folder), *long_seeds(folder)]
     logs = os.environ.get("VFT_LOGS")
     samples = Path(logs).parent / "samples" if logs else None
     if samples is not None and samples.is_dir():

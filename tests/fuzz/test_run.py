@@ -67,6 +67,8 @@ def attempt(*words: str, family: str = "table", rows: int | None = None) -> Atte
         (1, attempt("inspect"), {"stderr": "error: out of memory"}, "memory"),
         (1, attempt("inspect"), {"stderr": "Error: C++\nerror: no robot"}, "several lines"),
         (1, attempt("estimate"), {"stderr": "error: no", "out": ""}, "left behind"),
+        (0, attempt("report"), {"stderr": "a.py:7: RuntimeWarning: overflow"}, "traceback"),
+        (1, attempt("batch"), {"stderr": "error: x: no\n1 log: 1 failed", "out": ""}, "refused"),
         (2, attempt("inspect"), {"stderr": "Usage"}, "exit code 2"),
         (2, attempt("inspect", family="options"), {"stderr": "Usage"}, "usage"),
     ],

@@ -11,6 +11,7 @@ jumps and inertia is large, tells the lag; a wrong mass or drive constant shifts
 """
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from vftcli.doctor.findings import on_joints
 from vftcli.robots import Robot
 from vftcli.robots.kernels import momentum_terms
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
 from vftcli.signals.series import median_step
@@ -37,6 +38,12 @@ MOVES = 0.02
 """Speed of a window from which it tells a lag. [rad/s]"""
 KEPT = 0.8
 """Share of the differences that a fit is judged by: the rest may be contact."""
+DRIFTS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
+"""Growths of a lag that are tried, from one end of what is looked at to the other. [s]"""
+LONG = 60.0
+"""What is looked at of a long log: a clock that is .5 % off loses 300 ms in it. [s]"""
+STEADY = 1.1
+"""How much better a lag that grows explains the joints than a steady one; 1.00 on sound logs."""
 LEAST_RATE = 30.0
 """Sample rate below which no lag of that size can be told. [Hz]"""
 LATE = 0.035
@@ -57,33 +64,117 @@ LAGLESS = MISTIMED | {"stuck-position", "stuck-effort"}
 
 
 def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
-    """An effort that is logged later than the motion, or earlier.
+    """An effort that is logged later than the motion, or earlier, or by a clock of its own.
 
     Args:
         recording: The log; its velocities are sound.
         robot: An arm that explains its torques.
     """
-    left = unexplained(recording, robot)
-    if left is None:
+    late = lateness_of(recording, robot)
+    if late is None:
         return
-    lags, rest = left
+    lags, rest = late.lags, late.rest()
     known = np.flatnonzero(np.isfinite(rest[:, 0]) & (rest.min(axis=1) > 0))
     if known.size < ENOUGH:
         return
     together = np.log(rest[known]).mean(axis=0)
     best, none = int(np.argmin(together)), int(np.argmin(np.abs(lags)))
+    start, short = float(recording.t[0]), recording.duration <= LONG
+    begin = late if short else lateness_of(recording.between(start, start + LONG), robot)
+    if begin is not None and (found := begin.drift(known)) is not None:
+        yield found
+        return
     lag, better = float(lags[best]), float(np.exp(together[none] - together[best]))
     own = lags[np.argmin(rest[known], axis=1)]
     alike = np.abs(own - lag) < max(NEAR * abs(lag), 1.5 * STEP)
-    agreed = alike.sum() >= ENOUGH and np.mean(alike) >= AGREE
-    if abs(lag) > LATE and better > BETTER and agreed:
+    if abs(lag) > LATE and better > BETTER and is_agreed(alike):
         order = "later" if lag > 0 else "earlier"
         joints = on_joints(known[alike])
         yield warning("effort-lag", joints, lag_ms=1e3 * abs(lag), order=order, ratio=better)
 
 
-def unexplained(recording: Recording, robot: Robot) -> tuple[Array, Array] | None:
-    """Lags [s] and what the model leaves of each joint's effort then; NaN at rest. (L,), (n, L)"""
+def is_agreed(alike: Mask) -> bool:
+    """Whether enough joints agree on a lag. (K,)"""
+    return bool(alike.sum() >= ENOUGH and np.mean(alike) >= AGREE)
+
+
+class Lateness(NamedTuple):
+    """Pairs of neighbouring windows of a log, with what explains the change between them.
+
+    Attributes:
+        lags: Lags that are tried. (L,) [s]
+        step: Sample time. [s]
+        starts: First samples of the two windows of each pair. (W, 2)
+        when: When each pair is, from the log's first moment. (W,) [s]
+        model: What the change of a joint's torque is made of. (W, n, 4)
+        moves: Pairs in which a joint moves. (W, n)
+        effort: Means of the effort over the window that begins at each sample. (T', n)
+    """
+
+    lags: Array
+    step: float
+    starts: NDArray[np.intp]
+    when: Array
+    model: Array
+    moves: Mask
+    effort: Array
+
+    def rest(self, rate: float = 0.0) -> Array:
+        """What the model leaves of each joint's effort at every lag; NaN at rest. (n, L)
+
+        Args:
+            rate: By how much the lag grows, from these lags at the log's first moment. [s/s]
+        """
+        tried = np.round(self.lags[:, None] / self.step + rate * self.when / self.step).astype(int)
+        first, second = (
+            np.clip(self.starts[:, k] + tried, 0, len(self.effort) - 1) for k in (0, 1)
+        )
+        change = self.effort[second] - self.effort[first]
+        rest = np.full((self.effort.shape[1], len(self.lags)), np.nan)
+        for j in range(len(rest)):
+            moves = self.moves[:, j]
+            if moves.sum() >= LEAST:
+                rest[j] = rest_of(self.model[moves, j], change[:, moves, j].T)
+        return rest
+
+    def drift(self, known: NDArray[np.intp]) -> Remark | None:
+        """The finding that the effort's lag grows from one end to the other, None if it does not.
+
+        Args:
+            known: Joints that tell a lag, from zero.
+        """
+        span = float(self.when[-1])
+        rests = {grown: self.rest(grown / span)[known] for grown in (0.0, -DRIFTS[1], DRIFTS[1])}
+        if not np.isfinite(rests[0.0]).all():
+            return None
+        left = {grown: np.log(rest).mean(axis=0).min() for grown, rest in rests.items()}
+        if left[0.0] == min(left.values()):
+            return None
+        rests |= {g: self.rest(g / span)[known] for size in DRIFTS for g in (size, -size)}
+        left = {grown: np.log(rest).mean(axis=0) for grown, rest in rests.items()}
+        grown = min(left, key=lambda g: float(left[g].min()))
+        least, none = left[grown].min(), left[0.0][np.argmin(np.abs(self.lags))]
+        each = np.array(list(rests))
+        own = each[np.argmin([rest.min(axis=1) for rest in rests.values()], axis=0)]
+        alike = np.abs(own - grown) < max(NEAR * abs(grown), 1.5 * DRIFTS[0])
+        steadily = np.exp(left[0.0].min() - least)
+        if min(steadily / STEADY, np.exp(none - least) / BETTER) < 1 or not is_agreed(alike):
+            return None
+        first = float(self.lags[np.argmin(left[grown])])
+        return warning(
+            "effort-drift",
+            on_joints(known[alike]),
+            drift_percent=100 * abs(grown) / span,
+            pace="slow" if grown > 0 else "fast",
+            first_ms=1e3 * first,
+            last_ms=1e3 * (first + grown),
+            span_s=span,
+            ratio=float(np.exp(none - least)),
+        )
+
+
+def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
+    """What a log tells of how late its effort is, None where that is nothing."""
     effort = recording.torque if recording.torque is not None else recording.current
     if effort is None or recording.dq is None or recording.samples < LEAST:
         return None
@@ -97,15 +188,16 @@ def unexplained(recording: Recording, robot: Robot) -> tuple[Array, Array] | Non
         return None
     rows = starts[:, None] + np.linspace(0, length, min(length, INSIDE) + 1).round().astype(int)
     model, speed = model_columns(recording, robot, rows)
-    late = by_hann(effort, length)[starts[:, None] + lags]
-    neighbours = np.diff(starts) <= length // 2
-    rest = np.full((recording.joints, len(lags)), np.nan)
-    for j in range(recording.joints):
-        moves = neighbours & (np.maximum(speed[1:, j], speed[:-1, j]) > MOVES)
-        if moves.sum() >= LEAST:
-            change = np.diff(late[:, :, j], axis=0)[moves]
-            rest[j] = rest_of(np.diff(model[:, j], axis=0)[moves], change)
-    return lags * step, rest
+    pairs = np.diff(starts) <= length // 2
+    return Lateness(
+        lags=lags * step,
+        step=step,
+        starts=np.stack([starts[:-1], starts[1:]], axis=1)[pairs],
+        when=(t[starts[:-1]] - t[0])[pairs],
+        model=np.diff(model, axis=0)[pairs],
+        moves=(np.maximum(speed[1:], speed[:-1]) > MOVES)[pairs],
+        effort=by_hann(effort, length),
+    )
 
 
 def by_hann(x: Array, length: int) -> Array:

@@ -267,17 +267,17 @@ def late_velocities(recording: Recording, fit: VelocityFit, joints: Array) -> It
     turned = wrong & (np.abs(fit.gain + 1) < 0.3)
     sure = SURE * fit.gain_error
     beyond = wrong & ~turned & ((fit.gain - sure > BEYOND) | (fit.gain + sure < 1 / BEYOND))
-    kinds = (("velocity-sign", turned), ("velocity-mismatch", wrong & ~turned & ~beyond))
-    for code, found in kinds:
-        if found.any():
-            slopes = fit.gain[found].tolist()
-            yield warning(code, on_joints(np.flatnonzero(found)), slopes=slopes)
-    seen = np.array([quantity_of(fit, j) if beyond[j] else "" for j in range(recording.joints)])
-    for quantity in sorted(set(seen[beyond])):
-        found = seen == quantity
-        slopes = fit.gain[found].tolist()
-        joints = on_joints(np.flatnonzero(found))
-        yield warning("velocity-of-another-kind", joints, slopes=slopes, quantity=quantity)
+    for code, mask in (("velocity-sign", turned), ("velocity-mismatch", wrong & ~turned & ~beyond)):
+        if mask.any():
+            slopes = fit.gain[mask].tolist()
+            yield warning(code, on_joints(np.flatnonzero(mask)), slopes=slopes)
+    seen = {int(j): quantity_of(fit, int(j)) for j in np.flatnonzero(beyond)}
+    for quantity in dict.fromkeys(seen.values()):
+        alike = [j for j in seen if seen[j] == quantity]
+        slopes = fit.gain[alike].tolist()
+        yield warning(
+            "velocity-of-another-kind", on_joints(alike), slopes=slopes, quantity=quantity
+        )
 
 
 def quantity_of(fit: VelocityFit, joint: int) -> str:

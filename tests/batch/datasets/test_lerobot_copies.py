@@ -131,6 +131,17 @@ def test_version_2_1_has_its_statistics_a_line_an_episode(tmp_path: Path) -> Non
     assert not (tmp_path / "copy" / "meta" / "stats.json").exists()
 
 
+@pytest.mark.parametrize("name", ["stats.json", "episodes_stats.jsonl"])
+@pytest.mark.parametrize("text", ["{", '{"action": 3}', "[[1]]", "[" * 100_000])
+def test_damaged_statistics_are_one_line(tmp_path: Path, name: str, text: str) -> None:
+    (tmp_path / "meta").mkdir()
+    shutil.copyfile(FIXTURE / "meta" / "info.json", tmp_path / "meta" / "info.json")
+    (tmp_path / "meta" / name).write_text(text)
+    statistics = {1: {n: statistics_of(v) for n, v in forces([1])[1].items()}}
+    with pytest.raises(LogError, match=f"{name}: holds no statistics"):
+        LeRobotDataset(tmp_path).finish(COLUMNS, statistics, tmp_path / "copy")
+
+
 def test_metadata_of_other_kinds_is_left_alone() -> None:
     assert with_features({}, COLUMNS) == {}
     assert with_features({b"huggingface": b"[]"}, COLUMNS) == {b"huggingface": b"[]"}

@@ -109,7 +109,11 @@ class LeRobotDataset:
                 writer.write_table(pa.table(arrays, schema=schema), row_group_size=len(table) or 1)
 
     def finish(self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path) -> None:
-        """Write info.json with the new features, and their statistics wherever others stand."""
+        """Write info.json with the new features, and their statistics wherever others stand.
+
+        Raises:
+            LogError: If a file of statistics holds none.
+        """
         info = info_of(self.folder)
         fps = {"fps": info["fps"]} if is_third(info) and "fps" in info else {}
         features = info.setdefault("features", {})
@@ -122,25 +126,28 @@ class LeRobotDataset:
                 "info": dict(column.told),
             }
         write_json(copy / "meta" / "info.json", info)
-        if (self.folder / "meta" / "stats.json").is_file():
-            self._finish_stats(columns, statistics, copy)
         for path in sorted((self.folder / "meta" / "episodes").rglob("*.parquet")):
             self._finish_episodes(path, columns, statistics, copy)
-        lines = self.folder / "meta" / "episodes_stats.jsonl"
-        if lines.is_file():
-            self._finish_lines(lines, columns, statistics, copy)
+        described = {"stats.json": self._finish_stats, "episodes_stats.jsonl": self._finish_lines}
+        for name, write in described.items():
+            path = self.folder / "meta" / name
+            if path.is_file():
+                try:
+                    write(path, columns, statistics, copy)
+                except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+                    raise LogError(f"{path}: holds no statistics; mend or remove it") from None
 
     def _finish_stats(
-        self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path
+        self, path: Path, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path
     ) -> None:
         """Write stats.json, of the whole dataset."""
-        stats = json.loads(text_of(self.folder / "meta" / "stats.json"))
+        stats = json.loads(text_of(path))
         # Older ones have no quantiles.
         keys = tuple(next(iter(stats.values()))) if stats else KEYS
         for column in columns:
             whole = pooled([of_episode[column.name] for of_episode in statistics.values()])
             stats[PREFIX + column.name] = plain(whole, keys)
-        write_json(copy / "meta" / "stats.json", stats)
+        write_json(copy / "meta" / path.name, stats)
 
     def _finish_episodes(
         self, path: Path, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path
