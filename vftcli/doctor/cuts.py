@@ -134,7 +134,6 @@ def cut_findings(recording: Recording) -> Iterator[Remark]:
             from_s=worst.start,
             until_s=worst.stop,
             size=worst.size,
-            worst=", ".join(f"J{joint}" for joint in worst.joints),
         )
 
 
