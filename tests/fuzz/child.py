@@ -27,8 +27,10 @@ from robot_mutants import toml_mutant, urdf_mutant
 from text_mutants import lines_mutant, table_mutant
 from tokens import Mutant, Rng, Seed, pick
 
-CPU_SECONDS = 5
-WALL_SECONDS = 60
+CPU_SECONDS, LONG_CPU_SECONDS = 5, 15
+"""What an input may take, and what one of the family "long"."""
+
+WALL_SECONDS = 180
 """A process that waits takes no processor time, and the machine may be busy."""
 
 MEMORY = 1 << 30
@@ -160,7 +162,7 @@ def on_robot(family: str, seed: Seed, place: Path, seeds: dict[str, list[Seed]])
 def tried(made: Attempt, folder: Path) -> int:
     """Run the command of an input, what it says kept in the folder; its code."""
     (folder / "attempt.json").write_text(json.dumps(made._asdict()), encoding="utf-8")
-    limit()
+    limit(LONG_CPU_SECONDS if made.family == "long" else CPU_SECONDS)
     try:
         code = command(made.words, folder)
     except BaseException:  # noqa: BLE001 - whatever it is, it is what is looked for
@@ -171,13 +173,13 @@ def tried(made: Attempt, folder: Path) -> int:
     return code
 
 
-def limit() -> None:
-    """Bound what the next command may take."""
+def limit(seconds: int) -> None:
+    """Bound what the next command may take. [s]"""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     spent = resource.getrusage(resource.RUSAGE_SELF)
     used = int(spent.ru_utime + spent.ru_stime)
     _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-    resource.setrlimit(resource.RLIMIT_CPU, (used + CPU_SECONDS, hard))
+    resource.setrlimit(resource.RLIMIT_CPU, (used + seconds, hard))
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
     most = pages * os.sysconf("SC_PAGE_SIZE") + 2 * MEMORY
     resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))

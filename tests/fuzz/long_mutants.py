@@ -15,7 +15,7 @@ FIXTURES = Path(__file__).parents[2] / "fixtures"
 LOGS = {"ur5": "ur5_circle.csv", "panda": "panda_bearing.csv"}
 EPISODES = "panda_episodes"
 
-RATE, SECONDS = 50.0, 16.0
+RATE, SECONDS = 50.0, 12.0
 """Of a seed [Hz, s]: `best` runs on it, and most commands take about a second."""
 
 ENDINGS = {"identify": "out.toml", "tune": "out.toml"}

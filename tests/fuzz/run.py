@@ -3,14 +3,14 @@
 Seeds are small sound files of every kind that a user may give (made in code, and where VFT_LOGS is
 set the heads of the samples beside it). An input is one of them taken apart, one thing changed, and
 put together again, with inspect, convert, estimate, compare or simulate on it; or words that an
-option does not take. The family "long" has logs of 16 s and a dataset, with the other commands. All
+option does not take. The family "long" has logs of 12 s and a dataset, with the other commands. All
 run in forked children of a parent that has everything imported.
 
 An input fails if the command ends in a traceback, a warning of Python or by a signal, takes more
-than 5 s of processor time or 1 GiB, prints JSON that is none, writes numbers that are not finite or
-that no robot has, loses a joint, reads fewer rows than there are without a word, says more than one
-line when it refuses, or leaves something behind then. The same seed and index make the same input,
-whatever the number of jobs.
+than 5 s of processor time (15 s where it is long) or 1 GiB, prints JSON that is none, writes
+numbers that are not finite or that no robot has, loses a joint, reads fewer rows than there are
+without a word, says more than one line when it refuses, or leaves something behind then. The same
+seed and index make the same input, whatever the number of jobs.
 """
 
 import argparse

@@ -1,6 +1,7 @@
 """Which cycles are taken to be free: the one with the least residual, and those like it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -65,6 +66,13 @@ def test_of_cycles_that_are_all_alike_the_last_is_left_to_be_compared(
 def test_a_log_shorter_than_a_cycle_has_no_free_one(pushed: Callable[..., DriveRun]) -> None:
     with pytest.raises(ReferenceTorqueError, match=r"no whole cycle of 13 s.*--free"):
         find_free_cycles(pushed(), Cycles(period=13.0, begin=0.0, end=12.0))
+
+
+def test_a_gap_that_a_cycle_falls_into_is_one_line(pushed: Callable[..., DriveRun]) -> None:
+    motion = pushed()
+    with_gap = replace(motion, t=motion.t + 40.0 * (motion.t >= 6.0))
+    with pytest.raises(ReferenceTorqueError, match=r"no sample of cycle 3 of 4 s.*--interval"):
+        find_free_cycles(with_gap, Cycles(period=4.0, begin=0.0, end=52.0))
 
 
 def test_of_many_free_cycles_eight_are_laid_under_the_others_from_the_first_to_the_last() -> None:

@@ -77,19 +77,23 @@ def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
     each joint relative to that joint's smallest, averaged over the joints.
 
     Raises:
-        ReferenceTorqueError: If the log holds no whole cycle beside another part of one.
+        ReferenceTorqueError: If the log holds no whole cycle beside another part of one, or a gap
+            that a whole cycle falls into.
     """
+    number = cycles.number(motion.t)
     if cycles.whole < 1:
         raise ReferenceTorqueError(
             f"{motion.name}: no whole cycle of {cycles.period:.4g} s is in the log; give a free "
             "run with --free"
         )
+    if missing := set(range(cycles.whole)) - set(number.tolist()):
+        raise ReferenceTorqueError(
+            f"{motion.name}: no sample of cycle {min(missing) + 1} of {cycles.period:.4g} s is in "
+            "the log, it has a gap there; use the part before or behind it with --interval"
+        )
     residual = residuals(motion, cycles)
     freest = int(np.argmin(residual))
-    number, pairing = (
-        cycles.number(motion.t),
-        pair_with_cycle(motion, cycles, freest, cycles.period),
-    )
+    pairing = pair_with_cycle(motion, cycles, freest, cycles.period)
     first, last = np.searchsorted(motion.t, np.add(cycles.span(freest), (-SETTLES, SETTLES)))
     free = motion.taken(slice(int(first), int(last)))
     also = []
