@@ -174,7 +174,7 @@ def baseline_of(motion: FreeMotion) -> Baseline:
     if motion.choice.is_given or looks_free(spectra):
         return replace(known, spectra=spectra)
     residuals = motion.free_cycles.residuals
-    listed = [] if residuals is None else residuals.tolist()
+    listed = [] if residuals is None else residuals[np.isfinite(residuals)].tolist()
     return replace(bare, missing=caution("free-part-not-quiet", residuals=listed))
 
 

@@ -29,8 +29,8 @@ class FreeCycles(NamedTuple):
 
     Attributes:
         numbers: Counted from 0.
-        residuals: Of every whole cycle, relative to the smallest, by which these were chosen; None
-            where they were given. (cycles,)
+        residuals: Of every whole cycle, relative to the smallest, by which these were chosen, ∞ of
+            one that lies in a gap; None where they were given. (cycles,)
     """
 
     numbers: tuple[int, ...]
@@ -53,7 +53,7 @@ class FreeCycles(NamedTuple):
         named = [number + 1 for number in self.numbers]
         if self.residuals is None:
             return fact(f"{code}-given", cycles=named, whole=whole)
-        residuals = [float(x) for x in self.residuals]
+        residuals = self.residuals[np.isfinite(self.residuals)].tolist()
         return fact(f"{code}-found", cycles=named, whole=whole, residuals=residuals)
 
     def remarks(self, whole: int) -> list[Remark]:
@@ -77,19 +77,13 @@ def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
     each joint relative to that joint's smallest, averaged over the joints.
 
     Raises:
-        ReferenceTorqueError: If the log holds no whole cycle beside another part of one, or a gap
-            that a whole cycle falls into.
+        ReferenceTorqueError: If the log holds no whole cycle beside another part of one.
     """
     number = cycles.number(motion.t)
     if cycles.whole < 1:
         raise ReferenceTorqueError(
             f"{motion.name}: no whole cycle of {cycles.period:.4g} s is in the log; give a free "
             "run with --free"
-        )
-    if missing := set(range(cycles.whole)) - set(number.tolist()):
-        raise ReferenceTorqueError(
-            f"{motion.name}: no sample of cycle {min(missing) + 1} of {cycles.period:.4g} s is in "
-            "the log, it has a gap there; use the part before or behind it with --interval"
         )
     residual = residuals(motion, cycles)
     freest = int(np.argmin(residual))
@@ -118,12 +112,10 @@ def residuals(motion: DriveRun, cycles: Cycles) -> Array:
     cutoff = min(5.0, band(motion.step, None)[0])
     gap = low_pass(motion.t, motion.torque - motion.model, cutoff)
     number = cycles.number(motion.t)
-    inside = [number == c for c in range(cycles.whole)]
-    full = 0.5 * max(np.count_nonzero(rows) for rows in inside)
-    nothing = np.full(gap.shape[1], np.inf)
-    square = np.array(
-        [np.mean(gap[r] ** 2, axis=0) if np.count_nonzero(r) >= full else nothing for r in inside]
-    )
+    held = np.bincount(number[(number >= 0) & (number < cycles.whole)], minlength=cycles.whole)
+    square = np.full((cycles.whole, gap.shape[1]), np.inf)
+    for cycle in np.flatnonzero(2 * held >= held.max()).tolist():
+        square[cycle] = np.mean(gap[number == cycle] ** 2, axis=0)
     relative = np.sqrt(square / np.maximum(square.min(axis=0), 1e-12))
     return np.asarray(relative.mean(axis=1))
 
