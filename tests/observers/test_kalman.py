@@ -82,17 +82,67 @@ def test_decay_agrees_with_the_dense_textbook_filter(scheme: str, wandering: Ter
     np.testing.assert_allclose(observer.estimate(log).tau, tau, atol=1e-9)
 
 
-@pytest.mark.parametrize("scheme", ["fe", "zoh"])
-def test_as_printed_agrees_with_the_dense_filter_on_mu_alone(
-    scheme: str, wandering: TermsOf
-) -> None:
-    """With the noise as printed, but for (44): its block is the corrected one, as density's."""
-    observer, log = paper(scheme, as_printed=True), wandering(samples=600)
-    noise = paper(scheme, {"fe": "literal", "zoh": "density"}[scheme]).model(STEP, 6)
-    for ours, named in zip(observer.model(STEP, 6), noise, strict=True):
+def test_as_printed_euler_agrees_with_the_dense_filter_on_mu_alone(wandering: TermsOf) -> None:
+    observer, log = paper("fe", as_printed=True), wandering(samples=600)
+    for ours, named in zip(observer.model(STEP, 6), paper("fe", "literal").model(STEP, 6),
+                           strict=True):  # fmt: skip
         np.testing.assert_array_equal(ours, named)
     tau, _ = dense(observer, log)
     np.testing.assert_allclose(observer.estimate(log).tau, tau, atol=1e-10)
+
+
+def printed_loop(log: DynamicsTerms, joint: int, decay: float) -> tuple[np.ndarray, np.ndarray]:
+    """The textbook filter of one joint on (44) as printed, P₀ = diag(4, 100); τ̂ and √P₂₂."""
+    x, P, C = np.array([log.p[0, joint], 0.0]), np.diag([4.0, 100.0]), np.array([[1.0, 0.0]])
+    A_c, Q_c = np.array([[0.0, 1.0], [0.0, -decay]]), np.diag([Q_P[joint], Q_TAU[joint]])
+    tau, sd = np.empty((2, log.samples))
+    for k in range(log.samples):
+        step = log.clock.step if log.clock.uniform else log.dt[k, 0]
+        M = expm(np.block([[A_c, Q_c], [np.zeros((2, 2)), -A_c]]) * step)
+        if k:
+            x = M[:2, :2] @ x + np.array([step, 0.0]) * log.mu[k, joint]
+            P = M[:2, :2] @ P @ M[:2, :2].T + M[:2, 2:] @ M[:2, :2].T
+        L = P @ C.T / (P[0, 0] + R[joint] / step)
+        x, P = x + L[:, 0] * (log.p[k, joint] - x[0]), P - L @ C @ P
+        tau[k], sd[k] = x[1], np.sqrt(P[1, 1])
+    return tau, sd
+
+
+@pytest.mark.parametrize("decay", [0.0, 2.0])
+@pytest.mark.parametrize("jitter", [0.0, 0.2])
+def test_as_printed_hold_runs_the_printed_block(
+    jitter: float, decay: float, wandering: TermsOf
+) -> None:
+    log = wandering(samples=300, jitter=jitter)
+    observer = paper("zoh", as_printed=True, decay=decay, initial_covariance=[4.0, 0.0, 100.0])
+    found = observer.estimate(log)
+    for joint in (0, 3):
+        tau, sd = printed_loop(log, joint, decay)
+        # 300 steps of rounding at values of 100 N·m; with expm's, some 1e-13 of its largest entry.
+        np.testing.assert_allclose(found.tau[:, joint], tau, atol=1e-9, rtol=0)
+        np.testing.assert_allclose(found.sd[:, joint], sd, rtol=1e-9)
+
+
+def test_as_printed_hold_goes_on_where_a_block_ends(
+    wandering: TermsOf, in_blocks: Callable[..., Any]
+) -> None:
+    observer, log = paper("zoh", as_printed=True), wandering(samples=300, jitter=0.2)
+    np.testing.assert_array_equal(in_blocks(observer, log, 37)[0], observer.estimate(log).tau)
+
+
+def test_as_printed_hold_settles_to_what_its_loop_does(wandering: TermsOf) -> None:
+    """Without a covariance of the user's the gains are stationary from the first sample on."""
+    log = wandering(samples=900)
+    settled = paper("zoh", as_printed=True).estimate(log).sd[-1]
+    _, sd = printed_loop(log, 0, 0.0)
+    np.testing.assert_allclose(settled[0], sd[-1], rtol=1e-9)
+
+
+def test_as_printed_hold_is_faster_than_the_corrected_one_by_a_quarter_of_a_sample() -> None:
+    """Its unsymmetric part (Q_τ + Q_p)Ts²/2 pulls: 137.506 → 135.506 ms on J1, to first order."""
+    corrected, printed = paper("zoh").tuning(STEP, 6), paper("zoh", as_printed=True).tuning(STEP, 6)
+    np.testing.assert_allclose(corrected.delay - printed.delay, STEP / 4, rtol=0.05)
+    assert 1e3 * printed.delay[0] == pytest.approx(135.506, abs=0.001)
 
 
 def test_euler_and_hold_share_a_and_b_exactly() -> None:
@@ -310,7 +360,9 @@ def test_half_the_power_passes_at_the_bandwidth(scheme: str) -> None:
 def test_blocks_of_a_log_give_the_whole_log_s_estimate(
     jitter: float, more: dict[str, object], wandering: TermsOf, in_blocks: Callable[..., Any]
 ) -> None:
-    observer, log = paper("zoh", **more), wandering(PIECE + 900, jitter)
+    # (44) as printed has no pieces.
+    scheme = "fe" if "as_printed" in more else "zoh"
+    observer, log = paper(scheme, **more), wandering(PIECE + 900, jitter)
     whole = observer.estimate(log).tau
     np.testing.assert_array_equal(in_blocks(observer, log, PIECE)[0], whole)
     for size in (37, 5000):

@@ -19,6 +19,22 @@ def write(path: Path, text: str) -> Path:
     return path
 
 
+def test_one_joint_of_several_is_turned(tmp_path: Path) -> None:
+    rows = "t q_0 q_1 dq_0 dq_1\n0 0.1 0.2 0.3 0.0\n1 0.2 0.3 0.4 0.5\n2 0.3 0.4 0.5 0.6\n"
+    path = write(tmp_path / "x", rows)
+    recording = read(path, columns="t=t,q=q_{i},dq=dq_0|-dq_1")
+    np.testing.assert_array_equal(recording.dq, [[0.3, 0.0], [0.4, -0.5], [0.5, -0.6]])
+    assert not np.signbit(recording.require("dq")[0, 1])
+    assert "turned the sign of dq (--columns)" in recording.source.repairs
+    for columns, words in (
+        ("q=q_{i},dq=dq_0|-dq_0", "a column of dq twice"),
+        ("q=q_{i},dq=dq_0|-dq_7", "no column 'dq_7' for dq"),
+        ("t=q_0|-q_1,q=q_{i}", "time cannot run back"),
+    ):
+        with pytest.raises(LogError, match=words):
+            read(path, columns=columns)
+
+
 def test_counted_columns_are_taken_in_file_order(tmp_path: Path) -> None:
     log = motion()
     recording = read(headerless_csv(tmp_path / "x"), columns="t,q:6,dq:6,current:6")

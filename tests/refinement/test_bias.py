@@ -127,7 +127,16 @@ def test_noise_is_not_believed_to_be_a_bias() -> None:
 
 def test_features_are_held_within_what_the_free_part_showed(log: ModelledRun) -> None:
     X = features(log.recording)
-    scale = Scale(X.mean(axis=0), X.std(axis=0), np.abs(X).max(axis=0))
-    beyond = np.vstack([10.0 * scale.most, -10.0 * scale.most])
-    np.testing.assert_allclose(scale.applied(beyond), scale.applied(RANGE / 10.0 * beyond))
+    scale = Scale(X.mean(axis=0), X.std(axis=0), X.min(axis=0), X.max(axis=0))
+    middle, half = 0.5 * (scale.most + scale.least), 0.5 * (scale.most - scale.least)
+    beyond = np.vstack([middle + 10.0 * half, middle - 10.0 * half])
+    held = np.vstack([middle + RANGE * half, middle - RANGE * half])
+    np.testing.assert_allclose(scale.applied(beyond), scale.applied(held))
     np.testing.assert_allclose(scale.applied(X), (X - scale.mean) / scale.sd)
+
+
+def test_a_joint_that_hardly_moves_in_the_free_part_says_nothing_of_its_motion() -> None:
+    """Its angle varies evenly by 1e-5 about 1 rad there, √3 of its standard deviation."""
+    angle = 1.0 + 1e-5 * np.linspace(-1.0, 1.0, 100)[:, None]
+    scale = Scale(angle.mean(axis=0), angle.std(axis=0), angle.min(axis=0), angle.max(axis=0))
+    assert np.abs(scale.applied(np.array([[0.5], [1.05]]))).max() < RANGE * np.sqrt(3.0)

@@ -80,6 +80,14 @@ def test_no_load_is_found_where_there_is_none(log: Recording) -> None:
     assert free_load(()) is None
 
 
+def test_a_simulation_without_noise_or_torque_carries_nothing(log: Recording) -> None:
+    """No joint has anything left over then, and nothing is divided by it."""
+    still = replace(log, q=np.zeros_like(log.q), dq=np.zeros_like(log.q), current=0.0 * log.current)
+    weightless = replace(ROBOT, chain=replace(ROBOT.chain, gravity=np.zeros(3)))
+    run = ModelledRun(recording=still, robot=weightless)
+    assert free_load((FreePiece(run, log.t > 1.0, ()),)) is None
+
+
 def test_a_payload_is_torque_and_no_noise(log: Recording) -> None:
     """Gains and free error stay those of the unloaded arm, and the weight stays in the estimate."""
     plain, loaded = baseline(log), baseline(carrying(log))

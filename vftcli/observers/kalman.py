@@ -14,6 +14,14 @@ from vftcli.observers.kalman_model import (
     discretise,
 )
 from vftcli.observers.observer import Complex, Tuning, check_terms, numbers_of, per_joint
+from vftcli.observers.printed_hold import (
+    as_covariance,
+    predicted,
+    printed_noise,
+    printed_steady,
+    settled_prior,
+    updated,
+)
 from vftcli.observers.recursion import Fold, run_blocks, spans
 from vftcli.observers.uneven_kalman import settle
 from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
@@ -35,10 +43,12 @@ class KalmanState(NamedTuple):
     Attributes:
         error: e = p − p̂ [kg·m²/s] and τ̂ [N·m]. (2, n)
         posterior: Their covariance. (n,) each
+        skew: Its lower-left entry less its upper-right one, which only (44) as printed has. (n,)
     """
 
     error: Array
     posterior: Covariance
+    skew: Array | float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -61,7 +71,7 @@ class KalmanObserver(Shown):
         noise_convention: A key of `NOISE_CONVENTIONS`.
         initial_covariance: P⁻ of the first sample as (P₁₁, P₁₂, P₂₂), one a joint, or None for the
             stationary one. (3, n)
-        as_printed: Use μᵗ alone (40) and the literal noise convention.
+        as_printed: Use μᵗ alone (40), the literal noise convention, and (44)'s printed block.
 
     Raises:
         ParameterError: If a variance is not positive, or a name is unknown.
@@ -114,7 +124,18 @@ class KalmanObserver(Shown):
 
     def steady(self, step: float, joints: int) -> Steady:
         """Stationary gains and prior at a sample time. [s]"""
-        return steady(self.model(step, joints), self.densities(joints).decay)
+        return self._settled(self.model(step, joints), self.densities(joints))
+
+    @property
+    def prints_hold(self) -> bool:
+        """Whether its noise is that of (44) as printed."""
+        return self.as_printed and self.discretisation == "zoh"
+
+    def _settled(self, model: Discrete, densities: Densities) -> Steady:
+        """What a model of one sample time settles to."""
+        if self.prints_hold:
+            return printed_steady(model, densities)
+        return steady(model, densities.decay)
 
     def is_steady(self, clock: Clock) -> bool:
         """Whether the gains along a log of this clock are the stationary ones from its start on."""
@@ -132,7 +153,7 @@ class KalmanObserver(Shown):
         n, clock = terms.joints, terms.clock
         densities, d = self.densities(n), self.unexplained(terms)
         model = self._model_of(densities, clock.step)
-        settled = steady(model, densities.decay)
+        settled = self._settled(model, densities)
         if self.is_steady(clock):
             F, g = error_filter(settled.gains, model.a12, model.a22)
             start = np.zeros((2, n)) if state is None else state.error
@@ -140,6 +161,8 @@ class KalmanObserver(Shown):
             row = handed_over(np.sqrt(settled.gains.posterior.p22))
             sd = np.broadcast_to(row, tau.shape)
             state = KalmanState(end, settled.gains.posterior)
+        elif self.prints_hold:
+            tau, sd, state = self._printed_steps(terms, d, model, state)
         else:
             tau, sd, state = self._step_by_step(terms, d, settled, state)
         estimate = ExternalTorque(
@@ -182,6 +205,33 @@ class KalmanObserver(Shown):
             tau[span] = fold.unfold(states[1])
             sd.T[:, span] = fold.unfold(np.sqrt(gains.posterior.p22)).T[kind]
         return tau, sd, KalmanState(error, Covariance(*(p[kind] for p in entering)))
+
+    def _printed_steps(
+        self, terms: DynamicsTerms, d: Array, usual: Discrete, state: KalmanState | None
+    ) -> tuple[Array, Array, KalmanState]:
+        """τ̂ and √P₂₂ with the noise of (44) as printed, sample by sample. (T, n) each"""
+        densities, n = self.densities(terms.joints), terms.joints
+        tau, sd = np.zeros((2, *d.shape))
+        begins = state is None
+        if state is None:
+            P = settled_prior(usual, printed_noise(usual, densities))
+            if self.initial_covariance is not None:
+                p11, p12, p22 = self.first_prior(self._settled(usual, densities))
+                P = np.array([[p11, p12], [p12, p22]])
+            state = KalmanState(np.zeros((2, n)), as_covariance(P), P[1, 0] - P[0, 1])
+        (error, torque), (p11, p12, p22) = state.error, state.posterior
+        P = np.array([[p11, p12], [p12 + state.skew, p22]])
+        model = self._model_of(densities, np.broadcast_to(terms.dt, (len(d), 1)))
+        noise = np.moveaxis(printed_noise(model, densities), 2, 0)
+        for k, (a12, a22, r) in enumerate(zip(model.a12, model.a22, model.r, strict=True)):
+            if k or not begins:
+                P = predicted(P, a12, a22, noise[k])
+            (l1, l2), P = updated(P, r)
+            error = error + d[k] - a12 * torque
+            torque = a22 * torque + l2 * error
+            error = (1.0 - l1) * error
+            tau[k], sd[k] = torque, np.sqrt(P[1, 1])
+        return tau, sd, KalmanState(np.array([error, torque]), as_covariance(P), P[1, 0] - P[0, 1])
 
     def unexplained(self, terms: DynamicsTerms) -> Array:
         """The filter's input pᵗ − pᵗ⁻¹ − Ts·u: `DynamicsTerms.d`, or with u = μᵗ (40). (T, n)"""

@@ -33,6 +33,12 @@ ABSURD = 1e9
 COLUMN = {"wrench": "axis", "jacobian": "cell"}
 """What a column of a signal is that is none of a joint."""
 
+LEAVING_OUT = (
+    "leave the signal out: with --columns name the others, as in t=t,q=q_{i},dq=dq_{i}, or skip it "
+    "with _:6 in a table without a header"
+)
+"""How a log is read without one of its signals."""
+
 SHORTEST_STEP, LONGEST_LOG = 1e-7, 1e11
 """No robot is sampled ten million times a second, nor for three thousand years. [s]"""
 
@@ -224,13 +230,13 @@ def refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
         if lost == len(value) and np.isnan(value[:, column]).all():
             raise LogError(
                 f"{path}: {name} of joint {column + 1} holds no numbers at all, only empty cells "
-                "or NaN. Leave the signal out (with _ in --columns), or record it."
+                f"or NaN. Record it, or {LEAVING_OUT}."
             )
         raise LogError(
             f"{path}: {name} {COLUMN.get(name, 'of joint')} {column + 1} is "
             f"{value[row, column]:.6g} in sample {raw.first_row + row} (t = "
             f"{seconds(raw)[row]:.6g} s), {lost} such in all. Nothing is filled in: cut the rows "
-            "out, or leave the signal out with _ in --columns."
+            f"out, or {LEAVING_OUT}."
         )
 
 

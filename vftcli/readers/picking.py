@@ -100,6 +100,8 @@ def _stacked(pick: Pick, loaded: Mapping[int, Column]) -> Array:
     for j, cell in enumerate(pick.cells):
         column = loaded[cell.column]
         out[:, j] = column if cell.element is None else column[:, cell.element]
+        if cell.turned:
+            out[:, j] = 0.0 - out[:, j]
     if pick.factor != 1.0:
         out *= pick.factor
         out += 0.0  # a turned zero is plain zero
@@ -138,7 +140,7 @@ def _ticks(table: Table, picks: Picks, loaded: Mapping[int, Column], before: int
                 "order), or say the rate of a log without one: t@125Hz."
             )
         return np.arange(before, before + len(next(iter(loaded.values()))))
-    if picks.clock.factor < 0:
+    if picks.clock.factor < 0 or any(cell.turned for cell in picks.clock.cells):
         raise LogError(
             f"{table.path}: --columns turns the sign of the clock; time cannot run back."
         )

@@ -65,10 +65,11 @@ class LongTable(Table, Protocol):
 
 
 class Cell(NamedTuple):
-    """A column, or one element of a column of lists."""
+    """A column, or one element of a column of lists; `turned` where its sign is."""
 
     column: int
     element: int | None = None
+    turned: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,14 +168,14 @@ def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
 
 def pick_of(item: Item, cells: tuple[Cell, ...]) -> Pick:
     """The cells of an item, with its factor to SI units."""
-    wrench = item.signal == "wrench"
+    wrench, turned = item.signal == "wrench", any(cell.turned for cell in cells)
     return Pick(
         signal=SIGNALS.get(item.signal, item.signal),
         cells=cells,
         factor=item.factor,
         unit=item.unit,
         frame=WrenchFrame.parsed(item.unit) if wrench and item.unit else None,
-        remark=fact("sign-turned", signal=item.signal) if item.factor < 0 else None,
+        remark=fact("sign-turned", signal=item.signal) if item.factor < 0 or turned else None,
     )
 
 
@@ -208,8 +209,10 @@ def named_cells(table: Table, item: Item) -> tuple[Cell, ...]:
 
 
 def _exact(table: Table, item: Item, name: str) -> tuple[Cell, ...]:
-    """The cells of one column by its name, or of some elements of its lists: name[0:7]."""
+    """The cells of one column by its name, or of some elements of its lists: name[0:7], -name."""
     names = table.names or ()
+    if name not in names and name.startswith("-"):
+        return tuple(cell._replace(turned=True) for cell in _exact(table, item, name[1:]))
     bare, elements = name, slice(None)
     if name not in names and (match := re.fullmatch(r"(.+)\[(\d{0,9}):(\d{0,9})\]", name)):
         bare = match[1]
@@ -276,7 +279,7 @@ def checked(table: Table, picks: Picks) -> Picks:
             "(a reference goes to --reference file:PATH)."
         )
     for pick in picks.signals:
-        if len(set(pick.cells)) < len(pick.cells):
+        if len({cell[:2] for cell in pick.cells}) < len(pick.cells):
             raise LogError(
                 f"{table.path}: --columns names a column of {pick.signal} twice; every joint has "
                 "one of its own."

@@ -109,7 +109,7 @@ def remove_modelled(found: Baseline, readings: Sequence[FreeReading]) -> Removal
     if found.part is None:
         raise ParameterError("--remove-bias model needs a free part: --free A:B or --free LOG")
     X = np.concatenate([features(piece.run.recording)[piece.inside] for piece in found.pieces])
-    scale = Scale(X.mean(axis=0), np.maximum(X.std(axis=0), 1e-6), np.abs(X).max(axis=0))
+    scale = Scale(X.mean(axis=0), np.maximum(X.std(axis=0), 1e-6), X.min(axis=0), X.max(axis=0))
     here = scale.applied(features(found.motion.log.recording))
     removed, remarks = [], []
     for reading in readings:
@@ -133,16 +133,19 @@ class Scale(NamedTuple):
     Attributes:
         mean: (m,)
         sd: (m,)
-        most: Largest magnitude. (m,)
+        least: (m,)
+        most: (m,)
     """
 
     mean: Array
     sd: Array
+    least: Array
     most: Array
 
     def applied(self, X: Array) -> Array:
         """Standardised features, held within what the free part showed. (T, m)"""
-        held = np.clip(X, -RANGE * self.most, RANGE * self.most)
+        more = 0.5 * (RANGE - 1.0) * (self.most - self.least)
+        held = np.clip(X, self.least - more, self.most + more)
         return np.asarray((held - self.mean) / self.sd)
 
 

@@ -140,14 +140,15 @@ def free_load(pieces: Sequence[FreePiece]) -> FreeLoad | None:
     robot = pieces[0].run.robot
     d = np.concatenate([part[0] for part in parts])
     A = np.concatenate([part[1] for part in parts])
-    if len(d) < 2 * A.shape[2]:
+    if len(d) < 2 * A.shape[2] or not np.any(d):
         return None
     friction = dry_friction(robot.friction, robot.joints)
     prior = np.concatenate([WIDE, 0.2 * friction + 0.05, 0.15 * friction + 0.02])
     loaded = weigh(d, A, prior)
     bare = weigh(d, A[:, :, 4:], prior[4:])
     mass, sd = float(loaded.weights[0]), float(loaded.sd[0])
-    share = float(np.sqrt(np.mean((loaded.left / bare.left) ** 2)))
+    moved = bare.left > 0.0  # a simulation without noise leaves nothing on a joint at rest
+    share = float(np.sqrt(np.mean((loaded.left[moved] / bare.left[moved]) ** 2)))
     if mass < max(LEAST, SURE * sd) or share > PARTLY:
         return None
     gain = gain_sd(pieces[0].run.recording, robot)

@@ -152,7 +152,7 @@ def sense(
         remarks=(
             *warnings,
             *found,
-            *payload_remark(recording, robot),
+            *(() if drifts or motion.zero else payload_remark(recording, robot)),
             *(
                 mask_remark(raw.hidden, raw.sigma_min)
                 if any(w.hidden.any() for w in wrenches)
