@@ -196,10 +196,20 @@ def gripping(plant: Callable[[Table], Table], kg: float, *words: str) -> Command
     return lambda folder: [*of(plant, *words)(folder), "--robot", robot_file(folder, more=gripper)]
 
 
+THIRD_IN_DEGREES = np.array([1.0, 1.0, np.rad2deg(1.0), 1.0, 1.0, 1.0])
 SWAPPED = ("1", "3", "2", "4", "5", "6")
+
+
+def rehomed(table: Table) -> Table:
+    """The zero of J3 moved by .2 rad after 12 s."""
+    moved = (table.t - table.t[0] > 12.0)[:, None] * np.eye(6)[2]
+    return replace(table, q=table.q + 0.2 * moved)
+
 
 ROWS = [
     Row("gaps", of(dropped_span), "interval", "0:9"),
+    Row("position-jump", of(rehomed), "interval", "0:11"),
+    Row("velocity-of-another-kind", of(lambda t: replace(t, dq=t.dq * THIRD_IN_DEGREES)), "derive"),
     Row("no-effort", lambda f: renamed(sound(), "current", "pull", f), "columns",
         "current=pull{i}"),
     Row("zero-effort", lambda f: renamed(
