@@ -104,11 +104,10 @@ def of_thresholds(path: Path, table: Table) -> Answer:
 
 def of_report(made: Analysis, table: Table) -> Answer:
     """The estimates and contacts of an analysis, at the sound log's times."""
-    seconds = made.recording.source.t0 + made.t
-    order = np.argsort(table.t, kind="stable")
-    rows = order[nearest(table.t[order], seconds)]
     assert table.sound_t is not None
-    t = table.sound_t[rows]
+    t = table.sound_t
+    if len(made.t) != len(t):  # rows were left out; the others keep their stamps
+        t = t[nearest(table.t, made.recording.source.t0 + made.t)]
     findings = [finding for one in made.examinations for finding in one.findings]
     of_log = (*findings, *made.recording.source.remarks)
     doubts = [remark for remark in made.remarks if remark.level != "fact"]
