@@ -10,6 +10,7 @@ from vftcli.doctor import examine
 from vftcli.robots import load_robot
 
 UR10E = load_robot("ur10e")
+ALL = (1, 2, 3, 4, 5, 6)
 
 
 def test_warnings_go_before_facts() -> None:
@@ -74,3 +75,42 @@ def test_a_clock_of_another_rate_refuses() -> None:
     log = moving()
     made = examine(replace(log, t=1.05 * log.t), UR10E)
     assert [finding.code for finding in made.refusals()] == ["clock-rate"]
+
+
+@pytest.mark.parametrize(("factor", "joints"), [(0.8, ALL), (1.3, ALL), (0.8, (2,)), (1.25, (3,))])
+def test_drives_of_another_size_are_named_with_their_factor(
+    factor: float, joints: tuple[int, ...]
+) -> None:
+    """The model is the log's own: windows of 0.3 s leave .01 of a factor open."""
+    log = moving()
+    scale = np.ones(6)
+    scale[[j - 1 for j in joints]] = factor
+    made = examine(replace(log, current=log.require("current") * scale), UR10E)
+    (found,) = made.warnings
+    assert (found.code, found.where.joints) == ("drive-scale", joints)
+    assert found.values["factor"] == pytest.approx(factor, abs=0.01)
+    assert made.refusals() == ()
+
+
+def test_a_load_is_no_factor() -> None:
+    assert [f.code for f in examine(moving(load=3.0), UR10E).warnings] == ["unmodelled-load"]
+
+
+def test_another_generation_is_no_factor() -> None:
+    """A UR10e beside a UR10's model: the ratio of their masses explains most of it too."""
+    codes = [finding.code for finding in examine(moving(), load_robot("ur10")).warnings]
+    assert codes == ["other-robot"]
+
+
+@pytest.mark.parametrize(("before", "after"), [(0.0, 1.5), (2.0, 0.0)])
+def test_a_load_that_is_picked_up_or_set_down_is_named(before: float, after: float) -> None:
+    """To a tenth of the 2 kg: the fit weighs a load and leaves its inertia out."""
+    first, last = moving(load=before), moving(load=after)
+    half = (first.t < 6.0)[:, None]
+    current = np.where(half, first.require("current"), last.require("current"))
+    made = examine(replace(first, current=current), UR10E)
+    (found,) = made.warnings
+    assert found.code == "load-changes"
+    assert found.values["first_kg"] == pytest.approx(before, abs=0.2)
+    assert found.values["last_kg"] == pytest.approx(after, abs=0.2)
+    assert found.values["at_s"] == pytest.approx(6.0, abs=0.3)
