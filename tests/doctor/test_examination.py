@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_arms import moving
+from moving_arms import FRICTION, gravity, moving
 
 from vftcli.doctor import examine
 from vftcli.robots import load_robot
+from vftcli.signals.recording import Recording
 
 UR10E = load_robot("ur10e")
 ALL = (1, 2, 3, 4, 5, 6)
@@ -114,3 +115,35 @@ def test_a_load_that_is_picked_up_or_set_down_is_named(before: float, after: flo
     assert found.values["first_kg"] == pytest.approx(before, abs=0.2)
     assert found.values["last_kg"] == pytest.approx(after, abs=0.2)
     assert found.values["at_s"] == pytest.approx(6.0, abs=0.3)
+
+
+def test_an_effort_without_friction_is_no_measurement() -> None:
+    """The arm's own rigid-body torque, or its gravity alone; of `FRICTION` 4 N·m it has none."""
+    log = moving()
+    assert UR10E.torque_constant is not None
+    friction = FRICTION * np.tanh(log.require("dq") / 0.01) / UR10E.torque_constant
+    for current in (log.require("current") - friction, gravity(UR10E, log) / UR10E.torque_constant):
+        made = examine(replace(log, current=current), UR10E)
+        assert [finding.code for finding in made.refusals()] == ["no-friction-in-effort"]
+    frictionless = replace(UR10E, friction=())
+    made = examine(replace(log, current=log.require("current") - friction), frictionless)
+    assert made.warnings == ()
+
+
+def sampled_every(log: Recording, step: int) -> Recording:
+    """A log of which every so many samples are kept, straight lines between them."""
+    kept = log.t[::step]
+    between = {
+        name: np.stack([np.interp(log.t, kept, x[::step]) for x in getattr(log, name).T], axis=1)
+        for name in log.signals
+    }
+    return replace(log, **between)
+
+
+@pytest.mark.parametrize("step", [10, 25])
+def test_a_log_that_was_filled_up_by_straight_lines_is_named(step: int) -> None:
+    log = moving()
+    (found,) = [f for f in examine(sampled_every(log, step), UR10E).warnings
+                if f.code == "interpolated"]  # fmt: skip
+    assert found.values["rate_Hz"] == pytest.approx(125 / step)
+    assert "interpolated" not in {f.code for f in examine(log, UR10E).findings}

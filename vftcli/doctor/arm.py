@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.doctor.diagnosis import AMBIGUOUS, Cause, Diagnosis, diagnose
-from vftcli.doctor.effort import RANGE, case_of
+from vftcli.doctor.effort import RANGE, case_of, is_modelled
 from vftcli.doctor.findings import on_joints
 from vftcli.doctor.fit import (
     APART,
@@ -150,6 +150,9 @@ def explained(
 ) -> Iterator[Remark]:
     """The cause that was found, or that there is none; then what is left once it is put right."""
     healed = diagnosis.healed
+    if diagnosis.cause is None and is_modelled(healed, robot):
+        yield warning("no-friction-in-effort", robot=robot.name)
+        return
     if diagnosis.cause is not None:
         yield cause_remark(recording, diagnosis, diagnosis.cause)
     elif healed.gravity_range < RANGE:
