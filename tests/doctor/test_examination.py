@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_arms import moving
+from moving_arms import FRICTION, gravity, moving
 
 from vftcli.doctor import examine
 from vftcli.robots import load_robot
+from vftcli.signals.recording import Recording
 
 UR10E = load_robot("ur10e")
+ALL = (1, 2, 3, 4, 5, 6)
 
 
 def test_warnings_go_before_facts() -> None:
@@ -74,3 +76,74 @@ def test_a_clock_of_another_rate_refuses() -> None:
     log = moving()
     made = examine(replace(log, t=1.05 * log.t), UR10E)
     assert [finding.code for finding in made.refusals()] == ["clock-rate"]
+
+
+@pytest.mark.parametrize(("factor", "joints"), [(0.8, ALL), (1.3, ALL), (0.8, (2,)), (1.25, (3,))])
+def test_drives_of_another_size_are_named_with_their_factor(
+    factor: float, joints: tuple[int, ...]
+) -> None:
+    """The model is the log's own: windows of 0.3 s leave .01 of a factor open."""
+    log = moving()
+    scale = np.ones(6)
+    scale[[j - 1 for j in joints]] = factor
+    made = examine(replace(log, current=log.require("current") * scale), UR10E)
+    (found,) = made.warnings
+    assert (found.code, found.where.joints) == ("drive-scale", joints)
+    assert found.values["factor"] == pytest.approx(factor, abs=0.01)
+    assert made.refusals() == ()
+
+
+def test_a_load_is_no_factor() -> None:
+    assert [f.code for f in examine(moving(load=3.0), UR10E).warnings] == ["unmodelled-load"]
+
+
+def test_another_generation_is_no_factor() -> None:
+    """A UR10e beside a UR10's model: the ratio of their masses explains most of it too."""
+    codes = [finding.code for finding in examine(moving(), load_robot("ur10")).warnings]
+    assert codes == ["other-robot"]
+
+
+@pytest.mark.parametrize(("before", "after"), [(0.0, 1.5), (2.0, 0.0)])
+def test_a_load_that_is_picked_up_or_set_down_is_named(before: float, after: float) -> None:
+    """To a tenth of the 2 kg: the fit weighs a load and leaves its inertia out."""
+    first, last = moving(load=before), moving(load=after)
+    half = (first.t < 6.0)[:, None]
+    current = np.where(half, first.require("current"), last.require("current"))
+    made = examine(replace(first, current=current), UR10E)
+    (found,) = made.warnings
+    assert found.code == "load-changes"
+    assert found.values["first_kg"] == pytest.approx(before, abs=0.2)
+    assert found.values["last_kg"] == pytest.approx(after, abs=0.2)
+    assert found.values["at_s"] == pytest.approx(6.0, abs=0.3)
+
+
+def test_an_effort_without_friction_is_no_measurement() -> None:
+    """The arm's own rigid-body torque, or its gravity alone; of `FRICTION` 4 N·m it has none."""
+    log = moving()
+    assert UR10E.torque_constant is not None
+    friction = FRICTION * np.tanh(log.require("dq") / 0.01) / UR10E.torque_constant
+    for current in (log.require("current") - friction, gravity(UR10E, log) / UR10E.torque_constant):
+        made = examine(replace(log, current=current), UR10E)
+        assert [finding.code for finding in made.refusals()] == ["no-friction-in-effort"]
+    frictionless = replace(UR10E, friction=())
+    made = examine(replace(log, current=log.require("current") - friction), frictionless)
+    assert made.warnings == ()
+
+
+def sampled_every(log: Recording, step: int) -> Recording:
+    """A log of which every so many samples are kept, straight lines between them."""
+    kept = log.t[::step]
+    between = {
+        name: np.stack([np.interp(log.t, kept, x[::step]) for x in getattr(log, name).T], axis=1)
+        for name in log.signals
+    }
+    return replace(log, **between)
+
+
+@pytest.mark.parametrize("step", [10, 25])
+def test_a_log_that_was_filled_up_by_straight_lines_is_named(step: int) -> None:
+    log = moving()
+    (found,) = [f for f in examine(sampled_every(log, step), UR10E).warnings
+                if f.code == "interpolated"]  # fmt: skip
+    assert found.values["rate_Hz"] == pytest.approx(125 / step)
+    assert "interpolated" not in {f.code for f in examine(log, UR10E).findings}

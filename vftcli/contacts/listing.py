@@ -46,6 +46,9 @@ FINE = 0.008
 SHORTEST = 0.5
 """A log shorter than this tells no contact. [s]"""
 
+SLOWEST = 10.0
+"""Rate below which pushes of some tenths of a second lie between two samples. [Hz]"""
+
 FALSE_MARGIN = 1.5
 """A contact's evidence must be this much above that of any row in the log's own free part."""
 
@@ -105,11 +108,17 @@ def check_finite(run: ModelledRun) -> None:
 
 
 def check_length(recording: Recording) -> None:
-    """Raise unless a log is longer than what its observer takes to settle.
+    """Raise unless a log is longer than its observer takes to settle, and fast enough.
 
     Raises:
         ParameterError: If it is not.
     """
+    if recording.median_step * SLOWEST > 1:
+        raise ParameterError(
+            f"{recording.name} has {1 / recording.median_step:.2g} samples a second; below "
+            f"{SLOWEST:g} a contact comes and goes between them, and nobody can tell whether "
+            "there was one: record faster"
+        )
     if recording.duration < SHORTEST:
         raise ParameterError(
             f"{recording.name} lasts {recording.duration:.2g} s; of less than {SHORTEST:g} s "

@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.doctor.diagnosis import AMBIGUOUS, Cause, Diagnosis, diagnose
-from vftcli.doctor.effort import RANGE, case_of
+from vftcli.doctor.effort import RANGE, case_of, is_modelled
 from vftcli.doctor.findings import on_joints
 from vftcli.doctor.fit import (
     APART,
     GUESSED,
-    HEAVY,
     RobotMatch,
     is_judgeable,
     maker_case,
@@ -39,6 +38,8 @@ DOUBTFUL = 0.15
 """Misfit from which other arms are compared."""
 ANOTHER = 0.6
 """Share of the misfit that another profile may leave to be the log's own."""
+GENERATION = 1.5
+"""A load from which another generation of the arm is looked at first. [kg]"""
 MISTAKEN = 0.1
 """Misfit up to which a cause is believed where nobody said which arm it is."""
 
@@ -117,7 +118,7 @@ def of_known_arm(recording: Recording, robot: Robot, ignored: Sequence[int]) -> 
 def is_doubtful(diagnosis: Diagnosis) -> bool:
     """Whether another arm may explain a log better."""
     case = diagnosis.case
-    heavy = case.carries_load and case.loaded.values[0] > HEAVY / 2
+    heavy = case.carries_load and case.loaded.values[0] > GENERATION
     refuted = diagnosis.cause is not None and diagnosis.cause.code != "effort-offset"
     return bool(case.misfit > DOUBTFUL or heavy or refuted)
 
@@ -126,8 +127,10 @@ def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
     """Whether a log is another profile's: no load, contact or other cause explains it as well."""
     if other.by_maker:
         return other.misfit < GUESSED and own.misfit > APART * other.misfit
-    lighter = own.load > other.load + HEAVY / 2
-    share = 1 / AMBIGUOUS if lighter else ANOTHER
+    if diagnosis.cause is not None and diagnosis.cause.code == "drive-scale" and not other.load:
+        share = AMBIGUOUS  # a factor disguises another generation's masses as a load does
+    else:
+        share = 1 / AMBIGUOUS if own.load > other.load + GENERATION else ANOTHER
     return other.fits and other.misfit < share * diagnosis.healed.misfit
 
 
@@ -147,6 +150,9 @@ def explained(
 ) -> Iterator[Remark]:
     """The cause that was found, or that there is none; then what is left once it is put right."""
     healed = diagnosis.healed
+    if diagnosis.cause is None and is_modelled(healed, robot):
+        yield warning("no-friction-in-effort", robot=robot.name)
+        return
     if diagnosis.cause is not None:
         yield cause_remark(recording, diagnosis, diagnosis.cause)
     elif healed.gravity_range < RANGE:
@@ -227,6 +233,8 @@ def cause_remark(recording: Recording, diagnosis: Diagnosis, cause: Cause) -> Re
         }
     if cause.code == "milliamperes" and recording.current is not None:
         values = {"typical_A": float(np.percentile(np.abs(recording.current), 99))}
+    if cause.code == "drive-scale":
+        values |= {"factor": cause.factor, "sd": cause.sd}
     if cause.code == "effort-offset":
         values |= {"offset_Nm": cause.offset, "sd_Nm": cause.sd}
     return warning(cause.code, on_joints(cause.joints), **values)

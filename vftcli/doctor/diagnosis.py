@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.doctor.case import Case
+from vftcli.doctor.drives import scales
 from vftcli.doctor.effort import CLEAR, RANGE, Reading, readings
 from vftcli.doctor.gravity import TILTED, Vertical, vertical_of
 from vftcli.doctor.order import SUSPECT, crossed_rests
@@ -61,7 +62,8 @@ class Cause(NamedTuple):
         case: The log with it put right.
         vertical: The gravity that was fitted, where that is the cause.
         offset: The constant that was fitted, where that is the cause. [N·m]
-        sd: Its standard deviation. [N·m]
+        sd: Standard deviation of that, or of the factor. [N·m or 1]
+        factor: What the effort is multiplied with, where that is the cause.
     """
 
     code: str
@@ -70,6 +72,7 @@ class Cause(NamedTuple):
     vertical: Vertical | None = None
     offset: float = 0.0
     sd: float = 0.0
+    factor: float = 1.0
 
     @property
     def misfit(self) -> float:
@@ -118,6 +121,11 @@ def diagnose(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
         *turned_or_swapped(case),
     ]
     found += offset_joint(case)
+    if case.gravity_range >= RANGE:
+        found += [
+            Cause("drive-scale", scale.joints, scale.healed, sd=scale.sd, factor=scale.factor)
+            for scale in scales(case)
+        ]
     best = min((cause.misfit for cause in found), default=np.inf)
     plain = any(is_plain(case, cause) for cause in found)
     open_still = best > GOOD or (best > EXPLAINED * case.misfit and not plain)

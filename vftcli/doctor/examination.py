@@ -26,7 +26,7 @@ REFUSING = NO_FIT | {
     "current-as-torque", "torque-as-current", "milliamperes",
     "current-as-turned-torque", "torque-as-turned-current",
     "upside-down", "tilted-base", "time-unit", "clock-rate",
-    "velocity-unit", "velocity-of-another-kind", "velocity-sign",
+    "velocity-unit", "velocity-of-another-kind", "velocity-sign", "no-friction-in-effort",
 }  # fmt: skip
 """Findings that make every result meaningless. A load or a contact is never one of them."""
 

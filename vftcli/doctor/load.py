@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 
 from vftcli.doctor.case import Case
+from vftcli.doctor.effort import RANGE
 from vftcli.doctor.findings import on_joints
+from vftcli.doctor.robust import RobustFit, solve
 from vftcli.robots import Robot
 from vftcli.robots.drive import gain_sd
 from vftcli.signals.arrays import Array, Mask
@@ -35,6 +37,14 @@ SURE = 4.0
 """Standard deviations that a load has to be."""
 EXPLAINED, PARTLY = 0.5, 0.8
 """Share of the misfit that such loads may leave."""
+CHANGED, CHANGE = 0.6, 0.7
+"""Share of the misfit that a load which changes may leave, and by how much it must [-, kg].
+
+Sound logs leave .7 and more, pushes of some seconds among them; 1.5 kg picked up half-way .2–.6.
+"""
+HALVES, BETWEEN = 0.9, (1 / 3, 2 / 3)
+"""Share that a change in the middle must leave for others to be tried, and between which shares of
+the log: what lasts for less than a third of it may be a push."""
 DECLARED = 0.1
 """A declared payload, or a difference from the mounted one, that is none. [kg]"""
 RATIO = 0.05
@@ -81,6 +91,9 @@ def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Rem
         robot: The arm with what its file mounts.
         case: The log against it, whatever else is wrong put right.
     """
+    if (changed := load_change(case)) is not None:
+        yield changed
+        return
     mass, sd = float(case.loaded.values[0]), float(case.loaded.sd[0])
     if not case.carries_load or mass < max(HAND, SURE * sd) or not case.lasts(case.loaded):
         return
@@ -99,6 +112,39 @@ def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Rem
         yield warning("unmodelled-load", **values)
     elif share < PARTLY:
         yield caution("light-load", **values)
+
+
+def load_change(case: Case) -> Remark | None:
+    """The finding that a load is picked up or set down along the log, None without one."""
+    count, gravity = len(case.given), case.windows.gravity @ case.up
+    if with_two_loads(case, count // 2).size > HALVES * case.loaded.size:
+        return None
+    tried = {int(k): with_two_loads(case, int(k)) for k in np.linspace(*BETWEEN, 7) * count}
+    split = min(tried, key=lambda k: tried[k].size)
+    fit = tried[split]
+    before, after = fit.values[0], fit.values[4]
+    sd = float(np.hypot(fit.sd[0], fit.sd[4]))
+    # In one pose any residual passes for a load.
+    varied = min(np.ptp(part, axis=0).max() for part in (gravity[:split], gravity[split:]))
+    if fit.size > CHANGED * case.loaded.size or varied < RANGE:
+        return None
+    if abs(after - before) < max(CHANGE, SURE * sd):
+        return None
+    return warning(
+        "load-changes",
+        first_kg=float(before),
+        last_kg=float(after),
+        sd_kg=sd,
+        at_s=float(case.windows.t[split, 0]),
+    )
+
+
+def with_two_loads(case: Case, split: int) -> RobustFit:
+    """What friction, a load before a window and another from it on leave over."""
+    load, late = case.windows.load, np.arange(len(case.given)) >= split
+    parts = [load._replace(columns=load.columns * mask[:, None, None]) for mask in (~late, late)]
+    both = parts[0].beside(parts[1])
+    return solve(case.given - case.needed, both.beside(case.friction))
 
 
 def declared_payload(recording: Recording, robot: Robot) -> Iterator[Remark]:

@@ -1,13 +1,14 @@
 """Findings about the signals: what is missing, units and signs; and those of their own files."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.doctor.findings import on_joints
 from vftcli.doctor.stuck import stuck_findings
 from vftcli.doctor.velocity import VelocityFit, velocity_findings
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
@@ -29,6 +30,11 @@ STEPS = (1e-13, 1e10)
 """Sample times between which every recorder's lies, read in whatever unit. [s]"""
 SOME = 5000
 """Samples that tell how large a signal usually is."""
+STRAIGHT, BEND, MOVED = 0.6, 1e-3, 0.1
+"""Share of the samples at which a signal runs straight on, from which it is interpolated; change of
+its slope that is none, relative to it; and share of values that have to change to judge by.
+
+No measured effort runs straight: its noise bends it at nearly every sample."""
 LARGE_ANGLE = 13.0
 """Two turns and a little: no joint of these arms goes further from its zero. [rad]"""
 LARGE_CURRENT = 60.0
@@ -62,6 +68,7 @@ def signal_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[R
     if all(getattr(recording, name) is None for name in EFFORTS):
         yield warning("no-effort")
     yield from odd_units(recording)
+    yield from interpolated(recording)
     yield from velocity_findings(recording, fit)
     yield from stuck_findings(recording)
 
@@ -77,6 +84,47 @@ def odd_units(recording: Recording) -> Iterator[Remark]:
         typical = float(np.quantile(np.abs(thinned), 0.99))
         if typical > LARGE_CURRENT:
             yield warning("milliamperes", typical_A=typical)
+
+
+def interpolated(recording: Recording) -> Iterator[Remark]:
+    """Positions and effort that run straight between the few samples that were measured."""
+    if (effort := effort_of(recording)) is None:
+        return
+    middle = slice(max(0, (recording.samples - SOME) // 2), (recording.samples + SOME) // 2)
+    t = recording.t[middle]
+    bends = [bends_of(t, value[middle]) for value in (recording.q, effort[1])]
+    if min(bend.straight for bend in bends) < STRAIGHT:
+        return
+    knots = t[1:-1][bends[1].rows]
+    if len(knots) > 2:
+        yield warning(
+            "interpolated",
+            rate_Hz=1 / float(np.median(np.diff(knots))),
+            logged_Hz=1 / recording.median_step,
+        )
+
+
+class Bends(NamedTuple):
+    """Where a signal's columns bend.
+
+    Attributes:
+        straight: Share of the samples at which moving columns do not; 0 where hardly one moves.
+        rows: Whether any column bends at a sample, from the second to the last but one. (T - 2,)
+    """
+
+    straight: float
+    rows: Mask
+
+
+def bends_of(t: Array, value: Array) -> Bends:
+    """Where a signal's columns bend. (T, n)"""
+    slope = np.diff(value, axis=0) / np.diff(t)[:, None]
+    size = np.abs(slope[1:]) + np.abs(slope[:-1])
+    bent = np.abs(np.diff(slope, axis=0)) > BEND * size
+    moves = (slope[1:] != 0) & (slope[:-1] != 0)
+    enough = moves.sum() > MOVED * moves.size
+    straight = float(np.mean(~bent[moves])) if enough else 0.0
+    return Bends(straight, np.asarray((bent & moves).any(axis=1)))
 
 
 def work_shares(recording: Recording, effort: Array) -> Array:

@@ -9,7 +9,7 @@ from vftcli.signals.remarks import Remark
 
 SUBJECTS = {
     "load": ("unmodelled-load", "light-load", "payload-mismatch", "payload-mismatch-untold",
-             "payload-not-mounted", "payload-differs"),
+             "payload-not-mounted", "payload-differs", "load-changes"),
     "robot": ("other-robot", "no-robot-fits", "no-robot-fits-any", "no-robot-fits-at-rest",
               "no-profile"),
     "clock": ("time-unit", "clock-rate", "slow-rate", "gaps", "repeated-stamps", "clock-gaps",
@@ -27,7 +27,7 @@ SUBJECTS = {
 }  # fmt: skip
 """Subject → the findings that are about it; any other is about the drives' effort."""
 
-LOADS = frozenset(SUBJECTS["load"]) - {"payload-not-mounted"} | {"contact-is-load"}
+LOADS = frozenset(SUBJECTS["load"]) - {"payload-not-mounted", "load-changes"} | {"contact-is-load"}
 """Findings that ``--find-payload`` answers."""
 
 
