@@ -58,10 +58,25 @@ def test_the_first_and_last_samples_count_like_all_others() -> None:
     assert min(sizes) > 0.0
 
 
-def test_stretches_shorter_than_a_segment_do_not_count() -> None:
-    long = np.random.default_rng(3).standard_normal((1000, 2))
-    alone, count = welch([long], SIZE, STEP)
-    both, again = welch([long, np.full((SIZE - 1, 2), 1e3)], SIZE, STEP)
-    assert np.array_equal(alone, both)
-    # mirrored by half a segment at either end: 1200 samples hold 11 segments, 100 apart
-    assert count == again == 11
+def test_a_stretch_counts_by_its_length() -> None:
+    """White noise of 1 and of 3: the mean square is that of all samples, short stretches too."""
+    rng = np.random.default_rng(3)
+    quiet, loud = rng.standard_normal((1000, 1)), 3.0 * rng.standard_normal((5, SIZE - 1, 1))
+    power, count = welch([quiet, *loud], SIZE, STEP)
+    whole = np.sum(power) / (SIZE * STEP)
+    mean = np.mean(np.concatenate([quiet, *loud]) ** 2)
+    # mirrored ends count twice in one segment of three: a few percent of white noise
+    assert whole == pytest.approx(mean, rel=0.1)
+    # mirrored by half a segment at either end, in steps of 100: 11 segments of 1200 samples, and
+    # three of each 399
+    assert count == 11 + 5 * 3
+
+
+def test_a_stretch_that_breaks_in_two_says_the_same() -> None:
+    """One bad sample in the longest stretch left all to the next longest, a fifth as loud."""
+    rng = np.random.default_rng(3)
+    loud, quiet = 5.0 * rng.standard_normal((SIZE + 10, 1)), rng.standard_normal((SIZE + 5, 1))
+    whole, _ = welch([loud, quiet], SIZE, STEP)
+    broken, _ = welch([loud[:100], loud[101:], quiet], SIZE, STEP)
+    # what the chance of white noise leaves between two ways to cut 2 s of it
+    assert np.sum(broken) == pytest.approx(np.sum(whole), rel=0.15)

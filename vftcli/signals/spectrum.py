@@ -17,11 +17,11 @@ def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, in
 
     Nothing is detrended; the density at 0 Hz holds the square of the mean. Each stretch is
     mirrored at its ends by half a segment, so that its first and last samples count like all
-    others: a free part is often no longer than a segment.
+    others: a free part is often no longer than a segment. A stretch counts by its length, a short
+    one too: no sample that breaks a long one in two leaves the rest to speak for all.
 
     Args:
-        stretches: Unbroken pieces on one uniform clock, one of them at least a segment long.
-            (N, n) each
+        stretches: Unbroken pieces on one uniform clock. (N, n) each
         size: Samples of a segment, even.
         step: Sample time. [s]
 
@@ -33,16 +33,17 @@ def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, in
     joints = stretches[0].shape[1]
     power, count = np.zeros((joints, size // 2 + 1)), 0
     for stretch in stretches:
-        if len(stretch) < size:
+        if not len(stretch):
             continue
         columns = np.pad(stretch, ((size // 2, size // 2), (0, 0)), mode="symmetric").T
         last = columns.shape[1] - size
-        for first in np.linspace(0, last, 1 + -(-last // (size // 2))).astype(int):
+        starts = np.linspace(0, last, 1 + -(-last // (size // 2))).astype(int)
+        share = len(stretch) / (sum(map(len, stretches)) * len(starts))
+        for first in starts:
             spectrum = np.fft.rfft(columns[:, first : first + size] * window)
-            power += spectrum.real**2
-            power += spectrum.imag**2
-            count += 1
-    power *= 2.0 * step / (float(np.sum(window**2)) * count)
+            power += share * (spectrum.real**2 + spectrum.imag**2)
+        count += len(starts)
+    power *= 2.0 * step / float(np.sum(window**2))
     # The density is one-sided: every frequency stands for its negative too, but 0 and Nyquist's.
     power[:, [0, -1]] *= 0.5
     return np.ascontiguousarray(power.T), count
