@@ -58,25 +58,25 @@ def test_the_first_and_last_samples_count_like_all_others() -> None:
     assert min(sizes) > 0.0
 
 
-def test_a_stretch_counts_by_its_length() -> None:
-    """White noise of 1 and of 3: the mean square is that of all samples, short stretches too."""
+def test_a_stretch_counts_by_its_length_and_by_what_it_fills_of_a_segment() -> None:
+    """White noise of 1 and of 3: 1000 samples, and five times 100 that fill half a segment."""
     rng = np.random.default_rng(3)
-    quiet, loud = rng.standard_normal((1000, 1)), 3.0 * rng.standard_normal((5, SIZE - 1, 1))
+    quiet, loud = rng.standard_normal((1000, 1)), 3.0 * rng.standard_normal((5, SIZE // 2, 1))
     power, count = welch([quiet, *loud], SIZE, STEP)
-    whole = np.sum(power) / (SIZE * STEP)
-    mean = np.mean(np.concatenate([quiet, *loud]) ** 2)
-    # mirrored ends count twice in one segment of three: a few percent of white noise
-    assert whole == pytest.approx(mean, rel=0.1)
+    mean = (1000 * np.mean(quiet**2) + 250 * np.mean(loud**2)) / 1250
+    # Hann's window weighs chance: a tenth of the variance of some hundred samples
+    assert np.sum(power) / (SIZE * STEP) == pytest.approx(mean, rel=0.1)
     # mirrored by half a segment at either end, in steps of 100: 11 segments of 1200 samples, and
-    # three of each 399
-    assert count == 11 + 5 * 3
+    # two of each 300
+    assert count == 11 + 5 * 2
 
 
-def test_a_stretch_that_breaks_in_two_says_the_same() -> None:
+def test_a_stretch_that_breaks_in_two_still_speaks() -> None:
     """One bad sample in the longest stretch left all to the next longest, a fifth as loud."""
     rng = np.random.default_rng(3)
     loud, quiet = 5.0 * rng.standard_normal((SIZE + 10, 1)), rng.standard_normal((SIZE + 5, 1))
-    whole, _ = welch([loud, quiet], SIZE, STEP)
     broken, _ = welch([loud[:100], loud[101:], quiet], SIZE, STEP)
-    # what the chance of white noise leaves between two ways to cut 2 s of it
-    assert np.sum(broken) == pytest.approx(np.sum(whole), rel=0.15)
+    halves = 100 * 0.5 + 109 * 0.545
+    mean = (halves * np.mean(loud**2) + len(quiet) * np.mean(quiet**2)) / (halves + len(quiet))
+    # Hann's window weighs chance: a tenth of the variance of some hundred samples
+    assert np.sum(broken) / (SIZE * STEP) == pytest.approx(mean, rel=0.1)
