@@ -88,6 +88,8 @@ def test_what_takes_positions_or_a_sensor_is_refused(tmp_path: Path) -> None:
         judge_jacobian(log, WrenchChoice(), "zero")
     with pytest.raises(ParameterError, match="holds no sample"):
         judged(log, (90.0, 91.0))
+    with pytest.raises(ParameterError, match="--zero 90: holds no sample"):
+        judged(log, (90.0, np.inf))
     with pytest.raises(MissingSignalError, match="no wrench of a sensor"):
         judged(opened(made_log(tmp_path, lost="fx")))
 

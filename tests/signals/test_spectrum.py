@@ -58,10 +58,25 @@ def test_the_first_and_last_samples_count_like_all_others() -> None:
     assert min(sizes) > 0.0
 
 
-def test_stretches_shorter_than_a_segment_do_not_count() -> None:
-    long = np.random.default_rng(3).standard_normal((1000, 2))
-    alone, count = welch([long], SIZE, STEP)
-    both, again = welch([long, np.full((SIZE - 1, 2), 1e3)], SIZE, STEP)
-    assert np.array_equal(alone, both)
-    # mirrored by half a segment at either end: 1200 samples hold 11 segments, 100 apart
-    assert count == again == 11
+def test_a_stretch_counts_by_its_length_and_by_what_it_fills_of_a_segment() -> None:
+    """White noise of 1 and of 3: 1000 samples, and five times 100 that fill half a segment."""
+    rng = np.random.default_rng(3)
+    quiet, loud = rng.standard_normal((1000, 1)), 3.0 * rng.standard_normal((5, SIZE // 2, 1))
+    power, count = welch([quiet, *loud], SIZE, STEP)
+    mean = (1000 * np.mean(quiet**2) + 250 * np.mean(loud**2)) / 1250
+    # Hann's window weighs chance: a tenth of the variance of some hundred samples
+    assert np.sum(power) / (SIZE * STEP) == pytest.approx(mean, rel=0.1)
+    # mirrored by half a segment at either end, in steps of 100: 11 segments of 1200 samples, and
+    # two of each 300
+    assert count == 11 + 5 * 2
+
+
+def test_a_stretch_that_breaks_in_two_still_speaks() -> None:
+    """One bad sample in the longest stretch left all to the next longest, a fifth as loud."""
+    rng = np.random.default_rng(3)
+    loud, quiet = 5.0 * rng.standard_normal((SIZE + 10, 1)), rng.standard_normal((SIZE + 5, 1))
+    broken, _ = welch([loud[:100], loud[101:], quiet], SIZE, STEP)
+    halves = 100 * 0.5 + 109 * 0.545
+    mean = (halves * np.mean(loud**2) + len(quiet) * np.mean(quiet**2)) / (halves + len(quiet))
+    # Hann's window weighs chance: a tenth of the variance of some hundred samples
+    assert np.sum(broken) / (SIZE * STEP) == pytest.approx(mean, rel=0.1)

@@ -12,6 +12,7 @@ from vftcli.readers.jacobian import JacobianLog
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
@@ -141,6 +142,7 @@ def unloaded(log: JacobianLog, values: Array, zero: ZeroChoice) -> Array:
     start, stop = zero.spans[0]
     inside = (log.t >= start) & (log.t <= stop)
     if not inside.any():
-        raise ParameterError(f"{log.name}: --zero {start:g}:{stop:g} holds no sample of the log")
+        where = interval_text(start, stop)
+        raise ParameterError(f"{log.name}: --zero {where} holds no sample of the log")
     less: Array = values - values[inside].mean(axis=0)
     return less

@@ -52,8 +52,8 @@ def stated_band(found: Baseline, reading: FreeReading) -> Array:
 
     Friction is as wrong as is usual, by a fifth (`model_error.expected_error`); where a bias was
     fitted it is what that leaves of it, and what is read where its fit sees no contact. What the
-    gains leave out of the torque is not known. In a log of a few samples, or with a gap that no
-    filter runs across, a moving joint has `UNSEEN` of its dry friction.
+    gains leave out of the torque is not known. In a log of a few samples, or of hardly anything but
+    gaps, a moving joint has `UNSEEN` of its dry friction.
 
     Returns:
         Standard deviation. (T, n) [N·m]
@@ -66,12 +66,12 @@ def stated_band(found: Baseline, reading: FreeReading) -> Array:
         called = free_error(fitted.samples, fitted.resting, friction)
         return handed_over(error_band(called, nothing, run.rests, off.sd))
     held = FreeError(nothing, (HELD * friction) ** 2, unseen=nothing > 0.0)
-    t = run.recording.t
     try:
-        motion, stride = smooth_motion(run), stride_of(t)
+        motion = smooth_motion(run)
     except ClockError:
         usual = held._replace(moving=(UNSEEN * friction) ** 2)
         return handed_over(error_band(usual, nothing, run.rests))
+    t, stride = motion.t, stride_of(motion.t)
     spread = expected_spread(run, motion, friction_alone(run.robot), stride)
     sd = resample_columns(t, t[::stride], spread)
     return handed_over(error_band(held, nothing, run.rests, sd))

@@ -35,7 +35,7 @@ class Baseline:
     """What a log shows of itself before any observer has run.
 
     Attributes:
-        motion: The log and its free motion.
+        motion: The log and its free motion, without samples that stand alone.
         part: Its free part, None where there is none.
         spectra: Spectra of the raw disturbance, None where the free part is too short or not free.
         standing: Where a joint stands still. (T, n)
@@ -71,7 +71,13 @@ class Baseline:
         return self.best if name == BEST and self.best is not None else self
 
     def terms_of(self, run: ModelledRun) -> DynamicsTerms:
-        """P and μ of the log or of one of its free runs, the correction off. Made once."""
+        """P and μ of the log or of one of its free runs, as this baseline has them. Made once.
+
+        Where a correction was looked for, an observer has no samples that stand alone either.
+        """
+        if not self.on_correction:
+            return run.terms
+        run = run.steadied
         if self.correction is None:
             return run.terms
         if run not in self._made:

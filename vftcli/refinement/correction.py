@@ -32,6 +32,7 @@ def baseline_for(motion: FreeMotion, choice: RefinementChoice, *, best: bool) ->
     Raises:
         ParameterError: If a span that is given as free holds no samples of the log, or all.
     """
+    motion, as_read = motion.steadied, motion.log
     found = baseline_of(motion)
     if choice.at_phase:
         return without_free_motion(found)
@@ -45,6 +46,9 @@ def baseline_for(motion: FreeMotion, choice: RefinementChoice, *, best: bool) ->
     if found.spectra is None and bias.fitted:
         found = on_quiet_samples(found, bias.free)
     made = corrected(found, bias)
+    if motion.log is not as_read:
+        evened = motion.log.recording.source.remarks[-1:]
+        made = replace(made, on_correction=(*evened, *made.on_correction))
     return made if choice.corrects_all else replace(found, best=made)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.chain import Chain
+from vftcli.robots.disturbance import GAP
 from vftcli.robots.friction import dry_friction, steady_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
 from vftcli.robots.presliding import play
@@ -27,6 +28,7 @@ from vftcli.robots.regressor import (
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.filters import derivative, zero_phase
+from vftcli.signals.series import median_step
 
 CUTOFF = 6.0
 """What is faster is noise, or contact: the model's error follows the motion. [Hz]"""
@@ -36,6 +38,9 @@ PLAY = 0.3e-3
 
 SMOOTHING = 0.003
 """Velocity over which its sign turns. [rad/s]"""
+
+WAIT = 1.0
+"""A clock that waits longer counts as waiting so long: six times the period of `CUTOFF`. [s]"""
 
 SHAPES = 5
 """Columns of friction a joint beside its offset."""
@@ -48,7 +53,7 @@ class SmoothMotion(NamedTuple):
     """A log's motion without what is faster than `CUTOFF`, and the rigid body's torque of it.
 
     Attributes:
-        t: Clock. (T,) [s]
+        t: Clock without long waits. (T,) [s]
         q: Positions. (T, n) [rad]
         dq: Velocities. (T, n) [rad/s]
         ddq: Accelerations. (T, n) [rad/s²]
@@ -70,11 +75,24 @@ def smooth_motion(run: ModelledRun) -> SmoothMotion:
     Raises:
         ClockError: If the recording is shorter than two periods of `CUTOFF`.
     """
-    t, n = run.recording.t, run.recording.joints
+    t, n = without_waits(run.recording.t), run.recording.joints
     both = zero_phase(t, np.hstack([run.recording.q, run.recording.require("dq")]), CUTOFF)
     q, dq = both[:, :n], both[:, n:]
     rigid, gravity = rigid_torque(run.robot.loaded_chain, t, q, dq)
     return SmoothMotion(t, q, dq, derivative(t, dq), gravity, rigid)
+
+
+def without_waits(t: Array) -> Array:
+    """A clock that waits no longer than `WAIT`; itself where it does not. (T,) [s]
+
+    What was between is not known: a filter that fills an hour with a line takes minutes for it, and
+    a load that changes slowly had all the time to do so.
+    """
+    steps = np.diff(t)
+    longest = max(WAIT, GAP * median_step(t)) if len(t) > 1 else WAIT
+    if not np.any(steps > longest):
+        return t
+    return np.asarray(t[0] + np.concatenate([[0.0], np.cumsum(np.minimum(steps, longest))]))
 
 
 def rigid_torque(chain: Chain, t: Array, q: Array, dq: Array) -> tuple[Array, Array]:

@@ -20,6 +20,7 @@ from vftcli.refinement.model_error import (
     friction_alone,
     smooth_motion,
     usual_friction,
+    without_waits,
 )
 from vftcli.refinement.normal_equations import Rows
 from vftcli.refinement.robust_fit import WholeLogFit, fit_robustly
@@ -127,7 +128,8 @@ def whole_log_bias(run: ModelledRun) -> WholeLogBias:
         MissingSignalError: If velocities, or both currents and torques, are missing.
         RobotError: If the number of joints differs.
     """
-    terms, t = run.terms, run.recording.t
+    run = run.steadied
+    terms = run.terms
     span, refused = motion_of(run)
     if refused is not None:
         return untouched(terms, refused)
@@ -135,10 +137,11 @@ def whole_log_bias(run: ModelledRun) -> WholeLogBias:
     # What no arm does overflows, and is refused.
     with np.errstate(all="ignore"):
         try:
-            motion, stride = smooth_motion(run), stride_of(t)
+            motion = smooth_motion(run)
+            stride = stride_of(motion.t)
             fit = fit_robustly(
                 rows_of(run, motion, expected, stride),
-                stride * median_step(t),
+                stride * median_step(motion.t),
                 usual_friction(run.robot).dry,
             )
             tried = guarded(fit, motion.dq[::stride])
@@ -174,7 +177,7 @@ def weight_of_friction(fit: WholeLogFit, tried: Guarded) -> Array:
 
 def rows_of(run: ModelledRun, motion: SmoothMotion, expected: ModelError, stride: int) -> Rows:
     """What is fitted: every so many samples of the log."""
-    t, terms = run.recording.t, run.terms
+    t, terms = motion.t, run.terms
     d = zero_phase(t, derivative(t, terms.p) - terms.mu, CUTOFF)
     return Rows(
         columns=error_columns(run, motion, expected, stride),
@@ -185,7 +188,7 @@ def rows_of(run: ModelledRun, motion: SmoothMotion, expected: ModelError, stride
 
 def motion_of(run: ModelledRun) -> tuple[float, Remark | None]:
     """How long a log moves from first to last [s], and why it tells no error of the model."""
-    t, dq = run.recording.t, run.recording.require("dq")
+    t, dq = without_waits(run.recording.t), run.recording.require("dq")
     duration = float(t[-1] - t[0])
     if duration < LEAST_FRICTION:
         short = caution("whole-log-too-short", duration_s=duration, least_s=LEAST_FRICTION)
@@ -232,7 +235,7 @@ def bias_of(
     stride: int,
 ) -> WholeLogBias:
     """The bias on the log's own clock, with its uncertainty and what is said of it."""
-    t, n = run.recording.t, run.robot.joints
+    t, n = motion.t, run.robot.joints
     free = fit.free[np.minimum((np.arange(len(t)) + stride // 2) // stride, len(fit.free) - 1)]
     load = handed_over(resample_columns(t, t[::stride], -fit.rows.loads.made_by(found.loads)))
     if found.solution is None:

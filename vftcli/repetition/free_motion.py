@@ -11,6 +11,7 @@ from vftcli.repetition.free_run import FreeRun, ModelledRun
 from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.identity import refuse_repeated_runs
+from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.shown import Shown
 
@@ -82,6 +83,21 @@ class FreeMotion(Shown):
         refuse_repeated_runs(self.log.recording, [run.recording for run in self.runs])
         if self.zero is not None:
             refuse_repeated_runs(self.log.recording, [self.zero.recording])
+
+    @property
+    def steadied(self) -> "FreeMotion":
+        """The motion without samples that stand alone; itself where there are none."""
+        log, zero = self.log.steadied, self.zero
+        runs = (*self.runs, *(() if zero is None else (zero,)))
+        if log is self.log and all(run.run is run.run.steadied for run in runs):
+            return self
+        made = [FreeRun(run=run.run.steadied, log=log) for run in runs]
+        return replace(
+            self,
+            log=log,
+            runs=tuple(made[: len(self.runs)]),
+            zero=None if zero is None else made[-1],
+        )
 
     @cached_property
     def period(self) -> "Period":
@@ -215,7 +231,7 @@ class FreeMotion(Shown):
             inside |= (t >= first) & (t <= last)
         if spans and (np.count_nonzero(inside) < 2 or inside.all()):
             raise ParameterError(
-                f"{recording.name}: the free part {', '.join(f'{a:g}:{b:g}' for a, b in spans)} "
+                f"{recording.name}: the free part {', '.join(interval_text(*s) for s in spans)} "
                 f"holds {np.count_nonzero(inside)} of its {recording.samples} samples; it must be "
                 f"a part of the log, which runs from {t[0]:g} to {t[-1]:g} s"
             )

@@ -56,6 +56,14 @@ class ModelledRun(Shown):
         """Standard deviation of the white part of μ. (n,) [N·m]"""
         return white_noise(self.terms.mu)
 
+    @cached_property
+    def steadied(self) -> "ModelledRun":
+        """The run without samples that stand alone; itself where there are none."""
+        from vftcli.repetition.isolated import without_isolated
+
+        whole = without_isolated(self.recording)
+        return self if whole is self.recording else replace(self, recording=whole)
+
     def spare(self) -> None:
         """Of a long recording give back the terms: they are evaluated anew if they are asked for.
 
@@ -65,6 +73,8 @@ class ModelledRun(Shown):
         if self.recording.samples > LONG and "terms" in self.__dict__:
             _ = self.noise
             del self.__dict__["terms"]
+        if (steadied := self.__dict__.get("steadied", self)) is not self:
+            steadied.spare()
 
     @cached_property
     def rests(self) -> Mask:

@@ -8,6 +8,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import Remark, Where, fact, warning
 from vftcli.signals.series import runs_of
 from vftcli.signals.wrench import AXES, Wrench, unit_of
@@ -76,7 +77,7 @@ def zero_drift(wrench: Wrench, span: Span) -> Drift:
         ParameterError: If the span lies outside the log, or the pose cannot tell the wrench in it.
     """
     start, stop = max(span[0], float(wrench.t[0])), min(span[1], float(wrench.t[-1]))
-    where = f"zero interval {span[0]:g}:{span[1]:g}"
+    where = f"zero interval {interval_text(*span)}"
     if not start < stop:
         raise ParameterError(
             f"{where} lies outside the log, which runs from {wrench.t[0]:g} to {wrench.t[-1]:g} s"

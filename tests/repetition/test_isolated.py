@@ -1,0 +1,99 @@
+"""Samples that stand alone: drawn to their neighbours, and nothing that an arm or a tap does."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vftcli.repetition.isolated import without_isolated
+from vftcli.signals.recording import Recording
+
+STEP = 0.01
+ROWS = 1000
+
+
+def moving(noise: float = 0.05) -> Recording:
+    """10 s of two joints, the second at rest, with white noise in their torques [N·m]."""
+    t = STEP * np.arange(ROWS)
+    q = np.column_stack([np.sin(2.0 * t), np.full(ROWS, 0.3)])
+    dq = np.column_stack([2.0 * np.cos(2.0 * t), np.zeros(ROWS)])
+    torque = 10.0 * q + noise * np.random.default_rng(1).standard_normal(q.shape)
+    return Recording(t=t, q=q, dq=dq, torque=torque)
+
+
+def with_sample(log: Recording, signal: str, row: int, joint: int, off: float) -> Recording:
+    values = np.array(getattr(log, signal))
+    values[row, joint] += off
+    kept = {name: getattr(log, name) for name in ("t", "q", "dq", "torque")}
+    return Recording(**{**kept, signal: values})
+
+
+@pytest.mark.parametrize("row", [0, 1, 2, 400, ROWS - 2, ROWS - 1])
+@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize(
+    ("signal", "off", "left"),
+    # left: at an end a line of six samples misses 4 rad/s² by ½(3 Ts)² of it, 1.8 mrad, and its
+    # change by less than .01 rad/s; of the torque 6 sd of its noise
+    [("q", 2.0 * np.pi, 2e-3), ("q", -0.05, 2e-3), ("dq", 5.0, 1e-2), ("torque", 200.0, 0.3)],
+)
+def test_one_bad_sample_is_drawn_to_its_neighbours(signal, off, left, row, joint) -> None:
+    log = moving()
+    found = without_isolated(with_sample(log, signal, row, joint, off))
+    (said,) = found.source.remarks
+    assert (said.code, said.where.joints) == ("isolated-samples-evened", (joint + 1,))
+    assert said.values["samples"] == 1
+    for name in ("q", "dq", "torque"):
+        size = left if name == signal else 0.0
+        np.testing.assert_allclose(getattr(found, name), getattr(log, name), rtol=0, atol=size)
+
+
+def test_what_a_sample_is_worth_falls_back_without_a_jump() -> None:
+    """The larger a fault, the less is left of it; between two sizes next to each other no step."""
+    log, row = moving(), 400
+    sizes = np.linspace(0.0, 8.0, 401)
+    left = np.array(
+        [without_isolated(with_sample(log, "torque", row, 1, s)).torque[row, 1] for s in sizes]
+    )
+    left -= log.torque[row, 1]
+    # the sample follows the fault or goes back as fast; the fault itself moves the quantile little
+    assert np.max(np.abs(np.diff(left))) <= 1.1 * (sizes[1] - sizes[0])
+    assert left.max() > 0.5
+    assert abs(left[-1]) < 0.3  # 6 sd of the noise
+
+
+def test_a_sound_log_is_left_as_it_is() -> None:
+    log = moving()
+    assert without_isolated(log) is log
+
+
+@pytest.mark.parametrize("rows", [3, 6, 12])
+def test_a_tap_and_a_step_are_no_isolated_samples(rows: int) -> None:
+    """A half sine of 30, 60 or 120 ms, and a torque that jumps and stays."""
+    log = moving()
+    torque = np.array(log.torque)
+    torque[500 : 500 + rows, 0] += 30.0 * np.sin(np.pi * (np.arange(rows) + 0.5) / rows)
+    torque[700:, 1] += 5.0
+    there = Recording(t=log.t, q=log.q, dq=log.dq, torque=torque)
+    found = without_isolated(there)
+    np.testing.assert_allclose(found.torque, torque, rtol=0, atol=1e-12)
+
+
+def test_numbers_beyond_all_bounds_are_no_warning() -> None:
+    log = moving()
+    torque = np.array(log.torque)
+    torque[10:20] = 1e308
+    torque[30] = -np.inf
+    without_isolated(Recording(t=log.t, q=log.q, dq=log.dq, torque=torque))
+
+
+def test_the_one_odd_current_of_a_real_log_goes(logs: Path) -> None:
+    """Row 4 073 of free_14harm: 4.1 A on J3 between .3 A before and behind it."""
+    from vftcli.readers.library import Library
+    from vftcli.readers.reader import ReadChoice
+
+    columns = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
+    choice = ReadChoice.parsed(columns=columns)
+    (log,) = Library().open_each([logs / "ur10e" / "free_14harm.csv"], choice)
+    found = without_isolated(log)
+    assert np.count_nonzero(found.current != log.current) == 1
+    np.testing.assert_array_equal(found.q, log.q)
