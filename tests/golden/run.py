@@ -79,9 +79,9 @@ panda_bearing/compare vendor: compare LOG --reference vendor --json
 panda_bag/compare vendor: compare LOG --reference vendor --gains auto --json
 panda_bag/convert: convert fixtures/panda_bag -o out.parquet && {BACK}
 no_log/admit release: admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6 --json
-no_log/simulate circle: simulate ur5-circle --seed 2 --set duration=8 -o out.parquet
-no_log/simulate table1: simulate ur5-table1 --seed 5 --set duration=8 -o out.parquet
-no_log/simulate panda: simulate panda-bearing --seed 5 --set duration=4 -o out.parquet
+no_log/simulate circle: simulate ur5-circle --seed 2 --set duration=8 --as parquet -o out.parquet
+no_log/simulate table1: simulate ur5-table1 --seed 5 --set duration=8 --as parquet -o out.parquet
+no_log/simulate panda: simulate panda-bearing --seed 5 --set duration=4 --as parquet -o out.parquet
 refused/no file: inspect nothing.csv
 refused/no such robot: contacts fixtures/ur5_circle.csv --robot nobody
 refused/another robot: contacts fixtures/ur5_circle.csv --robot panda
@@ -144,7 +144,7 @@ def add_columns(file: Path, place: str, found: Leaves) -> None:
             y = np.where(np.isfinite(x), x, 0.0)
             whole = np.sqrt(np.mean(y**2)), np.mean(np.linspace(0, 1, len(y)) * y), abs(y).max()
             some = x[np.linspace(0, len(x) - 1, min(ROWS, len(x))).astype(int)]
-            add_tree([float(value) for value in (*whole, *some)], name, found)
+            found[name] = [float(f"{value:.{DIGITS}g}") for value in (*whole, *some)]
 
 
 def lines(text: str) -> list[str]:
@@ -161,7 +161,7 @@ def seen(commands: str) -> Leaves:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "fixtures").symlink_to(ROOT / "fixtures")
-        (folder / "logs").symlink_to(os.environ.get("VFT_LOGS", "none"))
+        (folder / "logs").symlink_to(os.environ.get("VFT_LOGS", HERE))  # asked for if it is set
         for number, command in enumerate(filter(None, commands.split(" && ")), 1):
             done = subprocess.run(
                 [sys.executable, "-m", "vftcli", *shlex.split(command)], cwd=folder,
