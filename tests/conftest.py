@@ -1,9 +1,14 @@
-"""Fixtures for all tests: the folders of real logs, or a skip that says why."""
+"""For all tests: the folders of real logs, or a skip that says why, and each test's processor time.
 
+`--cpu-limit` fails a test that takes longer and is not marked slow; `--cpu-record` keeps the times.
+"""
+
+import contextlib
+import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import pytest
@@ -12,6 +17,65 @@ from hypothesis import settings
 # How long an example takes tells how busy the machine is, not whether the code is right.
 settings.register_profile("steady", deadline=None)
 settings.load_profile("steady")
+
+BEGUN = pytest.StashKey[float]()
+
+LOADED_LATE = ("scipy.signal", "polars", "pinocchio", "rerun", "distributed", "matplotlib.figure")
+"""What vftcli imports late, .3 to 1.6 s each: charged to no test, whatever the order."""
+
+
+def cpu_time() -> float:
+    """Processor time of this process, its threads and its ended children [s], to 10 ms."""
+    return sum(os.times()[:4])
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the two options on processor time."""
+    parser.addoption(
+        "--cpu-limit",
+        type=float,
+        metavar="SECONDS",
+        help="fail a test that is not marked slow and uses more processor time, its setup included",
+    )
+    parser.addoption(
+        "--cpu-record",
+        type=Path,
+        metavar="FILE",
+        help="append `test<TAB>seconds of processor time`; a worker of xdist to FILE.WORKER",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Make the times those of the tests alone; their file is found from any folder."""
+    file = config.getoption("--cpu-record")
+    if file:
+        worker = os.environ.get("PYTEST_XDIST_WORKER")
+        config.option.cpu_record = Path(f"{file}.{worker}" if worker else file).absolute()
+    if file or config.getoption("--cpu-limit") is not None:
+        for name in LOADED_LATE:
+            with contextlib.suppress(ImportError):
+                importlib.import_module(name)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> Generator[None, object, object]:
+    """Start a test's clock before its fixtures: what a module shares is charged to its first."""
+    item.stash[BEGUN] = cpu_time()
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
+    """Record the time of a test that passed; fail it if it is over the limit."""
+    result = yield
+    spent = cpu_time() - item.stash[BEGUN]
+    if file := item.config.getoption("--cpu-record"):
+        with file.open("a", encoding="utf-8") as times:
+            times.write(f"{item.nodeid}\t{spent:.2f}\n")
+    limit = item.config.getoption("--cpu-limit")
+    if limit is not None and spent > limit and not item.get_closest_marker("slow"):
+        pytest.fail(f"{spent:.1f} s of processor time, over {limit:g} s: mark it slow")
+    return result
 
 
 @pytest.fixture(scope="session")
