@@ -100,6 +100,26 @@ def test_a_stopped_command_says_so_and_leaves_nothing(tmp_path: Path, number: in
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("words", [(), ("--rrd", "-v")])
+def test_a_full_disk_is_one_error_in_words_of_the_system(
+    tmp_path: Path, words: tuple[str, ...]
+) -> None:
+    """Polars' own "File out of specification: underlying IO error" stood around them."""
+    resource = pytest.importorskip("resource")
+    done = subprocess.run(
+        [sys.executable, "-m", "vftcli", "estimate", FIXTURE, "-o", tmp_path / "out", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (60_000,) * 2),
+    )
+    assert done.returncode == 1
+    lines = [line for line in done.stderr.splitlines() if not line.startswith("note: ")]
+    full = "estimates.parquet cannot be written: file too large; give another -o"
+    assert lines == ["log health: sound", f"error: {full}"]
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_limit_on_memory_that_holds_no_library_is_one_line(tmp_path: Path) -> None:
     """Libraries ended the program with words of their own, thousands of lines at some limits."""
     resource = pytest.importorskip("resource")

@@ -130,8 +130,8 @@ def launch() -> None:
 
 
 ROOM = 3e9
-"""Address space that the libraries reserve: with two processors the report of 10 s of a log of
-1 kHz works in 3.0e9 and ends in their own words in 2.6e9, that of 20 s at 125 Hz in 1.6e9. [B]"""
+"""Address space that the libraries reserve: with two processors the report of 10 s at 1 kHz works
+in 3.0e9 and ends in their own words in 2.6e9; that of 20 s at 125 Hz works in 1.9e9. [B]"""
 
 
 def check_room() -> None:

@@ -6,6 +6,7 @@ the first of them changes and comes when the last is in its place, so that a fol
 known to be incomplete, whenever a run was killed.
 """
 
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
@@ -84,16 +85,16 @@ def table_file(path: Path) -> Iterator[Path]:
     """Yield a path at which Polars writes a table.
 
     Raises:
-        OutputError: If the disk is full, which Polars calls an error of computation.
+        OutputError: If the disk is full, which Polars calls an error of computation, the system's
+            word in the middle of its own.
     """
     from polars.exceptions import ComputeError
 
     try:
         yield path
     except ComputeError as error:
-        raise OutputError(
-            f"{path.name} cannot be written ({one_line(error)[:200]}): is the disk full?"
-        ) from None
+        why = re.sub(r".*IO error: | \(os error \d+\)", "", one_line(error)[:200])
+        raise unwritable(Path(path.name), OSError(why)) from None
 
 
 def write_text(path: Path, text: str, force: bool = False) -> None:
