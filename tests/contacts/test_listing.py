@@ -117,6 +117,13 @@ def test_two_samples_do_not_say_that_nothing_touched() -> None:
         list_contacts(motion(part(made.log.recording, few), "ur5"))
 
 
+def test_one_sample_a_second_does_not_say_that_nothing_touched() -> None:
+    made = motion(read(FIXTURES / "ur5_circle.csv"), "ur5")
+    slow = np.arange(made.log.recording.samples) % 125 == 0
+    with pytest.raises(ParameterError, match=r"has 1 samples a second; below 10 a contact"):
+        list_contacts(motion(part(made.log.recording, slow), "ur5"))
+
+
 def test_four_hands_on_a_held_pose(logs: Path) -> None:
     free = ur10e(logs, "free_14harm.csv")
     found = list_contacts(motion(ur10e(logs, "push_pose.csv"), "ur10e", run=free))

@@ -28,7 +28,7 @@ CLEARER = 1.5
 """How much better than a load a factor must explain a log that some load explains."""
 
 
-class Scale(NamedTuple):
+class DriveScale(NamedTuple):
     """A factor that an effort has.
 
     Attributes:
@@ -44,7 +44,7 @@ class Scale(NamedTuple):
     healed: Case
 
 
-def scales(case: Case) -> list[Scale]:
+def scales(case: Case) -> list[DriveScale]:
     """The factors that may explain a log: one of all joints, one of a single joint."""
     each = np.zeros((*case.needed.shape, case.needed.shape[1]))
     joints = np.arange(case.needed.shape[1])
@@ -54,7 +54,7 @@ def scales(case: Case) -> list[Scale]:
     return [*of_all(case, together), *of_one(case, apart, len(joints))]
 
 
-def of_all(case: Case, fit: RobustFit) -> list[Scale]:
+def of_all(case: Case, fit: RobustFit) -> list[DriveScale]:
     """The factor of all joints, none where it is 1 or a load explains as much."""
     factor, sd = float(fit.values[0]), float(fit.sd[0])
     if not abs(factor - 1) > OFF + SURE * sd or not LEAST < factor < MOST:
@@ -65,10 +65,10 @@ def of_all(case: Case, fit: RobustFit) -> list[Scale]:
         return []
     # What is left stays relative to the effort as it was logged.
     healed = replace(case, given=case.given / factor, size=case.size / factor)
-    return [Scale(tuple(range(len(case.constant))), factor, sd, healed)]
+    return [DriveScale(tuple(range(len(case.constant))), factor, sd, healed)]
 
 
-def of_one(case: Case, fit: RobustFit, count: int) -> list[Scale]:
+def of_one(case: Case, fit: RobustFit, count: int) -> list[DriveScale]:
     """The factor of the one joint that is off alone, none where there is no such joint."""
     off, sd = np.abs(fit.values[:count] - 1), fit.sd[:count]
     wrong = np.flatnonzero((off > ALONE + SURE * sd) & (sd < KNOWN))
@@ -80,4 +80,4 @@ def of_one(case: Case, fit: RobustFit, count: int) -> list[Scale]:
         return []
     factor = np.ones(count)
     factor[j] = fit.values[j]
-    return [Scale((j,), float(factor[j]), float(sd[j]), case.with_effort(case.given / factor))]
+    return [DriveScale((j,), float(factor[j]), float(sd[j]), case.with_effort(case.given / factor))]
