@@ -27,6 +27,7 @@ from planted_faults import (
     dropped_span,
     gravity_torque,
     payload,
+    positions_in_degrees,
     stuck,
     velocities_in_degrees,
     with_more_torque,
@@ -461,3 +462,42 @@ def test_a_load_that_one_motion_does_not_show_is_found_in_a_pair(tmp_path: Path)
     assert "in a pair of logs of one motion with and without it" in text
     code, text = printed(["identify", loaded, "--free", free, *search])
     assert code == 0, text
+
+
+def unknown_estimate(table: Table) -> Table:
+    """The vendor's estimate is NaN for a while."""
+    assert table.tau_ext is not None
+    tau_ext = table.tau_ext.copy()
+    tau_ext[1000:1050] = np.nan
+    return replace(table, tau_ext=tau_ext)
+
+
+TWO_CYCLE = ("compare", "--reference", "two-cycle", "--observer", "gmo")
+REFUSALS = [
+    Row("which looks like degrees", of(positions_in_degrees), "columns", "q[deg]=q{i}"),
+    Row("Nothing is filled in", of(unknown_estimate, robot="panda"), "columns",
+        "t=t,q=q{i},dq=dq{i},tau=tau{i}"),
+    Row("stands still: all", of(lambda t: replace(t, t=0.0 * t.t)), "columns", "t@125Hz"),
+    Row("no joint positions (q)", lambda f: renamed(sound(), "q", "zz", f), "columns",
+        "q=zz{i},dq=dzz{i}"),
+    Row("no repetition found", of(lambda t: t.between(4.5, 9.0), *TWO_CYCLE), "free", free_log),
+    Row("needs a free part", of(lambda t: t.between(4.5, 9.0), *PUSHED, "--remove-bias", "model"),
+        "free", free_log),
+    Row("there is no Jacobian for it", of(
+        lambda t: t.between(0.0, 4.0), *PUSHED, "--frame", "tool"), "tool", "0,0,0.1"),
+    Row("a release needs an arm", lambda _: ["admit", "--release", "x=0.3"], "robot", "ur5"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("row", REFUSALS, ids=lambda row: f"{row.code}-{row.option}")
+def test_the_remedy_of_a_refusal_is_taken(
+    row: Row, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = row.command(tmp_path)
+    code, refused = printed(words)
+    assert code == 1
+    assert row.code in refused
+    code, after = printed(with_option(words, refused, row))
+    assert row.code not in after
+    assert code == 0, after
