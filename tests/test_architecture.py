@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 import vftcli
 from vftcli.signals.remarks import WORDS
 
@@ -130,6 +132,7 @@ def functions(file: str) -> Iterator[ast.FunctionDef]:
             yield node
 
 
+@pytest.mark.slow
 def test_every_room_has_a_place() -> None:
     assert {room(file) for file in modules()} - {"__init__"} == set(ORDER)
 
@@ -182,6 +185,7 @@ def test_a_class_name_stands_for_one_thing() -> None:
     assert not {name: files for name, files in names.items() if len(files) > 1}
 
 
+@pytest.mark.slow
 def test_only_the_command_line_prints_or_exits() -> None:
     wrong = [
         f"{file}:{node.lineno}"

@@ -64,6 +64,7 @@ def folder(tmp_path: Path) -> Iterator[Path]:
 TO_RUN = [path for path in DOCUMENTS if commands(path) or blocks(path, "python")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", TO_RUN, ids=lambda p: p.name)
 @pytest.mark.usefixtures("folder")
 def test_every_command_and_snippet_of_a_document_runs(path: Path) -> None:
@@ -91,6 +92,7 @@ def test_every_page_is_in_the_index() -> None:
     assert pages == set(in_the_menu()[1:])
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_the_pages_build_as_a_site_without_a_warning(tmp_path: Path) -> None:
     for package in ("sphinx", "myst_parser", "furo"):
@@ -102,6 +104,7 @@ def test_the_pages_build_as_a_site_without_a_warning(tmp_path: Path) -> None:
     assert all(f'href="{page.stem}.html"' in menu for page in in_the_menu()[1:])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_the_notebook_runs_and_shows_every_result() -> None:
     notebook = json.loads((ROOT / "docs" / "notebook.ipynb").read_text("utf-8"))

@@ -397,6 +397,7 @@ def cases() -> Iterator[Any]:
             yield pytest.param(relation, command, id=f"{relation}, {command}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("relation", "command"), list(cases()))
 def test_relation(relation: str, command: str, logs_of_one_motion: Logs, tmp_path: Path) -> None:
     logs = logs_of_one_motion

@@ -45,6 +45,7 @@ def test_a_log_and_a_robot_may_be_files_or_objects() -> None:
     assert named.equals(held)
 
 
+@pytest.mark.slow
 def test_a_list_without_contacts_is_a_list_nevertheless(analysis: vft.Analysis) -> None:
     from dataclasses import replace
 
@@ -87,6 +88,7 @@ def test_everything_in_hand_is_one_line_and_a_table(analysis: vft.Analysis) -> N
         assert len(table) < 6000, type(thing)
 
 
+@pytest.mark.slow
 def test_a_report_is_written_where_it_is_asked_for(tmp_path: Path) -> None:
     asked = {"robot": "ur5", "observers": "gmo", "interval": "0:6", "free_part": "0:4"}
     vft.report(CIRCLE, output=tmp_path / "out", **asked)  # type: ignore[arg-type]
@@ -97,6 +99,7 @@ def test_a_report_is_written_where_it_is_asked_for(tmp_path: Path) -> None:
         vft.report(CIRCLE, output=tmp_path / "out", **asked)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_thresholds_are_those_of_the_command(tmp_path: Path) -> None:
     from typer.testing import CliRunner
 

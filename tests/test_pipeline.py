@@ -43,6 +43,7 @@ def rmse_of(analysis: vft.Analysis, observer: str = "gmo") -> np.ndarray:
     return analysis.errors.filter(pl.col("observer") == observer)["rmse_Nm"].to_numpy()
 
 
+@pytest.mark.slow
 def test_a_fixture_goes_all_the_way_to_a_table() -> None:
     request = AnalysisChoice(
         robot=RobotChoice(name="ur5"),
@@ -72,6 +73,7 @@ def test_a_fixture_goes_all_the_way_to_a_table() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_log_must_settle_its_robot_or_be_told() -> None:
     """The controller's own torques tell a UR5; currents alone settle nothing."""
     told = analyse_log(FIXTURE, AnalysisChoice())
@@ -129,6 +131,7 @@ def asked(name: str, *free: Path, zero: Path | None = None, **more: object) -> A
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "reads", "models", "alignments"),
     [
@@ -176,6 +179,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
     assert counted == {"read_chosen": reads, "dynamics_terms": models, "align": alignments}
 
 
+@pytest.mark.slow
 def test_the_order_of_two_free_runs_on_one_clock_does_not_matter(runs: list[Path]) -> None:
     """The first was used twice; three rows less of one, and both were used."""
     load, free, more = runs
@@ -192,6 +196,7 @@ def test_the_order_of_two_free_runs_on_one_clock_does_not_matter(runs: list[Path
         assert np.mean(covered) > 0.9  # but where the three samples would have been
 
 
+@pytest.mark.slow
 def test_a_free_run_as_long_as_the_log_is_told_from_it(runs: list[Path]) -> None:
     """Its raw disturbance was taken for the log's: the tuned gains collapsed."""
     load, free, more = runs
@@ -253,6 +258,7 @@ def test_the_pipeline_is_short_and_imports_nothing_on_its_way() -> None:
     assert not any(isinstance(node, ast.Import | ast.ImportFrom | ast.If) for node in inner)
 
 
+@pytest.mark.slow
 def test_mujoco_ur5e_with_its_own_model(logs: Path) -> None:
     """An independent engine's log; its own truth is the vendor column. Prototype .426 … .058."""
     folder = logs / "mujoco_ur5e"
@@ -265,6 +271,7 @@ def test_mujoco_ur5e_with_its_own_model(logs: Path) -> None:
     assert np.all(rmse <= [0.47, 0.54, 0.40, 0.13, 0.05, 0.08])
 
 
+@pytest.mark.slow
 def test_libfranka_simulation_against_its_truth(logs: Path, tmp_path: Path) -> None:
     """Behind Franka's own protocol, with the exact model. Prototype .142 .198 .172 .219 …"""
     folder = logs / "libfranka_sim"
@@ -298,6 +305,7 @@ def test_panda_in_free_motion_from_its_four_text_files(logs: Path) -> None:
     assert np.all(rms <= [0.29, 0.63, 0.26, 0.31, 0.15, 0.11, 0.07])
 
 
+@pytest.mark.slow
 def test_ur10e_in_free_motion_needs_rotor_and_friction(logs: Path) -> None:
     """Real: the prototype's mean of six rms is 1.64 N·m; without rotor or friction it is worse."""
     path = logs / "ur10e" / "free_14harm.csv"
@@ -321,6 +329,7 @@ def test_ur10e_in_free_motion_needs_rotor_and_friction(logs: Path) -> None:
     assert without_friction > 5.0 * full
 
 
+@pytest.mark.slow
 def test_ur10e_payload_shows_in_the_two_cycle_difference(logs: Path) -> None:
     """A loaded run less a free one is the payload's own torque, 2.805 kg at the flange."""
     folder = logs / "ur10e"

@@ -125,6 +125,7 @@ def check_robot(path: Path, told: dict[str, Any]) -> None:
     np.testing.assert_allclose(gravity, told["gravity_torque"]["N·m"], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_every_entry_is_read_as_expected_or_refused_as_stated(
     samples: Path, expected: dict[str, Any]
 ) -> None:

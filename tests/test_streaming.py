@@ -35,6 +35,7 @@ def estimated(folder: Path, *words: str) -> tuple[pl.DataFrame, dict[str, Any]]:
     return pl.read_parquet(folder / "estimates.parquet"), record
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

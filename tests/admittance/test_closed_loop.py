@@ -68,6 +68,7 @@ def test_online_filter_is_the_batch_filter(convention: str) -> None:
     np.testing.assert_allclose(found, batch.tau, atol=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", WINDOWS)
 def test_latency_of_the_first_drag(convention: str) -> None:
     loop = run("ur5-drag", convention, duration=8.2)
@@ -81,6 +82,7 @@ def test_latency_of_the_first_drag(convention: str) -> None:
     assert entry.detection < entry.motion
 
 
+@pytest.mark.slow
 def test_instantaneous_torque_aliases() -> None:
     """The servo's answer to each command is over in milliseconds: one sample of it is no mean."""
     mean, last = (
@@ -96,6 +98,7 @@ def test_instantaneous_torque_aliases() -> None:
     assert error < 50.0
 
 
+@pytest.mark.slow
 def test_the_loop_s_record_replays_the_loop() -> None:
     """The controller that was in the loop, run on the force it acted on, moves as it did."""
     loop = run("ur5-drag", "discrete", "threshold_mode=soft", duration=9.5)
@@ -110,6 +113,7 @@ def test_the_loop_s_record_replays_the_loop() -> None:
     assert "α = 1.6" not in lost
 
 
+@pytest.mark.slow
 def test_the_controller_rests_while_the_zero_is_taken() -> None:
     loop = run("ur5-drag", "density", duration=4.0)
     np.testing.assert_array_equal(loop.commanded[loop.t <= 3.0], 0.0)

@@ -130,6 +130,7 @@ def random_controllers(count: int, limit: float, rng: np.random.Generator) -> tu
     return found, starts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [np.inf, 1.0])
 def test_printed_v_rises_and_w_does_not(limit: float) -> None:
     """1000 random releases inside the safe bound, seed 7; the rotation's axes count together."""
@@ -155,6 +156,7 @@ def test_printed_v_of_the_paper_s_release() -> None:
     assert V.max() == pytest.approx(1.099, abs=2e-3)  # Ts = 0.1 ms is not 0 yet: O(Ts)
 
 
+@pytest.mark.slow
 def test_escape_beyond_the_bound_without_a_limit_and_none_with_one() -> None:
     """UR5 rotation at α = 1.6: 0.495/1.6 rad is the last release that returns."""
     bound = 0.495 / 1.6

@@ -51,6 +51,7 @@ def codes(found: Replay) -> set[str]:
     return {remark.code for remark in found.remarks}
 
 
+@pytest.mark.slow
 def test_soft_travel_is_plausible_and_hard_is_said_not_to_be() -> None:
     """24 N for 2 s: 4 N of excess move K = 8 N/m by ≈ 0.6 m at most; the whole 24 N by metres."""
     soft = run(push(), "threshold_mode=soft", alphas=(1.0, 1.9))
@@ -169,6 +170,7 @@ def test_force_at_rest_for_long_is_told() -> None:
     assert "drag-at-rest" in codes(found)
 
 
+@pytest.mark.slow
 def test_w_never_rises_in_a_replay() -> None:
     record, q = push(30.0)
     wrench = record.values.copy()

@@ -95,6 +95,7 @@ def test_the_whole_copy(tmp_path: Path) -> None:
     assert not any(table[name].explode().is_nan().any() for name in table.columns[-3:])
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:Port")  # of Dask's own page, where another cluster has it
 def test_the_bytes_are_those_of_two_workers(tmp_path: Path) -> None:
     pytest.importorskip("distributed")

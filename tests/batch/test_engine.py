@@ -73,6 +73,7 @@ def test_a_task_that_kills_its_worker_fails_alone_and_nothing_is_lost() -> None:
     assert failed[0].failure.type == "KilledWorker"
 
 
+@pytest.mark.slow
 def test_workers_are_processes_with_one_thread_a_library() -> None:
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
     ended = list(run_tasks([names], os.getenv, WorkersChoice(workers=1), silent))
@@ -145,6 +146,7 @@ def answer_to_http(port: int) -> bytes:
             return b""
 
 
+@pytest.mark.slow
 def test_nobody_without_the_run_s_certificate_reaches_its_workers() -> None:
     """Every port that the processes of a run listen on; the attack itself works on an open one."""
     own = psutil.Process()

@@ -15,6 +15,7 @@ from tokens import Seed
 INPUTS = 20
 
 
+@pytest.mark.slow
 def test_a_short_run_finds_nothing() -> None:
     """The long ones are documented in docs/contributing.md."""
     words = [sys.executable, fuzz.__file__, "--seed", "7", "--inputs", str(INPUTS)]

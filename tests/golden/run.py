@@ -241,8 +241,8 @@ def main() -> int:
     if given.do == "accept" and changed:
         with (HERE / "changes.md").open("a", encoding="utf-8") as reasons:
             reasons.write("\n  - ".join([f"- {given.why}", *changed]) + "\n")
-    rest = f"{len(listed) - len(chosen)} {'kept already' if given.do == 'make' else 'not kept yet'}"
-    print(f"golden: {len(chosen)} items, {len(changed)} moved, {rest}")
+    done, rest = ("kept", "kept before") if given.do == "make" else ("moved", "not kept yet")
+    print(f"golden: {len(chosen)} items, {len(changed)} {done}, {len(listed) - len(chosen)} {rest}")
     return int(given.do == "check" and (bool(changed) or not chosen))
 
 

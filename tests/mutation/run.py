@@ -247,7 +247,8 @@ def tried(copy: Path, mutant: Mutant, limit: float) -> Verdict:
 
 def pytest(copy: Path, tests: Sequence[str], limit: float) -> subprocess.CompletedProcess[str]:
     """Run tests on a copy, on one core, until the first that fails."""
-    words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
+    words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider"]
+    words += ["-m", "not statistical", *tests]
     one = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS"), "1")
     env = os.environ | one | {"PYTHONPATH": str(copy)}
     return subprocess.run(

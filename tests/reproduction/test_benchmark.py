@@ -60,6 +60,7 @@ def test_the_examination_is_measured_on_a_log_that_reads_back(tmp_path: Path) ->
     assert costs["examination_minute_s"] > 0.0
 
 
+@pytest.mark.slow
 def test_the_command_is_measured_beside_reading_its_columns(tmp_path: Path) -> None:
     log = tmp_path / "long.csv"
     pl.DataFrame(wide_table(UR5, samples=300)).write_csv(log)

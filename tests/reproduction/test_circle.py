@@ -33,12 +33,14 @@ def ends(text: str) -> tuple[float, float]:
     return (numbers[1], numbers[2]) if "…" in text else (numbers[0], numbers[0])
 
 
+@pytest.mark.slow
 def test_items_without_a_seed_are_the_documents_digit_by_digit() -> None:
     for name, shown in computed(("table3", "table4"), fast=True).items():
         rows = {row[0].text: [cell.text for cell in row[3:]] for row in item_grid(shown).cells}
         assert rows == documented(name)
 
 
+@pytest.mark.slow
 def test_table_one_of_the_first_seed_lies_in_the_documents_range() -> None:
     """The range holds every seed's value, rounded to three digits: half of the last is let pass."""
     (shown,) = computed(("table1",), fast=True).values()

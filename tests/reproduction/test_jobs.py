@@ -1,5 +1,7 @@
 """Each experiment runs once a seed, whoever shows it; what fails is a line."""
 
+import pytest
+
 from vftcli.reproduction.jobs import Job, gather, jobs_of, run_jobs
 from vftcli.reproduction.paper import CORRECTED, RunResult
 from vftcli.reproduction.papers import PAPERS
@@ -39,6 +41,7 @@ def test_what_fails_is_a_line_and_the_rest_is_there(cheap) -> None:
     assert not results[jobs[1]].charts  # only the first seed's traces are shown
 
 
+@pytest.mark.slow
 def test_numbers_do_not_depend_on_how_many_run_at_once() -> None:
     jobs = [Job("huang2025", name, 0) for name in ("release-ur5", "release-panda")]
 

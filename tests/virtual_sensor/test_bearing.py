@@ -12,6 +12,8 @@ from vftcli.signals.external_torque import COVERS
 from vftcli.simulation import load_scenario, simulate
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 
+pytestmark = pytest.mark.slow
+
 WEIGHT = 9.2
 """Weight of the bearing, Sec. IV-D. [N]"""
 

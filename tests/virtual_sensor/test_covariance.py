@@ -58,6 +58,7 @@ def coverage(scheme: str, runs: int, first: int = 150, last: int = 250) -> np.nd
 SCHEMES = ["fe", pytest.param("zoh", marks=pytest.mark.statistical)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_over_200_simulations_the_band_holds_the_truth_in_93_to_97_percent(scheme: str) -> None:
     """200 runs of 100 samples, correlated over about 25: 800 independent ones, ± 0.8 % each way."""

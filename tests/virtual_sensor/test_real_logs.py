@@ -30,6 +30,7 @@ def by_axis(analysis, observer: str) -> np.ndarray:
     return np.array([r["rmse_N"] or r["rmse_Nm"] for r in rows.iter_rows(named=True)])
 
 
+@pytest.mark.slow
 def test_the_ur5e_of_mujoco_reads_its_truth(logs: Path) -> None:
     """Exact profile, gain 30: ≤ 3 N and ≤ 0.6 N·m in unmasked samples (measured 1.19 and 0.12)."""
     folder = logs / "mujoco_ur5e"
@@ -54,6 +55,7 @@ def test_the_ur5e_of_mujoco_reads_its_truth(logs: Path) -> None:
     assert sensed.vendor.offset.lag == pytest.approx(0.0, abs=0.002)
 
 
+@pytest.mark.slow
 def test_the_fr3_behind_libfranka_reads_its_truth(logs: Path, tmp_path: Path) -> None:
     """Exact profile, gain 30: ≤ 1.5 N and ≤ 0.4 N·m (measured 0.52 and 0.07)."""
     for name in ("pushes", "pushes_truth"):
@@ -85,6 +87,7 @@ def payload(logs: Path):
     return analysed(logs / "ur10e" / "load_14harm.csv", request)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("observer", ["fdo", "kfo-fe", "kfo-zoh"])
 def test_the_payload_weighs_what_it_weighs(payload, observer: str) -> None:
     """2.805 kg are 27.5 N; measured −27.17, −27.06, −27.06 N (GMO: −26.0, its J3 gain is 4 1/s)."""
@@ -92,6 +95,7 @@ def test_the_payload_weighs_what_it_weighs(payload, observer: str) -> None:
     assert np.nanmean(wrench.force[:, 2]) == pytest.approx(-27.5, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("observer", ["fdo", "gmo", "kfo-fe", "kfo-zoh"])
 def test_the_force_stays_vertical_within_its_band(payload, observer: str) -> None:
     """The horizontal force lies within the 95 % band in at least 90 % of the samples."""

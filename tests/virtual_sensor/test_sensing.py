@@ -40,6 +40,7 @@ def reading(log: str, *names: str, **choice: object) -> SensorReading:
 START = ZeroChoice(start=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["base", "flange"])
 def test_neither_order_nor_company_nor_frame_moves_the_zero(frame: str) -> None:
     alone = reading("ur5_sensor.parquet", "gmo", zero=START, frame=frame)
@@ -58,6 +59,7 @@ def test_neither_order_nor_company_nor_frame_moves_the_zero(frame: str) -> None:
     assert base.zero_span == alone.zero_span
 
 
+@pytest.mark.slow
 def test_further_spans_show_the_drift_and_only_the_first_is_removed() -> None:
     zero = ZeroChoice(spans=((1.0, 2.0), (2.5, 3.5)))
     found = reading("ur5_circle.csv", "gmo", "fdo", zero=zero, frame="base")
@@ -72,6 +74,7 @@ def test_further_spans_show_the_drift_and_only_the_first_is_removed() -> None:
     np.testing.assert_allclose(moved[0].values["force_N"], (later.mean - first.mean)[:3])
 
 
+@pytest.mark.slow
 def test_nothing_is_removed_unasked_but_the_start_is_known_to_be_unloaded() -> None:
     found = reading("ur5_circle.csv", "gmo")
     assert found.drifts == ()
@@ -81,12 +84,14 @@ def test_nothing_is_removed_unasked_but_the_start_is_known_to_be_unloaded() -> N
     assert found.free.any()
 
 
+@pytest.mark.slow
 def test_a_panda_has_the_null_space_channel() -> None:
     found = reading("panda_bearing.csv", "gmo", zero=START)
     assert [e.name for e in found.elsewhere] == ["gmo"]
     assert reading("ur5_circle.csv", "gmo", zero=START).elsewhere == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("choice", "code"),
     [
@@ -129,6 +134,7 @@ def test_a_payload_that_is_not_mounted_is_told_in_the_arms_own_gravity() -> None
     assert payload_remark(recording(None), ur5) == ()
 
 
+@pytest.mark.slow
 def test_masked_samples_are_counted() -> None:
     found = reading("ur5_circle.csv", "gmo")
     codes = [remark.code for remark in found.remarks]

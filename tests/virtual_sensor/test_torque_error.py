@@ -92,6 +92,7 @@ def test_a_free_part_measures_the_spread_about_its_mean(moves: bool) -> None:
     assert codes == ["band-from-free-part", *(["band-of-free-rest"] if not moves else [])]
 
 
+@pytest.mark.slow
 def test_two_observers_of_one_response_have_one_band() -> None:
     """FE and ZOH read nearly the same and are told nearly the same, whatever P₂₂ each has."""
     found = reading_of("kfo-fe", "kfo-zoh")
