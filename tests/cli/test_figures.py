@@ -42,6 +42,7 @@ def test_a_report_holds_its_figures_and_the_seal_lists_them(
     assert not (out / "figures").exists()
 
 
+@pytest.mark.slow
 def test_compare_draws_into_a_folder_and_nowhere_else(
     run: Callable[..., str], tmp_path: Path
 ) -> None:

@@ -50,6 +50,7 @@ def test_json_is_all_there_is_on_stdout(excitation, tmp_path):
     assert "repeated-trajectory" in {remark["code"] for remark in record["remarks"]}
 
 
+@pytest.mark.slow
 def test_a_refusal_leaves_no_file(excitation, tmp_path):
     robot = tmp_path / "r.toml"
     command = ["identify", str(excitation), "--robot", "ur10e", "-o", str(robot)]

@@ -65,6 +65,7 @@ def test_the_wrench_of_best_is_within_the_lists_band_at_its_peaks(name: str) -> 
     assert away <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_outside_of_the_rows_best_reads_nothing_within_a_band(name: str) -> None:
     analysis = analysed(name)

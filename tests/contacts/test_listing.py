@@ -78,6 +78,7 @@ def part(recording: Recording, chosen: np.ndarray) -> Recording:
     return Recording(t=recording.t[chosen] - recording.t[chosen][0], **signals)
 
 
+@pytest.mark.slow
 def test_gaps_of_the_clock_move_no_row_by_more_than_a_few_blocks(listed: Lister) -> None:
     whole = read(FIXTURES / "ur5_circle.csv")
     k = np.arange(whole.samples)
@@ -278,6 +279,7 @@ def test_a_load_that_stays_to_the_end_of_the_log_is_listed() -> None:
     assert row.wrench[2] < 0.0
 
 
+@pytest.mark.slow
 def test_a_load_that_is_struck_is_listed_as_a_whole(listed: Lister) -> None:
     """The bearing hangs from 4 s to 16 s; only what strikes it in the meantime changes quickly."""
     first = listed("panda_bearing.csv", "panda", "0.3:3.9").contacts[0]

@@ -61,6 +61,7 @@ def test_torque_shows_best_with_its_band_or_all_or_the_chosen(pushed: Analysis) 
     assert not {"best", "95 % band"} & set(two)
 
 
+@pytest.mark.slow
 def test_forces_stand_above_moments_or_beside_them(pushed: Analysis) -> None:
     drawing = wrench_drawing(pushed)
     heads = {w: [a.get_ylabel()[:2] for a in drawn(drawing, w).axes] for w in WIDTHS}
