@@ -39,6 +39,7 @@ def test_release_rows(admit: Run) -> None:
     assert {row["xi"] for row in rows[1:]} == {1.0}
 
 
+@pytest.mark.slow
 def test_default_is_both_controllers_with_the_profile_s_values(admit: Run) -> None:
     rows = json.loads(admit("--release", "rx=0.2", "--robot", "panda", "--json")[1])
     assert [(row["controller"], row["alpha"]) for row in rows] == [
@@ -47,6 +48,7 @@ def test_default_is_both_controllers_with_the_profile_s_values(admit: Run) -> No
     ]
 
 
+@pytest.mark.slow
 def test_log_becomes_a_folder(admit: Run, tmp_path: Path) -> None:
     folder = tmp_path / "out"
     code, out, err = admit(FIXTURE, "--robot", "panda", "-o", folder)
@@ -74,6 +76,7 @@ def test_log_becomes_a_folder(admit: Run, tmp_path: Path) -> None:
     assert (code, "exists; give another -o, or --force" in err) == (1, True)
 
 
+@pytest.mark.slow
 def test_estimates_and_truth_are_forces_too(admit: Run, tmp_path: Path, monkeypatch) -> None:
     words = [
         "vftcli",

@@ -11,6 +11,7 @@ from vftcli.cli import app, main
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "panda_episodes"
 
 
+@pytest.mark.slow
 def test_it_says_what_was_written(tmp_path: Path) -> None:
     words = ["annotate", str(FIXTURE), "-o", str(tmp_path / "copy"), "--wrench", "--contact"]
     result = CliRunner().invoke(app, words)

@@ -112,6 +112,7 @@ def test_a_cut_last_row_is_dropped_and_said(tmp_path: Path, run: Run) -> None:
     assert "400 samples" in stderr
 
 
+@pytest.mark.slow
 def test_existing_output_is_kept_unless_forced(tmp_path: Path, run: Run) -> None:
     out = tmp_path / "out"
     out.mkdir()
@@ -202,6 +203,7 @@ def test_a_reference_that_cannot_be_made_is_one_line(
     assert expected in errors[0]
 
 
+@pytest.mark.slow
 def test_a_name_with_markup_stays_text(tmp_path: Path, run: Run) -> None:
     log = tmp_path / "<script>alert(1)<.csv"
     shutil.copy(FIXTURE, log)

@@ -41,6 +41,7 @@ def record(out: Path) -> dict[str, object]:
     return json.loads((out / "run.json").read_text())
 
 
+@pytest.mark.slow
 def test_every_log_is_done_once_whatever_the_workers(run, folder: Path, tmp_path: Path) -> None:
     """A LocalCluster of two workers against this process against the command of one log."""
     out, cluster = tmp_path / "out", tmp_path / "cluster"
@@ -203,6 +204,7 @@ def test_an_address_that_does_not_answer_is_one_line(run, tmp_path: Path) -> Non
     assert "no Dask scheduler answers at tcp://127.0.0.1:1 within 10 s" in err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("do", ["estimate", "contacts"])
 def test_a_reference_that_nothing_is_compared_with_is_left_out(run, tmp_path: Path, do) -> None:
     """The log has no sensor: as a reference it would be refused."""

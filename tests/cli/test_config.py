@@ -75,6 +75,7 @@ def test_the_command_line_of_run_json_needs_no_file(run, here: Path) -> None:
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
+@pytest.mark.slow
 def test_kept_columns_are_not_those_of_estimates(run, here: Path) -> None:
     keep(here, 'robot = "ur5"\ncolumns = "-t,q:6"\nobserver = ["gmo"]\nno-contacts = true\n')
     code, _, err = run("estimate", LOG, "-o", "out")
@@ -147,6 +148,7 @@ def test_a_file_with_bytes_that_are_no_letters_is_refused(run, here: Path) -> No
     assert run("robots")[0] == 0
 
 
+@pytest.mark.slow
 def test_files_are_named_from_the_folder_of_the_file(run, here: Path) -> None:
     (here / "sub").mkdir()
     (here / "sub/free.csv").write_bytes(LOG.read_bytes())

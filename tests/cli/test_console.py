@@ -84,6 +84,7 @@ def logs(tmp_path: Path) -> tuple[Path, Path]:
     return good, bad
 
 
+@pytest.mark.slow
 def test_a_report_writes_the_others_and_fails(
     logs: tuple[Path, Path], tmp_path: Path, run: Run
 ) -> None:
@@ -124,6 +125,7 @@ def test_if_all_are_bad_nothing_is_written(tmp_path: Path, run: Run) -> None:
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_each_log_has_the_robot_that_it_settles_itself(run: Run) -> None:
     code, out, _ = run("contacts", TAPS, OTHER)
     assert code == 0

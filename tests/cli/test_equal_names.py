@@ -72,6 +72,7 @@ def test_significance_names_both_logs(logs):
     assert "b/log.csv" in text
 
 
+@pytest.mark.slow
 def test_a_report_of_both_has_both_in_its_table(logs, tmp_path):
     both = [logs / name / "log.csv" for name in ROWS]
     result = invoke("report", *both, "--robot", "ur5", "--reference", TRUTH, "-o", tmp_path / "out")
@@ -80,6 +81,7 @@ def test_a_report_of_both_has_both_in_its_table(logs, tmp_path):
     assert {row["recording"] for row in rows} == {"a/log.csv", "b/log.csv"}
 
 
+@pytest.mark.slow
 def test_an_identified_robot_has_one_rms_a_joint_and_log(logs, tmp_path):
     robot = tmp_path / "robot.toml"
     both = [logs / name / "log.csv" for name in ROWS]
@@ -90,6 +92,7 @@ def test_an_identified_robot_has_one_rms_a_joint_and_log(logs, tmp_path):
     assert all(len(one["rms_Nm"]) == 6 for one in sets)
 
 
+@pytest.mark.slow
 def test_a_payload_pair_of_equal_names_trains_friction_on_the_log_without_load(tmp_path):
     """The loaded log of a pair is the heavier one, whatever the files are called."""
     made = invoke("simulate", "payload-pair", "-o", tmp_path / "log.csv", "--seed", 1)

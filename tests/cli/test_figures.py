@@ -25,6 +25,7 @@ def run() -> Callable[..., str]:
     return run
 
 
+@pytest.mark.slow
 def test_a_report_holds_its_figures_and_the_seal_lists_them(
     run: Callable[..., str], tmp_path: Path
 ) -> None:
@@ -41,6 +42,7 @@ def test_a_report_holds_its_figures_and_the_seal_lists_them(
     assert not (out / "figures").exists()
 
 
+@pytest.mark.slow
 def test_compare_draws_into_a_folder_and_nowhere_else(
     run: Callable[..., str], tmp_path: Path
 ) -> None:
@@ -55,6 +57,7 @@ def test_compare_draws_into_a_folder_and_nowhere_else(
     assert "leave --significance away" in lost
 
 
+@pytest.mark.slow
 def test_admit_prints_tables_three_and_four_for_latex_and_draws_the_release(
     run: Callable[..., str], tmp_path: Path
 ) -> None:

@@ -36,6 +36,7 @@ def turned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "turned.csv"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [*COMMANDS, "convert"])
 def test_a_sound_log_is_said_to_be_sound(
     command: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -85,6 +86,7 @@ def test_a_meaningless_log_is_refused_in_one_line_and_nothing_is_written(
 
 
 # identify has a guard of its own: links that explain nothing make no robot.
+@pytest.mark.slow
 @pytest.mark.parametrize("command", sorted(COMMANDS.keys() - {"identify"}))
 def test_anyway_goes_on_and_says_so_first(command: str, turned: str, run: Run) -> None:
     code, _, err = run(command, turned, *COMMANDS[command], "--anyway")
@@ -95,6 +97,7 @@ def test_anyway_goes_on_and_says_so_first(command: str, turned: str, run: Run) -
     assert any("log health: " in line and "effort-sign" in line for line in lines)
 
 
+@pytest.mark.slow
 def test_every_output_of_a_report_carries_what_was_overridden(
     turned: str, run: Run, tmp_path: Path
 ) -> None:

@@ -21,6 +21,7 @@ def excitation(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_a_log_becomes_a_robot_that_estimate_uses(excitation, tmp_path):
     robot = tmp_path / "my_robot.toml"
     result = RUNNER.invoke(
@@ -37,6 +38,7 @@ def test_a_log_becomes_a_robot_that_estimate_uses(excitation, tmp_path):
     assert (out / "estimates.parquet").is_file()
 
 
+@pytest.mark.slow
 def test_json_is_all_there_is_on_stdout(excitation, tmp_path):
     command = ["identify", str(excitation), "--robot", "ur5", "--json"]
     command += ["--validate", str(excitation), "-o", str(tmp_path / "r.toml")]
@@ -48,6 +50,7 @@ def test_json_is_all_there_is_on_stdout(excitation, tmp_path):
     assert "repeated-trajectory" in {remark["code"] for remark in record["remarks"]}
 
 
+@pytest.mark.slow
 def test_a_refusal_leaves_no_file(excitation, tmp_path):
     robot = tmp_path / "r.toml"
     command = ["identify", str(excitation), "--robot", "ur10e", "-o", str(robot)]

@@ -24,6 +24,7 @@ def options(folder: Path) -> dict[str, object]:
     return tomllib.loads((folder / NAME).read_text("utf-8"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("log", "given", "expected"),
     [
@@ -45,6 +46,7 @@ def test_what_is_written_gives_the_numbers_of_typed_options(
     assert json.loads(kept)
 
 
+@pytest.mark.slow
 def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> None:
     """The load's own log, the same motion without the load, and a pose that hands push."""
     for name in ("load_14harm.csv", "free_14harm.csv", "push_pose.csv"):

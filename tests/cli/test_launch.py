@@ -31,6 +31,7 @@ def test_exit_codes(words: tuple[str, ...], code: int) -> None:
     assert "__main__" not in done.stderr  # the program is called by its name
 
 
+@pytest.mark.slow
 def test_long_output_arrives_whole_through_a_pipe() -> None:
     done = launched("compare", FIXTURE, "--robot", "ur5", "--reference", TRUTH, "--json")
     assert done.returncode == 0
@@ -45,6 +46,7 @@ def test_functions_registered_for_the_exit_are_called() -> None:
     assert done.stdout.splitlines()[-1] == "called at exit"
 
 
+@pytest.mark.slow
 def test_files_are_complete_when_it_has_left(tmp_path: Path) -> None:
     import polars as pl
 
@@ -69,6 +71,7 @@ def test_a_closed_output_is_one_line(words: tuple[str, ...], code: int, said: st
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_without_streams_the_files_are_written(tmp_path: Path) -> None:
     """What takes the place of a closed stream is no output file, into which words would go."""
     words = ["convert", FIXTURE, "-o", tmp_path / "x.csv"]
@@ -78,6 +81,7 @@ def test_without_streams_the_files_are_written(tmp_path: Path) -> None:
     assert (tmp_path / "x.csv").read_text(encoding="utf-8").startswith("t,")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stopped_command_says_so_and_leaves_nothing(tmp_path: Path, number: int) -> None:
     """The signal comes while half of the files are written, and again while they are removed."""
@@ -137,6 +141,7 @@ def test_a_limit_on_memory_that_holds_no_library_is_one_line(tmp_path: Path) -> 
     )
 
 
+@pytest.mark.slow
 def test_the_caller_s_threads_of_linear_algebra_change_no_byte(tmp_path: Path) -> None:
     """The order of sums moved the last digits of the estimates."""
     made = []

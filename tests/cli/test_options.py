@@ -103,6 +103,7 @@ def complaint(
     assert not any(tmp_path.iterdir())  # nothing half written
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("option", BAD)
 def test_the_same_bad_value_is_refused_with_the_same_line(
     option: str, complaint: Callable[..., str]

@@ -15,6 +15,7 @@ def invoke(*words: object):
     return CliRunner().invoke(app, [str(word) for word in words])
 
 
+@pytest.mark.slow
 def test_one_table_alone(tmp_path: Path) -> None:
     words = ("reproduce", "huang2025", "--only", "table4,fig11", "-o", tmp_path / "out")
     result = invoke(*words)

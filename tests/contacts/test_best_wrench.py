@@ -40,6 +40,7 @@ BEYOND = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [pytest.param(NAMES[0], marks=pytest.mark.xfail(reason=BEYOND, strict=True)), NAMES[1]],
@@ -64,6 +65,7 @@ def test_the_wrench_of_best_is_within_the_lists_band_at_its_peaks(name: str) -> 
     assert away <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_outside_of_the_rows_best_reads_nothing_within_a_band(name: str) -> None:
     analysis = analysed(name)
@@ -90,6 +92,7 @@ def test_the_band_of_best_holds_the_true_wrench_of_every_sample(name: str) -> No
     assert np.all(held.mean(axis=0) >= 0.88)
 
 
+@pytest.mark.slow
 def test_a_load_nobody_told_is_in_the_wrench_of_best() -> None:
     """2 kg at 5 cm in the drives of 14 s of the circle: 19.6 N, of which best had none.
 

@@ -24,6 +24,7 @@ from vftcli.simulation import load_scenario, simulate
 Lister = Callable[..., ContactList]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "robot", "free", "rms", "count"),
     [
@@ -50,6 +51,7 @@ def test_every_push_of_a_fixture_is_one_row(
     assert found.false_on_free == 0
 
 
+@pytest.mark.slow
 def test_a_bearing_and_two_knocks_are_three_contacts(listed: Lister) -> None:
     found = listed("panda_bearing.csv", "panda", "0.3:3.9")
     scored = score(found.contacts, true_contacts(*true_wrench("panda_bearing.csv")))
@@ -76,6 +78,7 @@ def part(recording: Recording, chosen: np.ndarray) -> Recording:
     return Recording(t=recording.t[chosen] - recording.t[chosen][0], **signals)
 
 
+@pytest.mark.slow
 def test_gaps_of_the_clock_move_no_row_by_more_than_a_few_blocks(listed: Lister) -> None:
     whole = read(FIXTURES / "ur5_circle.csv")
     k = np.arange(whole.samples)
@@ -137,6 +140,7 @@ def test_four_hands_on_a_held_pose(logs: Path) -> None:
     assert "wrist" not in (third.where, fourth.where)
 
 
+@pytest.mark.slow
 def test_a_payload_nobody_told_is_one_load(logs: Path) -> None:
     free = ur10e(logs, "free_14harm.csv")
     found = list_contacts(motion(ur10e(logs, "load_14harm.csv"), "ur10e", run=free))
@@ -188,6 +192,7 @@ def test_motion_of_which_nothing_is_named_lists_nothing(logs: Path, name: str) -
         assert found.load.mass == pytest.approx(2.805, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["identification", "repeat_a", "repeat_b"])
 def test_another_arm_that_nobody_touches_lists_nothing(logs: Path, name: str) -> None:
     recording = read(logs / "ur3" / f"{name}.bag", columns="-tau")
@@ -204,6 +209,7 @@ def test_without_friction_and_free_motion_no_contact_is_listed() -> None:
     assert found.unexplained.torque == pytest.approx(8.0, rel=0.3)
 
 
+@pytest.mark.slow
 def test_inferred_rows_are_never_good_unless_something_checks_them() -> None:
     plain = motion(read(FIXTURES / "ur5_sensor.parquet"), "ur5")
     found = list_contacts(plain)
@@ -263,6 +269,7 @@ def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons() -> None:
     assert [remark.code for remark in found.remarks] == ["no-wrench-of-few-joints"]
 
 
+@pytest.mark.slow
 def test_a_load_that_stays_to_the_end_of_the_log_is_listed() -> None:
     """The bearing of 9.2 N hangs from 4 s on; its mean is within its band.
 
@@ -279,6 +286,7 @@ def test_a_load_that_stays_to_the_end_of_the_log_is_listed() -> None:
     assert row.wrench[2] < 0.0
 
 
+@pytest.mark.slow
 def test_a_load_that_is_struck_is_listed_as_a_whole(listed: Lister) -> None:
     """The bearing hangs from 4 s to 16 s; only what strikes it in the meantime changes quickly."""
     first = listed("panda_bearing.csv", "panda", "0.3:3.9").contacts[0]

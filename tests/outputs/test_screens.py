@@ -16,6 +16,7 @@ def words(text: str) -> Iterator[str]:
         yield from line.partition("┤")[0].split()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCREENS)
 def test_a_screen_is_what_the_command_prints(
     name: str, request: pytest.FixtureRequest, tmp_path: Path

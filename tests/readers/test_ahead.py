@@ -103,6 +103,7 @@ def test_a_damaged_row_is_told_as_ever(tmp_path: Path) -> None:
     assert str(ahead.value) == str(plain.value)
 
 
+@pytest.mark.slow
 def test_the_parse_begins_before_numpy_is_there(tmp_path: Path) -> None:
     script = (
         "import sys\n"

@@ -43,6 +43,7 @@ def peak_mib() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrap", ["gzip", "zstd"])
 def test_decompression_bombs_are_bounded(tmp_path: Path, wrap: str) -> None:
     import zstandard
@@ -130,6 +131,7 @@ BOMBS: dict[str, tuple[Callable[[Path], Path], str]] = {
 """Name → a file that once filled the memory or never ended, and what is said of it."""
 
 
+@pytest.mark.slow
 def test_bombs_are_refused_in_one_line_and_little_memory(tmp_path: Path) -> None:
     paths = [make(tmp_path / name) for name, (make, _) in BOMBS.items()]
     found = read_apart(paths)
@@ -316,6 +318,7 @@ HOSTILE = {
 """Files that were found by fuzzing: how many samples they hold, and what is said of them."""
 
 
+@pytest.mark.slow
 def test_files_that_were_found_by_fuzzing(logs: Path) -> None:
     folder = logs.parent / "hostile"
     if not folder.is_dir():

@@ -220,6 +220,7 @@ def readings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Reading]:
     return read_apart([(HOSTILE | READ)[name][0](folder / name) for name in there])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HOSTILE | READ)
 def test_no_file_fills_memory_or_leads_elsewhere(name: str, readings: dict[str, Reading]) -> None:
     if name not in readings:

@@ -74,6 +74,7 @@ def test_same_in_blocks(tmp_path: Path, ending: str, size: int) -> None:
     check_same(*both_ways(path), size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5_circle.csv"])
 def test_same_of_fixtures(name: str) -> None:
     """The fixtures' own formats, their payload and clocks."""

@@ -111,6 +111,7 @@ def test_real_logs_that_need_a_word(logs: Path, name: str) -> None:
         read(logs / name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["logs", "samples"])
 def test_every_file_there_is_read_or_refused_in_one_line(
     request: pytest.FixtureRequest, kind: str

@@ -179,6 +179,7 @@ def test_arrays_of_objects_are_refused(tmp_path: Path) -> None:
         read(tmp_path / "x.npy", columns="t,q")
 
 
+@pytest.mark.slow
 def test_a_bundle_that_unpacks_beyond_reason_is_refused(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "x.npz", "w", zipfile.ZIP_DEFLATED) as bundle:
         bundle.writestr("q.npy", bytes(300 << 20))

@@ -57,6 +57,7 @@ def test_packages_beside_the_file_and_above_it_are_found(tmp_path: Path) -> None
     assert found.chain.mass[-1] == pytest.approx(1.2)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_xacro_installed")
 @pytest.mark.parametrize(
     ("text", "arguments", "words"),
@@ -103,6 +104,7 @@ def test_a_xacro_that_cannot_be_expanded_says_why_on_one_line(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_xacro_installed")
 @pytest.mark.parametrize("name", ["arm.xacro", "arm.urdf"])
 def test_a_xacro_that_never_ends_is_ended(

@@ -41,6 +41,7 @@ def test_only_what_must_change_does() -> None:
     assert slow.trajectory.period > own.trajectory.period
 
 
+@pytest.mark.slow
 def test_what_the_user_states_stays() -> None:
     ur3 = load_scenario("ur5-circle", ["robot=ur3", "trajectory.radius=0.1"])
     assert ur3.trajectory.radius == 0.1
@@ -63,6 +64,7 @@ def test_a_file_of_a_suited_scenario_makes_it_again(tmp_path: Path) -> None:
         assert load_scenario(path) == scenario
 
 
+@pytest.mark.slow
 def test_a_hand_pushes_no_harder_than_the_arm_holds() -> None:
     scenario = load_scenario("ur5-circle", ["robot=xarm6", "duration=6"])
     (hand,) = scenario.contacts

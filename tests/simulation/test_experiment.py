@@ -68,6 +68,7 @@ def rms(values: Array) -> Array:
     return result
 
 
+@pytest.mark.slow
 def test_same_seed_same_bytes_another_seed_another_log(tmp_path: Path) -> None:
     scenario = load_scenario("ur5-circle", ["duration=3.0", "contacts.hand.begin=0.0"])
     contents = []
@@ -80,6 +81,7 @@ def test_same_seed_same_bytes_another_seed_another_log(tmp_path: Path) -> None:
     assert contents[0][1] != contents[2][1]
 
 
+@pytest.mark.slow
 def test_true_torque_is_that_of_the_contacts(many: Simulation) -> None:
     """τ_ext = Σ Jᵢᵀ wᵢ from the truth's own columns, through Pinocchio's frame Jacobians."""
     truth, model = many.truth, load_robot("panda").model
@@ -101,6 +103,7 @@ def test_true_torque_is_that_of_the_contacts(many: Simulation) -> None:
     np.testing.assert_array_equal(truth.walks["drift"][before], 0.0)
 
 
+@pytest.mark.slow
 def test_truth_closes_the_equation_of_motion() -> None:
     """M q̈ + C q̇ + g + τ_f = τ + τ_ext with the true arm, from the truth's pieces alone."""
     scenario = load_scenario("ur5-circle", ["duration=6.0", "sensing.torque=instant"])
@@ -117,6 +120,7 @@ def test_truth_closes_the_equation_of_motion() -> None:
     assert np.median(np.abs(gap)) < 0.02
 
 
+@pytest.mark.slow
 def test_momentum_observer_is_as_late_as_it_must_be() -> None:
     """Exact profile, noise on: GMO(30) misses the truth by at most 1.2 times its own lag."""
     run = simulate(load_scenario("ur5-circle", EXACT), 1)
@@ -132,6 +136,7 @@ def test_momentum_observer_is_as_late_as_it_must_be() -> None:
     assert np.all(ratio[moving] <= 1.2), ratio
 
 
+@pytest.mark.slow
 def test_free_residual_is_of_the_size_seen_on_real_logs() -> None:
     """With the mismatch on, the free round's residual on J1–J3 is 0.5–2 N·m."""
     sizes = []
@@ -144,12 +149,14 @@ def test_free_residual_is_of_the_size_seen_on_real_logs() -> None:
     assert np.all(np.max(sizes, axis=1) < 2.0), sizes
 
 
+@pytest.mark.slow
 def test_first_round_is_free_and_the_others_are_not(circle: Simulation) -> None:
     free = circle.truth.t < 4.0
     np.testing.assert_array_equal(circle.truth.tau_ext[free], 0.0)
     assert np.all(rms(circle.truth.tau_ext[~free])[:3] > 3.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("stiffness", "low", "high"), [("stiff", 0.5, 5.0), ("soft", 8.0, 35.0)])
 def test_a_push_moves_the_arm_by_millimetres(stiffness: str, low: float, high: float) -> None:
     run = simulate(load_scenario("ur5-circle", [f"servo.stiffness={stiffness}"]), 1)
@@ -209,6 +216,7 @@ def test_pair_is_one_motion_with_and_without_the_payload() -> None:
     assert np.any(loaded.recording.q - loaded.truth.q != free.recording.q - free.truth.q)
 
 
+@pytest.mark.slow
 def test_warming_joints_rub_less() -> None:
     base = ["robot=ur5e", "duration=8.0", "contacts=[]", "sensing.rate=125"]
     drift = ["friction.temperature_begin=25", "friction.temperature_end=40"]
@@ -228,6 +236,7 @@ def test_a_temperature_that_no_joint_has_is_refused() -> None:
         simulate(load_scenario("ur5-circle", ["friction.temperature_end=300"]), 1)
 
 
+@pytest.mark.slow
 def test_bearing_weighs_what_it_should_and_the_arm_does_not_chatter() -> None:
     """Exact profile: GMO(30) through Jᵀ reads the 9.2 N, and nothing while unloaded."""
     kinds = ("mass", "com", "friction", "torque_constant", "torque_offset")

@@ -34,6 +34,7 @@ def test_condition_is_that_of_the_optimised_series(name: str, rank: int, conditi
     assert condition_number(robot, motion, columns) == pytest.approx(condition, abs=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur3", "gen3", URDF])
 def test_a_made_motion_excites_inside_the_limits(name: str) -> None:
     robot = load_robot(name)
@@ -52,6 +53,7 @@ def test_torque_is_that_of_pinocchio() -> None:
     np.testing.assert_allclose(torque_share(robot, motion), expected, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_an_arm_without_limits_moves_with_caution_and_says_so(tmp_path: Path) -> None:
     nothing = np.full(6, np.nan)
     robot = replace(load_robot(URDF), limits=Limits(**dict.fromkeys(LIMITS, nothing)))
@@ -76,6 +78,7 @@ def test_an_arm_that_cannot_carry_itself_is_refused() -> None:
         make_excitation(weak)
 
 
+@pytest.mark.slow
 def test_a_stated_period_is_kept() -> None:
     scenario = load_scenario("free-excitation", ["robot=ur10", "trajectory.period=6"])
     assert scenario.trajectory.period == 6.0

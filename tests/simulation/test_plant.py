@@ -59,6 +59,7 @@ def test_inverse_dynamics_return_the_applied_torque(name: str) -> None:
         np.testing.assert_allclose(back, tau, rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5", "panda"])
 def test_differenced_acceleration_error_falls_with_the_step(name: str) -> None:
     """With q̈ differenced from v at the log's instants the torque error is of second order."""
@@ -173,6 +174,7 @@ def test_step_outside_the_range_is_refused(step: float) -> None:
         Plant(robot.model, frictionless(robot), np.zeros(6), np.zeros(6), step)
 
 
+@pytest.mark.slow
 def test_follows_another_engine(logs: Path) -> None:
     """Driven by the torque and wrench MuJoCo logged, q stays with MuJoCo's over 0.2 s."""
     folder = logs / "mujoco_ur5e"

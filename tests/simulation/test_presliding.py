@@ -68,6 +68,7 @@ LEAST, MOST = 0.3, 0.65
 """A UR10e's, in eight free logs, is .28 to .48; the bar that was set for the simulation."""
 
 
+@pytest.mark.slow
 def test_a_resting_arm_holds_what_its_teeth_hold() -> None:
     """Seed 1 until the second drag: .44 (whole run .50); an arm that sticks holds .65 (.73)."""
     assert LEAST <= held_at_rest("ur5-drag", 1, "duration=17") <= MOST

@@ -46,6 +46,7 @@ def test_free_excitation_moves_a_panda() -> None:
     assert run.recording.joints == 7
 
 
+@pytest.mark.slow
 def test_both_drags_exceed_the_threshold_while_the_hand_holds() -> None:
     scenario = load_scenario("ur5-drag", ["duration=20.5"])
     run = simulate(scenario)
@@ -56,6 +57,7 @@ def test_both_drags_exceed_the_threshold_while_the_hand_holds() -> None:
         assert np.count_nonzero(above) * 0.008 > 0.3
 
 
+@pytest.mark.slow
 def test_twists_exceed_the_threshold() -> None:
     run = simulate(load_scenario("ur5-twist", ["duration=28"]))
     for start, stop in ((13.9, 16.0), (25.7, 27.6)):

@@ -32,6 +32,7 @@ def test_average_torque_is_the_mean_over_the_interval() -> None:
     np.testing.assert_allclose(mean.truth.torque[1:], steps, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_noise_has_the_profile_size() -> None:
     run = circle("duration=20.0", "sensing.position_step=0")
     noise = run.robot.noise
@@ -57,6 +58,7 @@ def test_clock_drift_stretches_the_period_on_the_log_clock() -> None:
     assert run.samples.stamp[-1] == pytest.approx(8.08, abs=0.008)
 
 
+@pytest.mark.slow
 def test_dropped_samples_leave_gaps_and_repeated_rows_are_counted() -> None:
     run = circle("duration=8.0", "sensing.dropped=0.05", "sensing.repeated=0.05")
     written = len(run.measured.rows)
@@ -72,6 +74,7 @@ def test_jittering_stamps_still_increase() -> None:
     assert np.std(steps) > 1e-3
 
 
+@pytest.mark.slow
 def test_vendor_estimate_sees_the_push_late_and_through_a_filter() -> None:
     run = simulate(load_scenario("ur5-circle", ["contacts.hand.style=slow"]), 1)
     truth, vendor = run.truth.tau_ext[:, 0], run.vendor.tau_ext[:, 0]
@@ -81,6 +84,7 @@ def test_vendor_estimate_sees_the_push_late_and_through_a_filter() -> None:
     assert 0.016 <= 0.008 * (1 + int(np.argmax(lags))) <= 0.08
 
 
+@pytest.mark.slow
 def test_force_sensor_reads_the_handle_in_its_own_axes() -> None:
     quiet = ["noise_force=0", "noise_torque=0", "drift_force=0", "tool_mass=0"]
     settings = [f"force_sensor.{s}" for s in quiet]

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from vftcli.observers.momentum import MomentumObserver
 from vftcli.robots.terms import dynamics_terms
@@ -19,6 +20,7 @@ UR5E = [
 ]
 
 
+@pytest.mark.slow
 def test_the_law_takes_the_drift_out_of_the_residual() -> None:
     """25 → 40 °C: at most 1.1 times the residual at a constant 35 °C; without it, four times."""
 

@@ -86,6 +86,7 @@ def test_a_form_is_checked_before_anything_is_computed(monkeypatch: pytest.Monke
     assert checked_form(None) is None
 
 
+@pytest.mark.slow
 def test_a_command_without_figures_loads_no_matplotlib(loaded) -> None:
     rooms = ("figures.tuned", "admittance.files", "identification.files", "log.report")
     modules = (f"vftcli.outputs.{room}" for room in rooms)

@@ -53,6 +53,7 @@ def test_the_least_of_a_curve_is_what_is_chosen_for_the_smallest_error(
         np.testing.assert_allclose(curves[name].least, line.rmse, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_gains_and_figures_appear_together(
     spectra: Spectra, tuned: tuple[Tuned, ...], tmp_path: Path
 ) -> None:

@@ -9,6 +9,7 @@ from vftcli.outputs.identification.figures import IDENTIFICATION_FIGURES, identi
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 
 
+@pytest.mark.slow
 def test_torque_measured_and_predicted_and_what_is_left(found: Any) -> None:
     identified, _ = found
     drawings = identification_figures(identified)

@@ -31,6 +31,7 @@ def names_in(figure: Any) -> list[str]:
     return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
 
 
+@pytest.mark.slow
 def test_every_axis_of_every_figure_has_its_unit(pushed: Analysis) -> None:
     """A number below bears the unit of the lowest plot; joints have none."""
     found = log_figures(pushed)
@@ -49,6 +50,7 @@ def test_every_axis_of_every_figure_has_its_unit(pushed: Analysis) -> None:
             }, name
 
 
+@pytest.mark.slow
 def test_torque_shows_best_with_its_band_or_all_or_the_chosen(pushed: Analysis) -> None:
     shown = names_in(drawn(torque_drawing(pushed)))
     assert "reference (two-cycle)" in shown
@@ -59,6 +61,7 @@ def test_torque_shows_best_with_its_band_or_all_or_the_chosen(pushed: Analysis) 
     assert not {"best", "95 % band"} & set(two)
 
 
+@pytest.mark.slow
 def test_forces_stand_above_moments_or_beside_them(pushed: Analysis) -> None:
     drawing = wrench_drawing(pushed)
     heads = {w: [a.get_ylabel()[:2] for a in drawn(drawing, w).axes] for w in WIDTHS}

@@ -55,6 +55,7 @@ def column(rows: dict[str, dict[str, list]], entity: str, ending: str) -> list:
     return rows[entity][name]
 
 
+@pytest.mark.slow
 def test_the_file_verifies(path: Path) -> None:
     """The text is asserted: for a file that is no recording the exit code is 0 as well."""
     command = [sys.executable, "-m", "rerun", "rrd", "verify", str(path)]
