@@ -106,6 +106,7 @@ def test_units_and_signs_of_velocity() -> None:
     assert not {"velocity-unit", "velocity-mismatch"} & names(examine(log))
 
 
+@pytest.mark.slow
 def test_velocity_in_radians_beside_positions_in_degrees_is_another_unit() -> None:
     """The slope is then 1/57.3: told as a unit, not as a velocity that is wrong on every joint."""
     log = moving("panda")

@@ -88,6 +88,7 @@ def test_a_fault_is_named(cells: Cells, log: str, fault: str) -> None:
         assert cell.named == ((log, fault) not in SILENT), cell
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("log", "fault"), PAIRS, ids=str)
 def test_a_fault_is_called_by_no_other_name(cells: Cells, log: str, fault: str) -> None:
     assert cell_in(cells, log, fault).wrong == ECHOES.get((log, fault), ())
