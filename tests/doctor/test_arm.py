@@ -65,6 +65,7 @@ def test_a_user_s_own_file_may_differ_from_its_maker_s_model(tmp_path: Path) -> 
     assert codes(arm_findings(moving("ur5"), robot)) == ["other-robot"]
 
 
+@pytest.mark.slow
 def test_an_arm_that_no_profile_knows_is_refused_with_the_fits() -> None:
     """A torque that no rigid body makes: it turns thrice as fast as gravity's."""
     log = moving("panda")
@@ -81,6 +82,7 @@ def test_a_log_that_says_its_arm_is_held_against_it() -> None:
     assert codes(arm_findings(replace(log, robot_hint="ur10e"), None)) == []
 
 
+@pytest.mark.slow
 def test_an_effort_is_put_right_where_nobody_says_the_arm() -> None:
     log = moving()
     found = arm_findings(replace(log, current=-log.require("current")), None)

@@ -184,6 +184,7 @@ def test_nothing_is_cut_out_of_a_sound_log(logs: Path, log: Any) -> None:
         assert Examiner().taken(part, robot, ReadChoice()).source.cuts == ()
 
 
+@pytest.mark.slow
 def test_one_bad_sample_is_no_contact(circle: Recording) -> None:
     """One sample of 1000 A read 3302 N, good: the list is that of the log without the sample."""
     touched = contacts(circle, ROBOT)[0]
@@ -207,6 +208,7 @@ def test_rows_of_the_file_know_their_samples(circle: Recording) -> None:
     assert samples[:8].tolist() == [-1, -1, 0, -1, 1, 2, 3, -1]
 
 
+@pytest.mark.slow
 def test_a_log_that_waits_a_minute_is_listed_like_one_that_does_not(circle: Recording) -> None:
     """A cycle that lies in the gap has no residual, and no mode is certain behind it."""
     later = np.where(np.arange(circle.samples) > AT, 60.0, 0.0)

@@ -73,6 +73,7 @@ def altered(recording: Recording, **changes: Array | None) -> Examination:
     return examine(replace(recording, **changes))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_inverted_effort_is_told_and_what_to_do() -> None:
     log = moving("ur10e")
     assert log.current is not None
@@ -83,6 +84,7 @@ def test_inverted_effort_is_told_and_what_to_do() -> None:
     assert not examination.robots[0].fits
 
 
+@pytest.mark.slow
 def test_effort_that_is_current_is_told() -> None:
     log = moving("ur5e")
     examination = altered(log, torque=log.current, current=None)
@@ -104,6 +106,7 @@ def test_units_and_signs_of_velocity() -> None:
     assert not {"velocity-unit", "velocity-mismatch"} & names(examine(log))
 
 
+@pytest.mark.slow
 def test_velocity_in_radians_beside_positions_in_degrees_is_another_unit() -> None:
     """The slope is then 1/57.3: told as a unit, not as a velocity that is wrong on every joint."""
     log = moving("panda")
@@ -206,6 +209,7 @@ ARMS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
 def test_real_logs_are_assigned_to_their_robot_or_to_none(logs: Path, name: str) -> None:
     columns, robot = ARMS[name]
@@ -231,6 +235,7 @@ def test_panda_exciting_is_a_panda(logs: Path) -> None:
     assert "stale-rows" in names(examination)  # the README of the logs counts 1145 repeated rows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["identification", "repeat_a", "repeat_b"])
 def test_ur3_effort_is_inverted(logs: Path, name: str) -> None:
     examination = examine(read(logs / "ur3" / f"{name}.bag"))

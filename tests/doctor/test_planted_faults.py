@@ -71,6 +71,7 @@ def cell_in(cells: Cells, log: str, fault: str) -> Cell:
     return cells[log, fault]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log", LOGS)
 def test_the_logs_are_sound(tables: dict[str, Table], log: str, tmp_path: Path) -> None:
     if log not in tables:
@@ -79,6 +80,7 @@ def test_the_logs_are_sound(tables: dict[str, Table], log: str, tmp_path: Path) 
     assert [str(finding) for finding in said if finding.level == "warning"] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("log", "fault"), PAIRS, ids=str)
 def test_a_fault_is_named(cells: Cells, log: str, fault: str) -> None:
     cell = cell_in(cells, log, fault)
@@ -86,6 +88,7 @@ def test_a_fault_is_named(cells: Cells, log: str, fault: str) -> None:
         assert cell.named == ((log, fault) not in SILENT), cell
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("log", "fault"), PAIRS, ids=str)
 def test_a_fault_is_called_by_no_other_name(cells: Cells, log: str, fault: str) -> None:
     assert cell_in(cells, log, fault).wrong == ECHOES.get((log, fault), ())
@@ -218,6 +221,7 @@ SEEN_BY_COMMANDS = [
 """Log, fault, and how estimate, compare and report judge it; inspect names every one."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("log", "fault", "judged"), SEEN_BY_COMMANDS)
 def test_commands_name_what_they_are_given(
     tables: dict[str, Table], folder: Path, log: str, fault: str, judged: str

@@ -5,6 +5,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -61,6 +62,7 @@ def arm(joints: int) -> Robot:
     return load_robot({6: "ur5e", 7: "panda"}[joints])
 
 
+@pytest.mark.slow
 @given(recordings())
 @example(log_of([0.0]))
 @example(log_of([0.0, 1e-300]))

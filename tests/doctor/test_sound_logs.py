@@ -12,6 +12,7 @@ def name_of(log: SoundLog) -> str:
     return f"{Path(log.path).name}-{log.robot or 'any'}-{(log.columns or '').count(',')}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log", LOGS, ids=name_of)
 def test_nothing_false_is_said(logs: Path, log: SoundLog) -> None:
     if log.path.startswith("..") and not (logs / log.path).exists():

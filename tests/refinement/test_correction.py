@@ -54,6 +54,7 @@ def codes(analysis: Analysis) -> list[str]:
     return [remark.code for remark in analysis.remarks]
 
 
+@pytest.mark.slow
 def test_the_bias_is_off_for_the_best_alone(automatic: Analysis) -> None:
     """Measured .27 and .60 N·m, seed 1: .46; a prototype had .37 of it in the mean of four."""
     assert automatic.refinement is not None
@@ -73,6 +74,7 @@ def test_the_bias_is_off_for_the_best_alone(automatic: Analysis) -> None:
         np.testing.assert_array_equal(estimate.tau, observer.estimate(terms).tau)
 
 
+@pytest.mark.slow
 def test_whole_log_is_off_for_everyone_and_none_for_no_one(
     request_: AnalysisChoice, automatic: Analysis
 ) -> None:
@@ -102,6 +104,7 @@ def test_the_band_of_the_best_holds_what_the_correction_may_err_by(automatic: An
     assert np.all(band >= np.where(best.correction.applied, best.correction.sd, 0.0))
 
 
+@pytest.mark.slow
 def test_a_log_without_a_free_part_leans_on_what_the_fit_takes_for_free(
     request_: AnalysisChoice,
 ) -> None:

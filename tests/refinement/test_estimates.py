@@ -43,6 +43,7 @@ def mean_rmse(analysis: Analysis, observer: str) -> float:
     return float(rows["rmse_Nm"].mean())
 
 
+@pytest.mark.slow
 def test_the_free_cycle_is_found_and_the_resting_joint_named(worked_up: Analysis) -> None:
     found = worked_up.refinement
     assert found is not None
@@ -55,6 +56,7 @@ def test_the_free_cycle_is_found_and_the_resting_joint_named(worked_up: Analysis
     assert band.where.joints == (5,)
 
 
+@pytest.mark.slow
 def test_ratios_to_the_hand_set_filter(
     worked_up: Analysis, without_bias: Analysis, request_: AnalysisChoice
 ) -> None:
@@ -226,6 +228,7 @@ def test_a_log_that_is_free_throughout_tunes_nothing() -> None:
     assert analysis.estimates[0].error_sd is None
 
 
+@pytest.mark.slow
 def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: AnalysisChoice) -> None:
     """Its quietest cycle is pushed too: hand-set gains, no bands, no bias removed, all said."""
     always = replace(
@@ -286,6 +289,7 @@ def test_what_cannot_be_done_is_one_line(changes: dict[str, Any], message: str) 
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_bias_removal_needs_no_tuned_observer() -> None:
     request = AnalysisChoice(
         robot=RobotChoice(name="ur5"),

@@ -27,6 +27,7 @@ def gaps(analysis: Analysis) -> list[Remark]:
     return [remark for remark in analysis.remarks if remark.code.startswith("paper-gains")]
 
 
+@pytest.mark.slow
 def test_the_ratio_is_that_of_the_bands(analysis: Analysis) -> None:
     (gap,) = gaps(analysis)
     assert gap.code == "paper-gains-expected"
@@ -37,6 +38,7 @@ def test_the_ratio_is_that_of_the_bands(analysis: Analysis) -> None:
     assert "(delay 39–333 ms)" in str(gap)
 
 
+@pytest.mark.slow
 def test_other_gains_in_the_run_do_not_change_what_the_paper_s_cost(analysis: Analysis) -> None:
     """Those of --gains auto and of --set ran; the paper's run beside them for the line."""
     for words in ({"gains": "auto"}, {"assignments": ["gmo.gain=30"]}, {"observer": ["best"]}):

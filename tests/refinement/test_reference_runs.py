@@ -101,6 +101,7 @@ def test_mujoco_ur5e(logs: Path) -> None:
     assert mean_rmse(analysis, "rts-auto") <= 0.6 * mean_rmse(analysis, "gmo")
 
 
+@pytest.mark.slow
 def test_libfranka_simulation(logs: Path, tmp_path: Path) -> None:
     """Behind Franka's own protocol; the log repeats nothing, so its free part is stated.
 
@@ -121,6 +122,7 @@ def test_libfranka_simulation(logs: Path, tmp_path: Path) -> None:
     assert mean_rmse(analysis, "rts-auto") <= 0.6 * mean_rmse(analysis, "gmo")
 
 
+@pytest.mark.slow
 def test_ur10e_payload_by_the_free_run(logs: Path) -> None:
     """Real: bias removed by the free run, at most 0.7 of the best causal observer as it stands.
 
