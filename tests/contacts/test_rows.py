@@ -73,7 +73,7 @@ def test_a_points_arm_leads_from_the_flange() -> None:
     q = run.recording.q[0]
     fit = PointFit(link=3, share=0.0, misfit=0.0, score=0.0, force=np.ones(3), band=1.0)
     frames = link_poses(run.robot.chain, q[None]).translation[0]
-    np.testing.assert_allclose(from_flange(run, q, fit), frames[2] - frames[-1])
+    np.testing.assert_allclose(from_flange(run.robot.chain, q, fit), frames[2] - frames[-1])
 
 
 def test_a_row_on_a_link_has_its_moment_about_the_flange() -> None:
