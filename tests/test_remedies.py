@@ -32,6 +32,7 @@ from planted_faults import (
     velocities_in_degrees,
     with_more_torque,
 )
+from planted_spans import picked_up
 
 from vftcli.readers import read
 from vftcli.robots import PROFILES
@@ -209,6 +210,7 @@ def rehomed(table: Table) -> Table:
 
 ROWS = [
     Row("gaps", of(dropped_span), "interval", "0:9"),
+    Row("load-changes", of(partial(picked_up, mass=3.0)), "interval", "0:9"),
     Row("position-jump", of(rehomed), "interval", "0:11"),
     Row("velocity-of-another-kind", of(lambda t: replace(t, dq=t.dq * THIRD_IN_DEGREES)), "derive"),
     Row("no-effort", lambda f: renamed(sound(), "current", "pull", f), "columns",

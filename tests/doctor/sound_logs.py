@@ -105,17 +105,19 @@ LOGS: tuple[SoundLog, ...] = (
         for name in ("press_1", "press_2", "press_3", "press_4", "press_5", "traj")
     ),
     *(
-        SoundLog(f"../samples/{name}", None, "panda", ("slow-rate",))
+        # The arm sets a bearing of 9.2 N down at 16.8 s.
+        SoundLog(f"../samples/{name}", None, "panda", ("slow-rate", "load-changes"))
         for name in ("droid_raw", "lerobot_v21_effort", "lerobot_v3_effort")
     ),
     SoundLog("../samples/reach/ur5.feather", None, "ur5"),
     SoundLog("../samples/reach/ur5_sec_nsec.csv", None, "ur5"),
     SoundLog("../samples/reach/ur5_position_only.csv", None, "ur5", ("no-velocity",)),
     *(
-        SoundLog(str(FIXTURES / name), None, name.split("_")[0])
-        for name in (
-            "ur5_circle.csv", "ur5_table1.csv", "ur5_sensor.parquet", "ur5_taps_ur_rtde.csv",
-            "panda_bearing.csv", "panda_bag",
+        SoundLog(str(FIXTURES / name), None, name.split("_")[0], known)
+        for name, known in (
+            ("ur5_circle.csv", ()), ("ur5_table1.csv", ()), ("ur5_sensor.parquet", ()),
+            ("ur5_taps_ur_rtde.csv", ()), ("panda_bearing.csv", ("load-changes",)),
+            ("panda_bag", ()),
         )
     ),
     SoundLog(str(FIXTURES / "panda_episodes"), None, "panda", ("slow-rate",)),

@@ -26,8 +26,9 @@ from vftcli.signals.series import median_step
 
 WINDOW = 0.15
 """Length of a window; each begins in the middle of the one before. [s]"""
-WINDOWS, BLOCK, LEAST = 320, 16, 40
-"""Windows that are looked at, at most, in blocks of neighbours; and how many a joint needs."""
+WINDOWS, BLOCK, LEAST = 320, 16, 60
+"""Windows that are looked at, at most, in blocks of neighbours; and how many a joint needs: 4.5 s of
+its motion, of which no push is the most."""
 INSIDE = 12
 """Instants of a window at which the model is computed."""
 EARLIEST, LATEST, STEP = -0.1, 0.25, 0.01
@@ -54,7 +55,8 @@ simulation whose torque belongs to the step before like 30. [s]"""
 BETTER = 1.45
 """How much better a lag explains the joints, in the mean."""
 AGREE, ENOUGH, NEAR = 0.65, 3, 0.35
-"""Share and number of the joints whose own best lag is nearer to it than this share of it."""
+"""Share and number of the joints whose own best lag is nearer to it than this share of it; half of
+the arm's have to tell one."""
 MISTIMED = frozenset(
     {"time-unit", "clock-rate", "velocity-unit", "velocity-sign", "velocity-mismatch"}
     | {"velocity-of-another-kind", "velocity-order", "velocity-lag", "velocity-filtered"}
@@ -77,7 +79,7 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
         return
     lags, rest = late.lags, late.rest()
     known = np.flatnonzero(np.isfinite(rest[:, 0]) & (rest.min(axis=1) > 0))
-    if known.size < ENOUGH:
+    if known.size < max(ENOUGH, 0.5 * recording.joints):
         return
     together = np.log(rest[known]).mean(axis=0)
     best, none = int(np.argmin(together)), int(np.argmin(np.abs(lags)))

@@ -18,12 +18,9 @@ from vftcli.signals.source import Source
 
 GARBAGE_ROWS = 100
 """Rows at the start of a log among which a misaligned packet may have left garbage."""
-
 GARBAGE_VALUE = 1e6
 """No joint measurement in SI units is this large; a misread double nearly always is, or is tiny."""
-
 DENORMAL = 1e-300
-
 ABSURD_STAMP = 1e19
 """Nanoseconds since 1970 stay below this for some centuries."""
 
