@@ -159,6 +159,7 @@ def free_torque(path: Path, robot: str | Path = "ur5", until: float = 3.9, **how
     return float(np.sqrt(np.mean(tau**2, axis=0)).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "until", "how"),
     [

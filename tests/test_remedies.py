@@ -343,6 +343,7 @@ def found_in(text: str, template: str) -> str | None:
     return None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.code}-{row.option}")
 def test_the_remedy_heals(row: Row, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -428,6 +429,7 @@ def test_a_load_that_a_log_shows_is_found_and_mounted(tmp_path: Path) -> None:
     assert told("unmodelled-load", printed(["inspect", path, "--robot", own])[1]) is None
 
 
+@pytest.mark.slow
 def test_an_offset_is_taken_out_with_the_remedy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -455,6 +457,7 @@ def test_an_offset_is_taken_out_with_the_remedy(
     assert left < 0.1 * offset()
 
 
+@pytest.mark.slow
 def test_a_load_that_one_motion_does_not_show_is_found_in_a_pair(tmp_path: Path) -> None:
     """As the refusal says."""
     loaded, free = payload(sound()).write(tmp_path / "a.csv"), sound().write(tmp_path / "b.csv")

@@ -95,6 +95,7 @@ def test_traditional_at_xi_one_is_the_other_figure_of_the_science() -> None:
     assert returned(motion, 0, 0.02) == pytest.approx(3.59, rel=0.01)  # printed to three digits
 
 
+@pytest.mark.slow
 def test_release_figures_of_the_panda() -> None:
     robot = load_robot("panda")
     p = from_table(robot.admittance, robot.name, {})

@@ -162,6 +162,7 @@ def test_quiet_log_moves_nothing_and_says_so() -> None:
     assert remark.values["share"] == pytest.approx(19.0 / 20.0)
 
 
+@pytest.mark.slow
 def test_force_at_rest_for_long_is_told() -> None:
     record, q = push(length=10.0)
     wrench = record.values.copy()

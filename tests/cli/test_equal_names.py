@@ -44,6 +44,7 @@ def compared(logs, *options):
     return result.stdout
 
 
+@pytest.mark.slow
 def test_json_has_the_rows_of_both_logs(logs):
     rows = json.loads(compared(logs, "--json"))
     samples = {row["recording"]: row["samples"] for row in rows}
@@ -51,11 +52,13 @@ def test_json_has_the_rows_of_both_logs(logs):
     assert samples["b/log.csv"] == ROWS["b"] - 1
 
 
+@pytest.mark.slow
 def test_csv_has_the_rows_of_both_logs(logs):
     rows = list(csv.DictReader(io.StringIO(compared(logs, "--csv"))))
     assert {row["recording"] for row in rows} == {"a/log.csv", "b/log.csv", "pooled"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("option", [None, "--markdown", "--latex"])
 def test_every_table_shows_both_logs(logs, option):
     text = compared(logs, *([option] if option else []))
@@ -66,6 +69,7 @@ def test_every_table_shows_both_logs(logs, option):
         )
 
 
+@pytest.mark.slow
 def test_significance_names_both_logs(logs):
     text = compared(logs, "--significance")
     assert "a/log.csv" in text

@@ -10,6 +10,8 @@ from typer.testing import CliRunner
 from vftcli.cli import app
 from vftcli.outputs.seals import digests
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 
 LOG = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
@@ -25,7 +27,6 @@ def run() -> Callable[..., str]:
     return run
 
 
-@pytest.mark.slow
 def test_a_report_holds_its_figures_and_the_seal_lists_them(
     run: Callable[..., str], tmp_path: Path
 ) -> None:
@@ -42,7 +43,6 @@ def test_a_report_holds_its_figures_and_the_seal_lists_them(
     assert not (out / "figures").exists()
 
 
-@pytest.mark.slow
 def test_compare_draws_into_a_folder_and_nowhere_else(
     run: Callable[..., str], tmp_path: Path
 ) -> None:
@@ -57,7 +57,6 @@ def test_compare_draws_into_a_folder_and_nowhere_else(
     assert "leave --significance away" in lost
 
 
-@pytest.mark.slow
 def test_admit_prints_tables_three_and_four_for_latex_and_draws_the_release(
     run: Callable[..., str], tmp_path: Path
 ) -> None:

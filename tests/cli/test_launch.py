@@ -104,6 +104,7 @@ def test_a_stopped_command_says_so_and_leaves_nothing(tmp_path: Path, number: in
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [(), ("--rrd", "-v")])
 def test_a_full_disk_is_one_error_in_words_of_the_system(
     tmp_path: Path, words: tuple[str, ...]

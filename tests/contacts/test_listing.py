@@ -294,6 +294,7 @@ def test_a_load_that_is_struck_is_listed_as_a_whole(listed: Lister) -> None:
     assert first.stop > 16.0
 
 
+@pytest.mark.slow
 def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap() -> None:
     """Every second sample of a log at 125 Hz."""
     whole = read(FIXTURES / "ur5_taps_ur_rtde.csv")

@@ -33,6 +33,7 @@ def test_a_sound_log_has_no_cause(name: str) -> None:
     assert found.case.misfit < 0.05
 
 
+@pytest.mark.slow
 def test_an_effort_is_told_from_what_it_may_be() -> None:
     log = moving()
     current = log.require("current")

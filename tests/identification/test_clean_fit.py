@@ -40,6 +40,7 @@ def data(rubbing_data):
     return rubbing_data
 
 
+@pytest.mark.slow
 def test_a_push_is_left_out_of_the_fit(recording):
     push = np.where((recording.t > 5) & (recording.t < 6), 40.0, 0.0)[:, None] * np.eye(6)[1]
     pushed = replace(recording, current=recording.current + push / UR5.torque_constant)
@@ -94,6 +95,7 @@ def test_strict_methods_refuse_what_others_remark_on(recording):
     assert codes[-2:] == ["unexplained-torque", "absorbed-doubt"]
 
 
+@pytest.mark.slow
 def test_links_of_another_arm_are_told_from_an_effort_that_no_links_explain(recording, data):
     """The same effort through a UR10e's links, and its own links under noise of 30 N·m."""
     weights = [m.usable.astype(float) for m in data.motions]

@@ -47,6 +47,7 @@ def training(log, robot=UR5, rubs=True):
     return prepare_training([log], robot, Processing(), False, rubs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("coupling", "currents"), [(1.0, True), (-0.3, False)])
 def test_a_planted_coupling_is_found_within_2_per_cent(made, coupling, currents):
     found = identify([made(coupling, currents)], UR5, Task(), [made(coupling, currents, seed=5)])
@@ -68,6 +69,7 @@ def test_a_planted_coupling_is_found_within_2_per_cent(made, coupling, currents)
     assert np.all(errors[4:] <= errors[3])
 
 
+@pytest.mark.slow
 def test_nothing_is_claimed_of_an_uncoupled_arm(made):
     data, remarks = with_couplings(training(made(0.0)))
     assert data.robot.chain.transmission is None
@@ -86,6 +88,7 @@ def test_without_friction_nothing_tells_a_coupling(made):
     assert with_couplings(given) == (given, [])
 
 
+@pytest.mark.slow
 def test_targets_of_coupled_joints_are_refused(made):
     """Nobody knows whose they are: taken for the joints', motor 6 would show in joint 6 alone."""
     T = np.eye(6)
@@ -114,6 +117,7 @@ def test_what_the_regression_demands(value, sd, left, rubs, demanded):
     assert Coupling(5, 4, value, sd, left, rubs).is_demanded is demanded
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["free_5", "free_6"])
 def test_links_that_are_another_arms_feign_none(logs, name):
     """A simulated arm without any friction: what its logs hint at opposes no motion."""

@@ -64,6 +64,7 @@ def rubbed(robot, model="coulomb-viscous-load", **values):
 UR5 = load_robot("ur5")
 
 
+@pytest.mark.slow
 def test_friction_and_rotor_come_back():
     rotor = UR5.chain.rotor_inertia * 1.3
     # 8 − 2·1·v is above zero up to the joints' π rad/s: the parabola may compete
@@ -83,6 +84,7 @@ def test_friction_and_rotor_come_back():
     )
 
 
+@pytest.mark.slow
 def test_a_plain_model_is_chosen_where_nothing_more_is_there():
     true = rubbed(UR5, "coulomb-viscous-offset")
     found = identify([log(true)], UR5, Task())
@@ -91,6 +93,7 @@ def test_a_plain_model_is_chosen_where_nothing_more_is_there():
     assert len(chosen) == 6
 
 
+@pytest.mark.slow
 def test_a_fall_beside_the_links_is_replaced_by_the_joints_own_fit(monkeypatch):
     from vftcli.identification import whole_arm
 
@@ -106,6 +109,7 @@ def test_a_fall_beside_the_links_is_replaced_by_the_joints_own_fit(monkeypatch):
             assert one.parameters[key] == pytest.approx(other.parameters[key], rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_stribeck_effect_is_seen():
     true = rubbed(UR5, "coulomb-viscous-stribeck", stribeck=4.0, stribeck_velocity=0.1)
     found = identify([log(true, noise=0.05)], UR5, Task()).robot
@@ -115,6 +119,7 @@ def test_a_stribeck_effect_is_seen():
     assert values["stribeck_velocity"] == 0.1  # one of the velocities that compete
 
 
+@pytest.mark.slow
 def test_drive_constants_come_back():
     true = rubbed(UR5, "coulomb-viscous-offset")
     true = replace(true, torque_constant=UR5.torque_constant * 1.1)
@@ -123,6 +128,7 @@ def test_drive_constants_come_back():
     np.testing.assert_allclose(found.torque_constant[1:3], true.torque_constant[1:3], rtol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["base", "consistent"])
 def test_links_are_identified_for_another_trajectory(method):
     scale = np.linspace(0.85, 1.2, 6)
@@ -144,6 +150,7 @@ def test_links_are_identified_for_another_trajectory(method):
     assert len(found.base) == 40 + 6 * 3
 
 
+@pytest.mark.slow
 def test_the_payload_comes_back_from_a_pair_in_either_order():
     true = rubbed(UR5, "coulomb-viscous-offset")
     load = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3, 3)))
@@ -219,6 +226,7 @@ def test_different_motions_are_no_pair():
         payload_from_pair(log(UR5, 1), log(UR5, 2), UR5)
 
 
+@pytest.mark.slow
 def test_a_repeated_trajectory_is_told():
     first, again, other = log(UR5, 1), log(UR5, 1, noise=0.4), log(UR5, 2)
     found = identify([first], UR5, Task(), [again, other])
@@ -229,6 +237,7 @@ def test_a_repeated_trajectory_is_told():
     assert repeated_share(motions[0], motions[2]) < 0.2
 
 
+@pytest.mark.slow
 def test_a_contact_is_found_and_left_out():
     true = rubbed(UR5, "coulomb-viscous-offset")
     clean = identify([log(true)], UR5, Task()).robot
@@ -252,6 +261,7 @@ def test_a_log_at_rest_identifies_nothing():
         identify([recording], UR5, Task())
 
 
+@pytest.mark.slow
 def test_a_joint_that_rests_keeps_its_numbers():
     t, q, dq, ddq = motion(0)
     dq[:, 3], q[:, 3], ddq[:, 3] = 0.0, 0.4, 0.0
@@ -263,6 +273,7 @@ def test_a_joint_that_rests_keeps_its_numbers():
     assert found.robot.chain.rotor_inertia[3] == UR5.chain.rotor_inertia[3]
 
 
+@pytest.mark.slow
 def test_a_joint_that_never_reverses_is_told():
     t, q, dq, ddq = motion(0)
     dq[:, 5], ddq[:, 5] = 0.3, 0.0
@@ -286,18 +297,21 @@ def test_missing_targets_are_told():
         identify([log(UR5)], UR5, Task(method="targets"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "error"), [("panda", RobotError), ("ur10e", IdentificationError)])
 def test_the_wrong_robot_is_refused(name, error):
     with pytest.raises(error, match="another"):
         identify([log(rubbed(UR5))], load_robot(name), Task())
 
 
+@pytest.mark.slow
 def test_turned_currents_are_refused():
     good = log(rubbed(UR5))
     with pytest.raises(IdentificationError, match="another sign or unit"):
         identify([replace(good, current=-good.current)], UR5, Task())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("push", "terms"), [(-0.1, "coulomb and viscous"), (0.1, None)])
 def test_a_joint_that_hardly_rubs_is_bounded_at_zero_and_named(push, terms):
     """Of joint 6 noise of .2 N·m and a model that is .1 N·m wrong are all there is to fit."""
@@ -317,12 +331,14 @@ def test_a_joint_that_hardly_rubs_is_bounded_at_zero_and_named(push, terms):
     assert found.robot.friction[4].parameters["coulomb"] == pytest.approx(5.0, rel=0.05)
 
 
+@pytest.mark.slow
 def test_turned_velocities_are_refused():
     good = log(rubbed(UR5))
     with pytest.raises(IdentificationError, match="it would push"):
         identify([replace(good, dq=-good.dq)], UR5, Task())
 
 
+@pytest.mark.slow
 def test_an_unknown_load_is_suspected():
     load = Payload(mass=2.5, com=np.array([0.0, 0.0, 0.05]), inertia=np.zeros((3, 3)))
     with pytest.raises(IdentificationError, match=r"kg on the flange .* --find-payload"):
@@ -382,6 +398,7 @@ def two_folders(*logs):
     ]
 
 
+@pytest.mark.slow
 def test_two_logs_of_one_file_name_stay_two_logs():
     """Their rows were pooled: 12 residuals for 6 joints, in the terminal and the robot file."""
     true = rubbed(UR5, "coulomb-viscous-offset")
@@ -392,6 +409,7 @@ def test_two_logs_of_one_file_name_stay_two_logs():
     assert found.residuals["log_index"].unique().sort().to_list() == [1, 2]
 
 
+@pytest.mark.slow
 def test_a_pair_of_one_file_name_identifies_the_arm_too():
     """The loaded log was told by its file name: with equal names no friction was identified."""
     true = rubbed(UR5, "coulomb-viscous-offset")
@@ -411,6 +429,7 @@ def test_the_heavier_log_is_refused_as_the_free_one_whatever_its_name():
         identify([free], UR5, Task(find_payload=True), free=loaded)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["friction", "base"])
 def test_a_simulators_arm_has_no_friction(method):
     """Rotors and links are fitted, friction neither competes nor stands in the file."""
@@ -429,6 +448,7 @@ def test_a_simulators_arm_has_no_friction(method):
         np.testing.assert_allclose(found.robot.chain.rotor_inertia, rotor, rtol=0.05)
 
 
+@pytest.mark.slow
 def test_torques_behind_the_gears_leave_the_friction_method_nothing_to_find():
     """Without friction: the rotor is before the gear, the links are the profile's."""
     robot = replace(UR5, torque_source="link_torque", torque_constant=None).without_friction()

@@ -16,6 +16,8 @@ from vftcli.robots import load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.robots.terms import dynamics_terms
 
+pytestmark = pytest.mark.slow
+
 UR5 = load_robot("ur5")
 BULLET = "t=t,q=q{i},dq=dq{i},-tau=tau{i}"
 

@@ -62,6 +62,7 @@ def codes(found):
     return {remark.code for remark in found.remarks}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "train", "test"), [("friction", 1.40, 1.40), ("base", 1.30, 1.40)]
 )
@@ -76,6 +77,7 @@ def test_ur10e_residuals_and_observer_floor(ur10e, method, train, test):
     assert floor(ur10e("free_12harm"), found.robot) <= 0.60
 
 
+@pytest.mark.slow
 def test_ur10e_other_days_and_loads_are_told(ur10e):
     others = [ur10e(name) for name in ("free_repeat_a", "load_14harm")]
     found = identify([ur10e("free_14harm")], load_robot("ur10e"), Task(), others)
@@ -87,12 +89,14 @@ def test_ur10e_other_days_and_loads_are_told(ur10e):
     assert load.values["mass_kg"] == pytest.approx(2.805, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["free_repeat_b", "free_repeat_c", "jointwise_4"])
 def test_other_free_logs_show_no_contact(ur10e, name):
     found = identify([ur10e(name)], load_robot("ur10e"), Task())
     assert "suspected-contacts" not in codes(found)
 
 
+@pytest.mark.slow
 def test_ur10e_targets_are_the_controllers_own(ur10e):
     found = identify(
         [ur10e("jointwise_2"), ur10e("free_14harm")], load_robot("ur10e"), Task(method="targets")
@@ -169,6 +173,7 @@ def window_floor(recording, robot):
     return [float(np.mean(np.sqrt(np.mean(tau**2, axis=0)))) for tau in torques]
 
 
+@pytest.mark.slow
 def test_presliding_halves_what_an_observer_reads_on_other_days(ur10e, logs):
     found = identify([ur10e("free_14harm")], load_robot("ur10e"), Task(method="base")).robot
     # required: window .65 .64 .85, whole log with its rests 1.05 .99 1.33 (stretch .95 .90 1.21)
@@ -192,6 +197,7 @@ RIGHT = {
 """Logs of arms whose gravity hardly varies, is rubbed over or pushed, and their right robots."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RIGHT)
 def test_a_right_arm_is_not_refused(logs, name):
     columns, robot = RIGHT[name]
@@ -200,6 +206,7 @@ def test_a_right_arm_is_not_refused(logs, name):
     assert "unexplained-torque" not in codes(found)
 
 
+@pytest.mark.slow
 def test_another_arm_is_refused(logs, ur10e):
     with pytest.raises(IdentificationError, match="Choose another --robot"):
         identify([ur10e("free_repeat_c")], load_robot("ur5e"), Task())
@@ -208,6 +215,7 @@ def test_another_arm_is_refused(logs, ur10e):
         identify([circle], load_robot("ur10e"), Task())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "limit"), [("friction", 0.195), ("base", 0.105), ("consistent", 0.105)]
 )

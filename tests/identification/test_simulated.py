@@ -75,6 +75,7 @@ def rubbing(robot, speeds, load):
     return 0.5 * (there - back)
 
 
+@pytest.mark.slow
 def test_friction_rotor_and_constants_come_back_within_five_per_cent(train, truth):
     found = identify([train], load_robot("ur5"), Task(fit_constants=True)).robot
     np.testing.assert_allclose(found.torque_constant, truth.torque_constant, rtol=0.05)
@@ -86,6 +87,7 @@ def test_friction_rotor_and_constants_come_back_within_five_per_cent(train, trut
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["base", "consistent"])
 def test_another_trajectory_is_predicted_to_the_noise_floor(train, other, truth, method):
     found = identify([train], load_robot("ur5"), Task(method=method), [other])
@@ -98,6 +100,7 @@ def test_another_trajectory_is_predicted_to_the_noise_floor(train, other, truth,
     assert np.all(found.robot.chain.rotor_inertia > 0)
 
 
+@pytest.mark.slow
 def test_rounds_of_one_motion_are_told_by_the_pull_they_do_without(train):
     """On the arm that gives before it slides, most parameters are open and no fold sees it."""
     rounds = simulate(load_scenario("ur5-circle", ["contacts=[]"]), SEED).recording

@@ -82,6 +82,7 @@ def test_friction_and_rotor_of_every_joint_are_found(data, weights):
     assert [x.shape for x in left] == [m.tau.shape for m in data.motions]
 
 
+@pytest.mark.slow
 def test_residuals_are_cut_apart_log_by_log(recording):
     logs = [recording, recording.between(0.0, 7.0)]
     data = prepare_training(logs, UR5, Processing(), fit_constants=False)
@@ -154,6 +155,7 @@ def test_a_current_that_falls_with_the_torque_is_refused(data):
         refuse_sign(data, 0, 0.05)
 
 
+@pytest.mark.slow
 def test_a_wrong_drive_constant_scales_friction_and_rotor(recording):
     """Currents of an arm whose K is 1.05 × the profile's: all torques are 1.05 × what is read."""
     log = replace(recording, current=recording.current / 1.05)
@@ -195,6 +197,7 @@ def test_a_vector_becomes_a_robot_without_its_payload(data, weights):
     np.testing.assert_allclose(refined.rigid[0], Y @ x[:60], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_whole_arms_say_how_they_were_chosen(data):
     base, consistent = (whole_arm(data, method) for method in ("base", "consistent"))
     assert "nearest-physical-model" in {r.code for r in base.remarks}
@@ -211,6 +214,7 @@ def test_whole_arms_say_how_they_were_chosen(data):
         assert np.sqrt(np.mean(change[:, 1:3] ** 2)) < 0.2
 
 
+@pytest.mark.slow
 def test_open_parameters_are_counted_without_friction(data, weights):
     layout, _ = initial_columns(data, fit_frictions(data, weights))
     many = whole_arm(data, "base").base
@@ -231,6 +235,7 @@ def test_too_short_logs_are_refused(data, weights):
     check_size(layout, [log])
 
 
+@pytest.mark.slow
 def test_a_joint_that_the_profile_predicts_better_keeps_its_numbers(data, weights, monkeypatch):
     """The log's own arm is its profile: what is fitted predicts as well as the truth, not worse."""
     fits = fit_frictions(data, weights)

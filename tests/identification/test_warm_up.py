@@ -18,6 +18,7 @@ def remarks_of(recording, arm):
     return warm_up_remarks(data, all_residuals(data, fits), weights, fits)
 
 
+@pytest.mark.slow
 def test_a_joint_that_rubs_less_and_less_is_told(rubbing_arm, rubbing_log):
     assert remarks_of(rubbing_log, rubbing_arm) == []
     # 2 N·m more in joint 1 at the start, gone at the end: +.67 and −.67 in the outer thirds

@@ -101,6 +101,7 @@ except OutputError as error:
 """Write a recording of 300 kB where a file may have so many bytes."""
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows limits no file's size")
 @pytest.mark.parametrize("room", [4096, 60_000])
 def test_a_full_disk_is_one_error_at_once_and_nothing_is_said_beside_it(

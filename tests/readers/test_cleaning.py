@@ -8,7 +8,7 @@ import pytest
 
 from vftcli.readers.cleaning import cleaned, last_jump, without_leading_garbage
 from vftcli.readers.reader import RawLog
-from vftcli.signals.errors import LogError
+from vftcli.signals.errors import ClockError, LogError
 
 STEP_NS = 2_000_000
 ROWS = 300
@@ -113,4 +113,12 @@ def test_a_named_joint_without_numbers_is_left_out_and_said():
         cleaned(replace(log, joint_names=()), Path("log"), "test")
     effort[:] = np.nan
     with pytest.raises(LogError, match="torque of joint 1 holds no numbers"):
+        cleaned(log, Path("log"), "test")
+
+
+def test_a_log_of_more_years_than_nanoseconds_count_is_refused() -> None:
+    """From the farthest start on 64 bits count 2.2e8 s: a cast to whole ones overflowed."""
+    stamps = np.linspace(0.0, 3e8, 10)
+    log = RawLog(stamps=stamps, clock="test", signals={"q": np.zeros((10, 6))})
+    with pytest.raises(ClockError, match="over 3e\\+08 s, which no robot's log is"):
         cleaned(log, Path("log"), "test")

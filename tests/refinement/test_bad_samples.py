@@ -63,6 +63,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [925, 1700])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_bad_sample_stays_within_the_band(fault, row) -> None:

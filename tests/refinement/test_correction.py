@@ -122,6 +122,7 @@ def test_a_log_without_a_free_part_leans_on_what_the_fit_takes_for_free(
     assert rmse(analysis, "best") < 0.5 * rmse(smoothed, "kfo-rts")
 
 
+@pytest.mark.slow
 def test_a_free_part_that_does_not_do_is_dropped_with_a_reason(request_: AnalysisChoice) -> None:
     """0.1 s are 13 samples, and a spectrum needs 32."""
     given = replace(request_, free=FreeChoice(spans=((0.0, 0.1),)))
@@ -164,6 +165,7 @@ def test_a_short_log_takes_what_is_left(request_: AnalysisChoice) -> None:
     assert (made["observer"], made["gains"], made["free_part"]) == ("kfo-rts", "robot", None)
 
 
+@pytest.mark.slow
 def test_a_fit_that_fails_is_said_and_costs_nothing_else(
     request_: AnalysisChoice, automatic: Analysis, monkeypatch: pytest.MonkeyPatch
 ) -> None:

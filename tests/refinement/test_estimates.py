@@ -194,6 +194,7 @@ def test_a_log_that_repeats_nothing_falls_back_and_says_so() -> None:
     assert auto.error_sd is None
 
 
+@pytest.mark.slow
 def test_a_free_part_that_is_too_short_falls_back_and_says_so() -> None:
     request = AnalysisChoice(
         free=FreeChoice(spans=((0.0, 0.1),)),
@@ -247,6 +248,7 @@ def test_a_log_in_contact_throughout_is_not_believed_to_be_free(request_: Analys
     assert stated.estimates[0].error_sd is not None
 
 
+@pytest.mark.slow
 def test_a_gap_in_the_log_is_survived() -> None:
     """Half a second is missing amid a push: everything stays finite."""
     request = AnalysisChoice(

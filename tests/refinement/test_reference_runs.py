@@ -89,6 +89,7 @@ def test_reference_runs_reach_their_ratios_and_coverage() -> None:
     assert np.all((covered.mean(axis=0) >= 0.93) & (covered.mean(axis=0) <= 0.99))
 
 
+@pytest.mark.slow
 def test_mujoco_ur5e(logs: Path) -> None:
     """An independent engine: the tuned smoother at most 0.6 of GMO(30). Measured .53."""
     folder = logs / "mujoco_ur5e"

@@ -47,6 +47,7 @@ def test_one_bad_sample_is_drawn_to_its_neighbours(signal, off, left, row, joint
         np.testing.assert_allclose(getattr(found, name), getattr(log, name), rtol=0, atol=size)
 
 
+@pytest.mark.slow
 def test_what_a_sample_is_worth_falls_back_without_a_jump() -> None:
     """The larger a fault, the less is left of it; between two sizes next to each other no step."""
     log, row = moving(), 400

@@ -55,6 +55,7 @@ def test_what_the_user_states_stays() -> None:
     assert hand.contacts[0].torque == (1.0, 2.0)
 
 
+@pytest.mark.slow
 def test_a_file_of_a_suited_scenario_makes_it_again(tmp_path: Path) -> None:
     for name in ("ur5-circle", "free-excitation"):
         scenario = load_scenario(name, ["robot=ur3e"])

@@ -207,6 +207,7 @@ def test_controller_in_the_loop_reads_what_it_needs() -> None:
     assert np.all(np.abs(arm.mean_torque(0.008) - weight) < 10.0)
 
 
+@pytest.mark.slow
 def test_pair_is_one_motion_with_and_without_the_payload() -> None:
     loaded, free = simulate_pair(load_scenario("payload-pair", ["duration=2.0"]), 1)
     np.testing.assert_array_equal(loaded.samples.target_q, free.samples.target_q)

@@ -47,6 +47,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("who", "form", "name", "kept"), CASES)
 def test_readers_read_back_what_is_written(
     who: str,

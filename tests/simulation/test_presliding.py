@@ -13,6 +13,8 @@ from vftcli.simulation import load_scenario, simulate
 from vftcli.simulation.friction import CREEP
 from vftcli.simulation.scenario import MismatchSpec
 
+pytestmark = pytest.mark.slow
+
 SHARE = 0.6
 SETTINGS = [
     *("robot=ur5e", "contacts=[]", "duration=4.0", "friction.stribeck=0"),
@@ -68,7 +70,6 @@ LEAST, MOST = 0.3, 0.65
 """A UR10e's, in eight free logs, is .28 to .48; the bar that was set for the simulation."""
 
 
-@pytest.mark.slow
 def test_a_resting_arm_holds_what_its_teeth_hold() -> None:
     """Seed 1 until the second drag: .44 (whole run .50); an arm that sticks holds .65 (.73)."""
     assert LEAST <= held_at_rest("ur5-drag", 1, "duration=17") <= MOST

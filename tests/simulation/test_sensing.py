@@ -25,6 +25,7 @@ def test_everything_off_is_the_true_state() -> None:
     np.testing.assert_allclose(np.diff(run.recording.t), 0.008, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_average_torque_is_the_mean_over_the_interval() -> None:
     fine = circle(*CLEAN, "sensing.rate=1000", "sensing.torque=instant")
     mean = circle(*CLEAN, "sensing.torque=average")
@@ -49,6 +50,7 @@ def test_positions_are_quantised() -> None:
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_clock_drift_stretches_the_period_on_the_log_clock() -> None:
     run = circle("duration=8.0", "sensing.clock_drift=0.01", *CLEAN, "contacts=[]")
     t, q = run.recording.t, run.recording.q[:, 0]

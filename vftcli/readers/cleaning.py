@@ -36,8 +36,9 @@ LEAVING_OUT = (
 )
 """How a log is read without one of its signals."""
 
-SHORTEST_STEP, LONGEST_LOG = 1e-7, 1e11
-"""No robot is sampled ten million times a second, nor for three thousand years. [s]"""
+SHORTEST_STEP, LONGEST_LOG = 1e-7, 2e8
+"""No robot is sampled ten million times a second, nor for six years: behind the farthest start
+nanoseconds in 64 bits count no farther. [s]"""
 
 FARTHEST_START = 9e9
 """A clock starts within 285 years of 1970: nanoseconds in 64 bits count no farther. [s]"""

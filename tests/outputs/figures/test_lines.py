@@ -89,6 +89,7 @@ def test_spikes_stay_and_few_points_are_drawn() -> None:
     assert line.get_ydata().max() == 5.0
 
 
+@pytest.mark.slow
 def test_a_legend_names_lines_bands_and_contacts_but_no_line_alone() -> None:
     made = chart(spans=[(1.0, 2.0)], band=np.ones(6), band_label="± floor")
     (legend,) = drawn(7.16, plots_of(made)).legends

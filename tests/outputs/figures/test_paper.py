@@ -35,6 +35,7 @@ def written(folder: Path, form: str) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in sorted((folder / "figures").iterdir())}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_the_same_figure_has_the_same_bytes_whatever_its_user_prefers(
     form: str, tmp_path: Path
@@ -65,6 +66,7 @@ def test_a_pdf_has_the_widths_of_the_ieee_and_its_fonts_embedded_as_truetype(
         assert b"/Type3" not in found[name]
 
 
+@pytest.mark.slow
 def test_a_png_has_600_dots_an_inch_and_an_svg_needs_no_font(tmp_path: Path) -> None:
     """3.5 in at 600 dots are 2100; the width of a PNG is in bytes 16 to 19."""
     picture = written(tmp_path / "png", "png")["a-single.png"]

@@ -12,6 +12,7 @@ from vftcli.outputs.identification.tables import (
 )
 
 
+@pytest.mark.slow
 def test_one_row_a_log_role_and_model_with_its_mean(found):
     result, log = found
     lines = terminal(residual_grid(result)).splitlines()

@@ -145,6 +145,7 @@ def test_odd_names_do_no_harm(analysis: Analysis, as_if: Callable, tmp_path: Pat
         assert "ᵀ" not in str(chunk.to_record_batch().to_pydict())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["flange", "base", "tool", "sensor"])
 def test_the_arrow_is_the_tabled_force_at_its_own_point(frame: str) -> None:
     """Also in the frame of a tool or sensor: zero removed, turned into base axes, nothing else.

@@ -102,6 +102,7 @@ def test_sections_and_units_are_there(page: Page) -> None:
         assert words in page.text, words
 
 
+@pytest.mark.slow
 def test_the_answer_comes_first(pushed: Analysis) -> None:
     page = Page(render(pushed))
     text = page.text

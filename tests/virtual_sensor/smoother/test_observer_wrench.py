@@ -62,6 +62,7 @@ def reading(*names: str, **wrench: object) -> SensorReading:
     return sensed
 
 
+@pytest.mark.slow
 def test_asked_for_it_is_every_observers_wrench_and_hides_nothing(motion: FreeMotion) -> None:
     sensed = reading("gmo", "fdo", solver="smoother", frame="base")
     assert sensed.solver == "smoother"
@@ -79,6 +80,7 @@ def test_asked_for_it_is_every_observers_wrench_and_hides_nothing(motion: FreeMo
     assert not {"pose-hides-wrench", "band-from-torques"} & {r.code for r in sensed.remarks}
 
 
+@pytest.mark.slow
 def test_in_another_frame_it_is_the_same_wrench_turned() -> None:
     base, flange = (
         reading("gmo", solver="smoother", frame=f).wrenches[0] for f in ("base", "flange")
