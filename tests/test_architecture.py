@@ -137,6 +137,7 @@ def test_every_room_has_a_place() -> None:
     assert {room(file) for file in modules()} - {"__init__"} == set(ORDER)
 
 
+@pytest.mark.slow
 def test_rooms_know_only_those_below_them() -> None:
     wrong = []
     for file in modules():
@@ -297,6 +298,7 @@ def patterns() -> Iterator[str]:
                     yield "".join("[a-z-]*" if part is None else str(part) for part in parts)
 
 
+@pytest.mark.slow
 def test_no_words_are_left_over() -> None:
     text = "\n".join((PACKAGE / file).read_text("utf-8") for file in modules())
     made = re.compile("|".join(patterns()))

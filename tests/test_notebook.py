@@ -58,6 +58,7 @@ def test_a_list_without_contacts_is_a_list_nevertheless(analysis: vft.Analysis) 
     assert "0 contacts" in repr(empty)
 
 
+@pytest.mark.slow
 def test_a_report_answers_everything(analysis: vft.Analysis) -> None:
     assert analysis.contacts is not None
     assert analysis.wrench is not None

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 TESTS = """
 import time, pytest
 
@@ -32,6 +34,7 @@ import sys; sys.modules |= dict.fromkeys({HIDDEN}); import pytest; sys.exit(pyte
 """
 
 
+@pytest.mark.slow
 def test_a_long_test_fails_unless_it_is_marked(tmp_path: Path) -> None:
     shutil.copy(Path(__file__).with_name("conftest.py"), tmp_path)
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = slow\n")

@@ -148,6 +148,7 @@ def test_printed_v_rises_and_w_does_not(limit: float) -> None:
     assert risen == 1000
 
 
+@pytest.mark.slow
 def test_printed_v_of_the_paper_s_release() -> None:
     """0.684 → 1.099 J from 0.3 m at α = 1.9 as Ts → 0 (science of the issue)."""
     controller = variable(parameters(alpha=np.full(6, 1.9), period=1e-4, speed_limit=np.inf))

@@ -267,6 +267,7 @@ def test_efforts_that_were_never_measured_are_refused(samples: Path, tmp_path: P
         made(samples / "lerobot_v3_effort_zero", tmp_path / "copy")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     importlib.util.find_spec("datasets") is None,
     reason="the datasets library is not installed: pip install 'vftcli[datasets-test]'",

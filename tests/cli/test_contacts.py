@@ -44,6 +44,7 @@ def test_json_and_csv_hold_the_same_rows(run: Run) -> None:
     assert run(*words, "--csv", "--json")[0] == 2
 
 
+@pytest.mark.slow
 def test_several_logs_are_an_array(run: Run) -> None:
     other = FIXTURES / "panda_bag"
     code, out, _ = run("contacts", TAPS, other, "--json")

@@ -59,6 +59,7 @@ def test_a_refusal_leaves_no_file(excitation, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_what_exists_stays_without_force(excitation, tmp_path):
     page = tmp_path / "r.html"
     page.write_text("mine")

@@ -63,6 +63,7 @@ def test_contacts_and_convert_say_it_too(
     assert "episode 0 of 2: --episode K|all" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_all_are_logs_of_their_own(episodes: Path, monkeypatch: Any, capsys: Any) -> None:
     words = ("contacts", episodes, "--robot", "ur5", "--episode", "all", "--anyway", "--json")
     assert run(monkeypatch, *words) == 0

@@ -80,6 +80,7 @@ def test_outside_of_the_rows_best_reads_nothing_within_a_band(name: str) -> None
     assert best.sd.min() > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_band_of_best_holds_the_true_wrench_of_every_sample(name: str) -> None:
     """Measured .97 to 1.00 an axis; with no band outside of the rows .93 to .98."""

@@ -60,6 +60,7 @@ def test_a_bearing_and_two_knocks_are_three_contacts(listed: Lister) -> None:
     assert not scored.false
 
 
+@pytest.mark.slow
 def test_free_cycles_are_found_where_nothing_is_said(listed: Lister) -> None:
     found = listed("ur5_circle.csv", "ur5")
     assert found.basis == "free motion"

@@ -94,6 +94,7 @@ def test_a_fault_is_called_by_no_other_name(cells: Cells, log: str, fault: str) 
     assert cell_in(cells, log, fault).wrong == ECHOES.get((log, fault), ())
 
 
+@pytest.mark.slow
 def test_pairs_without_a_name_do_little(tables: dict[str, Table], tmp_path: Path) -> None:
     """What moves the estimate by more than 5 N·m or half the effort is always named."""
     for log, fault in SILENT:
@@ -113,6 +114,7 @@ REFUSED = {
 """Faults with which no result means anything, beside those that the reader refuses."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("log", "fault"), HARMFUL, ids=str)
 def test_what_makes_results_meaningless_refuses_and_no_more(
     cells: Cells, log: str, fault: str

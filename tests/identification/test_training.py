@@ -169,6 +169,7 @@ def test_a_wrong_drive_constant_scales_friction_and_rotor(recording):
     assert found.robot.torque_constant[1] == pytest.approx(K[2].value, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_whole_arm_starts_from_the_profile_and_the_fits(data, weights):
     fits = fit_frictions(data, weights)
     layout, start = initial_columns(data, fits)
@@ -182,6 +183,7 @@ def test_the_whole_arm_starts_from_the_profile_and_the_fits(data, weights):
     np.testing.assert_allclose(start[60], UR5.chain.rotor_inertia[0])
 
 
+@pytest.mark.slow
 def test_a_vector_becomes_a_robot_without_its_payload(data, weights):
     load = Payload(mass=1.0, com=np.zeros(3), inertia=np.zeros((3, 3)))
     layout, start = initial_columns(data, fit_frictions(data, weights))
@@ -222,6 +224,7 @@ def test_open_parameters_are_counted_without_friction(data, weights):
     assert undetermined(all_open, layout) == (40, 40)
 
 
+@pytest.mark.slow
 def test_too_short_logs_are_refused(data, weights):
     from vftcli.identification.stacking import WeightedLog
 

@@ -76,6 +76,7 @@ def test_a_bad_sample_stays_within_the_band(fault, row) -> None:
     assert np.delete(ratio, joint, axis=1).max() <= 1.0
 
 
+@pytest.mark.slow
 def test_a_bad_sample_is_said() -> None:
     log, arm, choice, _ = sound(FIXTURE, "ur5")
     bad = replace(log, **with_sample(log, "dq", 925, 1, lambda _: 5.0))

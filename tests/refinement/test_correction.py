@@ -95,6 +95,7 @@ def test_whole_log_is_off_for_everyone_and_none_for_no_one(
     assert not any(code.startswith("whole-log") for code in codes(nobody))
 
 
+@pytest.mark.slow
 def test_the_band_of_the_best_holds_what_the_correction_may_err_by(automatic: Analysis) -> None:
     assert automatic.refinement is not None
     best = automatic.refinement.baseline.under("best")
@@ -133,6 +134,7 @@ def test_a_free_part_that_does_not_do_is_dropped_with_a_reason(request_: Analysi
     assert "a spectrum needs 32 samples" in str(said)
 
 
+@pytest.mark.slow
 def test_a_short_log_takes_what_is_left(request_: AnalysisChoice) -> None:
     """6 s tell friction alone, the free part tunes. 1.5 s tell nothing: the robot file's gains.
 

@@ -79,6 +79,7 @@ def test_ratios_to_the_hand_set_filter(
     assert mean_rmse(worked_up, "kfo-auto") <= 1.05 * min(by_hand, faster)
 
 
+@pytest.mark.slow
 def test_the_band_covers_the_truth_on_moving_joints(worked_up: Analysis) -> None:
     assert worked_up.errors is not None
     rows = worked_up.errors.filter(pl.col("joint").is_in(MOVING.tolist()))
@@ -111,6 +112,7 @@ def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
         assert estimate.sd is None or not np.allclose(estimate.sd[7], estimate.error_sd[7])
 
 
+@pytest.mark.slow
 def test_removing_the_bias_subtracts_the_free_cycle_at_the_same_phase(
     worked_up: Analysis, without_bias: Analysis
 ) -> None:
@@ -138,6 +140,7 @@ def test_what_is_left_without_the_bias_is_tuned_on(
     assert np.all(left.least[limited] < 0.7 * plain.least[limited])
 
 
+@pytest.mark.slow
 def test_a_bias_model_helps_where_nothing_repeats(request_: AnalysisChoice) -> None:
     asked = replace(
         request_,

@@ -48,6 +48,7 @@ def test_other_gains_in_the_run_do_not_change_what_the_paper_s_cost(analysis: An
         )
 
 
+@pytest.mark.slow
 def test_nothing_is_said_where_a_side_is_not_known(analysis: Analysis) -> None:
     assert analysis.refinement is not None
     found, estimates = analysis.refinement.baseline, analysis.estimates

@@ -29,6 +29,7 @@ def test_a_shortened_run_counts_in_full() -> None:
     assert timings.median("short") == 0.0
 
 
+@pytest.mark.slow
 def test_the_keys_that_scripts_read() -> None:
     found = benchmark("ur5", samples=1200, rounds=1)
     assert [row["name"] for row in found["observers"]] == ["fdo", "gmo", "kfo-fe", "kfo-zoh"]

@@ -83,6 +83,7 @@ def test_full_recipe_has_the_columns_of_the_client(ur5: Simulation, tmp_path: Pa
     assert all(len(line.split(b" ")) == 119 for line in text.split(b"\r\n")[:-1])
 
 
+@pytest.mark.slow
 def test_libfranka_log_has_its_columns_and_sign(panda: Simulation, tmp_path: Path) -> None:
     save({tmp_path / "log.csv": panda})
     lines = (tmp_path / "log.csv").read_text().splitlines()

@@ -58,6 +58,7 @@ def test_lines_are_told_apart_without_colour() -> None:
             assert one.get_linewidth() != other.get_linewidth()
 
 
+@pytest.mark.slow
 def test_the_legend_names_a_ribbon_where_no_contact_is_listed() -> None:
     first = chart().series[1]
     quiet = chart(series=(first._replace(quiet=T < 5.0),))

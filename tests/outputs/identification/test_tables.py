@@ -23,6 +23,7 @@ def test_one_row_a_log_role_and_model_with_its_mean(found):
     assert log.name in lines[1]
 
 
+@pytest.mark.slow
 def test_two_logs_of_one_label_are_two_rows(found):
     """They were one row of twelve numbers for six joints."""
     result, _ = found

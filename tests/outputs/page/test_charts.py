@@ -84,6 +84,7 @@ def test_a_ribbon_is_grey_where_no_contact_is_listed() -> None:
     assert QUIET not in multiples(plain)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seconds", "factor"), [(60.0, 1.0), (600.0, LONG)])
 def test_a_long_log_is_decimated_into_the_room_of_the_page(seconds: float, factor: float) -> None:
     t = np.arange(0.0, seconds, 1e-3)

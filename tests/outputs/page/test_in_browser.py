@@ -18,6 +18,7 @@ def html(pushed: Analysis) -> str:
     return render(pushed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pushed", "analysis", "with_wrench"])
 def test_every_chart_is_drawn_and_no_error_is_told(
     opened: Callable, request: pytest.FixtureRequest, name: str

@@ -122,6 +122,7 @@ def test_the_answer_comes_first(pushed: Analysis) -> None:
     assert not any("open" in attributes for attributes in details)
 
 
+@pytest.mark.slow
 def test_without_contacts_the_torques_are_open(
     pushed: Analysis, without_reference: Analysis
 ) -> None:
