@@ -27,8 +27,8 @@ from vftcli.signals.series import median_step
 WINDOW = 0.15
 """Length of a window; each begins in the middle of the one before. [s]"""
 WINDOWS, BLOCK, LEAST = 320, 16, 60
-"""Windows that are looked at, at most, in blocks of neighbours; and how many a joint needs: 4.5 s of
-its motion, of which no push is the most."""
+"""Windows that are looked at, at most, in blocks of neighbours; and how many a joint needs: 4.5 s
+of its motion, of which no push is the most."""
 INSIDE = 12
 """Instants of a window at which the model is computed."""
 EARLIEST, LATEST, STEP = -0.1, 0.25, 0.01
