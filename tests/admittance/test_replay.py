@@ -12,7 +12,7 @@ from vftcli.admittance.replay import Replay, on_control_clock, replay, replay_re
 from vftcli.admittance.stability import UnstableError
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import link_poses
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.errors import ClockError, ParameterError
 from vftcli.signals.pose import exp_matrix
 from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import Wrench
@@ -150,6 +150,14 @@ def test_start_outside_the_limits_is_refused() -> None:
     p = parameters()
     with pytest.raises(ParameterError, match=r"the start pose has 5 joints; ur5 has 6"):
         replay_release(np.array([0.3, 0, 0, 0, 0, 0]), UR5, p, controllers(p), start=np.zeros(5))
+
+
+def test_a_log_that_is_nearly_all_gap_is_refused() -> None:
+    """An hour in a log of seconds would be replayed at the control period."""
+    record, q = push()
+    late = replace(record, t=record.t + 3600.0 * (np.arange(len(record.t)) > 20))
+    with pytest.raises(ClockError, match=r"the log waits 36\d\d s after .*--interval"):
+        run((late, q))
 
 
 def test_quiet_log_moves_nothing_and_says_so() -> None:

@@ -95,6 +95,16 @@ def test_what_passes_is_noise_above_a_persons_contacts() -> None:
         assert passed == pytest.approx(np.sqrt(np.mean(size**2)), rel=0.05)
 
 
+def test_of_a_slow_log_what_passes_is_read_at_its_highest_frequency() -> None:
+    """At 2 Hz nothing lies above 5 Hz; the mean of nothing was a NumPy warning on the terminal."""
+    t = 0.5 * np.arange(100)
+    log = DynamicsTerms(t=t, p=np.zeros((100, 2)), mu=np.ones((100, 2)))
+    observer = MomentumObserver(gain=0.5)
+    (found,) = facts([observer], {"gmo": observer.tuning(0.5, 2)}, run_of(log), None)
+    highest = np.abs(observer.frequency_response(np.array([1.0]), 0.5, 2))
+    assert found.passed == pytest.approx(float(np.mean(highest)), rel=1e-12)  # rounding of a mean
+
+
 def test_the_slowest_joint_decides_and_noise_is_the_joints_mean() -> None:
     """Joints of 50 and 5 1/s against observers that have one of them on both joints."""
     found = []

@@ -24,7 +24,9 @@ from vftcli.admittance.thresholds import Phases, phases
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.filters import refuse_mostly_gap
 from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.series import median_step
 from vftcli.signals.wrench import Wrench
 
 RISE = 1e-12
@@ -112,7 +114,10 @@ def replay(
     Raises:
         UnstableError: If a controller is unstable.
         ParameterError: If the log starts outside the joint limits.
+        ClockError: If nearly all of its time is a gap.
     """
+    if len(wrench.t) > 1:
+        refuse_mostly_gap(wrench.t, median_step(wrench.t))
     verdicts, complaints = check_stable(controllers, force_unstable=force_unstable)
     solver = FlangeSolver(robot)
     clock, (force, q) = on_control_clock(wrench.t, (wrench.known, q), parameters.period)

@@ -99,7 +99,7 @@ def facts_of(
         response=float(np.max(step_response(observer, step, len(noise)))),
         delay=float(np.max(tuning.delay)),
         noise=float(np.mean(noise * np.sqrt(gain.mean(axis=0)))),
-        passed=float(np.mean(np.sqrt(gain[frequency > FAST].mean(axis=0)))),
+        passed=float(np.mean(np.sqrt(gain[frequency >= min(FAST, frequency[-1])].mean(axis=0)))),
         rmse=mean_rmse(observer.name, errors),
         parameter_count=tuning.parameter_count,
     )

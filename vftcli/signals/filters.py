@@ -148,13 +148,18 @@ def even_clock(t: Array, step: float) -> Array:
         ClockError: If nearly all of them would lie in gaps.
     """
     samples = max(2, round(float(t[-1] - t[0]) / step) + 1)
-    if samples > MOSTLY_GAP * len(t):
+    refuse_mostly_gap(t, step)
+    return np.linspace(t[0], t[-1], samples)
+
+
+def refuse_mostly_gap(t: Array, step: float) -> None:
+    """Raise a ClockError if a clock of steps of about `step` [s] is nearly all gap. (T,) [s]"""
+    if float(t[-1] - t[0]) > MOSTLY_GAP * len(t) * step:
         after = int(np.argmax(np.diff(t)))
         raise ClockError(
             f"the log waits {t[after + 1] - t[after]:.4g} s after t = {t[after]:.3f} s, over "
             f"{MOSTLY_GAP} times what it holds; take the part before or behind with --interval"
         )
-    return np.linspace(t[0], t[-1], samples)
 
 
 def butterworth(

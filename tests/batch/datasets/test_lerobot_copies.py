@@ -142,6 +142,13 @@ def test_damaged_statistics_are_one_line(tmp_path: Path, name: str, text: str) -
         LeRobotDataset(tmp_path).finish(COLUMNS, statistics, tmp_path / "copy")
 
 
+def test_features_without_names_are_one_line(tmp_path: Path) -> None:
+    (tmp_path / "meta").mkdir()
+    (tmp_path / "meta" / "info.json").write_text('{"features": ["action"]}')
+    with pytest.raises(LogError, match=r"info\.json: its features are no table of names"):
+        LeRobotDataset(tmp_path).finish(COLUMNS, {}, tmp_path / "copy")
+
+
 def test_metadata_of_other_kinds_is_left_alone() -> None:
     assert with_features({}, COLUMNS) == {}
     assert with_features({b"huggingface": b"[]"}, COLUMNS) == {b"huggingface": b"[]"}

@@ -112,11 +112,14 @@ class LeRobotDataset:
         """Write info.json with the new features, and their statistics wherever others stand.
 
         Raises:
-            LogError: If a file of statistics holds none.
+            LogError: If a file of statistics holds none, or the features have no names.
         """
         info = info_of(self.folder)
         fps = {"fps": info["fps"]} if is_third(info) and "fps" in info else {}
         features = info.setdefault("features", {})
+        if not isinstance(features, dict):
+            path = self.folder / "meta" / "info.json"
+            raise LogError(f"{path}: its features are no table of names; nothing can be added")
         for column in columns:
             features[PREFIX + column.name] = {
                 "dtype": "float32",
