@@ -116,7 +116,7 @@ def annotated(*words: str) -> Command:
 
 
 def mimicking(folder: Path) -> list[Any]:
-    """A description whose third joint follows its second."""
+    """A description of an arm in which the third joint follows the second."""
     text = (FIXTURES / "arm.urdf").read_text("utf-8")
     parts = text.split("</joint>")
     parts[2] += '<mimic joint="' + re.findall('<joint name="([^"]+)"', text)[1] + '"/>'
@@ -176,7 +176,7 @@ def two_bags(folder: Path) -> list[Any]:
 
 
 def with_jacobian(table: pl.DataFrame) -> pl.DataFrame:
-    """A vendor's torques beside its Jacobian, whose axes have length 1, and no positions."""
+    """A vendor's torques beside its Jacobian, its axes of length 1, and no positions."""
     cells = {
         f"jacobian_{row}_{k}": pl.lit(float(row % 3 == k % 3)) if row > 2 else pl.col(f"q{k + 1}")
         for row in range(6) for k in range(6)

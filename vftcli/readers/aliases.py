@@ -88,7 +88,7 @@ RESIDUAL_TURNED = fact("residual-turned")
 
 
 class Group(NamedTuple):
-    """Columns that share a name but for their index; `twice` names one whose index has another."""
+    """Columns of one name but for their index; `twice` is one that has the index of another."""
 
     cells: tuple[Cell, ...]
     indices: tuple[int, ...]
