@@ -88,11 +88,12 @@ RESIDUAL_TURNED = fact("residual-turned")
 
 
 class Group(NamedTuple):
-    """Columns that share a name but for their index."""
+    """Columns of one name but for their index; `twice` is one that has the index of another."""
 
     cells: tuple[Cell, ...]
     indices: tuple[int, ...]
     joints: tuple[str, ...] = ()
+    twice: str = ""
 
 
 def picks_by_alias(table: Table, stated: Sequence[Item] = ()) -> tuple[Picks, tuple[str, ...]]:
@@ -195,13 +196,14 @@ def stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
         return replace(pick, factor=pick.factor * found.factor)
     group = groups.get(item.pattern.lower())
     if group is not None and item.pattern not in (table.names or ()):
-        return pick_of(item, group.cells)
+        return pick_of(item, filled_cells(table, item.pattern, group))
     return pick_of(item, named_cells(table, item))
 
 
 def grouped(table: Table) -> dict[str, Group]:
     """The columns of a table by name without index, in lower case."""
     found: dict[str, dict[int, Cell]] = {}
+    twice: dict[str, str] = {}
     by_joint = joint_columns(table)
     in_joints = {cell.column for cells in by_joint.values() for cell in cells.values()}
     for column, name in enumerate(table.names or ()):
@@ -216,13 +218,12 @@ def grouped(table: Table) -> dict[str, Group]:
             index = int(match["a"] or match["b"] or match["c"])
             stem = FIELD.sub("", match["stem"].lower(), count=1)
             if found.setdefault(stem, {}).setdefault(index, Cell(column)) != Cell(column):
-                raise LogError(
-                    f"{table.path}: two columns could be {match['stem']} of index {index}: "
-                    f"{name!r} and another. Name the columns with --columns."
-                )
+                twice[stem] = name
     # By index, not by place: a table may hold q_10 before q_2.
     groups = {
-        stem: Group(tuple(cells[i] for i in sorted(cells)), tuple(sorted(cells)))
+        stem: Group(
+            tuple(cells[i] for i in sorted(cells)), tuple(sorted(cells)), twice=twice.get(stem, "")
+        )
         for stem, cells in found.items()
     }
     for stem, cells_of in by_joint.items():
@@ -281,8 +282,13 @@ def filled_cells(table: Table, name: str, group: Group) -> tuple[Cell, ...]:
     """The cells of a group.
 
     Raises:
-        LogError: If there are none: a column of lists whose first one is empty.
+        LogError: If there are none: a column of lists whose first one is empty; or two of an index.
     """
+    if group.twice:
+        raise LogError(
+            f"{table.path}: two columns could be {name} of one index: {group.twice!r} and another. "
+            "Name the columns with --columns."
+        )
     if not group.cells:
         raise LogError(
             f"{table.path}: {name} holds no number in its first row, so its width cannot be told. "

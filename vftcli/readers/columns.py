@@ -93,8 +93,8 @@ class ColumnSpec:
         return sum(item.count for item in self.items if item.rate is None)
 
 
-def parse_columns(text: str) -> ColumnSpec:
-    """Parse a --columns text.
+def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
+    """Parse a --columns text, of a log unless it is of a reference, which has no positions.
 
     Raises:
         LogError: If an item cannot be understood; the message shows the item and the grammar.
@@ -106,7 +106,7 @@ def parse_columns(text: str) -> ColumnSpec:
     signals = {item.signal for item in items}
     # Nothing can be counted without positions: what is left says a unit or a sign.
     single = all(item.count == 1 or item.signal == "wrench" for item in items)
-    alone = single and not signals & {"q", "_"}
+    alone = log and single and not signals & {"q", "_"}
     named = alone or any(item.pattern is not None for item in items)
     for item in items:
         if named and not alone and item.pattern is None and item.rate is None:
@@ -118,7 +118,7 @@ def parse_columns(text: str) -> ColumnSpec:
     for name in names:
         if names.count(name) > 1:
             raise LogError(f"--columns: {name} is given twice. Skip the other columns with _.")
-    if items and "q" not in names and not named:
+    if log and items and "q" not in names and not named:
         raise LogError("--columns: no q; a log needs joint positions, as in t,q:6,dq:6,current:6.")
     return ColumnSpec(items=items, named=named, segment=segment)
 

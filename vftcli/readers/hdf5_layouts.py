@@ -164,9 +164,20 @@ def robot_of(folder: Path) -> str | None:
 
 
 def read_any(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
-    """Any other file: by --columns, or by alias among the datasets of one group."""
+    """Any other file: by --columns, or by alias among the datasets of one group.
+
+    Raises:
+        UnknownFormatError: If two layouts fit and --columns does not say which positions are meant.
+    """
     refuse_arm(table.path, request)
-    return from_table(table if states_positions(request) else leveled(table), request)
+    if states_positions(request):
+        return from_table(table, request)
+    if len(fitting := [x.name for x in LAYOUTS if x.groups(table.names or ())]) > 1:
+        raise UnknownFormatError(
+            f"{table.path}: laid out as {' and as '.join(fitting)}. Say what is what with "
+            "--columns, as in t=…,q=PATH/OF/POSITIONS."
+        )
+    return from_table(leveled(table), request)
 
 
 def leveled(table: Hdf5Table) -> Hdf5Table:
@@ -211,18 +222,9 @@ ANY = Layout("HDF5", "", (), read_any)
 
 
 def layout_of(table: Hdf5Table) -> tuple[Layout, tuple[str, ...]]:
-    """How a file is laid out, and the groups of its episodes.
-
-    Raises:
-        UnknownFormatError: If two layouts fit.
-    """
+    """How a file is laid out, and the groups of its episodes; as any other where two ways fit."""
     found = [(x, groups) for x in LAYOUTS if (groups := x.groups(table.names or ()))]
-    if len(found) > 1:
-        raise UnknownFormatError(
-            f"{table.path}: laid out as {' and as '.join(x.name for x, _ in found)}. Say what is "
-            "what with --columns, as in t=…,q=PATH/OF/POSITIONS."
-        )
-    return found[0] if found else (ANY, ("",))
+    return found[0] if len(found) == 1 else (ANY, ("",))
 
 
 def numbers_of(groups: Sequence[str]) -> tuple[int, ...]:

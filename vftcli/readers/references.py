@@ -50,7 +50,8 @@ def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
     """
     file = open_log(path)
     table = opened(file)
-    picks = picks_of(table, parse_columns(columns), as_given) if columns else found(table)
+    spec = parse_columns(columns, log=False) if columns else None
+    picks = found(table) if spec is None else picks_of(table, spec, as_given)
     raw = picked(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
     t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
     # No cleaning here: a reference is made by a program, and must be whole.

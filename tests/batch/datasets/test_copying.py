@@ -46,11 +46,12 @@ def test_only_an_earlier_copy_is_replaced(dataset: Path) -> None:
     check_copy(dataset, copy, force=False)
     (copy / RECORD).parent.mkdir(parents=True)
     (copy / "other").write_text("")
+    for force in (False, True):
+        with pytest.raises(OutputError, match="no copy that annotate made"):
+            check_copy(dataset, copy, force=force)
+    (copy / RECORD).write_text("{}")
     with pytest.raises(OutputError, match="exists; give another -o, or --force"):
         check_copy(dataset, copy, force=False)
-    with pytest.raises(OutputError, match="no copy that annotate made"):
-        check_copy(dataset, copy, force=True)
-    (copy / RECORD).write_text("{}")
     check_copy(dataset, copy, force=True)
     (dataset.parent / "file").write_text("")
     with pytest.raises(OutputError, match="is no folder"):

@@ -45,13 +45,13 @@ def check_copy(dataset: Path, copy: Path, *, force: bool) -> None:
     if copy.is_symlink() or (copy.exists() and not copy.is_dir()):
         raise OutputError(f"{copy} is no folder; -o needs the name of a new one")
     if copy.exists() and any(copy.iterdir()):
-        if not force:
-            raise OutputError(f"{copy} exists; give another -o, or --force to overwrite it")
         if not (copy / RECORD).is_file():
             raise OutputError(
                 f"{copy} is no copy that annotate made (it has no {RECORD}), and --force removes "
                 "no other folder; give another -o"
             )
+        if not force:
+            raise OutputError(f"{copy} exists; give another -o, or --force to overwrite it")
     try:
         check_writable(next(p for p in target.parents if p.exists()))
     except OSError as error:

@@ -6,6 +6,7 @@ apart, is read in one piece.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -56,7 +57,7 @@ def _blocks(
     count: Callable[[int], None],
 ) -> Iterator[RawLog]:
     """The blocks of a bag with nothing wrong."""
-    decoder, documents, waiting = Decoder(ingest), Documents(ingest), Waiting(ingest)
+    decoder, documents, waiting = Decoder(ingest), Documents(ingest), Waiting(ingest.path, request)
     messages, row = 0, 1
 
     def block(streams: Sequence[Stream]) -> RawLog:
@@ -95,8 +96,8 @@ class Waiting:
         streams: Those that wait.
     """
 
-    def __init__(self, ingest: Ingest) -> None:
-        self._ingest = ingest
+    def __init__(self, path: Path, request: ReadChoice) -> None:
+        self._path, self._request = path, request
         self._counting: set[Key] | None = None
         self._headless: set[Key] = set()
         self.streams: dict[Key, Stream] = {}
@@ -121,7 +122,7 @@ class Waiting:
             raise InOnePieceError
         streams = list(self.streams.values())
         first = self._counting is None
-        lead = leading(streams, self._ingest.path, others)
+        lead = leading(streams, self._path, others, self._request)
         counting = {
             key: s
             for key, s in self.streams.items()

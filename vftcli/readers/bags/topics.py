@@ -45,7 +45,7 @@ def aligned(
     Raises:
         LogError: If no topic has joint positions, or --columns names what is not there.
     """
-    gathering = Gathering(leading(streams, path, others), request)
+    gathering = Gathering(leading(streams, path, others, request), request)
     gathering.take_lead(path)
     for stream in streams:
         gathering.take(stream)
@@ -315,8 +315,12 @@ def same_arm(stream: Stream, lead: Stream) -> bool:
     return set(stream.names) >= set(lead.names) and not TARGETS.search(stream.channel.topic)
 
 
-def leading(streams: Sequence[Stream], path: Path, others: dict[str, str]) -> Stream:
+def leading(
+    streams: Sequence[Stream], path: Path, others: dict[str, str], request: ReadChoice
+) -> Stream:
     """The topic whose positions lead: measured ones, of most messages; a robot state breaks ties.
+
+    One that --columns names, as in q=TOPIC.position, goes before all others.
 
     Raises:
         LogError: If there is none, or if two arms were recorded in one bag.
@@ -326,6 +330,8 @@ def leading(streams: Sequence[Stream], path: Path, others: dict[str, str]) -> St
         if "q" in s.signals and s.messages > 1 and not TARGETS.search(s.channel.topic)
     ]  # fmt: skip
     found = [s for s in found if s.signals["q"].shape[1] > 2] or found
+    named = {(i.pattern or "").rpartition(".")[0] for i in said(request) if i.signal == "q"}
+    found = [s for s in found if s.channel.topic in named] or found
     if not found:
         there = [f"{s.channel.topic} ({s.channel.type})" for s in streams]
         there += [f"{topic} ({kind})" for topic, kind in others.items()]

@@ -1,0 +1,381 @@
+"""Every remedy that an error text names, tried on the command that it refused.
+
+Of the rooms that read files and options: cli, readers, robots, signals, batch, doctor. A row runs a
+command that is refused, reads the option out of the refusal, and runs the command with it, or
+without it where the refusal says to leave it out. A text that names an option or a command and has
+no row needs a reason.
+"""
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import polars as pl
+import pytest
+from refused_commands import (
+    COUNTED,
+    EPISODES,
+    GMO,
+    LISTS,
+    PLAIN,
+    PULL,
+    RELEASE,
+    SENSOR,
+    UR5,
+    annotated,
+    arrays,
+    circle,
+    converted,
+    edited_header,
+    estimated,
+    gripping,
+    judged,
+    mimicking,
+    named_arrays,
+    on,
+    own_bag,
+    renamed,
+    same,
+    short_scenario,
+    two_bags,
+    two_copies,
+    waiting,
+    with_columns,
+    with_jacobian,
+    without_clock,
+    written,
+    xacro,
+)
+from seed_logs import ur_binary
+from test_remedies import Command, free_log, printed
+
+import vftcli
+
+PACKAGE = Path(vftcli.__file__).parent
+ROOMS = ("cli", "readers", "robots", "signals", "batch", "doctor")
+
+LEFT_OUT, FLAG = None, True
+"""The value of an option that the refusal says to leave out, and of one that takes none."""
+
+
+class Row(NamedTuple):
+    """A remedy that is tried.
+
+    Attributes:
+        text: Words that only this error has.
+        command: Makes what is refused in a folder, and the command that is refused.
+        options: The options that the refusal names, one behind the other.
+        value: What the user gives the last of them; "" for what the refusal says.
+    """
+
+    text: str
+    command: Command
+    options: str
+    value: str | bool | None = ""
+
+
+ROWS = [
+    # cli
+    Row("give one of LOG, --release", lambda _: ["admit", "--robot", "ur5"], "--release", "x=0.3"),
+    Row("are of what -o DIR writes", lambda _: [*RELEASE, "--figures", "svg"], "-o", "out"),
+    Row("choose one of --json and --latex", lambda _: [*RELEASE, "--json", "--latex"], "--latex",
+        LEFT_OUT),
+    Row("s force drives the replay", on(same, "admit", *GMO, "--observer", "kfo-zoh"),
+        "--observer", "gmo"),
+    Row("leave --frame away", on(same, "admit", *GMO, "--frame", "tool"), "--frame", LEFT_OUT),
+    Row("choose one of --sensor and --truth", lambda _: [
+        "admit", SENSOR, "--interval", "0:2", "--robot", "ur5", "--sensor", "--truth",
+        f"{SENSOR}.truth.parquet"], "--truth", LEFT_OUT),
+    Row("holds still over a span", lambda f: [
+        "admit", "--closed-loop", short_scenario(f), "--zero", "start"], "--zero", "0:1"),
+    Row("the closed loop runs", lambda f: [
+        "admit", "--closed-loop", short_scenario(f), "--observer", "gmo"], "--observer",
+        "kfo-zoh"),
+    Row("--do compare needs --reference", on(same, "batch", *GMO, "--do", "compare", "-o", "out",
+                                             "--workers", "0"), "--reference", "zero"),
+    Row("--figures and -o DIR need each other", on(
+        same, "compare", *GMO, "--reference", "zero", "--figures", "svg"), "-o", "out"),
+    Row("leave --significance away", on(
+        same, "compare", *GMO, "--reference", "zero", "--figures", "svg", "-o", "out",
+        "--significance"), "--significance", LEFT_OUT),
+    Row("choose one of --details, --quiet", converted(same, "--details", "--quiet"), "--quiet",
+        LEFT_OUT),
+    Row("choose one of --json, --csv", on(
+        same, "contacts", "--robot", "ur5", "--json", "--csv"), "--csv",
+        LEFT_OUT),
+    Row("--derive dq belongs to an estimate", converted(same, "--derive", "dq"), "--derive",
+        LEFT_OUT),
+    Row("free motion to identify the arm from", lambda f: [
+        "identify", UR5, "-o", "my.toml", "--robot", "ur5", "--free", free_log(f)], "--free",
+        LEFT_OUT),
+    # readers: which column is which
+    Row("two columns could be", converted(with_columns(q_1=pl.col("q1"))), "--columns", PLAIN),
+    Row("could both be", converted(with_columns(pl.col("^dq.$").name.replace("dq", "qd"))),
+        "--columns", PLAIN),
+    Row("with holes. Name them", converted(renamed({"q3": "q9"})), "--columns",
+        PLAIN.replace("q=q{i}", "q=q1|q2|q9|q4|q5|q6", 1)),
+    Row("holds no number in its first row", converted(
+        with_columns(tau_ext=pl.lit([], pl.List(pl.Float64))), name="log.parquet"), "--columns",
+        PLAIN),
+    Row("could each be the clock", converted(with_columns(time=pl.col("t") + 1.0)), "--columns",
+        PLAIN),
+    Row("but a sample has one time", converted(with_columns(t=LISTS, tick=pl.col("t")),
+                                               name="log.parquet"), "--columns",
+        PLAIN.replace("t=t", "t=tick", 1)),
+    Row("--columns must name them", named_arrays, "--columns", "t=t,q=q,dq=dq"),
+    Row("and no topic has one; leave it out", own_bag, "--columns", LEFT_OUT),
+    Row("Choose one with --observer.", lambda f: [
+        "admit", estimated(f, "--observer", "kfo-fe"), "--robot", "ur5", "--observer",
+        "kfo-zoh"], "--observer", "kfo-fe"),
+    Row("could each be the positions", arrays({"a/q": (99, 6), "b/q": (99, 6), "a/t": (99,)}),
+        "--columns", "t=a/t,q=a/q"),
+    Row("laid out as", arrays({"obs/robot0_joint_pos": (99, 7), "qp_arm": (99, 7), "time": (99,),
+                               "qv_arm": (99, 7)}), "--columns", "t=time,q=qp_arm,dq=qv_arm"),
+    Row("no timestamp among", without_clock, "--format --columns"),
+    Row("must count its", converted(same, "--columns", PLAIN, header=False), "--columns", COUNTED),
+    Row("--columns describes", converted(same, "--columns", "t,q:6,dq:6", header=False),
+        "--columns", "t,q:6,dq:6,_:6"),
+    Row("no clock. Name its column", converted(renamed({"t": "tick"})), "--columns",
+        PLAIN.replace("t=t", "t=tick", 1)),
+    Row("no clock. Name its column", converted(renamed({"t": "tick"})), "--columns",
+        "t@125Hz,q=q{i}"),
+    Row("the two columns of the clock", converted(
+        with_columns(secs=pl.col("t"), nsecs=0.5 + pl.col("t")), "--columns",
+        PLAIN.replace("t=t", "t=secs|nsecs", 1)), "--columns", PLAIN),
+    Row("Check --columns.", converted(same, "--columns", "t=t,q=q{i},dq=dq1|dq2"), "--columns",
+        PLAIN),
+    Row("columns without a header. Say what they are", converted(
+        lambda table: table.select("t", "q1", "current1"), header=False), "--columns",
+        "t,q:1,current:1"),
+    Row("a table without a header. Say what its", judged(
+        lambda table: table.select("t", pl.col("^current.$")), header=False),
+        "--reference-columns", "t,tau_ext:6"),
+    Row("the reference torques cannot be told", judged(PULL), "--reference-columns",
+        "t=t,tau_ext=pull{i}"),
+    Row("The header was edited", edited_header, "--format --columns", "q=q[{i}],t[ms]=duration"),
+    Row("--columns does not apply to", lambda f: [
+        "convert", ur_binary(f / "log.bin"), "-o", "out.csv", "--columns", PLAIN], "--columns",
+        LEFT_OUT),
+    # readers: the clock
+    Row("the clock starts anew", converted(
+        lambda table: pl.concat([table.with_columns(t=pl.col("t") - table["t"][0])] * 2)),
+        "--columns"),
+    Row("which no clock shows", converted(
+        with_columns(t=(1e9 * pl.col("t")).round() + 1.7e18), "--columns",
+        PLAIN.replace("t=t", "t[s]=t")), "--columns", PLAIN.replace("t=t", "t[ns]=t", 1)),
+    Row("which no robot's log is", converted(
+        with_columns(t=1e9 * pl.col("t")), "--columns", PLAIN.replace("t=t", "t[s]=t", 1)),
+        "--columns", PLAIN.replace("t=t", "t[ns]=t", 1)),
+    Row("the clock is coarser than the samples", converted(
+        with_columns(t=pl.col("t").round(1))), "--columns", PLAIN.replace("t=t", "t@125Hz", 1)),
+    # readers: which part of a file
+    Row("no episode", lambda _: ["convert", EPISODES, "-o", "out.csv", "--episode", "9"],
+        "--episode", "1"),
+    Row("a log of one arm; leave --arm out", converted(same, "--arm", "left"), "--arm", LEFT_OUT),
+    Row("holds two arms", arrays({"observations/qpos": (99, 14), "observations/qvel": (99, 14),
+                                  "observations/effort": (99, 14)}), "--arm"),
+    Row("--episode all is for commands", lambda _: [
+        "convert", EPISODES, "-o", "out.csv", "--episode", "all"], "--episode", "1"),
+    Row("leave --episode out.", converted(same, "--episode", "1"), "--episode", LEFT_OUT),
+    Row("leave --episode out.", on(same, "compare", *GMO, "--reference", "zero", "--episode",
+                                   "all"), "--episode", LEFT_OUT),
+    Row("two arms were recorded", two_bags, "--columns"),
+    Row("no observer can run on that", on(with_jacobian, "estimate", "-o", "out"), "--wrench",
+        FLAG),
+    Row("no external torques of", on(
+        lambda table: with_jacobian(table).rename(lambda c: c.replace("tau_ext", "pull")),
+        "estimate", "-o", "out", "--wrench"), "--columns", "tau_ext=pull_{i}"),
+    # robots
+    Row("only joints that move by themselves", mimicking, "--tip"),
+    Row("which payload the controller", gripping, "--payload", "gripper"),
+    Row("joints but robot", on(same, "estimate", "-o", "out", "--robot", "panda"), "--robot",
+        "ur5"),
+    Row("positions alone carry no force", on(
+        lambda _: PULL(circle()), "identify", "-o", "my.toml", "--robot", "ur5"), "--columns",
+        PLAIN.replace("=current", "=pull")),
+    Row("the xacro needs", xacro, "--robot-arg", "heavy=1"),
+    Row("the xacro takes no argument", lambda f: [*xacro(f), "--robot-arg", "heavi=1"],
+        "--robot-arg", "heavy=1"),
+    # signals
+    Row("the log waits", on(
+        lambda _: waiting(circle()), "identify", "-o", "my.toml", "--robot", "ur5"), "--interval",
+        "0:15"),
+    Row("leave --free away", lambda f: ["compare", written(f, same), *GMO, "--reference", "zero",
+                                        "--free", written(f, same)], "--free", LEFT_OUT),
+    Row("Record them, or name their columns with --columns….", on(
+        renamed({"dq": "speed"}), "estimate", "-o", "out", *GMO, "--derive", "none"), "--derive"),
+    Row("so none of it can be", on(PULL, "inspect", "--robot", "ur5", "--effort", "current"),
+        "--columns", PLAIN.replace("=current", "=pull")),
+    # batch
+    Row("the torques of one observer; give --observer once", annotated(
+        "--observer", "gmo", "--observer", "kfo-zoh"), "--observer", "gmo"),
+    Row("leave --interval and --episode out", annotated("--interval", "0:1"), "--interval",
+        LEFT_OUT),
+    Row("leave --interval and --episode out", annotated("--episode", "1"), "--episode", LEFT_OUT),
+    Row("states no standard deviation", annotated("--sd", "--observer", "gmo"), "--observer",
+        "kfo-zoh"),
+    Row("exists; give another -o, or --force", two_copies, "--force", FLAG),
+    Row("--force removes no other folder", lambda f: [
+        "annotate", EPISODES, "-o", written(f, same).parent, "--robot", "panda", "--observer",
+        "gmo"], "-o", "out"),
+    # doctor
+    Row("With --anyway it goes on all the same.", on(
+        with_columns(pl.col("^current.$") * 0.0), "estimate", "-o", "out", *GMO), "--anyway", FLAG),
+]  # fmt: skip
+
+
+COMMANDS: dict[str, tuple[Command, tuple[Command, ...]]] = {
+    "vftcli init LOG writes one": (
+        on(same, "inspect", "--config", "my.toml"),
+        (on(same, "init", "-o", "my.toml"), on(same, "inspect", "--config", "my.toml")),
+    ),
+    "holds estimates, not what the drives measured": (
+        lambda f: ["estimate", estimated(f), "--robot", "ur5", "-o", "out"],
+        (lambda f: ["contacts", f / "made" / "estimates.parquet"],
+         lambda f: ["admit", f / "made" / "estimates.parquet", "--robot", "ur5"]),
+    ),
+    "`vftcli estimate LOG --rrd -o DIR` a recording": (
+        lambda _: ["open", "out"],
+        (on(same, "estimate", "--rrd", "-o", "out", *GMO),),
+    ),
+    "of another log `vftcli estimate` writes": (
+        on(same, "annotate", "-o", "out", "--robot", "ur5"),
+        (on(same, "estimate", "-o", "out", *GMO),),
+    ),
+}  # fmt: skip
+"""Error that names a command → what it refuses, and the commands that it names."""
+
+
+SLOW = {"positions alone carry no force", "the log waits", "the closed loop runs",
+        "holds still over a span", "free motion to identify the arm from"}  # fmt: skip
+"""Errors of commands that take seconds."""
+
+
+def mended(words: list[Any], refused: str, row: Row) -> list[Any]:
+    """The command with the options that the refusal names, or without the one to leave out."""
+    *others, last = row.options.split()
+    for option in (*others, last):
+        found = re.search(rf"{option}(?![-a-z])(?:[ =]('[^']+'|[^\s,;)]+))?", refused)
+        assert found is not None, refused
+        value = row.value if option == last else ""
+        if value == "":
+            value = (found[1] or "").rstrip(".:").strip("'")
+        while option in words:
+            at = words.index(option)
+            takes = len(words) > at + 1 and not str(words[at + 1]).startswith("-")
+            words = [*words[:at], *words[at + 1 + takes :]]
+        if value is not None:
+            words = [*words, option, *([] if value is FLAG else [value])]
+    return words
+
+
+@pytest.mark.parametrize("text", COMMANDS)
+def test_the_command_that_an_error_names_runs(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    refused, named = COMMANDS[text]
+    code, said = printed(refused(tmp_path))
+    assert code == 1
+    assert text in said
+    for command in named:
+        code, after = printed(command(tmp_path))
+        assert code == 0, after
+
+
+@pytest.mark.parametrize("row", [
+    pytest.param(row, id=f"{row.text}-{row.options}",
+                 marks=[pytest.mark.slow] if row.text in SLOW else [])
+    for row in ROWS
+])  # fmt: skip
+def test_the_remedy_of_an_error_is_tried(
+    row: Row, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = row.command(tmp_path)
+    code, refused = printed(words)
+    assert code in {1, 2}
+    for piece in row.text.split("…"):
+        assert piece in refused
+    code, after = printed(mended(words, refused, row))
+    assert code == 0, after
+
+
+NOTHING = "says what does not go together; what to do depends on the files of the user"
+ELSEWHERE = "tried in tests/test_remedies.py"
+DATASET = "needs a dataset with other features than the fixture's"
+CLUSTER = "needs a cluster, its certificates or an installation without Dask"
+LONG = "needs a log too long to be read in one piece"
+NAMED = "only names the option that is wrong, and what it may be"
+WITHOUT_ROW = {
+    NAMED: (
+        ": too large for a file of options", ": not a text in UTF-8", "--config …: …",
+        "--columns is empty", "has no column name while others have one",
+        "is given twice. Skip the other", "--columns: no q; a log needs",
+        "must be one whole number, from 1", "--columns: cannot understand", "--columns: no signal",
+        ": _ only skips", "it must cover at least one", "a table without a clock is given as",
+        "--columns: … has no unit", "has no field", "is neither a number, as in 0, nor all",
+        "--columns turns the sign of the clock", "names a column of … twice",
+        "is no address, as tcp", "--tip …: ", "--reference-columns names no tau_ext",
+        "is for a xacro, which this is not",
+    ),
+    NOTHING: (
+        "and none ran", "is what an MJCF gives its joints", "the xacro cannot be expanded",
+        "do not tell those of robot", "Say which with --format.",
+    ),
+    ELSEWHERE: (
+        "a load is found from one pair of logs", "--reference says where a log was touched",
+        "the clock stands still", "which looks like degrees", "no joint positions (q) among",
+    ),
+    DATASET: (
+        "no joint positions among", "the positions are of", "arm alone; leave --arm out",
+        "--derive dq makes them", "gravity would be written as force",
+    ),
+    CLUSTER: (
+        "leave --ship out", "add --scheduler ADDRESS", "need Dask and cryptography",
+        "(all three) belong together", "leave --workers out", "are given together",
+        "can run code as you", "workers need a certificate", "no Dask scheduler answers",
+        "has no worker; start some", "send the logs there with --ship",
+    ),
+    LONG: ("cannot be mended: leave out --causal",),
+}  # fmt: skip
+"""Why a text has no row, and words that only it has."""
+
+
+@cache
+def texts() -> dict[str, str]:
+    """Every text of a raise that names an option or a command; a value in it is `…`."""
+    found = {}
+    for room in ROOMS:
+        for path in sorted((PACKAGE / room).rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.Raise) and node.exc is not None:
+                    text = "".join(spoken(node.exc))
+                    if re.search(r"--[a-z]|vftcli [a-z]", text):
+                        found[f"{path.relative_to(PACKAGE)}:{node.lineno}"] = text
+    return found
+
+
+def spoken(node: ast.expr) -> Iterator[str]:
+    """The pieces of a text as they are written, `…` for a value."""
+    for part in ast.iter_child_nodes(node):
+        if isinstance(part, ast.FormattedValue):
+            yield "…"
+        elif isinstance(part, ast.Constant) and isinstance(part.value, str):
+            yield part.value
+        elif isinstance(part, ast.expr):
+            yield from spoken(part)
+
+
+def test_every_text_with_an_option_is_tried_or_says_why_not() -> None:
+    tried = {row.text for row in ROWS} | COMMANDS.keys()
+    reasons = {words for each in WITHOUT_ROW.values() for words in each}
+    assert not tried & reasons
+    for place, text in texts().items():
+        by = [words for words in tried | reasons if words in text]
+        assert len(by) == 1, f"{place}: {text!r} has {by}"
+    spoken_of = " ".join(texts().values())
+    assert not [words for words in tried | reasons if words not in spoken_of]
