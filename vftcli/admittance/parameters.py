@@ -219,11 +219,13 @@ def check_complete(
     for name in REQUIRED:
         row = values.get(name, np.full(6, np.nan))
         if np.any(np.isnan(row)):
-            absent = [axis for axis, value in zip(AXES, row, strict=True) if np.isnan(value)]
+            absent = np.flatnonzero(np.isnan(row))
+            listed = ", ".join(AXES[k] for k in absent)
+            section = next(key for key, axes in GROUPS.items() if set(axes) <= set(absent))
             where = "its [admittance]" if has_table else "an [admittance] section, which it lacks,"
             raise ParameterError(
-                f"{robot}: no admittance {name} for {', '.join(absent)}; give it in {where} or "
-                f"with --set {absent[0]}.{name}=VALUE"
+                f"{robot}: no admittance {name} for {listed}; give it in {where} or "
+                f"with --set {section}.{name}=VALUE"
             )
     if "period" not in plain:
         raise ParameterError(

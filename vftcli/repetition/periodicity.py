@@ -108,8 +108,8 @@ def check_stated(recording: Recording, stated: float | None, duration: float) ->
     if stated > (1.0 - LEAST_REPEATED) * duration:
         raise ReferenceTorqueError(
             f"{recording.name}: a period of {stated:g} s does not fit into the {duration:.4g} s "
-            "the arm moves, which must hold more than one cycle; give a shorter --period, or a "
-            "free run in another log with --free"
+            "the arm moves, which must hold more than one cycle; give a shorter --period, or "
+            "in its place a free run in another log with --free"
         )
     if stated < 4.0 * recording.median_step:
         raise ReferenceTorqueError(
@@ -127,8 +127,8 @@ def moving_part(recording: Recording) -> tuple[Array, Array]:
     t, q = recording.t, recording.q
     if recording.samples < 8:
         raise ReferenceTorqueError(
-            f"{recording.name}: {recording.samples} samples are too few to find a period in; "
-            "give a free run in another log with --free"
+            f"{recording.name}: {recording.samples} samples are too few to find a period in, "
+            "or to compare with a free run; record a longer log"
         )
     dq = recording.dq if recording.dq is not None else np.gradient(q, t, axis=0)
     moving = np.flatnonzero(~np.all(standing(t, dq), axis=1))

@@ -63,7 +63,7 @@ def decompose(jacobian: Array) -> Decomposition:
     if n < 6:
         raise RobotError(
             f"an arm of {n} joints cannot tell the six components of a wrench; "
-            "leave --wrench out and use the joint torques"
+            "leave --wrench and its options out: use the joint torques"
         )
     scaled = SCALE[:, None] * jacobian
     # The 6×6 product is cheaper to decompose than the 6×n factor, and only the squares are needed.

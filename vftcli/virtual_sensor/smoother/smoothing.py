@@ -210,7 +210,7 @@ def smooth_wrench(
     if terms.joints < 6:
         raise RobotError(
             f"an arm of {terms.joints} joints cannot tell the six components of a wrench; "
-            "leave --wrench out and use the joint torques"
+            "leave --wrench and its options out: use the joint torques"
         )
     if prior is None:
         prior = prior_of(terms, q, robot, free, gate)

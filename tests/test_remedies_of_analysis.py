@@ -1,0 +1,397 @@
+"""Every option that an error of the analysis names, tried on what provoked it: the error is gone.
+
+As tests/test_remedies.py, for the errors of the rooms below; those of the others have their own.
+"""
+
+import ast
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+from moving_arms import moving
+from planted_faults import Table, gravity_torque, with_more_torque
+from test_remedies import FIXTURES, REFUSALS, Command, Row, free_log, of, printed, robot_file, sound
+
+import vftcli
+from vftcli.robots import load_robot
+from vftcli.robots.kinematics import flange_jacobian
+
+PACKAGE = Path(vftcli.__file__).parent
+ROOMS = ("admittance", "contacts", "evaluation", "identification", "observers", "outputs",
+         "refinement", "repetition", "reproduction", "simulation", "virtual_sensor",
+         "notebook.py", "pipeline.py", "proposal.py", "streaming.py")  # fmt: skip
+
+AWAY, FLAG = "leave it away", "takes no value"
+"""What a row may do with its option in place of giving it a value."""
+
+
+def cut(start: float, stop: float, *words: str, robot: str = "ur5") -> Command:
+    """A command on a part of the sound log. [s]"""
+    return of(lambda table: table.between(start, stop), *words, robot=robot)
+
+
+def fixture(name: str, span: str, *words: str) -> Command:
+    """A command on a part of a fixture of the UR5."""
+    begin, *more = words
+    return lambda _: [begin, FIXTURES / name, "--robot", "ur5", "--interval", span, *more]
+
+
+def simulated(name: str, *words: str) -> Command:
+    """A second of a scenario."""
+    return lambda _: ["simulate", name, "--set", "duration=1", *words]
+
+
+def before(command: Command, *words: str) -> Command:
+    """A command that has been run before; now with more words."""
+
+    def again(folder: Path) -> list[Any]:
+        made = command(folder)
+        code, text = printed(made)
+        assert code == 0, text
+        return [*made, *words]
+
+    return again
+
+
+def beside(command: Command, option: str, make: Callable[[Path], object]) -> Command:
+    """A command with an option that names a file."""
+    return lambda folder: [*command(folder), option, make(folder)]
+
+
+def released(without: str) -> Command:
+    """A release of an arm that lacks one line of its robot file."""
+
+    def command(folder: Path) -> list[Any]:
+        path = Path(robot_file(folder))
+        text = path.read_text("utf-8")
+        path.write_text(re.sub(f"^{without}.*$", "", text, flags=re.M), "utf-8")
+        return ["admit", "--release", "x=0.3", "--robot", path]
+
+    return command
+
+
+def moved(seconds: float = 4.0) -> Table:
+    """A motion that the sound log does not hold, nobody touching the arm."""
+    log = moving("ur5", seconds=seconds)
+    return replace(sound(), t=log.t, q=log.q, dq=log.require("dq"), effort=log.require("current"))
+
+
+def other_motion(folder: Path) -> Path:
+    return moved().write(folder / "other.csv")
+
+
+def still(table: Table, seconds: float = 4.0) -> Table:
+    """The arm at rest."""
+    table = table.between(0.0, seconds)
+    held = {name: np.tile(value[0], (len(table.t), 1)) for name, value in table.series()}
+    return replace(table, **held | {"dq": 0.0 * table.dq})
+
+
+def at_rest(folder: Path) -> Path:
+    return still(sound(), 3.0).write(folder / "free.csv")
+
+
+def gap_at_the_end(table: Table) -> Table:
+    """Three samples a day after the others."""
+    table = table.between(0.0, 9.0)
+    return replace(table, t=table.t + 1e5 * (np.arange(len(table.t)) >= len(table.t) - 3))
+
+
+def backwards(table: Table) -> Table:
+    """Velocities with their sign turned."""
+    table = table.between(0.0, 8.0)
+    return replace(table, dq=-table.dq)
+
+
+def against_gravity(table: Table) -> Table:
+    """Currents of friction, and of gravity turned around."""
+    table = table.between(0.0, 4.0)
+    return replace(table, effort=5.0 * np.tanh(table.dq / 0.01) - gravity_torque(
+        table, table.arm) / table.constant)  # fmt: skip
+
+
+def touched_late(folder: Path) -> list[Any]:
+    """Thresholds of a log that somebody pushes after 31 s."""
+    table = moved(33.0)
+    push = 200.0 * np.sin(np.pi * np.clip(table.t - 31.0, 0.0, 1.0))
+    pushed = with_more_torque(table, push[:, None] * np.eye(6)[1])
+    return ["thresholds", pushed.write(folder / "log.csv"), "--robot", "ur5", "--rate", "100"]
+
+
+def of_five_joints(folder: Path) -> list[Any]:
+    """A wrench of an arm of five joints."""
+    text = (FIXTURES / "arm.urdf").read_text("utf-8")
+    text = text.replace('"hand" type="revolute"', '"hand" type="fixed"')
+    (folder / "five.urdf").write_text(text, "utf-8")
+    table = sound().between(0.0, 4.0)
+    five = {name: value[:, :5] for name, value in table.series()}
+    made = replace(table, **five | {"effort": table.torque[:, :5]}, signal="tau")
+    log = made.write(folder / "log.csv")
+    return ["estimate", log, "--robot", folder / "five.urdf", *EST[1:], "--wrench", "--anyway"]
+
+
+def by_jacobian(sensor: str, *words: str) -> Command:
+    """A comparison of a log without positions: torques, their Jacobian, a wrench called so."""
+
+    def command(folder: Path) -> list[Any]:
+        rng = np.random.default_rng(0)
+        q = rng.uniform(-1.0, 1.0, (400, 7))
+        J = flange_jacobian(load_robot("panda").chain, q)
+        names = ("fx", "fy", "fz", "mx", "my", "mz")
+        columns = {"timestamp": np.arange(400) / 80.0}
+        columns |= {f"tau_ext_{j}": rng.standard_normal(400) for j in range(7)}
+        columns |= {f"jacobian_{r}_{c}": J[:, r, c] for r in range(6) for c in range(7)}
+        columns |= {f"{sensor}{name}": rng.standard_normal(400) for name in names}
+        pl.DataFrame(columns).write_csv(folder / "jacobian.csv")
+        return ["compare", folder / "jacobian.csv", *words]
+
+    return command
+
+
+def stored(folder: Path) -> list[Any]:
+    """A replay of estimates that a command wrote."""
+    before(cut(0, 4, *EST))(folder)
+    return ["admit", folder / "out" / "estimates.parquet", "--robot", "ur5", "--observer", "gmo",
+            "--solver", "smoother"]  # fmt: skip
+
+
+def gains(folder: Path) -> Path:
+    """A file of gains, as the error says."""
+    (folder / "gains.toml").write_text("[observers.gmo]\ngain = 10.0\n", "utf-8")
+    return folder / "gains.toml"
+
+
+def tuned(folder: Path) -> str:
+    """What `vftcli tune` writes."""
+    before(cut(0, 4, *TUNE))(folder)
+    return "g.toml"
+
+
+def no_batch(folder: Path) -> list[Any]:
+    """A batch into a folder that holds what another program left."""
+    (folder / "b" / "rows").mkdir(parents=True)
+    return BATCH(folder)
+
+
+EST = ("estimate", "-o", "out", "--json", "--no-contacts", "--observer", "gmo")
+SMOOTHED = (*EST[:-1], "rts-auto")
+TWO = ("compare", "--observer", "gmo", "--no-contacts", "--reference", "two-cycle")
+SENSOR = (*TWO[:-1], "sensor", "--wrench")
+TUNE = ("tune", "-o", "g.toml", "--free", "0.3:3.9")
+MAKE = ("identify", "-o", "own.toml")
+BATCH = cut(0, 4, "batch", "--do", "estimate", "--observer", "gmo", "-o", "b", "--workers", "0")
+W = "wrench/fx|wrench/fy|wrench/fz|wrench/mx|wrench/my|wrench/mz"
+TRUTH = f"file:{FIXTURES / 'ur5_circle.csv.truth.parquet'}"
+TWICE = beside(cut(0, 4, *EST, "--wrench", "--remove-bias", "model", "--free", "0.3:3.9"),
+               "--zero", free_log)  # fmt: skip
+ONE_LOG = beside(cut(0, 9, *TWO, "--period", "4"), "--free", free_log)
+BOTH_GAINS = beside(beside(cut(0, 4, *EST), "--gains", gains), "--set-file", gains)
+WHOLE_CAUSAL = cut(0, 4, *EST, "--remove-bias", "whole-log", "--causal")
+PRINTED_MATCHED = cut(0, 4, *EST, "--match", "delay=0.05", "--as-printed")
+SENSOR_ZERO = beside(fixture("ur5_sensor.parquet", "0:6", "admit", "--sensor"), "--zero", free_log)
+TOO_LONG = cut(0, 9, *TWO, "--period", "30")
+
+ROWS = [
+    Row("has no admittance.start", released("start"), "start", "0,-1.35,1.9,-2.12,-1.57,0"),
+    Row("no admittance.period", released("period"), "set"),
+    Row(": no admittance ", released("mass = 3.0"), "set", "position.mass=3"),
+    Row("a release needs a deviation", lambda _: [
+        "admit", "--release", "x=0", "--robot", "ur5"], "release"),
+    Row("unstable: ", lambda _: ["admit", "--release", "x=0.3", "--robot", "ur5", "--set",
+                                 "position.alpha=50"], "force-unstable", FLAG),
+    Row("takes the log itself", stored, "solver", AWAY),
+    Row("can be compared with its", by_jacobian("", "--reference", "vendor"), "reference"),
+    Row("no wrench of a sensor to compare", by_jacobian("a", "--reference", "sensor"), "columns",
+        "wrench=afx|afy|afz|amx|amy|amz"),
+    Row("is an option of --method friction", cut(
+        0, 8, *MAKE, "--fit-constants", "--method", "base"), "method", "friction"),
+    Row("leave out --friction none", fixture("ur5_circle.csv", "0:8", *MAKE, "--method", "targets",
+                                             "--friction", "none"), "friction", AWAY),
+    Row("it would push", of(backwards, *MAKE, "--anyway"), "columns",
+        "t=t,q=q{i},-dq=dq{i},current=current{i}"),
+    Row("has no torque constants", cut(0, 8, *MAKE, "--method", "targets", robot="panda"),
+        "method"),
+    Row("--fit-constants needs motor currents", cut(0, 8, *MAKE, "--fit-constants",
+                                                    robot="panda"), "fit-constants", AWAY),
+    Row("is the old name of --gains", BOTH_GAINS, "gains", AWAY),
+    Row("is the old name of --gains", BOTH_GAINS, "set-file", AWAY),
+    Row("--causal leaves out", cut(0, 4, *SMOOTHED, "--causal"), "observer", "gmo"),
+    Row("Leave --match or", PRINTED_MATCHED, "match", AWAY),
+    Row("Leave --match or", PRINTED_MATCHED, "as-printed", AWAY),
+    Row("--match cannot tune", cut(0, 4, *SMOOTHED, "--match", "delay=0.05"), "observer", "gmo"),
+    Row("no such file of gains", cut(0, 4, *EST, "--gains", "mine.toml"), "gains", "paper"),
+    Row("no such file of gains", cut(0, 4, *EST, "--gains", "mine.toml"), "gains", tuned),
+    Row("which no batch wrote", no_batch, "force", FLAG),
+    Row("holds a batch of other options", before(BATCH, "--causal"), "force", FLAG),
+    Row("exists; give another -o", before(cut(0, 4, *TUNE)), "force", FLAG),
+    Row("exists; give another -o", before(simulated("ur5-circle", "-o", "sim.csv")), "force",
+        FLAG),
+    Row("writes no recording", cut(0, 4, *EST, "--rrd", "--rrd-detail", "none"), "rrd", AWAY),
+    Row("writes no recording", cut(0, 4, *EST, "--rrd", "--rrd-detail", "none"), "rrd-detail",
+        AWAY),
+    Row("--remove-bias free-cycle needs", cut(4.5, 9, *EST, "--remove-bias", "free-cycle"),
+        "free", lambda folder: str(sound().between(0.0, 9.0).write(folder / "free.csv"))),
+    Row("--remove-bias free-cycle needs", cut(0, 4, *EST, "--remove-bias", "free-cycle", "--free",
+                                              "0:1.5"), "remove-bias", "model"),
+    Row("add --threshold", cut(0, 4, *TUNE, "--goal", "false-alarms=1"), "threshold", "5"),
+    Row("raise --threshold", cut(0, 4, *TUNE, "--goal", "false-alarms=1", "--threshold", "0.001"),
+        "threshold", "50"),
+    Row("is not a free run of the trajectory", beside(
+        cut(4.5, 9, *TWO), "--free", other_motion), "free", free_log),
+    Row("are for cycles of one log", ONE_LOG, "period", AWAY),
+    Row("are for cycles of one log", ONE_LOG, "free", AWAY),
+    Row("alignment commanded needs", cut(0, 12, *TWO, "--alignment", "commanded"), "period", "4"),
+    Row("nearly all of that is a gap", of(gap_at_the_end, *TWO, "--anyway"), "interval", "0:9"),
+    Row("does not fit into", TOO_LONG, "period", "4"),
+    Row("the arm does not move", of(still, *TWO, "--anyway"), "free",
+        lambda folder: str(at_rest(folder))),
+    Row("cannot log as a Franka", simulated("ur5-circle", "-o", "sim", "--as", "libfranka"), "as",
+        "rtde"),
+    Row("cannot log in a UR", simulated("panda-bearing", "-o", "sim", "--as", "rtde"), "as",
+        "libfranka"),
+    Row("--zero LOG and --remove-bias each", TWICE, "zero", AWAY),
+    Row("--zero LOG and --remove-bias each", TWICE, "remove-bias", AWAY),
+    Row("whole-log needs the complete log", WHOLE_CAUSAL, "remove-bias", AWAY),
+    Row("whole-log needs the complete log", WHOLE_CAUSAL, "causal", AWAY),
+    Row("give another solver", cut(0, 4, *EST, "--wrench", "--solver", "smoother", "--causal"),
+        "solver", "pinv"),
+    Row("--zero takes either start or", cut(0, 4, *EST, "--wrench", "--zero", "start", "--zero",
+                                            "0:1"), "zero", "0:1"),
+    Row("the sensor's pose on the flange", cut(0, 4, *EST, "--wrench", "--frame", "sensor"),
+        "sensor-pose", "0,0,0.05"),
+    Row("no frame known here", fixture("ur5_sensor.parquet", "0:5", *SENSOR, "--columns",
+                                       f"wrench[world]={W}"), "columns", f"wrench[base@tool]={W}"),
+    Row("not in sensor axes", fixture("ur5_sensor.parquet", "0:18", *SENSOR, "--sensor-pose",
+                                      "fit", "--columns", f"wrench[base]={W}"), "columns",
+        f"wrench[sensor]={W}"),
+    Row("the forces lie on one line", fixture("ur5_sensor.parquet", "0:5", *SENSOR,
+                                              "--sensor-pose", "fit"), "sensor-pose", "0,0,0.05"),
+    Row("six components of a wrench", of_five_joints, "wrench", AWAY),
+    Row("--zero LOG removes what", SENSOR_ZERO, "zero", "0:1"),
+    Row("--zero LOG removes what", SENSOR_ZERO, "zero", "start"),
+    Row("no unloaded start", cut(4.5, 9, *EST, "--wrench", "--zero", "start"), "zero", "0:1"),
+    Row("no unloaded start", cut(4.5, 9, *EST, "--wrench", "--zero", "start"), "zero", free_log),
+    Row("or take it all with --anyway", touched_late, "interval", "0:30.5"),
+    Row("or take it all with --anyway", touched_late, "anyway", FLAG),
+    Row("no free part to learn the band", fixture("ur5_circle.csv", "5:12", *TWO[:3], "--contacts",
+                                                  "--reference", TRUTH), "free", "5:6"),
+]  # fmt: skip
+DEARER = [
+    Row("sets errors beside the paper's", cut(
+        0, 9, "report", "-o", "out", "--observer", "gmo", "--published", "table1"), "reference"),
+    Row("torque behind the gears", cut(0, 8, *MAKE, "--friction", "none", robot="panda"),
+        "method"),
+    Row("leave out --fit-constants", of(
+        against_gravity, *MAKE, "--fit-constants", "--anyway"), "fit-constants", AWAY),
+]  # fmt: skip
+"""Rows over a second of processor time."""
+
+WRONG = "names only the option that is wrong, or the words it takes"
+TOGETHER = "says what cannot be combined, or not here; there is nothing to try"
+RECORDING = "asks for another recording"
+IN_MEMORY = "only Python gets as far; the command line refuses such a log or word first"
+WITHOUT_ROW: dict[str, tuple[str, ...]] = {
+    WRONG: ("no such admittance parameter. Sections", "is not a number or a list",
+            "--release … is not …", "rad; it must be less than π", "holds no sample of the log",
+            "is not a positive number of false alarms per hour", "--method …; there is …",
+            "is not delay=S (seconds) or bandwidth=HZ", "--set … is not …", "--figures … is not",
+            "--rrd-detail … is none of", "is not rmse, delay=S, bandwidth=HZ",
+            "is not a positive number or one a joint [N·m]", "values; give one, or one for each of",
+            "is not a positive time in seconds", "is not a positive cutoff in Hz",
+            "is not a list of cycle numbers such as", "names no cycle; they count from 1",
+            "s; it must be positive", "is shorter than four samples",
+            "is not a cutoff between 0 and", "is neither A:B in seconds, nor start",
+            "is not …, one positive number, or one for each of"),
+    TOGETHER: ("of the wrench's options it takes only --zero A:B", "is of an arm with … joints",
+               "and --force does not overwrite that either", "--zero takes one free run"),
+    RECORDING: ("a log at rest identifies no friction", "have a partner in the free run",
+                "less than the period of", "no whole cycle of",
+                "cannot be weighed: the unloaded samples are all in one orientation",
+                "too few unloaded samples; name the unloaded spans"),
+    IN_MEMORY: ("samples are not finite; leave them out with --interval",
+                "nothing to identify: give --method",
+                "… has … joints, … has …: a free run must be"),
+    "needs a free run of another maker's arm with as many joints": ("is a log of …, … of …",),
+    "its command is tried where there is no such file of gains": ("no [observers.*] tables",),
+    "needs a robot file of coupled joints": ("has joints driven through each other",),
+    "no log that provokes it is known": ("the physically consistent fit did not settle",
+                                         "or let --method base identify the links too",
+                                         "equations for … unknowns"),
+}  # fmt: skip
+"""Reason → texts, by words that only they have, that name an option and have no row."""
+
+
+def without(words: list[Any], option: str) -> list[Any]:
+    """A command without an option and its value."""
+    at = [k for k, word in enumerate(words) if word == option]
+    values = [k + 1 for k in at if not str([*words, "-"][k + 1]).startswith("-")]
+    return [word for k, word in enumerate(words) if k not in {*at, *values}]
+
+
+def mended(words: list[Any], refused: str, row: Row) -> list[Any]:
+    """The command with what the error says of an option."""
+    found = re.search(rf"--{row.option}(?![-a-z])(?:[ =]('[^']+'|[^\s,;)|]+))?", refused)
+    assert found is not None, refused
+    option, value = f"--{row.option}", row.value
+    left = without(words, option)
+    if value in {AWAY, FLAG}:
+        return left if value == AWAY else [*left, option]
+    given = value(Path.cwd()) if callable(value) else value
+    return [*left, option, given or found[1].rstrip(".:")]
+
+
+@pytest.mark.parametrize(
+    "row",
+    [*ROWS, *(pytest.param(row, marks=pytest.mark.slow) for row in DEARER)],
+    ids=lambda row: f"{row.code}-{row.option}",
+)
+def test_the_remedy_of_an_error_is_taken(
+    row: Row, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = row.command(tmp_path)
+    code, refused = printed(words)
+    assert code == 1, refused
+    assert row.code in refused
+    code, after = printed(mended(words, refused[refused.index("error: ") :], row))
+    assert code == 0, after
+    assert row.code not in after
+
+
+def strings(node: ast.AST) -> Iterator[str]:
+    """The literal words of a node in their order, "…" for each value among them."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.FormattedValue) and not any(strings(node.value)):
+        yield "…"
+    else:
+        for child in ast.iter_child_nodes(node):
+            yield from strings(child)
+
+
+def texts() -> list[str]:
+    """What the errors of the rooms say that name an option or a command."""
+    files = [path for room in ROOMS for path in sorted(PACKAGE.glob(f"{room}/**/*.py"))]
+    files += [PACKAGE / room for room in ROOMS if room.endswith(".py")]
+    raised = [
+        "".join(strings(node.exc))
+        for path in files
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Raise) and node.exc is not None
+    ]
+    return [text for text in raised if re.search(r"--[a-z]|vftcli [a-z]", text)]
+
+
+def test_every_error_with_an_option_is_tried_or_says_why_not() -> None:
+    known = texts()
+    tried = {row.code for row in (*ROWS, *DEARER)}
+    excused = {fragment for each in WITHOUT_ROW.values() for fragment in each}
+    elsewhere = {row.code for row in REFUSALS}
+    assert [t for t in known if not any(f in t for f in tried | excused | elsewhere)] == []
+    assert [f for f in tried | excused if not any(f in t for t in known)] == []
+    assert [t for t in known if any(f in t for f in tried) and any(f in t for f in excused)] == []
