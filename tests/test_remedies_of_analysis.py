@@ -37,8 +37,7 @@ def cut(start: float, stop: float, *words: str, robot: str = "ur5") -> Command:
 
 def fixture(name: str, span: str, *words: str) -> Command:
     """A command on a part of a fixture of the UR5."""
-    begin, *more = words
-    return lambda _: [begin, FIXTURES / name, "--robot", "ur5", "--interval", span, *more]
+    return lambda _: [*words[:1], FIXTURES / name, "--robot", "ur5", "--interval", span, *words[1:]]
 
 
 def simulated(name: str, *words: str) -> Command:
@@ -51,8 +50,7 @@ def before(command: Command, *words: str) -> Command:
 
     def again(folder: Path) -> list[Any]:
         made = command(folder)
-        code, text = printed(made)
-        assert code == 0, text
+        assert printed(made)[0] == 0
         return [*made, *words]
 
     return again
@@ -68,8 +66,7 @@ def released(without: str) -> Command:
 
     def command(folder: Path) -> list[Any]:
         path = Path(robot_file(folder))
-        text = path.read_text("utf-8")
-        path.write_text(re.sub(f"^{without}.*$", "", text, flags=re.M), "utf-8")
+        path.write_text(re.sub(rf"(?m)^{without}.*$", "", path.read_text("utf-8")), "utf-8")
         return ["admit", "--release", "x=0.3", "--robot", path]
 
     return command
@@ -81,10 +78,6 @@ def moved(seconds: float = 4.0) -> Table:
     return replace(sound(), t=log.t, q=log.q, dq=log.require("dq"), effort=log.require("current"))
 
 
-def other_motion(folder: Path) -> Path:
-    return moved().write(folder / "other.csv")
-
-
 def still(table: Table, seconds: float = 4.0) -> Table:
     """The arm at rest."""
     table = table.between(0.0, seconds)
@@ -92,27 +85,21 @@ def still(table: Table, seconds: float = 4.0) -> Table:
     return replace(table, **held | {"dq": 0.0 * table.dq})
 
 
-def at_rest(folder: Path) -> Path:
-    return still(sound(), 3.0).write(folder / "free.csv")
-
-
 def gap_at_the_end(table: Table) -> Table:
     """Three samples a day after the others."""
     table = table.between(0.0, 9.0)
-    return replace(table, t=table.t + 1e5 * (np.arange(len(table.t)) >= len(table.t) - 3))
+    return replace(table, t=np.append(table.t[:-3], table.t[-3:] + 1e5))
 
 
 def backwards(table: Table) -> Table:
     """Velocities with their sign turned."""
-    table = table.between(0.0, 8.0)
-    return replace(table, dq=-table.dq)
+    return replace(table, dq=-table.dq).between(0.0, 8.0)
 
 
 def against_gravity(table: Table) -> Table:
     """Currents of friction, and of gravity turned around."""
-    table = table.between(0.0, 4.0)
-    return replace(table, effort=5.0 * np.tanh(table.dq / 0.01) - gravity_torque(
-        table, table.arm) / table.constant)  # fmt: skip
+    gravity = gravity_torque(table, table.arm) / table.constant
+    return replace(table, effort=5.0 * np.tanh(table.dq / 0.01) - gravity).between(0.0, 4.0)
 
 
 def touched_late(folder: Path) -> list[Any]:
@@ -126,13 +113,13 @@ def touched_late(folder: Path) -> list[Any]:
 def of_five_joints(folder: Path) -> list[Any]:
     """A wrench of an arm of five joints."""
     text = (FIXTURES / "arm.urdf").read_text("utf-8")
-    text = text.replace('"hand" type="revolute"', '"hand" type="fixed"')
-    (folder / "five.urdf").write_text(text, "utf-8")
+    fixed = text.replace('"hand" type="revolute"', '"hand" type="fixed"')
+    (folder / "five.urdf").write_text(fixed, "utf-8")
     table = sound().between(0.0, 4.0)
     five = {name: value[:, :5] for name, value in table.series()}
     made = replace(table, **five | {"effort": table.torque[:, :5]}, signal="tau")
-    log = made.write(folder / "log.csv")
-    return ["estimate", log, "--robot", folder / "five.urdf", *EST[1:], "--wrench", "--anyway"]
+    return ["estimate", made.write(folder / "log.csv"), "--robot", folder / "five.urdf", *EST[1:],
+            "--wrench", "--anyway"]  # fmt: skip
 
 
 def by_jacobian(sensor: str, *words: str) -> Command:
@@ -140,13 +127,11 @@ def by_jacobian(sensor: str, *words: str) -> Command:
 
     def command(folder: Path) -> list[Any]:
         rng = np.random.default_rng(0)
-        q = rng.uniform(-1.0, 1.0, (400, 7))
-        J = flange_jacobian(load_robot("panda").chain, q)
-        names = ("fx", "fy", "fz", "mx", "my", "mz")
+        J = flange_jacobian(load_robot("panda").chain, rng.uniform(-1.0, 1.0, (400, 7)))
         columns = {"timestamp": np.arange(400) / 80.0}
         columns |= {f"tau_ext_{j}": rng.standard_normal(400) for j in range(7)}
         columns |= {f"jacobian_{r}_{c}": J[:, r, c] for r in range(6) for c in range(7)}
-        columns |= {f"{sensor}{name}": rng.standard_normal(400) for name in names}
+        columns |= {f"{sensor}{k}{x}": rng.standard_normal(400) for k in "fm" for x in "xyz"}
         pl.DataFrame(columns).write_csv(folder / "jacobian.csv")
         return ["compare", folder / "jacobian.csv", *words]
 
@@ -199,7 +184,7 @@ TOO_LONG = cut(0, 9, *TWO, "--period", "30")
 ROWS = [
     Row("has no admittance.start", released("start"), "start", "0,-1.35,1.9,-2.12,-1.57,0"),
     Row("no admittance.period", released("period"), "set"),
-    Row(": no admittance ", released("mass = 3.0"), "set", "position.mass=3"),
+    Row(": no admittance ", released("mass = 3.0"), "set", "3"),
     Row("a release needs a deviation", lambda _: [
         "admit", "--release", "x=0", "--robot", "ur5"], "release"),
     Row("unstable: ", lambda _: ["admit", "--release", "x=0.3", "--robot", "ur5", "--set",
@@ -208,16 +193,10 @@ ROWS = [
     Row("can be compared with its", by_jacobian("", "--reference", "vendor"), "reference"),
     Row("no wrench of a sensor to compare", by_jacobian("a", "--reference", "sensor"), "columns",
         "wrench=afx|afy|afz|amx|amy|amz"),
-    Row("is an option of --method friction", cut(
-        0, 8, *MAKE, "--fit-constants", "--method", "base"), "method", "friction"),
     Row("leave out --friction none", fixture("ur5_circle.csv", "0:8", *MAKE, "--method", "targets",
                                              "--friction", "none"), "friction", AWAY),
-    Row("it would push", of(backwards, *MAKE, "--anyway"), "columns",
-        "t=t,q=q{i},-dq=dq{i},current=current{i}"),
     Row("has no torque constants", cut(0, 8, *MAKE, "--method", "targets", robot="panda"),
         "method"),
-    Row("--fit-constants needs motor currents", cut(0, 8, *MAKE, "--fit-constants",
-                                                    robot="panda"), "fit-constants", AWAY),
     Row("is the old name of --gains", BOTH_GAINS, "gains", AWAY),
     Row("is the old name of --gains", BOTH_GAINS, "set-file", AWAY),
     Row("--causal leaves out", cut(0, 4, *SMOOTHED, "--causal"), "observer", "gmo"),
@@ -241,15 +220,13 @@ ROWS = [
     Row("add --threshold", cut(0, 4, *TUNE, "--goal", "false-alarms=1"), "threshold", "5"),
     Row("raise --threshold", cut(0, 4, *TUNE, "--goal", "false-alarms=1", "--threshold", "0.001"),
         "threshold", "50"),
-    Row("is not a free run of the trajectory", beside(
-        cut(4.5, 9, *TWO), "--free", other_motion), "free", free_log),
     Row("are for cycles of one log", ONE_LOG, "period", AWAY),
     Row("are for cycles of one log", ONE_LOG, "free", AWAY),
     Row("alignment commanded needs", cut(0, 12, *TWO, "--alignment", "commanded"), "period", "4"),
     Row("nearly all of that is a gap", of(gap_at_the_end, *TWO, "--anyway"), "interval", "0:9"),
     Row("does not fit into", TOO_LONG, "period", "4"),
     Row("the arm does not move", of(still, *TWO, "--anyway"), "free",
-        lambda folder: str(at_rest(folder))),
+        lambda folder: str(still(sound(), 3.0).write(folder / "free.csv"))),
     Row("cannot log as a Franka", simulated("ur5-circle", "-o", "sim", "--as", "libfranka"), "as",
         "rtde"),
     Row("cannot log in a UR", simulated("panda-bearing", "-o", "sim", "--as", "rtde"), "as",
@@ -266,9 +243,6 @@ ROWS = [
         "sensor-pose", "0,0,0.05"),
     Row("no frame known here", fixture("ur5_sensor.parquet", "0:5", *SENSOR, "--columns",
                                        f"wrench[world]={W}"), "columns", f"wrench[base@tool]={W}"),
-    Row("not in sensor axes", fixture("ur5_sensor.parquet", "0:18", *SENSOR, "--sensor-pose",
-                                      "fit", "--columns", f"wrench[base]={W}"), "columns",
-        f"wrench[sensor]={W}"),
     Row("the forces lie on one line", fixture("ur5_sensor.parquet", "0:5", *SENSOR,
                                               "--sensor-pose", "fit"), "sensor-pose", "0,0,0.05"),
     Row("six components of a wrench", of_five_joints, "wrench", AWAY),
@@ -278,10 +252,22 @@ ROWS = [
     Row("no unloaded start", cut(4.5, 9, *EST, "--wrench", "--zero", "start"), "zero", free_log),
     Row("or take it all with --anyway", touched_late, "interval", "0:30.5"),
     Row("or take it all with --anyway", touched_late, "anyway", FLAG),
-    Row("no free part to learn the band", fixture("ur5_circle.csv", "5:12", *TWO[:3], "--contacts",
-                                                  "--reference", TRUTH), "free", "5:6"),
 ]  # fmt: skip
 DEARER = [
+    Row("is an option of --method friction", cut(
+        0, 8, *MAKE, "--fit-constants", "--method", "base"), "method", "friction"),
+    Row("it would push", of(backwards, *MAKE, "--anyway"), "columns",
+        "t=t,q=q{i},-dq=dq{i},current=current{i}"),
+    Row("no free part to learn the band", fixture("ur5_circle.csv", "5:12", *TWO[:3], "--contacts",
+                                                  "--reference", TRUTH), "free", "5:6"),
+    Row("not in sensor axes", fixture("ur5_sensor.parquet", "0:18", *SENSOR, "--sensor-pose",
+                                      "fit", "--columns", f"wrench[base]={W}"), "columns",
+        f"wrench[sensor]={W}"),
+    Row("--fit-constants needs motor currents", cut(0, 8, *MAKE, "--fit-constants",
+                                                    robot="panda"), "fit-constants", AWAY),
+    Row("is not a free run of the trajectory", beside(
+        cut(4.5, 9, *TWO), "--free", lambda folder: moved().write(folder / "other.csv")),
+        "free", free_log),
     Row("sets errors beside the paper's", cut(
         0, 9, "report", "-o", "out", "--observer", "gmo", "--published", "table1"), "reference"),
     Row("torque behind the gears", cut(0, 8, *MAKE, "--friction", "none", robot="panda"),
@@ -291,37 +277,35 @@ DEARER = [
 ]  # fmt: skip
 """Rows over a second of processor time."""
 
-WRONG = "names only the option that is wrong, or the words it takes"
-TOGETHER = "says what cannot be combined, or not here; there is nothing to try"
-RECORDING = "asks for another recording"
-IN_MEMORY = "only Python gets as far; the command line refuses such a log or word first"
 WITHOUT_ROW: dict[str, tuple[str, ...]] = {
-    WRONG: ("no such admittance parameter. Sections", "is not a number or a list",
-            "--release … is not …", "rad; it must be less than π", "holds no sample of the log",
-            "is not a positive number of false alarms per hour", "--method …; there is …",
-            "is not delay=S (seconds) or bandwidth=HZ", "--set … is not …", "--figures … is not",
-            "--rrd-detail … is none of", "is not rmse, delay=S, bandwidth=HZ",
-            "is not a positive number or one a joint [N·m]", "values; give one, or one for each of",
-            "is not a positive time in seconds", "is not a positive cutoff in Hz",
-            "is not a list of cycle numbers such as", "names no cycle; they count from 1",
-            "s; it must be positive", "is shorter than four samples",
-            "is not a cutoff between 0 and", "is neither A:B in seconds, nor start",
-            "is not …, one positive number, or one for each of"),
-    TOGETHER: ("of the wrench's options it takes only --zero A:B", "is of an arm with … joints",
-               "and --force does not overwrite that either", "--zero takes one free run"),
-    RECORDING: ("a log at rest identifies no friction", "have a partner in the free run",
-                "less than the period of", "no whole cycle of",
-                "cannot be weighed: the unloaded samples are all in one orientation",
-                "too few unloaded samples; name the unloaded spans"),
-    IN_MEMORY: ("samples are not finite; leave them out with --interval",
-                "nothing to identify: give --method",
-                "… has … joints, … has …: a free run must be"),
+    "names only the option that is wrong, or the words it takes": (
+        "no such admittance parameter. Sections", "is not a number or a list",
+        "--release … is not …", "rad; it must be less than π", "holds no sample of the log",
+        "is not a positive number of false alarms per hour", "--method …; there is …",
+        "is not delay=S (seconds) or bandwidth=HZ", "--set … is not …", "--figures … is not",
+        "--rrd-detail … is none of", "is not rmse, delay=S, bandwidth=HZ",
+        "is not a positive number or one a joint [N·m]", "values; give one, or one for each of",
+        "is not a positive time in seconds", "is not a positive cutoff in Hz",
+        "is not a list of cycle numbers such as", "names no cycle; they count from 1",
+        "s; it must be positive", "is shorter than four samples", "is not a cutoff between 0 and",
+        "is neither A:B in seconds, nor start", "one positive number, or one for each of"),
+    "says what cannot be combined, or not here; there is nothing to try": (
+        "of the wrench's options it takes only --zero A:B", "is of an arm with … joints",
+        "and --force does not overwrite that either", "--zero takes one free run"),
+    "asks for another recording, or for poses that no fixture has": (
+        "a log at rest identifies no friction", "have a partner in the free run",
+        "less than the period of", "no whole cycle of",
+        "cannot be weighed: the unloaded samples are all in one orientation",
+        "too few unloaded samples; name the unloaded spans"),
+    "only Python gets as far; the command line refuses such a log or word first": (
+        "samples are not finite; leave them out with --interval",
+        "nothing to identify: give --method", "… has … joints, … has …: a free run must be"),
     "needs a free run of another maker's arm with as many joints": ("is a log of …, … of …",),
     "its command is tried where there is no such file of gains": ("no [observers.*] tables",),
     "needs a robot file of coupled joints": ("has joints driven through each other",),
-    "no log that provokes it is known": ("the physically consistent fit did not settle",
-                                         "or let --method base identify the links too",
-                                         "equations for … unknowns"),
+    "no log that provokes it is known": (
+        "the physically consistent fit did not settle", "equations for … unknowns",
+        "or let --method base identify the links too"),
 }  # fmt: skip
 """Reason → texts, by words that only they have, that name an option and have no row."""
 
@@ -342,7 +326,10 @@ def mended(words: list[Any], refused: str, row: Row) -> list[Any]:
     if value in {AWAY, FLAG}:
         return left if value == AWAY else [*left, option]
     given = value(Path.cwd()) if callable(value) else value
-    return [*left, option, given or found[1].rstrip(".:")]
+    said = (found[1] or "").rstrip(".:")
+    if "=VALUE" in said:
+        given = said.replace("VALUE", given)
+    return [*left, option, given or said]
 
 
 @pytest.mark.parametrize(
@@ -350,9 +337,7 @@ def mended(words: list[Any], refused: str, row: Row) -> list[Any]:
     [*ROWS, *(pytest.param(row, marks=pytest.mark.slow) for row in DEARER)],
     ids=lambda row: f"{row.code}-{row.option}",
 )
-def test_the_remedy_of_an_error_is_taken(
-    row: Row, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_remedy_is_taken(row: Row, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     words = row.command(tmp_path)
     code, refused = printed(words)
@@ -361,6 +346,24 @@ def test_the_remedy_of_an_error_is_taken(
     code, after = printed(mended(words, refused[refused.index("error: ") :], row))
     assert code == 0, after
     assert row.code not in after
+
+
+def test_a_remedy_of_two_options_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A free run in the place of a period; a wrench left out with its solver."""
+    monkeypatch.chdir(tmp_path)
+    words = TOO_LONG(tmp_path)
+    assert "in its place a free run in another log with --free" in printed(words)[1]
+    assert printed([*without(words, "--period"), "--free", free_log(tmp_path)])[0] == 0
+    words = [*of_five_joints(tmp_path), "--solver", "smoother"]
+    assert "leave --wrench and its options out" in printed(words)[1]
+    assert printed(without(without(words, "--wrench"), "--solver"))[0] == 0
+
+
+def test_no_free_run_is_asked_for_where_none_helps(tmp_path: Path) -> None:
+    """Seven samples, of which a free run makes no more."""
+    refused = printed(cut(0, 0.05, *TWO, "--anyway")(tmp_path))[1]
+    assert "7 samples are too few" in refused
+    assert "--free" not in refused
 
 
 def strings(node: ast.AST) -> Iterator[str]:
