@@ -68,7 +68,10 @@ class LeRobotDataset:
 
         path = self.folder / file.place
         with guarded(path, (pa.ArrowException,)):
-            there = {*pq.read_schema(path).names, *info_of(self.folder).get("features", {})}
+            there = {
+                *pq.read_schema(path).names,
+                *named_features(self.folder, info_of(self.folder)),
+            }
         for column in columns:
             if PREFIX + column.name in there:
                 raise LogError(
@@ -116,10 +119,7 @@ class LeRobotDataset:
         """
         info = info_of(self.folder)
         fps = {"fps": info["fps"]} if is_third(info) and "fps" in info else {}
-        features = info.setdefault("features", {})
-        if not isinstance(features, dict):
-            path = self.folder / "meta" / "info.json"
-            raise LogError(f"{path}: its features are no table of names; nothing can be added")
+        features = named_features(self.folder, info)
         for column in columns:
             features[PREFIX + column.name] = {
                 "dtype": "float32",
@@ -249,6 +249,19 @@ def whole_columns(
     if done != rows:
         raise LogError(f"{path}: has rows of episodes that the table of episodes does not tell")
     return whole
+
+
+def named_features(folder: Path, info: dict[str, Any]) -> dict[str, Any]:
+    """The features of a description by their names, to be added to.
+
+    Raises:
+        LogError: If they have no names.
+    """
+    features = info.setdefault("features", {})
+    if not isinstance(features, dict):
+        path = folder / "meta" / "info.json"
+        raise LogError(f"{path}: its features are no table of names; nothing can be added")
+    return features
 
 
 def with_features(
