@@ -149,6 +149,7 @@ def test_rooms_know_only_those_below_them() -> None:
     assert not wrong
 
 
+@pytest.mark.slow
 def test_no_file_leads_back_to_itself() -> None:
     """Strongly connected files (Tarjan) of more than one; imports for types count."""
     graph = {file: set(imported(file)) - {file} for file in modules() if file != "__init__.py"}
@@ -177,6 +178,7 @@ def test_no_file_leads_back_to_itself() -> None:
     assert not circles
 
 
+@pytest.mark.slow
 def test_a_class_name_stands_for_one_thing() -> None:
     names = defaultdict(list)
     for file, tree in modules().items():
@@ -200,6 +202,7 @@ def test_only_the_command_line_prints_or_exits() -> None:
     assert not wrong
 
 
+@pytest.mark.slow
 def test_only_readers_outputs_and_loaders_touch_files() -> None:
     wrong = []
     for file, tree in modules().items():
@@ -213,6 +216,7 @@ def test_only_readers_outputs_and_loaders_touch_files() -> None:
     assert not wrong
 
 
+@pytest.mark.slow
 def test_no_code_reads_a_sentence() -> None:
     assert not [
         f"{file}: {ast.unparse(node)}"
@@ -244,6 +248,7 @@ def is_text(node: ast.AST) -> bool:
     return isinstance(node, ast.Name) and node.id in {"note", "remark"}
 
 
+@pytest.mark.slow
 def test_a_function_is_asked_for_a_dozen_things_at_most() -> None:
     """Parameters written by hand: 12 in commands, 10 elsewhere; those of classes are fields."""
     wrong = []
@@ -282,6 +287,7 @@ def catalogue() -> Counter[str]:
     return Counter(code for words in each for code in words)
 
 
+@pytest.mark.slow
 def test_every_remark_has_its_words_once() -> None:
     assert not codes().keys() - catalogue().keys()
     assert not [code for code, count in catalogue().items() if count > 1]

@@ -24,6 +24,7 @@ def analysis() -> vft.Analysis:
     return vft.report(CIRCLE, "ur5", observers=["best", "gmo"], reference="two-cycle")
 
 
+@pytest.mark.slow
 def test_contacts_are_those_of_the_pipeline() -> None:
     choice = AnalysisChoice(
         robot=RobotChoice.parsed(robot="ur5"), free=FreeChoice.parsed(free_part="0.3:4")
@@ -38,6 +39,7 @@ def test_contacts_are_those_of_the_pipeline() -> None:
     assert frame["peak_force_N"].to_list() == [peak for _, _, peak in rows]
 
 
+@pytest.mark.slow
 def test_a_log_and_a_robot_may_be_files_or_objects() -> None:
     recording, robot = vft.read(TAPS), vft.load_robot("ur5")
     named = vft.contacts(TAPS, "ur5", free_part="0.3:4", interval="0:6").to_polars()
@@ -71,6 +73,7 @@ def test_a_report_answers_everything(analysis: vft.Analysis) -> None:
     assert len(codes) == len(analysis.remarks)
 
 
+@pytest.mark.slow
 def test_everything_in_hand_is_one_line_and_a_table(analysis: vft.Analysis) -> None:
     assert analysis.contacts is not None
     things = [

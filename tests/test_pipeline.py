@@ -84,6 +84,7 @@ def test_the_log_must_settle_its_robot_or_be_told() -> None:
         analyse_log(FIXTURE, AnalysisChoice(read=measured))
 
 
+@pytest.mark.slow
 def test_an_interval_keeps_the_logs_own_time() -> None:
     analysis = analyse_log(
         FIXTURE, AnalysisChoice(read=ReadChoice(interval=(4.0, 8.0)), robot=RobotChoice(name="ur5"))

@@ -192,6 +192,7 @@ def test_an_arm_is_laid_on_its_log_by_name(samples: Path) -> None:
     assert free_torque(reach / "arm_with_gripper_bag", robot) < 0.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "columns", "words"),
     [

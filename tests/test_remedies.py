@@ -416,6 +416,7 @@ def test_every_remark_with_an_option_is_tried_or_says_why_not() -> None:
     assert WITHOUT_ROW.keys() <= with_option
 
 
+@pytest.mark.slow
 def test_a_load_that_a_log_shows_is_found_and_mounted(tmp_path: Path) -> None:
     """The doctor's and the list's command, on a motion whose poses differ."""
     log = moving("ur5", load=2.8, seconds=12.0)
@@ -494,6 +495,7 @@ REFUSALS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", REFUSALS, ids=lambda row: f"{row.code}-{row.option}")
 def test_the_remedy_of_a_refusal_is_taken(
     row: Row, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

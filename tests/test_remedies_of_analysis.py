@@ -332,6 +332,7 @@ def mended(words: list[Any], refused: str, row: Row) -> list[Any]:
     return [*left, option, given or said]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "row",
     [*ROWS, *(pytest.param(row, marks=pytest.mark.slow) for row in DEARER)],
@@ -390,6 +391,7 @@ def texts() -> list[str]:
     return [text for text in raised if re.search(r"--[a-z]|vftcli [a-z]", text)]
 
 
+@pytest.mark.slow
 def test_every_error_with_an_option_is_tried_or_says_why_not() -> None:
     known = texts()
     tried = {row.code for row in (*ROWS, *DEARER)}

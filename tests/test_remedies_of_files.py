@@ -286,6 +286,7 @@ def test_the_command_that_an_error_names_runs(
         assert code == 0, after
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [
     pytest.param(row, id=f"{row.text}-{row.options}",
                  marks=[pytest.mark.slow] if row.text in SLOW else [])
@@ -370,6 +371,7 @@ def spoken(node: ast.expr) -> Iterator[str]:
             yield from spoken(part)
 
 
+@pytest.mark.slow
 def test_every_text_with_an_option_is_tried_or_says_why_not() -> None:
     tried = {row.text for row in ROWS} | COMMANDS.keys()
     reasons = {words for each in WITHOUT_ROW.values() for words in each}

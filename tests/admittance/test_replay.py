@@ -63,6 +63,7 @@ def test_soft_travel_is_plausible_and_hard_is_said_not_to_be() -> None:
     assert "travel-implausible-hard" in codes(hard)
 
 
+@pytest.mark.slow
 def test_rows_say_what_happened() -> None:
     found = run(push(), "threshold_mode=soft", alphas=(1.0, 1.9))
     assert [(r["controller"], r["alpha"], r["axis"]) for r in found.rows] == [
@@ -87,6 +88,7 @@ def test_rows_say_what_happened() -> None:
     assert found.rows[2]["peak_advance_s"] > 0.0  # the release's brake acts sooner
 
 
+@pytest.mark.slow
 def test_as_printed_a_force_below_the_threshold_moves_the_arm() -> None:
     """5 N of 20 for 20 s: to F/K_d and F/(αK_d); as corrected not at all.
 
@@ -108,6 +110,7 @@ def test_work_of_a_constant_force_is_force_times_way() -> None:
     assert found.rows[0]["work_J"] == pytest.approx(24.0 * way, rel=1e-9)  # a sum of equal terms
 
 
+@pytest.mark.slow
 def test_joints_follow_the_flange() -> None:
     """The joint positions put the flange where the deviation says, rotation included."""
     record, q = push(21.0)

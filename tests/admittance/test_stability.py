@@ -69,6 +69,7 @@ def escapes(xi: float, y: float) -> bool:
     return len(found.t_events[0]) > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("xi", [0.0, 0.510, 0.671, 1.0, 1.0607, 2.7386])
 def test_escape_factor_against_a_stiff_integrator(xi: float) -> None:
     bound = escape_factor(xi)

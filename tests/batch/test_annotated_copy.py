@@ -166,6 +166,7 @@ def test_frames_without_a_number_stop_it_or_are_marked(dataset: Path, tmp_path: 
     assert np.all(np.array(table[TORQUE].to_list())[zero] == 0.0)
 
 
+@pytest.mark.slow
 def test_what_tells_no_forces_is_refused_and_leaves_nothing(dataset: Path, tmp_path: Path) -> None:
     def zero(values: np.ndarray) -> None:
         values[:, :4] = 0.0
@@ -206,6 +207,7 @@ def test_derived_velocities_and_smoothers_are_recorded_as_not_causal(tmp_path: P
     assert info["features"][TORQUE]["info"]["causal"] is False
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("observer", "sample"),
     [

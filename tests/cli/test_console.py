@@ -101,6 +101,7 @@ def test_a_report_writes_the_others_and_fails(
     assert list(record["logs"]) == ["good"]
 
 
+@pytest.mark.slow
 def test_lists_and_tables_show_the_others_and_fail(logs: tuple[Path, Path], run: Run) -> None:
     words = (*logs, "--robot", "ur5")
     code, out, _ = run("contacts", *words, "--json")

@@ -115,6 +115,7 @@ def test_a_payload_pair_of_equal_names_trains_friction_on_the_log_without_load(t
     assert any(row["parameter"] == "coulomb" for row in record["parameters"])
 
 
+@pytest.mark.slow
 def test_one_run_given_twice_is_refused(logs, tmp_path):
     log, copy = logs / "a" / "log.csv", logs / "copy.csv"
     common = ("--robot", "ur5")

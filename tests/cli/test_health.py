@@ -73,6 +73,7 @@ def test_a_log_with_temperatures_is_modelled_by_them(
     assert not estimates["cold"].equals(estimates["untold"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_meaningless_log_is_refused_in_one_line_and_nothing_is_written(
     command: str, turned: str, run: Run, tmp_path: Path
@@ -123,6 +124,7 @@ def test_every_output_of_a_report_carries_what_was_overridden(
     assert "effort-sign" in pl.read_parquet_metadata(out / "estimates.parquet")["vftcli"]
 
 
+@pytest.mark.slow
 def test_an_open_effort_heals_the_log(turned: str, run: Run, tmp_path: Path) -> None:
     words = ("--observer", "gmo", "--effort", "auto", "-o", "out", "--json")
     code, out, err = run("estimate", turned, *UR5, *words)

@@ -176,6 +176,7 @@ OF_OTHER_TOOLS = {"--binary", "--storage", "--help", "--all-extras", "--nthreads
 """Options in the documents that are those of pip, of ros2 bag, of Dask, or of all programs."""
 
 
+@pytest.mark.slow
 def test_documents_name_every_option_and_no_other() -> None:
     files = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
     # The one names options that are gone, the other those of the developers' tools.

@@ -54,6 +54,7 @@ def test_the_first_is_said_on_the_terminal_and_in_the_record(
     assert "episode-taken" in {told["code"] for told in record["warnings"]}
 
 
+@pytest.mark.slow
 def test_contacts_and_convert_say_it_too(
     episodes: Path, tmp_path: Path, monkeypatch: Any, capsys: Any
 ) -> None:
@@ -80,6 +81,7 @@ def test_a_command_of_one_log_takes_no_all(episodes: Path, monkeypatch: Any, cap
     assert "name one: --episode K" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_inspect_describes_the_left_arm_and_names_both(
     tmp_path: Path, monkeypatch: Any, capsys: Any
 ) -> None:

@@ -63,6 +63,7 @@ def test_one_bad_block_is_no_contact() -> None:
     assert not taken(*joints_of(d)).any()
 
 
+@pytest.mark.slow
 def test_a_long_log_is_searched_in_stretches_as_if_in_one(monkeypatch: pytest.MonkeyPatch) -> None:
     d = pushed(2000, 5)
     d[1200:1300] += 5.0

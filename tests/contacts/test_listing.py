@@ -169,6 +169,7 @@ def ranges(found: ContactList) -> list[tuple[float, float]]:
     return [(size - band, size + band) for size, band in sizes]
 
 
+@pytest.mark.slow
 def test_free_motion_and_none_give_one_answer(logs: Path) -> None:
     free, push = ur10e(logs, "free_14harm.csv"), ur10e(logs, "push_pose.csv")
     answers = [list_contacts(motion(push, "ur10e", run=run)) for run in (None, free)]
@@ -178,6 +179,7 @@ def test_free_motion_and_none_give_one_answer(logs: Path) -> None:
         assert max(low for low, _ in rows) < min(high for _, high in rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     ["free_12harm.csv", "free_10harm.csv.gz", "free_repeat_a.csv", "jointwise_2.csv",
@@ -306,6 +308,7 @@ def test_a_slow_log_says_that_it_cuts_the_peak_of_a_tap() -> None:
     assert not {remark.code for row in fast.contacts for remark in row.remarks}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["press_1", "press_4"])
 def test_a_press_on_a_resting_arm_is_one_contact_and_no_load(logs: Path, name: str) -> None:
     """Pressed for most of the log, with free motion before and behind."""

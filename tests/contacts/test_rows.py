@@ -120,6 +120,7 @@ def test_a_course_bears_the_band_along_its_force() -> None:
     assert wider == pytest.approx(1.96 * np.hypot(2.6833, 0.15), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_every_row_has_its_course(listed: Callable[..., ContactList]) -> None:
     for contact in listed("ur5_circle.csv", "ur5", "0.3:4").contacts:
         course = contact.course

@@ -172,6 +172,7 @@ def test_no_sample_is_cut_out_of_another_unit(circle: Recording) -> None:
     assert "milliamperes" in found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log", LOGS, ids=lambda log: f"{log.path}-{log.robot or 'any'}")
 def test_nothing_is_cut_out_of_a_sound_log(logs: Path, log: Any) -> None:
     if log.robot.startswith("..") and not (logs / log.robot).is_file():

@@ -92,12 +92,14 @@ def test_effort_that_is_current_is_told() -> None:
     assert "--effort current" in said.remedy
 
 
+@pytest.mark.slow
 def test_milliamperes_are_told() -> None:
     log = moving("ur5e")
     assert log.current is not None
     assert "milliamperes" in names(altered(log, current=1000 * log.current))
 
 
+@pytest.mark.slow
 def test_units_and_signs_of_velocity() -> None:
     log = moving("panda")
     assert log.dq is not None
@@ -158,6 +160,7 @@ def test_saturation_and_still_joints() -> None:
     assert "still-joints" in names(altered(log, q=q))
 
 
+@pytest.mark.slow
 def test_clock_findings() -> None:
     log = moving("ur5")
     jitter = log.t + np.random.default_rng(1).uniform(0, 2e-3, log.samples)

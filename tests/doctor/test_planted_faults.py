@@ -137,6 +137,7 @@ ADVISED = {
 """Faults whose remedy is an option that mends the log as it is."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("log", "fault"), [pair for pair in HARMFUL if pair[1] in ADVISED], ids=str
 )

@@ -359,6 +359,7 @@ def test_tasks_that_make_no_sense_are_refused(options, match):
         Task(**options)
 
 
+@pytest.mark.slow
 def test_the_controllers_own_model_is_read_off():
     """A controller with other K, rotor and friction than the profile, and a hand on the arm."""
     K = UR5.torque_constant * [1.05, 0.95, 1.0, 1.1, 1.0, 1.0]

@@ -69,6 +69,7 @@ def test_the_equation_of_a_joint_is_torque_less_rigid_body(data, weights):
     assert data_of_joint(behind_gear, 1, weights, constant=False).fixed.shape[1] == 0
 
 
+@pytest.mark.slow
 def test_friction_and_rotor_of_every_joint_are_found(data, weights):
     fits = fit_frictions(data, weights)
     for j, found in enumerate(fits):

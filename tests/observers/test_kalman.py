@@ -61,6 +61,7 @@ def dense(observer: KalmanObserver, log: DynamicsTerms) -> tuple[np.ndarray, np.
     return tau, sd
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", NOISE_CONVENTIONS)
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])

@@ -35,6 +35,7 @@ def listed(analysis: Analysis, count: int) -> Analysis:
     return replace(analysis, contacts=contact_list(*many(count), remarks=()))
 
 
+@pytest.mark.slow
 def test_the_answer_stands_first_and_everything_on_one_screen(analysis: Analysis) -> None:
     text = log_screen(listed(analysis, 4), CANVAS, ["out/  index.html", "Open: out/index.html"])
     lines = text.splitlines()

@@ -87,6 +87,7 @@ def test_a_bad_sample_is_said() -> None:
 REAL = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["free_12harm", "free_14harm"])
 def test_an_hour_without_samples_stays_within_the_band(logs: Path, name: str) -> None:
     """No free motion is given or repeats: the model's error comes from all of the log."""

@@ -181,6 +181,7 @@ def test_a_fit_that_fails_is_said_and_costs_nothing_else(
     np.testing.assert_array_equal(analysis.estimates[0].tau, automatic.estimates[2].tau)
 
 
+@pytest.mark.slow
 def test_run_json_says_what_the_best_is_made_of(automatic: Analysis) -> None:
     made = run_record(automatic, "")["complete_log"]["best"]
     assert (made["observer"], made["gains"]) == ("rts-auto", "log")

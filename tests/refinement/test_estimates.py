@@ -90,6 +90,7 @@ def test_the_band_covers_the_truth_on_moving_joints(worked_up: Analysis) -> None
     assert np.count_nonzero(worked_up.estimates[-1].moving[:, 4]) == 23
 
 
+@pytest.mark.slow
 def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
     found = worked_up.refinement
     assert found is not None
@@ -129,6 +130,7 @@ def test_removing_the_bias_subtracts_the_free_cycle_at_the_same_phase(
     assert "free-cycle-is-zero" in codes(without_bias)
 
 
+@pytest.mark.slow
 def test_what_is_left_without_the_bias_is_tuned_on(
     worked_up: Analysis, without_bias: Analysis
 ) -> None:
@@ -311,6 +313,7 @@ def test_bias_removal_needs_no_tuned_observer() -> None:
     assert np.max(np.abs(estimate.tau - plain.tau)) > 0.5
 
 
+@pytest.mark.slow
 def test_an_unknown_gains_file_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "gains.toml"
     file.write_text("[observers.gmo]\ngian = 3.0\n", encoding="utf-8")

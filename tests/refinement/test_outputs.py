@@ -21,6 +21,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 
 
+@pytest.mark.slow
 def test_the_parquet_holds_the_band_beside_the_covariance(worked_up: Analysis) -> None:
     table = estimates_table(worked_up)
     assert isinstance(table, pl.DataFrame)
@@ -89,6 +90,7 @@ def test_a_run_that_asks_for_nothing_shows_nothing() -> None:
     assert json.loads(to_json(run_record(plain, "")))["complete_log"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["base", "flange"])
 def test_the_wrench_takes_its_band_from_the_joint_torques(frame: str) -> None:
     from vftcli.pipeline import AnalysisChoice, analyse_log

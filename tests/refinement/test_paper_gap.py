@@ -77,6 +77,7 @@ def test_gains_that_do_as_well_are_not_called_off_the_best() -> None:
         assert str(said)
 
 
+@pytest.mark.slow
 def test_what_is_measured_takes_the_place_of_what_was_expected(analysis: Analysis) -> None:
     import polars as pl
 

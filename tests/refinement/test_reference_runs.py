@@ -147,6 +147,7 @@ def test_ur10e_payload_by_the_free_run(logs: Path) -> None:
     assert mean_rmse(unbiased, "rts-auto") <= 0.7 * causal
 
 
+@pytest.mark.slow
 def test_ur10e_pushes_between_which_stiction_is_named(logs: Path) -> None:
     """Real: a held pose; what is left between pushes is stiction, and is said to be."""
     request = AnalysisChoice(

@@ -231,6 +231,7 @@ def test_what_no_arm_does_is_refused():
     assert not found.bias.any()
 
 
+@pytest.mark.slow
 def test_long_logs_are_fitted_at_a_lower_rate():
     """30 Hz up to a minute, 10 Hz beyond, and never more than 36 000 samples."""
     assert [stride_of(0.01 * np.arange(n)) for n in (1000, 6000, 7000)] == [3, 3, 10]

@@ -49,6 +49,7 @@ def test_rates_that_differ_a_little_are_corrected() -> None:
     assert found.deviation < 1e-4  # interpolation between samples 10 ms apart
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.75, 1.05, 1.5, 1000.0])
 def test_rates_that_differ_much_are_refused(rate: float) -> None:
     log = wandering()

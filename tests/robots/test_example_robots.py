@@ -109,6 +109,7 @@ def key_of(path: Path) -> str:
     return str(path.with_suffix("")).partition("/example-robot-data/robots/")[2]
 
 
+@pytest.mark.slow
 def test_every_robot_is_loaded_or_refused_by_the_rules() -> None:
     arms: dict[str, int] = {}
     refused = {}

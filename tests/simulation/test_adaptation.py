@@ -17,6 +17,7 @@ from vftcli.simulation.pushes import STYLES, PushesSpec
 URDF = str(Path(__file__).parents[2] / "fixtures" / "arm.urdf")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur3", "xarm6", "m1013", "panda", "gen3", URDF])
 def test_a_circle_stays_inside_the_limits_of_any_arm(name: str) -> None:
     scenario, robot = load_scenario("ur5-circle", [f"robot={name}"]), load_robot(name)

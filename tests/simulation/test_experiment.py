@@ -184,6 +184,7 @@ def test_switching_one_mismatch_off_leaves_the_others() -> None:
     assert np.any(both.friction.coulomb != other.friction.coulomb)
 
 
+@pytest.mark.slow
 def test_stepping_the_arm_oneself_gives_the_same_log() -> None:
     scenario = load_scenario("ur5-circle", ["duration=0.4"])
     arm, reference = prepare(scenario, 3)

@@ -46,6 +46,7 @@ def test_a_made_motion_excites_inside_the_limits(name: str) -> None:
     assert made.condition < 30.0
 
 
+@pytest.mark.slow
 def test_torque_is_that_of_pinocchio() -> None:
     robot = load_robot("xarm6")  # without friction
     motion = ExcitationSpec().motion(robot).at(np.linspace(0.0, 10.0, 20))

@@ -73,6 +73,7 @@ def test_readers_read_back_what_is_written(
     assert compared >= 3
 
 
+@pytest.mark.slow
 def test_full_recipe_has_the_columns_of_the_client(ur5: Simulation, tmp_path: Path) -> None:
     save({tmp_path / "log.csv": ur5})
     text = (tmp_path / "log.csv").read_bytes()
@@ -146,6 +147,7 @@ def test_a_bag_that_a_killed_run_left_is_made_anew(ur5: Simulation, tmp_path: Pa
         save({bag: ur5}, "rosbag2", force=True)
 
 
+@pytest.mark.slow
 def test_a_robot_logs_only_in_its_own_formats(
     ur5: Simulation, panda: Simulation, tmp_path: Path
 ) -> None:

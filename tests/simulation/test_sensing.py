@@ -15,6 +15,7 @@ def circle(*settings: str) -> Simulation:
     return simulate(load_scenario("ur5-circle", [*SHORT, *settings]), 1)
 
 
+@pytest.mark.slow
 def test_everything_off_is_the_true_state() -> None:
     run = circle(*CLEAN, "sensing.torque=instant", "mismatch.torque_constant=0")
     np.testing.assert_allclose(run.recording.q, run.truth.q, atol=1e-15)
@@ -45,6 +46,7 @@ def test_noise_has_the_profile_size() -> None:
     np.testing.assert_allclose(np.std(currents, axis=0), noise.current, rtol=0.07)
 
 
+@pytest.mark.slow
 def test_positions_are_quantised() -> None:
     steps = circle("sensing.position_step=0.001").recording.q / 0.001
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
@@ -70,6 +72,7 @@ def test_dropped_samples_leave_gaps_and_repeated_rows_are_counted() -> None:
     assert np.max(np.diff(run.recording.t)) > 0.0159
 
 
+@pytest.mark.slow
 def test_jittering_stamps_still_increase() -> None:
     steps = np.diff(circle("sensing.jitter=0.003").recording.t)
     assert np.all(steps > 0)
@@ -100,6 +103,7 @@ def test_force_sensor_reads_the_handle_in_its_own_axes() -> None:
     assert np.max(there) > 20.0
 
 
+@pytest.mark.slow
 def test_force_sensor_at_rest_weighs_its_tool() -> None:
     run = simulate(load_scenario("ur5-sensor", ["duration=2", "force_sensor.tool_mass=0.5"]), 1)
     assert run.force_sensor is not None

@@ -33,6 +33,7 @@ def drawn(width: float, *words: Any, **more: Any) -> Any:
     return figure
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("width", "rows"), [(3.5, 3), (7.16, 2)])
 def test_every_axis_has_its_unit_and_rows_share_one_below(width: float, rows: int) -> None:
     figure = drawn(width, plots_of(chart()))
@@ -43,6 +44,7 @@ def test_every_axis_has_its_unit_and_rows_share_one_below(width: float, rows: in
     assert below == [""] * (6 - columns) + ["Time (s)"] * columns
 
 
+@pytest.mark.slow
 def test_lines_are_told_apart_without_colour() -> None:
     """By dashes as they are drawn, or, solid both, by width and lightness."""
     from matplotlib.colors import to_rgb
@@ -68,6 +70,7 @@ def test_the_legend_names_a_ribbon_where_no_contact_is_listed() -> None:
         assert texts == (names if isinstance(names, list) else ["line 0", "95 % band"])
 
 
+@pytest.mark.slow
 def test_nothing_sticks_out_of_the_sheet_or_covers_another_plot() -> None:
     figure = drawn(3.5, plots_of(chart(spans=[(1.0, 2.0)], band=np.ones(6), band_label="± floor")))
     boxes = [axes.get_tightbbox() for axes in figure.axes] + [figure.legends[0].get_window_extent()]
@@ -100,6 +103,7 @@ def test_a_legend_names_lines_bands_and_contacts_but_no_line_alone() -> None:
     assert not drawn(7.16, plots_of(chart(series=made.series[2:3]))).legends
 
 
+@pytest.mark.slow
 def test_contacts_are_numbered_above_the_first_row_where_there_is_room() -> None:
     figure = drawn(7.16, plots_of(chart()), numbers={1: 1.0, 2: 1.1, 3: 5.0})
     assert [[text.get_text() for text in axes.texts] for axes in figure.axes] == [
@@ -121,6 +125,7 @@ def test_frequencies_stand_on_a_logarithmic_axis_without_powers() -> None:
     assert [plain(value, 0) for value in (0.01, 1.0, 100.0)] == ["0.01", "1", "100"]
 
 
+@pytest.mark.slow
 def test_a_second_chart_has_its_axis_to_the_right_named_at_the_end_of_a_row() -> None:
     over = chart(title="|H|", units=("dB",) * 6)
     figure = drawn(7.16, plots_of(chart(), over))
@@ -141,6 +146,7 @@ def test_marks_stand_where_they_are_told_each_shape_its_own() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_of_seven_joints_the_sixth_has_its_time_in_the_empty_place() -> None:
     """Rows stay as close as without it: the numbers below take no room of their own."""
     values = np.zeros((len(T), 7))

@@ -50,6 +50,7 @@ def test_the_same_figure_has_the_same_bytes_whatever_its_user_prefers(
         assert not re.search(rb"20\d\d-\d\d-\d\dT", content)
 
 
+@pytest.mark.slow
 def test_a_pdf_has_the_widths_of_the_ieee_and_its_fonts_embedded_as_truetype(
     tmp_path: Path,
 ) -> None:

@@ -5,6 +5,7 @@ import re
 from html.parser import HTMLParser
 
 import numpy as np
+import pytest
 
 from vftcli.doctor import examine
 from vftcli.outputs.identification.files import identification_record
@@ -30,6 +31,7 @@ class Balance(HTMLParser):
             assert self.open.pop() == tag
 
 
+@pytest.mark.slow
 def test_the_page_is_whole_and_loads_nothing(found):
     result, log = found
     page = render_identification(

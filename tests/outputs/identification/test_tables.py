@@ -34,6 +34,7 @@ def test_two_logs_of_one_label_are_two_rows(found):
     assert {len(row) for row in rows} == {8}
 
 
+@pytest.mark.slow
 def test_what_the_log_does_not_determine_is_said(found):
     result, _ = found
     doubted = result.parameters.with_columns(determined=pl.lit(False))

@@ -131,6 +131,7 @@ def test_without_a_reference_there_are_no_residuals(
     assert not [entity for entity in entities if entity.startswith("/residual")]
 
 
+@pytest.mark.slow
 def test_wrenches_have_their_own_tab(with_wrench: Analysis) -> None:
     lines = list(line_groups(with_wrench)["Wrench"])
     assert [entry.path for entry in lines] == [f"/wrench/{a}" for a in (*AXES, "sigma_min")]

@@ -2,6 +2,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
@@ -13,6 +14,7 @@ def listed(analysis: Analysis) -> ContactList:
     return analysis.contacts
 
 
+@pytest.mark.slow
 def test_every_contact_has_its_stripe_its_number_and_its_course(pushed: Analysis) -> None:
     found = listed(pushed)
     drawn = content(pushed, found, WIDE)

@@ -137,6 +137,7 @@ def test_without_contacts_the_torques_are_open(
     assert "contacts-not-told" not in {r.code for r in without_reference.remarks}
 
 
+@pytest.mark.slow
 def test_nothing_is_said_twice(pushed: Analysis) -> None:
     made = replace(pushed, run=run_record(pushed, "vftcli report"))
     # The grounds above name the few that an answer rests on.

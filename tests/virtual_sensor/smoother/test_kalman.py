@@ -106,6 +106,7 @@ def test_a_log_of_which_nothing_is_known_leaves_the_prior() -> None:
     np.testing.assert_array_equal(likelihoods(both, blind), [0.0])
 
 
+@pytest.mark.slow
 def test_the_truth_lies_in_the_band_of_a_model_that_is_right() -> None:
     """Drawn from the model itself, 200 times: 95 % bands hold .93 to .97 on every axis.
 

@@ -93,6 +93,7 @@ def test_in_another_frame_it_is_the_same_wrench_turned() -> None:
         np.testing.assert_allclose(*sums, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_unasked_it_is_nobodys_here() -> None:
     sensed = reading("gmo")
     assert sensed.solver == "pinv"
@@ -110,6 +111,7 @@ def test_a_span_that_is_its_zero_is_free_motion_where_there_is_no_other(motion: 
     assert known_free(motion, SmootherInput(terms, (given,)), unloaded) == (given,)
 
 
+@pytest.mark.slow
 def test_a_zero_takes_its_mean_off_the_smoothed_wrench_too() -> None:
     sensed = reading("gmo", solver="smoother", zero=ZeroChoice(spans=((0.3, 4.0),)))
     (wrench,) = sensed.wrenches
