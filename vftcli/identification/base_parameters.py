@@ -7,7 +7,6 @@ import numpy as np
 from vftcli.identification.stacking import TRUNCATION, ParameterColumns, Triangles
 from vftcli.robots.chain import Chain
 from vftcli.robots.regressor import torque_regressor
-from vftcli.robots.transmission import at_motors, motor_rows
 from vftcli.signals.arrays import Array
 
 PROBES = 400
@@ -66,10 +65,9 @@ def group_parameters(chain: Chain, rotor: bool) -> Grouping:
 
     n, rng = chain.joints, np.random.default_rng(0)
     q, dq, ddq = rng.uniform(-3.0, 3.0, (3, PROBES, n))
-    T = chain.transmission
-    A = motor_rows(T, torque_regressor(chain, q, dq, ddq))
+    A = torque_regressor(chain, q, dq, ddq)
     if rotor:
-        A = np.concatenate([A, at_motors(T, ddq)[:, :, None] * np.eye(n)], axis=2)
+        A = np.concatenate([A, ddq[:, :, None] * np.eye(n)], axis=2)
     flat = A.reshape(-1, A.shape[2])
     R, order = qr(flat, mode="r", pivoting=True)
     diagonal = np.abs(np.diag(R))

@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 import polars as pl
 
-from vftcli.identification.coupling import with_couplings
 from vftcli.identification.friction_method import friction_method
 from vftcli.identification.links_choice import chosen_method
 from vftcli.identification.method_result import MethodResult
@@ -152,14 +151,7 @@ def found_by_method(
     """What the asked method finds of the arm, and the method's name."""
     method = task.method or "payload"
     data = prepare_training(train, robot, task.processing, task.fit_constants, task.friction)
-    if method == "targets":
-        return method, METHODS[method](data)
-    data, coupled = with_couplings(data)
-    if method == AUTO:
-        method, result = chosen_method(data)
-    else:
-        result = METHODS[method](data)
-    return method, result._replace(remarks=[*coupled, *result.remarks])
+    return chosen_method(data) if method == AUTO else (method, METHODS[method](data))
 
 
 def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:

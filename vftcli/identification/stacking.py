@@ -22,7 +22,6 @@ from vftcli.identification.least_squares import (
 from vftcli.identification.processing import PreparedLog
 from vftcli.robots.chain import Chain
 from vftcli.robots.regressor import INERTIAL_NAMES, LINK, torque_regressor
-from vftcli.robots.transmission import at_motors, motor_rows
 from vftcli.signals.arrays import Array, Mask
 
 
@@ -78,9 +77,7 @@ class ParameterColumns(NamedTuple):
         n = self.chain.joints
         q, dq, ddq = motion.q[span], motion.dq[span], motion.ddq[span]
         A = np.zeros((len(q), n, self.size))
-        T = self.chain.transmission
-        A[:, :, : self.inertial] = motor_rows(T, torque_regressor(self.chain, q, dq, ddq))
-        ddq = at_motors(T, ddq)
+        A[:, :, : self.inertial] = torque_regressor(self.chain, q, dq, ddq)
         for j, (shape, place) in enumerate(zip(self.shapes, self.frictions, strict=True)):
             if self.rotor:
                 A[:, j, self.inertial + j] = ddq[:, j]

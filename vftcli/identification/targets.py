@@ -157,19 +157,13 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[Co
         robot: The profile, whose rigid body is the maker's; its K stands in where none is found.
 
     Raises:
-        IdentificationError: If the robot has no drive constants or coupled joints, or a hand led
-            the arm.
+        IdentificationError: If the robot has no drive constants, or a hand led the arm.
         MissingSignalError: If the targets are missing.
     """
     if robot.torque_constant is None:
         raise IdentificationError(
             f"robot {robot.name!r} has no torque constants, so its log has no target currents to "
             "read a model off; use --method friction, base or consistent"
-        )
-    if robot.chain.transmission is not None:
-        raise IdentificationError(
-            f"robot {robot.name!r} has joints driven through each other (transmission), and no log "
-            "says whether targets are joints' or motors'; use --method friction, base or auto"
         )
     logs = [read_targets(recording, robot) for recording in recordings]
     for log in logs:
