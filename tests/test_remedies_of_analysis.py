@@ -303,7 +303,7 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
     "needs a free run of another maker's arm with as many joints": ("is a log of …, … of …",),
     "its command is tried where there is no such file of gains": ("no [observers.*] tables",),
     "no log that provokes it is known": (
-        "the physically consistent fit did not settle", "equations for … unknowns",
+        "the fit of physical links did not settle", "equations for … unknowns",
         "or let --method base identify the links too"),
 }  # fmt: skip
 """Reason → texts, by words that only they have, that name an option and have no row."""

@@ -42,7 +42,7 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
     if not (data.rubs or data.rotor):
         raise IdentificationError(
             f"robot {data.robot.name!r} has its torque behind the gears: without friction the "
-            "friction method has nothing to find; use --method base or consistent"
+            "friction method has nothing to find; use --method base"
         )
     fits, _, remarks = fitted or fit_without_contacts(data, strict=True)
     remarks, robot = [*remarks], data.robot

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 import polars as pl
@@ -40,8 +39,7 @@ from vftcli.signals.recording import Recording
 
 METHODS: dict[str, Callable[[Training], MethodResult]] = {
     "friction": friction_method,
-    "base": partial(whole_arm, method="base"),
-    "consistent": partial(whole_arm, method="consistent"),
+    "base": whole_arm,
     "targets": targets_method,
 }
 """Name at the command line → method."""

@@ -163,7 +163,7 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[Co
     if robot.torque_constant is None:
         raise IdentificationError(
             f"robot {robot.name!r} has no torque constants, so its log has no target currents to "
-            "read a model off; use --method friction, base or consistent"
+            "read a model off; use --method friction or base"
         )
     logs = [read_targets(recording, robot) for recording in recordings]
     for log in logs:
