@@ -28,8 +28,7 @@ def stacked(chain, phi, noise, seed=0, samples=300):
     tau = Y @ phi + noise * rng.normal(size=(samples, chain.joints))
     rows = np.concatenate([Y, tau[:, :, None]], axis=2) / noise
     parts = tuple(triangle(part.reshape(-1, rows.shape[2])) for part in np.array_split(rows, 5))
-    sigma = np.full(chain.joints, noise)
-    return Triangles(layout, parts, sigma, 1.0, float(samples * chain.joints)), (q, dq, ddq)
+    return Triangles(layout, parts, 1.0), (q, dq, ddq)
 
 
 def perturbed(chain, seed):

@@ -7,8 +7,8 @@ import pytest
 
 from vftcli.identification import training
 from vftcli.identification.friction_method import (
+    by_constant,
     friction_method,
-    refuse_sign,
     rotor_remarks,
 )
 from vftcli.identification.method_result import check_friction, held_joints, rotor_number
@@ -22,7 +22,6 @@ from vftcli.identification.training import (
 from vftcli.identification.whole_arm import (
     check_size,
     initial_columns,
-    undetermined,
     whole_arm,
     with_links,
     with_vector,
@@ -151,9 +150,10 @@ def test_a_rotor_inertia_three_standard_deviations_off_is_taken(value, sd, taken
 
 
 def test_a_current_that_falls_with_the_torque_is_refused(data):
-    refuse_sign(data, 0, 0.06)
+    sd = np.array([0.01])
+    assert by_constant(data, 0, np.array([0.06]), sd)[2].value > 0
     with pytest.raises(IdentificationError, match="current of joint 1 does not follow"):
-        refuse_sign(data, 0, 0.05)
+        by_constant(data, 0, np.array([0.05]), sd)
 
 
 @pytest.mark.slow
@@ -212,14 +212,6 @@ def test_the_whole_arm_says_how_it_was_made(data):
     Y = torque_regressor(UR5.chain, motion.q, motion.dq, motion.ddq)
     change = Y @ (chain_parameters(base.robot.chain) - chain_parameters(UR5.chain))
     assert np.sqrt(np.mean(change[:, 1:3] ** 2)) < 0.2
-
-
-@pytest.mark.slow
-def test_open_parameters_are_counted_without_friction(data, weights):
-    layout, _ = initial_columns(data, fit_frictions(data, weights))
-    many = whole_arm(data).base
-    all_open = many._replace(determined=(False,) * len(many.determined))
-    assert undetermined(all_open, layout) == (40, 40)
 
 
 @pytest.mark.slow

@@ -110,7 +110,9 @@ def identify(
     if load is not None and (task.method is None or not train):
         method, result = "payload", MethodResult(robot, [], [], None, [])
     else:
-        method, result = found_by_method(task, train, robot)
+        method = task.method or "payload"
+        data = prepare_training(train, robot, task.processing, task.fit_constants, task.friction)
+        method, result = chosen_method(data) if method == AUTO else (method, METHODS[method](data))
     new, numbers, remarks = result.robot, [*result.numbers], [*result.remarks]
     scored = [
         score(log, role, robot, new, task.processing)
@@ -141,15 +143,6 @@ def identify(
     )
     sources = logs if free is None else [*logs, free]
     return replace(found, robot=with_provenance(found, task.name, sources, train, load))
-
-
-def found_by_method(
-    task: Task, train: Sequence[Recording], robot: Robot
-) -> tuple[str, MethodResult]:
-    """What the asked method finds of the arm, and the method's name."""
-    method = task.method or "payload"
-    data = prepare_training(train, robot, task.processing, task.fit_constants, task.friction)
-    return chosen_method(data) if method == AUTO else (method, METHODS[method](data))
 
 
 def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:

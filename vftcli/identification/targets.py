@@ -175,15 +175,10 @@ def joint_model(j: int, logs: Sequence[Targets], before: float) -> ControllerMod
     """Read one joint's model; K first, since friction needs it."""
     # K is needed for friction; of two ways to it, the surer one in this log is taken.
     still, moving = constant_at_rest(j, logs), constant_in_motion(j, logs)
-    constant = min((still, moving), key=relative_sd)
+    constant = min((still, moving), key=lambda k: k.sd / abs(k.value) if k.sd < np.inf else np.inf)
     K = constant.value if constant.known else before
     rotor, gravity = rotor_inertia(j, logs)
     return ControllerModel(constant, rotor, controller_friction(j, logs, K), gravity)
-
-
-def relative_sd(estimate: Estimate) -> float:
-    """Standard deviation over value; infinite where there is none."""
-    return estimate.sd / abs(estimate.value) if np.isfinite(estimate.sd) else float("inf")
 
 
 def constant_at_rest(j: int, logs: Sequence[Targets]) -> Estimate:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.identification.base_parameters import BaseParameters, base_parameters
+from vftcli.identification.base_parameters import base_parameters
 from vftcli.identification.clean_fit import fit_without_contacts
 from vftcli.identification.friction_fit import PLAIN, is_dissipative
 from vftcli.identification.friction_shapes import Shape, round_digits
@@ -63,7 +63,8 @@ def whole_arm(data: Training) -> MethodResult:
     layout, start = initial_columns(data, fits)
     triangles = stack_training(refined, layout, start, weights)
     base = base_parameters(triangles, start)
-    count, open_ones = undetermined(base, layout)
+    count = len(base.values) - (layout.size - layout.inertial - layout.rotors)
+    open_ones = sum(not known for known in base.determined[:count])
     share = open_ones / max(count, 1)
     narrow = share > NARROW or (share > MOST and predicts_best_unpulled(triangles, start))
     x = nearest_physical_links(triangles, start, TABLE if narrow else WEIGHTS[0])
@@ -97,12 +98,6 @@ def whole_arm(data: Training) -> MethodResult:
         [*remarks, *presliding_remark(fits), *temperature_remarks(data), *held_joints(data)],
         narrow,
     )
-
-
-def undetermined(base: BaseParameters, layout: ParameterColumns) -> tuple[int, int]:
-    """How many base parameters there are and how many are open, friction not counted."""
-    count = len(base.values) - (layout.size - layout.inertial - layout.rotors)
-    return count, sum(not known for known in base.determined[:count])
 
 
 def stack_training(
