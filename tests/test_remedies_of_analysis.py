@@ -302,9 +302,8 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
         "nothing to identify: give --method", "… has … joints, … has …: a free run must be"),
     "needs a free run of another maker's arm with as many joints": ("is a log of …, … of …",),
     "its command is tried where there is no such file of gains": ("no [observers.*] tables",),
-    "needs a robot file of coupled joints": ("has joints driven through each other",),
     "no log that provokes it is known": (
-        "the physically consistent fit did not settle", "equations for … unknowns",
+        "the fit of physical links did not settle", "equations for … unknowns",
         "or let --method base identify the links too"),
 }  # fmt: skip
 """Reason → texts, by words that only they have, that name an option and have no row."""

@@ -24,7 +24,7 @@ CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
         "--reference": ("zero", "two-cycle", "vendor"),
         "--rrd-detail": ("levels", "none"),
     },
-    "identify": {"--method": ("auto", "friction", "base", "consistent", "targets")},
+    "identify": {"--method": ("auto", "friction", "base", "targets")},
     "tune": {"--goal": ("rmse", "delay=0.05", "bandwidth=5", "false-alarms=60")},
     "admit": {"--controller": ("variable", "traditional")},
     "contacts": {"--free": ("0:3", "9:12")},

@@ -108,16 +108,6 @@ def test_estimates_lie_within_their_spread(excited):
     np.testing.assert_array_equal(sure, found.sd <= DOUBTFUL * size)
 
 
-def test_the_full_vector_has_the_base_parameters_and_keeps_the_rest(excited):
-    triangles, start, _ = excited
-    found = base_parameters(triangles, start)
-    layout = triangles.layout
-    grouping = with_friction(group_parameters(layout.chain, layout.rotor), layout)
-    np.testing.assert_allclose(grouping.values(found.full), found.values, atol=1e-9)
-    others = list(grouping.dependent)
-    np.testing.assert_array_equal(found.full[others], start[others])
-
-
 def test_what_no_data_tells_keeps_the_start_and_has_no_spread(excited):
     triangles, start, _ = excited
     blind = triangles._replace(parts=tuple(part * _mask(part, 70) for part in triangles.parts))

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
-import pytest
 
 from vftcli.identification.payload import LoadFit
 from vftcli.identification.provenance import residual_tables, source_table, with_provenance
@@ -80,12 +79,11 @@ def test_what_was_determined_names_the_logs_the_rest_the_profile():
     assert with_provenance(found(), "", logs, logs, None).name == "ur5-identified"
 
 
-@pytest.mark.parametrize("method", ["base", "consistent"])
-def test_methods_of_the_whole_arm_name_the_links_too(method):
+def test_the_method_of_the_whole_arm_names_the_links_too():
     base = pl.DataFrame([("m1", 1.0, float("inf"), False)], schema=BASE, orient="row")
-    robot = with_provenance(found(method, base), "", [log("a.csv")], [log("a.csv")], None)
-    assert set(sources(robot, "inertial")) == {f"identified ({method}) from a.csv"}
-    assert set(sources(robot, "rotor_inertia")) == {f"identified ({method}) from a.csv"}
+    robot = with_provenance(found("base", base), "", [log("a.csv")], [log("a.csv")], None)
+    assert set(sources(robot, "inertial")) == {"identified (base) from a.csv"}
+    assert set(sources(robot, "rotor_inertia")) == {"identified (base) from a.csv"}
     (row,) = robot.document["identification"]["base_parameters"]
     assert row == {"parameter": "m1", "value": 1.0, "sd": float("inf"), "determined": False}
 

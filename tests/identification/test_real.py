@@ -218,9 +218,7 @@ def test_another_arm_is_refused(logs, ur10e):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("method", "limit"), [("friction", 0.195), ("base", 0.105), ("consistent", 0.105)]
-)
+@pytest.mark.parametrize(("method", "limit"), [("friction", 0.195), ("base", 0.105)])
 def test_panda_second_half(panda, method, limit):
     first, second = panda
     found = identify([first], load_robot("panda"), Task(method=method), [second])

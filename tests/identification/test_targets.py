@@ -19,7 +19,6 @@ from vftcli.identification.targets import (
     controller_friction,
     controller_models,
     refuse_guided,
-    relative_sd,
     resolution,
     rotor_inertia,
 )
@@ -166,11 +165,6 @@ def test_rests_whose_current_wanders_or_is_small_tell_nothing(prepared):
 def test_digits_are_the_smallest_step():
     assert resolution(np.array([0.1, 0.3, 0.15, 0.3])) == pytest.approx(0.05)
     assert resolution(np.ones(4)) == 0.0
-
-
-def test_the_surest_estimate_is_that_of_least_relative_spread():
-    assert relative_sd(Estimate(-4.0, 0.2, True)) == pytest.approx(0.05)
-    assert relative_sd(UNKNOWN) == np.inf
 
 
 def test_a_robot_without_constants_has_no_targets():

@@ -34,8 +34,7 @@ class OnlineKalman:
         n = robot.joints
         self.pin, self.model, self.robot, self.step = pin, robot.model, robot, step
         self.averaged = averaged
-        self.friction = RunningFriction(robot.friction, robot.chain.transmission)
-        self.coupling = robot.chain.rotor_coupling
+        self.friction = RunningFriction(robot.friction)
         self.data: Any = self.model.createData()
         model = observer.model(step, n)
         self.a12, self.a22 = model.a12, model.a22
@@ -52,8 +51,6 @@ class OnlineKalman:
         pin, model, data = self.pin, self.model, self.data
         C = pin.computeCoriolisMatrix(model, data, q, dq)
         p = pin.crba(model, data, q) @ dq
-        if self.coupling is not None:
-            p = p + self.coupling @ dq
         gravity = pin.computeGeneralizedGravity(model, data, q)
         rest = C.T @ dq - gravity
         if self.robot.friction:

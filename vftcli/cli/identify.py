@@ -22,8 +22,8 @@ class TaskOptions(Bundle):
     method: str | None = option(
         "--method",
         "METHOD",
-        "friction, base, consistent, targets or auto. Default: auto, friction but base where the "
-        "robot's links are wrong; none with --find-payload.",
+        "friction, base, targets or auto. Default: auto, friction but base where the robot's links "
+        "are wrong; none with --find-payload.",
     )
     find_payload: bool = flag(
         "--find-payload",

@@ -4,10 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.stacking import TRUNCATION, ParameterColumns, Triangles
+from vftcli.identification.stacking import ParameterColumns, Triangles, truncated_step
 from vftcli.robots.chain import Chain
 from vftcli.robots.regressor import torque_regressor
-from vftcli.robots.transmission import at_motors, motor_rows
 from vftcli.signals.arrays import Array
 
 PROBES = 400
@@ -66,10 +65,9 @@ def group_parameters(chain: Chain, rotor: bool) -> Grouping:
 
     n, rng = chain.joints, np.random.default_rng(0)
     q, dq, ddq = rng.uniform(-3.0, 3.0, (3, PROBES, n))
-    T = chain.transmission
-    A = motor_rows(T, torque_regressor(chain, q, dq, ddq))
+    A = torque_regressor(chain, q, dq, ddq)
     if rotor:
-        A = np.concatenate([A, at_motors(T, ddq)[:, :, None] * np.eye(n)], axis=2)
+        A = np.concatenate([A, ddq[:, :, None] * np.eye(n)], axis=2)
     flat = A.reshape(-1, A.shape[2])
     R, order = qr(flat, mode="r", pivoting=True)
     diagonal = np.abs(np.diag(R))
@@ -95,15 +93,12 @@ class BaseParameters(NamedTuple):
         values: Estimates. (b,)
         sd: Standard deviations; infinite where the data says nothing. (b,)
         determined: Whether the data determines it, by `DOUBTFUL`. (b,)
-        full: A full parameter vector with exactly these base parameters, the start's dependent
-            ones kept; it need not be physical. (size,)
     """
 
     names: tuple[str, ...]
     values: Array
     sd: Array
     determined: tuple[bool, ...]
-    full: Array
 
     def rows(self) -> list[tuple[str, float, float, bool]]:
         """Name, estimate, standard deviation and whether it is determined, one row each."""
@@ -120,28 +115,17 @@ def base_parameters(triangles: Triangles, start: Array) -> BaseParameters:
     """
     layout = triangles.layout
     grouping = with_friction(group_parameters(layout.chain, layout.rotor), layout)
-    places = list(grouping.independent)
     R, z = triangles.joined()
-    R = R[:, places]
+    R = R[:, list(grouping.independent)]
     before = grouping.values(start)
-    scale = np.linalg.norm(R, axis=0)
-    silent = scale == 0.0
-    scale[silent] = 1.0
-    U, S, Vt = np.linalg.svd(R / scale, full_matrices=False)
-    keep = TRUNCATION * S[0] < S
-    step = Vt[keep].T @ ((U[:, keep].T @ (z - R @ before)) / S[keep]) / scale
+    step, spread, lost = truncated_step(R, z - R @ before)
     values = before + step
-    spread = np.sqrt(np.sum((Vt[keep].T / S[keep]) ** 2, axis=1) * triangles.correlation) / scale
     # A parameter that lies mostly in directions without data has no spread to speak of.
-    lost = np.sum(Vt[~keep] ** 2, axis=0) > DOUBTFUL
-    sd = np.where(silent | lost, np.inf, spread)
+    sd = np.where(lost > DOUBTFUL, np.inf, spread * np.sqrt(triangles.correlation))
     size = np.maximum(np.abs(values), np.abs(before))
-    full = start.copy()
-    full[places] = values - grouping.carried @ start[list(grouping.dependent)]
     return BaseParameters(
         names=tuple(grouping.sums(layout.names)),
         values=values,
         sd=sd,
         determined=tuple((sd <= DOUBTFUL * size).tolist()),
-        full=full,
     )

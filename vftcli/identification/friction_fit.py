@@ -133,10 +133,7 @@ class JointData(NamedTuple):
 
     def speeds(self, j: int) -> list[float]:
         """Speed that joint j (from 0) exceeds in a hundredth of each log. [rad/s]"""
-        return [
-            float(np.quantile(np.abs(source.motion.motor_dq[:, j]), 0.99))
-            for source in self.sources
-        ]
+        return [float(np.quantile(np.abs(source.motion.dq[:, j]), 0.99)) for source in self.sources]
 
     def parts(self, j: int) -> list[Array]:
         """The rows that cross-validation of joint j (from 0) leaves out in turn."""

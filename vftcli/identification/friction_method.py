@@ -42,7 +42,7 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
     if not (data.rubs or data.rotor):
         raise IdentificationError(
             f"robot {data.robot.name!r} has its torque behind the gears: without friction the "
-            "friction method has nothing to find; use --method base or consistent"
+            "friction method has nothing to find; use --method base"
         )
     fits, _, remarks = fitted or fit_without_contacts(data, strict=True)
     remarks, robot = [*remarks], data.robot
@@ -94,7 +94,12 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
         IdentificationError: If the current does not follow the torque.
     """
     scale, scale_sd = float(values[-1]), float(sd[-1])
-    refuse_sign(data, j, scale)
+    if scale <= LEAST_SLOPE:
+        raise IdentificationError(
+            f"{data.recordings[0].name}: the current of joint {j + 1} does not follow its torque "
+            f"(slope {scale:.2g}); wrong robot, sign or joint order, or the joint carries no load: "
+            "leave out --fit-constants"
+        )
     before = profile_constant(data.robot, j)
     K, K_sd = before / scale, before * scale_sd / scale**2
     return values / scale, sd / scale, number(j, "torque_constant", K, K_sd, before, True)
@@ -107,13 +112,3 @@ def rotor_remarks(J: Number, where: Where) -> list[Remark]:
     found = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
     code = "refuted-rotor-inertia" if J.determined else "undetermined-rotor-inertia"
     return [caution(code, where, **found)]
-
-
-def refuse_sign(data: Training, j: int, scale: float) -> None:
-    """Raise an IdentificationError if the current falls where the torque rises."""
-    if scale <= LEAST_SLOPE:
-        raise IdentificationError(
-            f"{data.recordings[0].name}: the current of joint {j + 1} does not follow its torque "
-            f"(slope {scale:.2g}); wrong robot, sign or joint order, or the joint carries no load: "
-            "leave out --fit-constants"
-        )

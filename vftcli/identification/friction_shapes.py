@@ -14,7 +14,6 @@ from vftcli.robots.friction import SMOOTHING, bent_line, coulomb_logarithmic
 from vftcli.robots.presliding import play
 from vftcli.robots.profile import FRICTION_KEYS
 from vftcli.robots.robot import JointFriction
-from vftcli.robots.transmission import at_motors
 from vftcli.signals.arrays import Array
 
 SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)
@@ -184,13 +183,11 @@ class FrictionColumns:
         }
         key = (term, j, numbers.get(term, ()))
         if key not in self.cache:
-            log, T = self.motion.recording, self.motion.transmission
+            log = self.motion.recording
             if term == "presliding":
-                q = at_motors(T, log.q)[:, j : j + 1]
-                values = play(q, shape.presliding_length).state[:, 0]
+                values = play(log.q[:, j : j + 1], shape.presliding_length).state[:, 0]
             else:
-                dq = at_motors(T, log.require("dq"))[:, j]
-                values = term_values(term, shape, dq, self.load[:, j])
+                values = term_values(term, shape, log.require("dq")[:, j], self.load[:, j])
             if self.warmth is not None and term != "offset":
                 values = values * self.warmth[:, j]
             self.cache[key] = self.motion.filtered(values[:, None])[:, 0]

@@ -2,12 +2,10 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 import polars as pl
 
-from vftcli.identification.coupling import with_couplings
 from vftcli.identification.friction_method import friction_method
 from vftcli.identification.links_choice import chosen_method
 from vftcli.identification.method_result import MethodResult
@@ -41,8 +39,7 @@ from vftcli.signals.recording import Recording
 
 METHODS: dict[str, Callable[[Training], MethodResult]] = {
     "friction": friction_method,
-    "base": partial(whole_arm, method="base"),
-    "consistent": partial(whole_arm, method="consistent"),
+    "base": whole_arm,
     "targets": targets_method,
 }
 """Name at the command line → method."""
@@ -113,7 +110,9 @@ def identify(
     if load is not None and (task.method is None or not train):
         method, result = "payload", MethodResult(robot, [], [], None, [])
     else:
-        method, result = found_by_method(task, train, robot)
+        method = task.method or "payload"
+        data = prepare_training(train, robot, task.processing, task.fit_constants, task.friction)
+        method, result = chosen_method(data) if method == AUTO else (method, METHODS[method](data))
     new, numbers, remarks = result.robot, [*result.numbers], [*result.remarks]
     scored = [
         score(log, role, robot, new, task.processing)
@@ -144,22 +143,6 @@ def identify(
     )
     sources = logs if free is None else [*logs, free]
     return replace(found, robot=with_provenance(found, task.name, sources, train, load))
-
-
-def found_by_method(
-    task: Task, train: Sequence[Recording], robot: Robot
-) -> tuple[str, MethodResult]:
-    """What the asked method finds of the arm, and the method's name."""
-    method = task.method or "payload"
-    data = prepare_training(train, robot, task.processing, task.fit_constants, task.friction)
-    if method == "targets":
-        return method, METHODS[method](data)
-    data, coupled = with_couplings(data)
-    if method == AUTO:
-        method, result = chosen_method(data)
-    else:
-        result = METHODS[method](data)
-    return method, result._replace(remarks=[*coupled, *result.remarks])
 
 
 def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:

@@ -40,7 +40,7 @@ def chosen_method(data: Training) -> tuple[str, MethodResult]:
     if ratio <= OTHER_LINKS or doubted or data.fit_constants:
         return "friction", kept
     try:
-        freed = whole_arm(data, "base")
+        freed = whole_arm(data)
     except IdentificationError:
         return "friction", kept
     if freed.is_narrow:

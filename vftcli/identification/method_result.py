@@ -78,7 +78,7 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> list[Rema
     Raises:
         IdentificationError: If it pushes at all speeds: sign or unit are wrong.
     """
-    speed = max(float(np.max(np.abs(m.motor_dq[:, j]))) for m in data.motions)
+    speed = max(float(np.max(np.abs(m.dq[:, j]))) for m in data.motions)
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
     noise = max(robust_sd(m.tau[:, j]) for m in data.motions)
     # A hundredth of the torque's spread: friction of nothing comes out on either side of zero.

@@ -1,7 +1,7 @@
 """From a log to the signals an identification is made from: filtered alike, without delay."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,6 @@ from vftcli.robots.drive import drive_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
 from vftcli.robots.robot import Robot
 from vftcli.robots.temperature import friction_factor, measured_temperature
-from vftcli.robots.transmission import at_motors, motor_torque
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
@@ -75,11 +74,9 @@ class PreparedLog:
         q: Positions. (M, n) [rad]
         dq: Velocities. (M, n) [rad/s]
         ddq: Accelerations. (M, n) [rad/s²]
-        tau: Drive torque at the motors, friction included: where joints are driven through each
-            other not theirs, so that each motor's friction is in its own row. (M, n) [N·m]
+        tau: Drive torque, friction included. (M, n) [N·m]
         usable: Whether a sample of a joint tells anything: the joint is not in a long stop and
             the sample lies in no gap of the clock. (M, n)
-        transmission: From joints to motors, None where they turn alike. (n, n)
     """
 
     recording: Recording
@@ -91,17 +88,6 @@ class PreparedLog:
     ddq: Array
     tau: Array
     usable: Mask
-    transmission: Array | None = None
-
-    @property
-    def motor_dq(self) -> Array:
-        """Velocities of the motors, reflected to the joints. (M, n) [rad/s]"""
-        return at_motors(self.transmission, self.dq)
-
-    @property
-    def motor_ddq(self) -> Array:
-        """Accelerations of the motors, reflected to the joints. (M, n) [rad/s²]"""
-        return at_motors(self.transmission, self.ddq)
 
     @property
     def samples(self) -> int:
@@ -131,8 +117,7 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
         RobotError: If the number of joints differs.
         ClockError: If the log is too short for the filter.
     """
-    T, dq = robot.chain.transmission, recording.require("dq")
-    torque = motor_torque(T, drive_torque(recording, robot))
+    dq, torque = recording.require("dq"), drive_torque(recording, robot)
     t, stride = recording.t, processing.stride(recording.median_step)
     # Before the first and after the last movement stiction holds what no model of velocity knows.
     moving = np.flatnonzero(np.any(np.abs(dq) > processing.still, axis=1))
@@ -151,7 +136,6 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
         kept=kept,
         t=t[kept],
         usable=usable,
-        transmission=T,
         **{name: np.concatenate(parts, axis=1) for name, parts in columns.items()},
     )
 
@@ -180,14 +164,9 @@ def friction_warmth(recording: Recording, robot: Robot) -> Array | None:
 
 
 def gravity_torque(robot: Robot, q: Array) -> Array:
-    """Gravity torques of the loaded arm at its motors, chunk by chunk. (T, n) [N·m]"""
+    """Gravity torques of the loaded arm, chunk by chunk. (T, n) [N·m]"""
     out = np.empty(q.shape)
     for start in range(0, len(q), CHUNK):
         span = slice(start, start + CHUNK)
         out[span] = momentum_terms(robot.loaded_chain, q[span], np.zeros_like(q[span])).gravity
-    return motor_torque(robot.chain.transmission, out)
-
-
-def with_transmission(robot: Robot, transmission: Array | None) -> Robot:
-    """The robot with its joints coupled so."""
-    return replace(robot, chain=replace(robot.chain, transmission=transmission))
+    return out

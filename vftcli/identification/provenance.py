@@ -12,9 +12,6 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.writing import robot_document
 from vftcli.signals.recording import Recording
 
-LINK_METHODS = frozenset({"base", "consistent"})
-"""Methods that identify the links too."""
-
 
 def with_provenance(
     found: Identification,
@@ -47,7 +44,7 @@ def with_provenance(
     old = f"profile {profile.name}"
     sure = found.parameters.filter("determined")
     determined = set(zip(sure["joint"], sure["parameter"], strict=True))
-    links = found.method in LINK_METHODS
+    links = found.method == "base"
     for j, table in enumerate(document["joints"], start=1):
         table["inertial_source"] = new if links else old
         for key in ("rotor_inertia", "torque_constant"):

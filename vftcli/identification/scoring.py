@@ -6,13 +6,7 @@ import numpy as np
 
 from vftcli.identification.excitation import SLOW
 from vftcli.identification.least_squares import fit_column
-from vftcli.identification.processing import (
-    PreparedLog,
-    Processing,
-    gravity_torque,
-    prepare,
-    with_transmission,
-)
+from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
 from vftcli.identification.result import Trace, root_mean_square
 from vftcli.robots.drive import uses_current
 from vftcli.robots.friction import SMOOTHING
@@ -20,7 +14,6 @@ from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction
 from vftcli.robots.temperature import measured_temperature
-from vftcli.robots.transmission import at_motors, motor_rows, motor_torque
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
@@ -52,28 +45,24 @@ REPEATED = 0.8
 
 
 def rigid_torque(robot: Robot, motion: PreparedLog) -> Array:
-    """Rigid-body torque of the loaded arm at its motors, without rotors. (M, n) [N·m]"""
+    """Rigid-body torque of the loaded arm, without rotors. (M, n) [N·m]"""
     phi = chain_parameters(robot.loaded_chain)
     out = np.empty(motion.q.shape)
     for span in motion.chunks():
         state = motion.q[span], motion.dq[span], motion.ddq[span]
         out[span] = torque_regressor(robot.chain, *state) @ phi
-    return motor_torque(robot.chain.transmission, out)
+    return out
 
 
 def predicted_torque(robot: Robot, motion: PreparedLog) -> Array:
     """Torque the drives need by the robot's model, friction filtered like the log. (M, n) [N·m]"""
-    T = robot.chain.transmission
-    torque = rigid_torque(robot, motion) + robot.chain.rotor_inertia * at_motors(T, motion.ddq)
+    torque = rigid_torque(robot, motion) + robot.chain.rotor_inertia * motion.ddq
     if not robot.friction:
         return torque
     recording = motion.recording
     load = gravity_torque(robot, recording.q)
     friction = RunningFriction(robot.friction).torque(
-        at_motors(T, recording.q),
-        at_motors(T, recording.require("dq")),
-        load,
-        measured_temperature(recording),
+        recording.q, recording.require("dq"), load, measured_temperature(recording)
     )
     total: Array = torque + motion.filtered(friction)
     return total
@@ -90,8 +79,6 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, processing: P
     if motion.samples < 2:
         return Trace(motion, role, motion.tau, motion.tau, np.zeros(motion.tau.shape[1]))
     before = root_mean_square(motion.tau - predicted_torque(profile, motion))
-    if profile.chain.transmission is not (found := robot.chain.transmission):
-        motion = prepare(log, with_transmission(profile, found), processing)
     measured = motion.tau * constant_ratio(profile, robot, motion)
     return Trace(motion, role, measured, predicted_torque(robot, motion), before)
 
@@ -164,7 +151,7 @@ def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]
 
 def in_motion(motion: PreparedLog, j: int) -> Mask:
     """Where joint j (from 0) moves fast enough to tell its friction. (M,)"""
-    moving: Mask = motion.usable[:, j] & (np.abs(motion.motor_dq[:, j]) > SLOW)
+    moving: Mask = motion.usable[:, j] & (np.abs(motion.dq[:, j]) > SLOW)
     return moving
 
 
@@ -174,7 +161,7 @@ def apparent_load(robot: Robot, motion: PreparedLog, residual: Array) -> tuple[f
         torque_regressor(robot.chain, motion.q[s], motion.dq[s], motion.ddq[s])[:, :, -LINK:]
         for s in motion.chunks()
     ]
-    A = motor_rows(robot.chain.transmission, np.concatenate(Y)[:, :, :4]).reshape(-1, 4)
+    A = np.concatenate(Y)[:, :, :4].reshape(-1, 4)
     y = residual.ravel()
     x = np.linalg.lstsq(A, y, rcond=1e-6)[0]
     return float(x[0]), 1.0 - float(np.sum((y - A @ x) ** 2) / max(np.sum(y**2), 1e-12))
@@ -194,7 +181,7 @@ def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
     motion, residual, size = trace.motion, trace.residual, float(trace.rms[j])
     where = Where(motion.recording.name, (j + 1,))
     values = {"rms_Nm": size, "ratio": size / trained}
-    dq = at_motors(motion.transmission, motion.recording.require("dq"))[:, j]
+    dq = motion.recording.require("dq")[:, j]
     used = in_motion(motion, j)
     sign = np.tanh(dq / SMOOTHING)
     A = np.column_stack([motion.filtered(np.column_stack([sign, dq])), np.ones(motion.samples)])
@@ -203,7 +190,7 @@ def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
     explained = 1.0 - left / max(float(np.mean(residual[used, j] ** 2)), 1e-12)
     if explained < EXPLAINS:
         return caution("larger-residual", where, **values)
-    speed = float(np.sqrt(np.mean(motion.motor_dq[used, j] ** 2)))
+    speed = float(np.sqrt(np.mean(motion.dq[used, j] ** 2)))
     more = float(fit.values[0] + fit.values[1] * speed)
     values |= {"friction_Nm": abs(more), "speed_rad_s": speed, "share_percent": 100.0 * explained}
     return caution("more-friction" if more > 0 else "less-friction", where, **values)

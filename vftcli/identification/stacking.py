@@ -22,7 +22,6 @@ from vftcli.identification.least_squares import (
 from vftcli.identification.processing import PreparedLog
 from vftcli.robots.chain import Chain
 from vftcli.robots.regressor import INERTIAL_NAMES, LINK, torque_regressor
-from vftcli.robots.transmission import at_motors, motor_rows
 from vftcli.signals.arrays import Array, Mask
 
 
@@ -78,9 +77,7 @@ class ParameterColumns(NamedTuple):
         n = self.chain.joints
         q, dq, ddq = motion.q[span], motion.dq[span], motion.ddq[span]
         A = np.zeros((len(q), n, self.size))
-        T = self.chain.transmission
-        A[:, :, : self.inertial] = motor_rows(T, torque_regressor(self.chain, q, dq, ddq))
-        ddq = at_motors(T, ddq)
+        A[:, :, : self.inertial] = torque_regressor(self.chain, q, dq, ddq)
         for j, (shape, place) in enumerate(zip(self.shapes, self.frictions, strict=True)):
             if self.rotor:
                 A[:, j, self.inertial + j] = ddq[:, j]
@@ -108,16 +105,12 @@ class Triangles(NamedTuple):
     Attributes:
         layout: The unknowns.
         parts: R factor of each cross-validation stretch. (size+1, size+1) each
-        sigma: Standard deviation of each joint's residual, by which its rows are divided. [N·m]
         correlation: Samples that count as one, by the residual's correlation along time.
-        samples: Effective number of weighted equations.
     """
 
     layout: ParameterColumns
     parts: tuple[Array, ...]
-    sigma: Array
     correlation: float
-    samples: float
 
     def joined(self, leave_out: int | None = None) -> tuple[Array, Array]:
         """R (size, size) and the right-hand side (size,) of all stretches but one."""
@@ -182,10 +175,9 @@ def triangulate(
 ) -> Triangles:
     """QR updates over all chunks of all logs, one triangle a cross-validation stretch."""
     parts = [np.zeros((0, layout.size + 1)) for _ in range(FOLDS)]
-    total, correlation = 0.0, []
+    correlation = []
     for data, residual in zip(logs, left, strict=True):
         weights = data.weights * huber(residual / sigma)
-        total += float(np.sum(weights))
         for r, w in zip(residual.T, data.weights.T, strict=True):
             if np.count_nonzero(w) > 10:
                 correlation.append(correlation_time(r[w > 0]))
@@ -193,8 +185,7 @@ def triangulate(
         for k, fold in enumerate(folds(data.motion.samples)):
             for rows in weighted_rows(layout, data, np.sqrt(weights) / sigma, fold):
                 parts[k] = triangle(np.vstack([parts[k], rows]))
-    inflation = float(np.mean(correlation)) if correlation else 1.0
-    return Triangles(layout, tuple(parts), sigma, inflation, total / inflation)
+    return Triangles(layout, tuple(parts), float(np.mean(correlation)) if correlation else 1.0)
 
 
 def weighted_rows(
@@ -214,13 +205,23 @@ TRUNCATION = 1e-3
 """Singular values below this share of the largest are left at the start (columns scaled)."""
 
 
-def least_change(triangles: Triangles, start: Array, truncation: float = TRUNCATION) -> Array:
-    """Least squares that leaves the start only where the data says so (truncated SVD). (size,)"""
-    R, z = triangles.joined()
+def truncated_step(R: Array, rest: Array) -> tuple[Array, Array, Array]:
+    """Least squares R x ≈ rest in the directions that the data tells (truncated SVD).
+
+    Returns:
+        The step (k,), its standard deviations for equations of one each (k,), and the share of
+        each unknown that lies in directions without data (k,).
+    """
     scale = np.linalg.norm(R, axis=0)
     scale[scale == 0.0] = 1.0
-    U, S, Vt = np.linalg.svd(R / scale)
-    keep = truncation * S[0] < S
-    step = Vt[keep].T @ ((U[:, keep].T @ (z - R @ start)) / S[keep])
-    x: Array = start + step / scale
-    return x
+    U, S, Vt = np.linalg.svd(R / scale, full_matrices=False)
+    keep = TRUNCATION * S[0] < S
+    step = Vt[keep].T @ ((U[:, keep].T @ rest) / S[keep]) / scale
+    sd = np.sqrt(np.sum((Vt[keep].T / S[keep]) ** 2, axis=1)) / scale
+    return step, sd, np.sum(Vt[~keep] ** 2, axis=0)
+
+
+def least_change(triangles: Triangles, start: Array) -> Array:
+    """Least squares that leaves the start only where the data says so. (size,)"""
+    R, z = triangles.joined()
+    return start + truncated_step(R, z - R @ start)[0]

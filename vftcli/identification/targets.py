@@ -157,19 +157,13 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[Co
         robot: The profile, whose rigid body is the maker's; its K stands in where none is found.
 
     Raises:
-        IdentificationError: If the robot has no drive constants or coupled joints, or a hand led
-            the arm.
+        IdentificationError: If the robot has no drive constants, or a hand led the arm.
         MissingSignalError: If the targets are missing.
     """
     if robot.torque_constant is None:
         raise IdentificationError(
             f"robot {robot.name!r} has no torque constants, so its log has no target currents to "
-            "read a model off; use --method friction, base or consistent"
-        )
-    if robot.chain.transmission is not None:
-        raise IdentificationError(
-            f"robot {robot.name!r} has joints driven through each other (transmission), and no log "
-            "says whether targets are joints' or motors'; use --method friction, base or auto"
+            "read a model off; use --method friction or base"
         )
     logs = [read_targets(recording, robot) for recording in recordings]
     for log in logs:
@@ -181,15 +175,10 @@ def joint_model(j: int, logs: Sequence[Targets], before: float) -> ControllerMod
     """Read one joint's model; K first, since friction needs it."""
     # K is needed for friction; of two ways to it, the surer one in this log is taken.
     still, moving = constant_at_rest(j, logs), constant_in_motion(j, logs)
-    constant = min((still, moving), key=relative_sd)
+    constant = min((still, moving), key=lambda k: k.sd / abs(k.value) if k.sd < np.inf else np.inf)
     K = constant.value if constant.known else before
     rotor, gravity = rotor_inertia(j, logs)
     return ControllerModel(constant, rotor, controller_friction(j, logs, K), gravity)
-
-
-def relative_sd(estimate: Estimate) -> float:
-    """Standard deviation over value; infinite where there is none."""
-    return estimate.sd / abs(estimate.value) if np.isfinite(estimate.sd) else float("inf")
 
 
 def constant_at_rest(j: int, logs: Sequence[Targets]) -> Estimate:

@@ -77,7 +77,7 @@ class Training:
 
     def top_speed(self, j: int) -> float:
         """Speed limit of joint j (from 0), its fastest motion where the robot has none. [rad/s]"""
-        fastest = max(float(np.max(np.abs(m.motor_dq[:, j]), initial=0.0)) for m in self.motions)
+        fastest = max(float(np.max(np.abs(m.dq[:, j]), initial=0.0)) for m in self.motions)
         return float(np.fmax(self.robot.limits.qd_max[j], fastest))
 
 
@@ -208,7 +208,7 @@ def data_of_joint(data: Training, j: int, weights: Sequence[Array], constant: bo
     rigid = np.concatenate([r[:, j] for r in data.rigid])
     fixed = []
     if data.rotor:
-        fixed.append(np.concatenate([m.motor_ddq[:, j] for m in motions]))
+        fixed.append(np.concatenate([m.ddq[:, j] for m in motions]))
     if constant:
         fixed.append(rigid)
     load = np.concatenate([c.load[:, j] for c in data.columns])

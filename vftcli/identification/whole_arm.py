@@ -1,20 +1,12 @@
-"""Methods "base" and "consistent": all parameters of the arm together."""
+"""Method "base": all parameters of the arm together."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from vftcli.identification.base_parameters import BaseParameters, base_parameters
+from vftcli.identification.base_parameters import base_parameters
 from vftcli.identification.clean_fit import fit_without_contacts
-from vftcli.identification.consistent import (
-    MARGIN,
-    NARROW_MARGIN,
-    TABLE,
-    WEIGHTS,
-    fit_consistent,
-    nearest_physical,
-)
 from vftcli.identification.friction_fit import PLAIN, is_dissipative
 from vftcli.identification.friction_shapes import Shape, round_digits
 from vftcli.identification.method_result import (
@@ -29,6 +21,12 @@ from vftcli.identification.method_result import (
     profile_friction,
     temperature_remarks,
 )
+from vftcli.identification.physical_links import (
+    TABLE,
+    WEIGHTS,
+    nearest_physical_links,
+    predicts_best_unpulled,
+)
 from vftcli.identification.scoring import rigid_torque
 from vftcli.identification.stacking import ParameterColumns, Triangles, WeightedLog, stack
 from vftcli.identification.training import (
@@ -41,36 +39,38 @@ from vftcli.robots.regressor import chain_parameters, with_parameters
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.remarks import Remark, caution, fact
+from vftcli.signals.remarks import caution, fact
 
 NARROW = 0.7
 """Share of undetermined base parameters from which on a motion tells the links too little."""
 
 MOST = 0.5
-"""The same where cross-validation takes the weakest pull, as on rounds of one motion."""
+"""The same where the weakest pull predicts best, as of rounds of one motion: each knows the others,
+whatever the links are."""
 
 
-def whole_arm(data: Training, method: str) -> MethodResult:
-    """Identify all parameters of the arm together.
-
-    Method "base" takes base parameters by weighted least squares, and the file gets the nearest
-    physical model; "consistent" a physical model near the profile, its pull cross-validated.
+def whole_arm(data: Training) -> MethodResult:
+    """Base parameters by weighted least squares, and the robot of the nearest physical links.
 
     Friction models are chosen twice: with the profile's links, and again with the links that come
     out, so that an error of the profile is not taken for friction.
     """
     fits, weights, remarks = fit_without_contacts(data, strict=False)
     layout, start = initial_columns(data, fits)
-    x = nearest_physical(stack_training(data, layout, start, weights), start)
+    x = nearest_physical_links(stack_training(data, layout, start, weights), start)
     refined = with_links(data, layout, x)
     fits = fit_frictions(refined, weights)
     layout, start = initial_columns(data, fits)
     triangles = stack_training(refined, layout, start, weights)
     base = base_parameters(triangles, start)
-    count, open_ones = undetermined(base, layout)
-    x, narrow, said = fit_links(triangles, start, method, open_ones / max(count, 1))
+    count = len(base.values) - (layout.size - layout.inertial - layout.rotors)
+    open_ones = sum(not known for known in base.determined[:count])
+    share = open_ones / max(count, 1)
+    narrow = share > NARROW or (share > MOST and predicts_best_unpulled(triangles, start))
+    x = nearest_physical_links(triangles, start, TABLE if narrow else WEIGHTS[0])
+    remarks.append(fact("nearest-physical-model"))
     level = caution if narrow else fact
-    remarks += [said, level("undetermined-base-parameters", count=count, undetermined=open_ones)]
+    remarks.append(level("undetermined-base-parameters", count=count, undetermined=open_ones))
     remarks += bound_remarks(fits)
     if data.robot.payload is not None:
         remarks.append(fact("payload-in-link"))
@@ -84,7 +84,7 @@ def whole_arm(data: Training, method: str) -> MethodResult:
             if not is_dissipative(shape, values, data.top_speed(j)):
                 values = found.fit.values[: len(shape.terms)]
             frictions[j] = identified_friction(
-                data, j, shape, values, friction_source(data, method, sd)
+                data, j, shape, values, friction_source(data, "base", sd)
             )
             numbers += friction_numbers(j, shape, values, sd, profile_friction(data.robot)[j])
             remarks += check_friction(j, frictions[j], data)
@@ -98,43 +98,6 @@ def whole_arm(data: Training, method: str) -> MethodResult:
         [*remarks, *presliding_remark(fits), *temperature_remarks(data), *held_joints(data)],
         narrow,
     )
-
-
-def undetermined(base: BaseParameters, layout: ParameterColumns) -> tuple[int, int]:
-    """How many base parameters there are and how many are open, friction not counted."""
-    count = len(base.values) - (layout.size - layout.inertial - layout.rotors)
-    return count, sum(not known for known in base.determined[:count])
-
-
-def fit_links(
-    triangles: Triangles, start: Array, method: str, share: float
-) -> tuple[Array, bool, Remark]:
-    """Fit the links by a method.
-
-    The rounds of one motion predict each other whatever the links are: cross-validation then finds
-    no use for the profile. Where most base parameters are open too, a table's pull is taken.
-
-    Args:
-        triangles: The stacked equations.
-        start: The profile's parameters. (size,)
-        method: "base" or "consistent".
-        share: Share of base parameters that the motion leaves open.
-
-    Returns:
-        The parameters (size,), whether the motion tells the links too little, and how it was done.
-    """
-    narrow, weight = share > NARROW, TABLE
-    if method == "consistent" or MOST < share <= NARROW:
-        margin = NARROW_MARGIN if narrow else MARGIN
-        x, weight, _ = fit_consistent(triangles, start, margin)
-    rounds = share > MOST and weight == WEIGHTS[0]
-    narrow |= rounds
-    if method == "base":
-        pull = TABLE if narrow else WEIGHTS[0]
-        return nearest_physical(triangles, start, pull), narrow, fact("nearest-physical-model")
-    if rounds:
-        x, weight = nearest_physical(triangles, start, TABLE), TABLE
-    return x, narrow, fact("profile-pull", weight=weight, weights=sorted(WEIGHTS))
 
 
 def stack_training(

@@ -63,7 +63,6 @@ BOUNDS: dict[str, Bound] = {
     "inertia": TENSOR,
     "rotor_inertia": Bound(0.0, 1e4, "kg·m²"),  # a 1 kg·m² rotor behind a gear of 100
     "torque_constant": Bound(TINY, 1e5, "N·m/A"),  # 100 N·m/A behind a gear of 1000
-    "transmission": either_way(100.0, ""),  # motor over joint speed; gears couple by 0.01 to 1
     "gravity": either_way(100.0, "m/s²"),  # four times Jupiter's
     "sample_rate_hz": Bound(TINY, 1e6, "Hz"),
     "q_min": TRAVEL,

@@ -52,8 +52,6 @@ class Chain(Shown):
         inertia: Inertia tensors about the centre of mass, in the link's axes. (n, 3, 3) [kg·m²]
         rotor_inertia: Rotor inertia reflected to the joint side. (n,) [kg·m²]
         gravity: Gravity vector in base axes, (0, 0, −9.81) for an upright base. (3,) [m/s²]
-        transmission: T of `vftcli.robots.transmission`, None where no joint is driven through
-            another. (n, n)
         flange_rotation: Orientation of the flange in frame n. (3, 3)
         flange_translation: Origin of the flange in frame n. (3,) [m]
     """
@@ -68,7 +66,6 @@ class Chain(Shown):
     gravity: Array
     flange_rotation: Array
     flange_translation: Array
-    transmission: Array | None = None
 
     def __post_init__(self) -> None:
         n = self.joints
@@ -86,22 +83,11 @@ class Chain(Shown):
         seal(self, *shapes)
         for name, shape in shapes.items():
             check_shape(getattr(self, name), shape, name, "the chain")
-        if self.transmission is not None:
-            seal(self, "transmission")
-            check_shape(self.transmission, (n, n), "transmission", "the chain")
 
     @property
     def joints(self) -> int:
         """Number of joints n."""
         return len(self.names)
-
-    @property
-    def rotor_coupling(self) -> Array | None:
-        """Inertia of the rotors beyond `rotor_inertia`, TᵀJT − J; None if T = 1. (n, n) [kg·m²]"""
-        if (T := self.transmission) is None:
-            return None
-        J = np.diag(self.rotor_inertia)
-        return np.asarray(T.T @ J @ T - J)
 
     def with_payload(self, payload: Payload | None) -> "Chain":
         """Return the chain with a load fixed to its flange, merged into the last link."""
@@ -123,7 +109,7 @@ class Chain(Shown):
         """Build the Pinocchio model of this chain, with a frame ``flange``.
 
         Reflected rotor inertia becomes the model's `armature`, which `rnea`, `crba` and `aba`
-        include; it has no room for `rotor_coupling`.
+        include.
         """
         pin = needed("pinocchio", "a Pinocchio model (simulation, replay, --as-printed)")
 

@@ -4,7 +4,6 @@ import numpy as np
 
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.robot import Robot
-from vftcli.robots.transmission import joint_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, RobotError
 from vftcli.signals.names import EFFORTS
@@ -60,9 +59,8 @@ def drive_torque(recording: Recording, robot: Robot) -> Array:
 
     τ = K i where the robot's torque source is current, else the measured torque. A robot described
     by currents whose log has only torques uses the torques, and the other way round if its file
-    has torque constants. Where joints are driven through each other K i is the torque of the motors
-    and Tᵀ K i that of the joints. Torques without gravity get the gravity torque g(q) of the arm
-    with its payload: τ = e + g(q).
+    has torque constants. Torques without gravity get the gravity torque g(q) of the arm with its
+    payload: τ = e + g(q).
 
     Raises:
         MissingSignalError: If the log has neither, or currents without drive constants.
@@ -88,4 +86,4 @@ def drive_torque(recording: Recording, robot: Robot) -> Array:
             f"{recording.name}: the log has motor currents but robot {robot.name!r} has no "
             "torque_constant; give one per joint in its TOML file, or record torques"
         )
-    return joint_torque(robot.chain.transmission, current * robot.torque_constant)
+    return current * robot.torque_constant

@@ -111,9 +111,6 @@ def record(chain: Chain) -> tuple[Tape, dict[str, list[Value]]]:
         omega = on.add(omega, (ZERO, ZERO, dq[j]))
         motion.append((omega, v, gamma))
 
-    rotors = np.diag(chain.rotor_inertia)
-    if chain.rotor_coupling is not None:
-        rotors = rotors + chain.rotor_coupling
     results: dict[str, list[Value]] = {"p": [], "coriolis": [], "gravity": [], "bias": []}
     K, L, H = NOTHING, NOTHING, NOTHING  # of the links behind, in the axes of this one
     for j in range(n - 1, -1, -1):
@@ -125,7 +122,7 @@ def record(chain: Chain) -> tuple[Tape, dict[str, list[Value]]]:
         coriolis = on.plus(on.cross_z(K, omega), on.cross_z(L, v))
         weight = on.cross_z(H, gamma)
         found = {
-            "p": on.plus(K[2], on.dot([Value(float(J)) for J in rotors[j]], dq)),
+            "p": on.plus(K[2], on.times(Value(float(chain.rotor_inertia[j])), dq[j])),
             "coriolis": coriolis,
             "gravity": -weight,
             "bias": on.plus(coriolis, weight),
@@ -144,7 +141,7 @@ PROGRAMS = threading.local()
 def program_of(chain: Chain, wanted: tuple[str, ...]) -> Program:
     """The program of an arm, recorded where it is not among the last `KEPT`."""
     made: dict[tuple[bytes, tuple[str, ...]], Program] = vars(PROGRAMS).setdefault("made", {})
-    numbers = (*vars(chain).values(), chain.rotor_coupling)
+    numbers = vars(chain).values()
     key = b"".join(x.tobytes() for x in numbers if isinstance(x, np.ndarray)), wanted
     if (program := made.pop(key, None)) is None:
         tape, results = record(chain)

@@ -3,7 +3,6 @@
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +23,6 @@ from vftcli.signals.remarks import fact
 SCHEMA = 1
 UPRIGHT = (0.0, 0.0, -9.81)
 ORIGIN = (0.0, 0.0, 0.0)
-
-WORST_CONDITION = 1e3
-"""Condition from which on a transmission tells joints no more apart; real ones have 3."""
 
 FRICTION_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "coulomb-viscous": (("coulomb", "viscous"), ("smoothing",)),
@@ -82,7 +78,7 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
     return Robot(
         name=(name := root.text("name", root.file.path.stem)),
         title=root.text("title", name),
-        chain=replace(chain, transmission=checked_transmission(root, chain.joints)),
+        chain=chain,
         torque_source=source,
         torque_constant=checked_torque_constant(joints, source),
         gear=checked_gear(joints, "gear"),
@@ -180,29 +176,6 @@ def checked_body(
     if why := unphysical(mass, tensor):
         table.refuse(why, "mass" if why.startswith("mass") else "inertia")
     return mass, com, tensor
-
-
-def checked_transmission(root: Section, joints: int) -> Array | None:
-    """Return `transmission`, from joint to motor speeds, None where no joints are coupled. (n, n)
-
-    Its diagonal is 1: the gear of each motor is in its torque constant and its rotor inertia.
-    """
-    if "transmission" not in root.values:
-        return None
-    rows = root.values["transmission"]
-    asked = f"it must be {joints} lists of {joints} finite numbers"
-    if not isinstance(rows, list) or len(rows) != joints:
-        root.refuse(f"transmission is {shown(rows)}; {asked}", "transmission")
-    for row in rows:
-        if not isinstance(row, list) or len(row) != joints or not all(map(is_finite, row)):
-            root.refuse(f"transmission has the row {shown(row)}; {asked}", "transmission")
-    found = np.array(rows, dtype=float)
-    root.check_bounds("transmission", found.ravel().tolist())
-    if np.any(np.diag(found) != 1.0):
-        root.refuse("transmission has another diagonal than 1", "transmission")
-    if np.linalg.cond(found) > WORST_CONDITION:
-        root.refuse("transmission cannot be inverted: two motors turn alike", "transmission")
-    return None if np.array_equal(found, np.eye(joints)) else found
 
 
 def checked_torque_constant(joints: Sequence[Section], source: str) -> Array | None:

@@ -7,7 +7,6 @@ import numpy as np
 from vftcli.robots.friction import friction_torque, presliding_joints
 from vftcli.robots.presliding import play
 from vftcli.robots.robot import JointFriction
-from vftcli.robots.transmission import at_motors, joint_torque, motor_torque
 from vftcli.signals.arrays import Array
 
 
@@ -19,15 +18,12 @@ class RunningFriction:
 
     Attributes:
         friction: One model a joint; empty for a frictionless arm.
-        transmission: From joints to motors, whose friction it is; None where they turn alike.
         centre: c of the play operator after the last sample, of the joints that have presliding
             friction; None before the first. (m,) [rad]
     """
 
-    def __init__(
-        self, friction: Sequence[JointFriction], transmission: Array | None = None
-    ) -> None:
-        self.friction, self.transmission = friction, transmission
+    def __init__(self, friction: Sequence[JointFriction]) -> None:
+        self.friction = friction
         self.centre: Array | None = None
         self._joints, self._length = presliding_joints(friction)
 
@@ -50,15 +46,9 @@ class RunningFriction:
         Raises:
             ParameterError: If a model's name is unknown.
         """
-        T = self.transmission
-        torque = friction_torque(
-            self.friction,
-            at_motors(T, dq),
-            None if load is None else motor_torque(T, load),
-            deflection=self.deflection(at_motors(T, q)),
-            temperature=temperature,
+        return friction_torque(
+            self.friction, dq, load, deflection=self.deflection(q), temperature=temperature
         )
-        return joint_torque(T, torque)
 
     @property
     def takes_load(self) -> bool:
@@ -69,7 +59,7 @@ class RunningFriction:
         """State s of the play operator along the next samples; None without one. (T, n)
 
         Args:
-            q: Angles of the joints, of their motors where they are coupled. (T, n) [rad]
+            q: Angles of the joints. (T, n) [rad]
         """
         if not self._joints:
             return None

@@ -138,7 +138,7 @@ class RunningTerms:
     def __init__(self, robot: Robot, clock: Clock | None = None, *, literal: bool = False) -> None:
         self.robot, self.clock, self.literal = robot, clock, literal
         self.before: Instant | None = None
-        self._friction = RunningFriction(robot.friction, robot.chain.transmission)
+        self._friction = RunningFriction(robot.friction)
 
     def next(self, recording: Recording) -> DynamicsTerms:
         """Evaluate p and μ along the next block, chunk by chunk.
@@ -184,8 +184,6 @@ class RunningTerms:
         from vftcli.robots.literal import literal_momentum_terms
 
         p, coriolis, gravity = literal_momentum_terms(self.robot.model, q, dq)
-        if (rotors := self.robot.chain.rotor_coupling) is not None:
-            p = p + dq @ rotors
         yield slice(0, len(q)), dq, [p, coriolis - gravity, gravity]
 
 
@@ -207,7 +205,6 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
 
 def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]:
     """The measured effort (T, n) and what turns it into torque: K [N·m/A], or 1 for torques."""
-    coupled = robot.chain.transmission is not None
-    if uses_current(recording, robot) and robot.torque_constant is not None and not coupled:
+    if uses_current(recording, robot) and robot.torque_constant is not None:
         return recording.require("current"), robot.torque_constant
     return drive_torque(recording, robot), 1.0

@@ -52,8 +52,6 @@ def robot_document(robot: Robot) -> Table:
     document = {**old, "schema": SCHEMA, "name": robot.name, "title": robot.title or robot.name}
     document |= {"torque_source": robot.torque_source, "gravity": robot.chain.gravity.tolist()}
     document |= {"dof": robot.joints, "joints": tables, "payload": payload_tables(robot)}
-    if robot.chain.transmission is not None:
-        document["transmission"] = robot.chain.transmission.tolist()
     return {key: value for key, value in document.items() if value != {}}
 
 

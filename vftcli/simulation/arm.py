@@ -112,11 +112,6 @@ class Arm:
                 )
         self.scenario, self.seed = scenario, seed
         self.robot: Robot = load_robot(scenario.robot)
-        if self.robot.chain.transmission is not None:
-            raise ParameterError(
-                f"robot {self.robot.name!r} has joints driven through each other, which is not "
-                "simulated; leave transmission out of its file to simulate it without"
-            )
         self.seeds: dict[str, Any] = dict(
             zip(("arm", "contacts", "sensing"), np.random.SeedSequence(seed).spawn(3), strict=True)
         )

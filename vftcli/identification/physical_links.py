@@ -1,4 +1,4 @@
-r"""A physically consistent model: least squares with a barrier at the edge of what a body can be.
+r"""The physical links nearest to least squares: a barrier at the edge of what a body can be.
 
 A link's ten parameters belong to some mass distribution exactly if its pseudo-inertia
 
@@ -11,6 +11,7 @@ parameters, and grows without bound towards the edge, so that Newton's method ne
 physical models and finds the one optimum.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -21,15 +22,10 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 
 WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
-"""Weights of the distance to the profile that cross-validation chooses from."""
+"""Weights of the distance to the profile, from hardly any pull to the profile itself."""
 
 MARGIN = 1.01
-"""The strongest pull within this factor of the best cross-validated misfit is taken."""
-
-NARROW_MARGIN = 1.05
-"""The same where the motion tells the links too little. One that repeats itself is predicted a
-little better without any pull, and others ten times worse: of five rounds of one circle each knows
-the other four."""
+"""Factor of the least misfit within which a pull predicts as well as the best one."""
 
 TABLE = 100.0
 """Pull of a maker's table whose masses have a standard deviation of 5 %: the distance of
@@ -172,7 +168,7 @@ def solve(problem: Problem, x: Array) -> Array:
     if decrement < 1.0:
         return x
     raise IdentificationError(
-        "the physically consistent fit did not settle; the log contradicts the profile too much. "
+        "the fit of physical links did not settle; the log contradicts the profile too much. "
         "Use --method friction, or a profile closer to the arm"
     )
 
@@ -186,51 +182,39 @@ def starting_point(layout: ParameterColumns, x: Array) -> Array:
     return start
 
 
-def fit_at(
-    triangles: Triangles, start: Array, weight: float, x: Array, leave_out: int | None = None
-) -> Array:
-    """The physical model at one weight; the equations count as correlated as they are. (size,)"""
+def pulled_links(
+    triangles: Triangles, profile: Array, leave_out: int | None = None
+) -> Iterator[tuple[float, Array]]:
+    """Each weight and the physical parameters (size,) under it, the strongest pull first."""
+    start = x = starting_point(triangles.layout, profile)
     R, z = triangles.joined(leave_out)
     # Correlated rows say the same thing again; dividing them makes the misfit a log-likelihood
     # that can be weighed against the distance.
     shrink = 1.0 / np.sqrt(triangles.correlation)
-    return solve(Problem(R * shrink, z * shrink, start, triangles.layout, weight), x)
+    for weight in WEIGHTS[::-1]:
+        # Each optimum is a good start for the next, weaker pull.
+        x = solve(Problem(R * shrink, z * shrink, start, triangles.layout, weight), x)
+        yield weight, x
 
 
-def fit_consistent(
-    triangles: Triangles, profile: Array, margin: float = MARGIN
-) -> tuple[Array, float, dict[float, float]]:
-    """Fit a physical model, its pull to the profile chosen by cross-validation.
+def nearest_physical_links(
+    triangles: Triangles, profile: Array, weight: float = WEIGHTS[0]
+) -> Array:
+    """The physical parameters that predict nearly what least squares predicts. (size,)
 
     Args:
         triangles: The stacked equations.
         profile: The profile's parameters with fitted friction. (size,)
-        margin: Factor of the best misfit within which the strongest pull is taken.
-
-    Returns:
-        All unknowns (size,), the weight of the distance, and the cross-validated misfit of every
-        weight, in standard deviations of the residual.
+        weight: Pull to the profile, one of `WEIGHTS`.
     """
-    start = starting_point(triangles.layout, profile)
-    # Strongest first: each fit starts where the last one, pulled harder, ended.
-    totals = dict.fromkeys(WEIGHTS[::-1], 0.0)
+    return next(x for pull, x in pulled_links(triangles, profile) if pull <= weight)
+
+
+def predicts_best_unpulled(triangles: Triangles, profile: Array) -> bool:
+    """Whether every pull to the profile but the weakest predicts left-out stretches worse."""
+    misfits = dict.fromkeys(WEIGHTS, 0.0)
     for part in range(len(triangles.parts)):
-        x = start
-        for weight in totals:
-            x = fit_at(triangles, start, weight, x, leave_out=part)
-            totals[weight] += triangles.misfit(part, x)
-    rows = triangles.samples * triangles.correlation
-    errors = {weight: float(np.sqrt(total / rows)) for weight, total in totals.items()}
-    best = min(errors.values())
-    weight = max(w for w, error in errors.items() if error <= margin * best)
-    return fit_at(triangles, start, weight, start), weight, errors
-
-
-def nearest_physical(triangles: Triangles, profile: Array, weight: float = WEIGHTS[0]) -> Array:
-    """The physical model that predicts nearly what least squares predicts. (size,)"""
-    start = starting_point(triangles.layout, profile)
-    # From the strongest pull on, each optimum is a good start for the next, weaker one.
-    x = start
-    for pull in (w for w in WEIGHTS[::-1] if w >= weight):
-        x = fit_at(triangles, start, pull, x)
-    return x
+        for weight, x in pulled_links(triangles, profile, leave_out=part):
+            misfits[weight] += triangles.misfit(part, x)
+    near = MARGIN**2 * min(misfits.values())  # of squares
+    return all(misfits[weight] > near for weight in WEIGHTS[1:])
