@@ -64,7 +64,7 @@ BAD = {
     "--solver": ("qr", "no solver 'qr'"),
     "--tool": ("1,2", "--tool"),
     "--sensor-pose": ("hand", "--sensor-pose"),
-    "--zero": ("nowhere", "is neither A:B in seconds, nor start, nor a log that exists"),
+    "--zero": ("nowhere", "is neither A:B with A < B, in seconds, nor start; name a log"),
     "--torque-sd": ("some", "--torque-sd"),
     "--derive": ("tau", "--derive 'tau'"),
     "--reference": ("magic", "no reference 'magic'"),

@@ -24,7 +24,6 @@ from vftcli.virtual_sensor.detection import (
     read_in_free_runs,
     true_intervals,
 )
-from vftcli.virtual_sensor.free_run_torque import as_modelled
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 from vftcli.virtual_sensor.zero import zero_drift
@@ -166,10 +165,14 @@ def test_observers_are_run_along_free_runs() -> None:
     run = ModelledRun(recording=log, robot=load_robot("ur5"))
     piece = FreePiece(run, (log.t > 0.3) & (log.t < 4.0), ())
     gmo = MomentumObserver(gain=10.0)
-    torques = read_in_free_runs([piece], [gmo], as_modelled, None)["gmo"]
+
+    def read_by(pieces, sensor):
+        return read_in_free_runs(pieces, [gmo], lambda _name, run: run.terms, sensor)
+
+    torques = read_by([piece], None)["gmo"]
     # From the settling, at 1 s, to 4 s.
     settled = (log.t >= 1.0) & (log.t < 4.0)
     np.testing.assert_array_equal(torques, gmo.estimate(run.terms).tau[settled])
-    wrenches = read_in_free_runs([piece], [gmo], as_modelled, VirtualSensor(frame="base"))["gmo"]
+    wrenches = read_by([piece], VirtualSensor(frame="base"))["gmo"]
     assert wrenches.shape == (len(torques), 6)
-    assert read_in_free_runs([], [gmo], as_modelled, None) == {}
+    assert read_by([], None) == {}

@@ -206,9 +206,9 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
     )
     zero: Words = option(
         "--zero",
-        "A:B|start|LOG",
-        "Unloaded span whose mean comes off. Also the unloaded start, or a free run. Repeat A:B to "
-        "see the drift between spans. Implies --wrench.",
+        "A:B|start",
+        "Unloaded span whose mean comes off. Also the unloaded start. Repeat A:B to see the "
+        "drift between spans. Implies --wrench.",
     )
     sensor_weight: bool = flag(
         "--sensor-weight",

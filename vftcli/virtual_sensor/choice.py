@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError
@@ -30,7 +29,6 @@ class ZeroChoice:
     Attributes:
         spans: Unloaded spans of the log: the first is the zero, further ones show its drift. [s]
         start: Whether the unloaded start is to be found and taken.
-        log: A log of the arm unloaded, or None.
 
     Raises:
         ParameterError: If both spans and the start are chosen.
@@ -38,7 +36,6 @@ class ZeroChoice:
 
     spans: tuple[tuple[float, float], ...] = ()
     start: bool = False
-    log: Path | None = None
 
     def __post_init__(self) -> None:
         if self.spans and self.start:
@@ -46,27 +43,23 @@ class ZeroChoice:
 
     @classmethod
     def parsed(cls, words: Sequence[str]) -> "ZeroChoice":
-        """The choice that ``--zero A:B|start|LOG``, which may be repeated, states.
+        """The choice that ``--zero A:B|start``, which may be repeated, states.
 
         Raises:
-            ParameterError: If a word is none of the three, or they exclude each other.
+            ParameterError: If a word is neither, or they exclude each other.
         """
-        spans, logs = [], []
+        spans = []
         for text in words:
             if text == START:
                 continue
-            # A file that is there wins: its name may hold a colon.
-            if Path(text).exists():
-                logs.append(Path(text))
-            elif ":" in text:
+            try:
                 spans.append(interval(text))
-            else:
+            except ParameterError:
                 raise ParameterError(
-                    f"--zero {text!r} is neither A:B in seconds, nor start, nor a log that exists"
-                )
-        if len(logs) > 1:
-            raise ParameterError("--zero takes one free run, and either start or spans A:B")
-        return cls(spans=tuple(spans), start=START in words, log=logs[0] if logs else None)
+                    f"--zero {text!r} is neither A:B with A < B, in seconds, nor start; name a log "
+                    "of free motion by --free LOG"
+                ) from None
+        return cls(spans=tuple(spans), start=START in words)
 
 
 @dataclass(frozen=True, kw_only=True)

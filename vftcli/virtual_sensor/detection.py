@@ -1,6 +1,6 @@
 """Contacts of every observer, or of a list, against the true ones, one to one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -8,6 +8,8 @@ import numpy as np
 
 from vftcli.observers.observer import Observer
 from vftcli.repetition.free_motion import FreePiece
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
@@ -22,7 +24,6 @@ from vftcli.virtual_sensor.contact import (
     match_contacts,
     operating_curve,
 )
-from vftcli.virtual_sensor.free_run_torque import TermsOf
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 from vftcli.virtual_sensor.zero import SETTLING
@@ -80,7 +81,7 @@ class ToldContacts:
 def read_in_free_runs(
     pieces: Sequence[FreePiece],
     observers: Sequence[Observer],
-    terms_of: TermsOf,
+    terms_of: Callable[[str, ModelledRun], DynamicsTerms],
     sensor: VirtualSensor | None,
 ) -> dict[str, Array]:
     """What each observer reads in free runs once it has settled: wrenches, or joint torques.
@@ -88,7 +89,7 @@ def read_in_free_runs(
     Args:
         pieces: The free samples of each run.
         observers: The observers.
-        terms_of: What each of them runs on.
+        terms_of: Name of an observer, and a recording → p and μ that it runs on.
         sensor: What makes their wrenches, None for joint torques.
 
     Returns:
