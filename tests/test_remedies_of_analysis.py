@@ -288,9 +288,7 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
         "and --force does not overwrite that either"),
     "asks for another recording, or for poses that no fixture has": (
         "a log at rest identifies no friction", "have a partner in the free run",
-        "less than the period of", "no whole cycle of",
-        "cannot be weighed: the unloaded samples are all in one orientation",
-        "too few unloaded samples; name the unloaded spans"),
+        "less than the period of", "no whole cycle of"),
     "only Python gets as far; the command line refuses such a log or word first": (
         "samples are not finite; leave them out with --interval",
         "nothing to identify: give --method", "… has … joints, … has …: a free run must be"),

@@ -17,7 +17,6 @@ from vftcli.virtual_sensor.choice import FIT, WrenchChoice, ZeroChoice
         {"tool": "0,0,0.1"},
         {"sensor_pose": FIT},
         {"zero": ["1:2"]},
-        {"sensor_weight": True},
         {"torque_sd": "own"},
     ],
 )

@@ -210,11 +210,6 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
         "Unloaded span whose mean comes off. Also the unloaded start. Repeat A:B to see the "
         "drift between spans. Implies --wrench.",
     )
-    sensor_weight: bool = flag(
-        "--sensor-weight",
-        "Weigh the sensor's own tool in the unloaded spans and remove it from its reading.",
-        seldom=True,
-    )
     torque_sd: str | None = option(
         "--torque-sd",
         "own|NUMBER(S)",

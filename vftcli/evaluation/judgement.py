@@ -79,7 +79,7 @@ def judge(
     source = ReferenceSource(motion=motion)
     if sensed is not None:
         mounting = sensed.sensor.mounting
-        source = ReferenceSource(motion=motion, mounting=mounting, logged=sensed.logged)
+        source = ReferenceSource(motion=motion, mounting=mounting)
     made = make_reference(source, choice)
     reference = made.torque
     errors = evaluate(recording.name, estimates, reference)

@@ -73,7 +73,6 @@ class WrenchChoice:
         tool: The tool's pose as text or a name in the robot file, None for the file's own.
         sensor_pose: The sensor's pose likewise, or "fit".
         zero: What is taken as the zero.
-        sensor_weight: Whether the sensor's own tool is weighed in the unloaded spans and removed.
         torque_sd: Torque error the covariance starts from: "own", a number or one a joint as text,
             or None for the best that is known. [N·m]
 
@@ -86,7 +85,6 @@ class WrenchChoice:
     tool: str | None = None
     sensor_pose: str | None = None
     zero: ZeroChoice = field(default_factory=ZeroChoice)
-    sensor_weight: bool = False
     torque_sd: str | None = None
 
     def __post_init__(self) -> None:
@@ -132,7 +130,6 @@ class WrenchChoice:
         tool: str | None = None,
         sensor_pose: str | None = None,
         zero: Sequence[str] | None = None,
-        sensor_weight: bool = False,
         torque_sd: str | None = None,
     ) -> "WrenchChoice | None":
         """The choice that the options of a command state, None where none of them asks for one.
@@ -144,13 +141,12 @@ class WrenchChoice:
             tool: See the attribute, as the next.
             sensor_pose: See the attribute.
             zero: The words of every ``--zero``.
-            sensor_weight: See the attribute, as the next.
             torque_sd: See the attribute.
 
         Raises:
             ParameterError: If a frame or solver does not exist, or a zero is malformed.
         """
-        options = (frame, solver, tool, sensor_pose, zero or None, torque_sd, sensor_weight or None)
+        options = (frame, solver, tool, sensor_pose, zero or None, torque_sd)
         if not wrench and all(option is None for option in options):
             return None
         return cls(
@@ -159,6 +155,5 @@ class WrenchChoice:
             tool=tool,
             sensor_pose=sensor_pose,
             zero=ZeroChoice.parsed(zero or ()),
-            sensor_weight=sensor_weight,
             torque_sd=torque_sd,
         )

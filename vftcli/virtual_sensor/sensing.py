@@ -16,10 +16,9 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
-from vftcli.virtual_sensor.log_wrench import logged_wrench
 from vftcli.virtual_sensor.mean_disturbance import mean_disturbance
-from vftcli.virtual_sensor.mounting import find_mounting, without_tool_weight
 from vftcli.virtual_sensor.null_space import contact_elsewhere
+from vftcli.virtual_sensor.sensor import find_mounting
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.smoother.observer_wrench import (
     Gate,
@@ -75,7 +74,7 @@ def sense(
 
     Raises:
         ParameterError: If a pose or zero interval cannot be used, or cannot be found in the log.
-        MissingSignalError: If the log has no wrench and a sensor's pose or weight is asked for.
+        MissingSignalError: If the log has no wrench and a sensor's pose is asked for.
         RobotError: If the arm has fewer than six joints.
     """
     recording, robot, terms = motion.log.recording, motion.log.robot, motion.log.terms
@@ -120,18 +119,12 @@ def sense(
     free = zero.unloaded(t)
     vendor = check_vendor(recording, raw, chain)
     elsewhere = tuple(e for w in wrenches if (e := contact_elsewhere(w, free)) is not None)
-    logged = None
-    if choice.sensor_weight:
-        lighter, weight = without_tool_weight(recording, chain, mounting, free)
-        logged = logged_wrench(lighter, chain, mounting)
-        found += weight
     return SensorReading(
         sensor=sensor,
         wrenches=wrenches,
         masked=raw.hidden,
         drifts=tuple(chained.from_iterable(drifts)),
         free=free,
-        logged=logged,
         vendor=vendor,
         smoothed=smoothed,
         elsewhere=elsewhere,
