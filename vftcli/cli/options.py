@@ -184,11 +184,10 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
     )
     solver: str | None = option(
         "--solver",
-        "smoother|pinv|damped|map",
+        "smoother|pinv|map",
         "How torques become a wrench: smoothed over the whole log with a band in every pose "
         "(default for best: zero outside of the listed contacts), least squares (default for the "
-        "others), damped, or with a prior of "
-        "50 N and 10 N·m. Implies --wrench.",
+        "others), or with a prior of 50 N and 10 N·m. Implies --wrench.",
         seldom=True,
     )
     tool: str | None = option(

@@ -22,9 +22,6 @@ SCALE = np.array([1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH])
 LEAST_SIGMA = 0.05
 """Below this σ_min of S J the pose cannot tell the wrench: 1 N·m of torque error is 20 N. [m]"""
 
-DAMPING = 0.05
-"""Damping δ of the damped solver, the singular value below which it starts to hold back. [m]"""
-
 PRIOR = np.repeat([50.0, 10.0 / LENGTH], 3)
 """Standard deviations of the MAP solver's prior about zero: 50 N and 10 N·m, of w_s. (6,) [N]"""
 
@@ -109,16 +106,6 @@ def pinv(parts: Decomposition, sd: Array) -> Solution:
     return Solution(gain, gain * sd[:, None, :])
 
 
-def damped(parts: Decomposition, sd: Array) -> Solution:
-    """Damped least squares, 1/λ replaced by 1/(λ + δ²).
-
-    Bounded everywhere and biased everywhere, towards zero by the share δ²/(σ² + δ²) in each
-    singular direction; the covariance does not hold that bias.
-    """
-    gain = spectral_gain(parts, 1.0 / (np.maximum(parts.squares, 0.0) + DAMPING**2))
-    return Solution(gain, gain * sd[:, None, :])
-
-
 def maximum_a_posteriori(parts: Decomposition, sd: Array) -> Solution:
     """The most probable wrench under a normal prior of 50 N and 10 N·m about zero.
 
@@ -135,7 +122,6 @@ def maximum_a_posteriori(parts: Decomposition, sd: Array) -> Solution:
 
 SOLVERS: dict[str, Callable[[Decomposition, Array], Solution]] = {
     "pinv": pinv,
-    "damped": damped,
     "map": maximum_a_posteriori,
 }
 """Name at the command line → what turns a decomposed Jacobian and torque sd (T, n) into A and B."""
