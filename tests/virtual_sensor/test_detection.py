@@ -88,7 +88,7 @@ def test_settling_is_no_contact() -> None:
     tau = reference(2.0).tau + np.exp(-5.0 * T)[:, None] * 50.0
     (score,) = judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, reference(2.0))
     assert score.detection.false_alarms == 0
-    assert [round(c.start, 1) for c in score.found] == [5.0]
+    assert score.detection.delay == (0.0,)
 
 
 def reading(values: np.ndarray, zero: tuple[float, float] | None) -> SensorReading:
@@ -131,14 +131,14 @@ def test_false_alarms_count_by_the_hour_of_the_whole_log() -> None:
 
 
 def test_what_is_listed_is_judged_as_it_stands() -> None:
-    """Two rows for one push: one is credited, the other a piece; no band, no curve."""
+    """Two rows for one push: one is credited, the other a piece."""
     told = ToldContacts(
         untouched=np.zeros(len(T), dtype=bool),
-        listed={"best": (ContactInterval(5.0, 5.8, 1.0), ContactInterval(6.0, 7.0, 1.0))},
+        listed={"best": (ContactInterval(5.0, 5.8), ContactInterval(6.0, 7.0))},
     )
     best = ExternalTorque(name="best", t=T, tau=np.zeros((len(T), 2)))
     (score,) = judge_contacts([best], None, reference(2.0), told)
-    assert (score.signal, score.curve) == ("list", ())
+    assert score.signal == "list"
     assert (score.detection.found, score.detection.listed, score.detection.split) == (1, 2, 1)
 
 

@@ -18,11 +18,9 @@ from vftcli.virtual_sensor.contact import (
     ContactInterval,
     Detection,
     Interval,
-    OperatingPoint,
+    departure,
     find_contacts,
-    free_band,
     match_contacts,
-    operating_curve,
 )
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
@@ -41,9 +39,6 @@ TRUE_GAP = 0.12
 """Contacts of an exact reference closer than this are one; those of a measured one, which has a
 floor, as those of an observer. [s]"""
 
-THRESHOLDS = tuple(float(x) for x in np.geomspace(0.1, 10.0, 41))
-"""Multiples of the free band of an operating curve."""
-
 
 class ContactScore(NamedTuple):
     """How one observer tells contacts.
@@ -52,15 +47,11 @@ class ContactScore(NamedTuple):
         name: The observer.
         signal: What it tells them from: "torque", "wrench", or "list" of contacts.
         detection: Counts and delays, of the free band itself or of the list.
-        curve: Hits against false alarms over `THRESHOLDS`; none of a list, which has no band.
-        found: The contacts it found.
     """
 
     name: str
     signal: str
     detection: Detection
-    curve: tuple[OperatingPoint, ...]
-    found: tuple[Interval, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -180,17 +171,14 @@ def judge_contacts(
     found = []
     for name, values in signals.items():
         if name in told.listed:
-            rows = tuple(told.listed[name])
-            counts = match_contacts(rows, true, duration)
-            found.append(ContactScore(name, "list", counts, (), rows))
+            counts = match_contacts(told.listed[name], true, duration)
+            found.append(ContactScore(name, "list", counts))
             continue
         quiet = untouched_values(values, told.beside.get(name), told.untouched, zero, (t, true))
         # Observers rise from zero: what they read before they have settled touches nothing.
-        band = free_band(quiet, np.ones(len(quiet), dtype=bool), least)
-        score = np.where(t < t[0] + SETTLING, 0.0, band.score(values))
-        here = find_contacts(t, score)
-        curve = operating_curve(t, score, true, THRESHOLDS)
-        found.append(ContactScore(name, kind, match_contacts(here, true, duration), curve, here))
+        score = np.where(t < t[0] + SETTLING, 0.0, departure(values, quiet, least))
+        counts = match_contacts(find_contacts(t, score), true, duration)
+        found.append(ContactScore(name, kind, counts))
     return tuple(found)
 
 
