@@ -134,14 +134,8 @@ class WrenchChoice:
     ) -> "WrenchChoice | None":
         """The choice that the options of a command state, None where none of them asks for one.
 
-        Args:
-            wrench: Whether ``--wrench`` was given; any other option of the sensor asks as well.
-            frame: Frame of the answer, None for the flange's.
-            solver: See the attribute.
-            tool: See the attribute, as the next.
-            sensor_pose: See the attribute.
-            zero: The words of every ``--zero``.
-            torque_sd: See the attribute.
+        `wrench` says whether ``--wrench`` was given, `zero` holds the words of every ``--zero``;
+        the others are fields. Any of them asks for a wrench.
 
         Raises:
             ParameterError: If a frame or solver does not exist, or a zero is malformed.

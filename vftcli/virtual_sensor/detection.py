@@ -167,47 +167,21 @@ def judge_contacts(
     t = reference.t
     duration = float(t[-1] - t[0])
     told = told or ToldContacts(untouched=np.zeros(len(t), dtype=bool))
-    zero = measured.free if measured is not None and measured.drifts else None
+    settled = t >= t[0] + SETTLING
+    quiet = told.untouched & settled
+    if measured is not None and measured.drifts:
+        quiet = measured.free
     found = []
     for name, values in signals.items():
         if name in told.listed:
             counts = match_contacts(told.listed[name], true, duration)
             found.append(ContactScore(name, "list", counts))
             continue
-        quiet = untouched_values(values, told.beside.get(name), told.untouched, zero, (t, true))
+        free = values[quiet] if quiet.any() else told.beside.get(name, ())
+        if not len(free):
+            free = values[learned_free(t, true)]
         # Observers rise from zero: what they read before they have settled touches nothing.
-        score = np.where(t < t[0] + SETTLING, 0.0, departure(values, quiet, least))
+        score = np.where(settled, departure(values, np.asarray(free), least), 0.0)
         counts = match_contacts(find_contacts(t, score), true, duration)
         found.append(ContactScore(name, kind, counts))
     return tuple(found)
-
-
-def untouched_values(
-    values: Array,
-    beside: Array | None,
-    own: Mask,
-    zero: Mask | None,
-    true: tuple[Array, Sequence[ContactInterval]],
-) -> Array:
-    """What an observer reads where nothing touches the arm. (S, k)
-
-    Args:
-        values: What it reads of the log. (T, k)
-        beside: What it reads in free runs, None without any. (S, k)
-        own: The log's own free samples; none where nothing is known. (T,)
-        zero: Samples of the zero spans, None without any. (T,)
-        true: Time, and the true contacts.
-
-    Raises:
-        ParameterError: If nothing tells.
-    """
-    t, contacts = true
-    chosen = own & (t >= t[0] + SETTLING)
-    if zero is not None:
-        chosen = zero
-    elif not chosen.any():
-        if beside is not None and len(beside):
-            return beside
-        chosen = learned_free(t, contacts)
-    found: Array = values[chosen]
-    return found

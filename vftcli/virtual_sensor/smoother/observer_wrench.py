@@ -60,9 +60,12 @@ log calls for one steady load it is left out, since a load and an error of the m
 """
 
 
-def plain_input(motion: FreeMotion, name: str = "") -> SmootherInput:  # noqa: ARG001
-    """The log as the robot's model explains it, with its free part; the same for every name."""
-    pieces = motion.part.pieces if has_part(motion) else ()
+def plain_input(motion: FreeMotion) -> SmootherInput:
+    """The log as the robot's model explains it, with the free part that is given or found."""
+    try:
+        pieces = motion.part.pieces
+    except ReferenceTorqueError:
+        pieces = ()
     return input_under(motion, pieces, lambda run: run.terms)
 
 
@@ -100,14 +103,6 @@ def input_under(
         terms = terms if load is None else load.off(terms, run)
         free.append(FreeTerms(terms, run.recording.q, inside))
     return SmootherInput(terms_of(motion.log), tuple(free), load)
-
-
-def has_part(motion: FreeMotion) -> bool:
-    """Whether a free part is given or found."""
-    try:
-        return bool(motion.part.pieces)
-    except ReferenceTorqueError:
-        return False
 
 
 def known_free(motion: FreeMotion, found: SmootherInput, unloaded: Mask) -> tuple[FreeTerms, ...]:
@@ -187,9 +182,8 @@ def smooth_all(
     """
     made: list[tuple[DynamicsTerms, SmoothedWrench]] = []
     found: dict[str, SmoothedWrench] = {}
-    take = input_of or partial(plain_input, motion)
     for name in names:
-        given = take(name)
+        given = plain_input(motion) if input_of is None else input_of(name)
         same = next((smoothed for terms, smoothed in made if terms is given.terms), None)
         found[name] = same or smooth_input(motion, given, unloaded, gate)
         made.append((given.terms, found[name]))
