@@ -32,7 +32,7 @@ from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.signals.errors import MissingSignalError, ParameterError, RobotError
 from vftcli.signals.remarks import Remark
-from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
+from vftcli.virtual_sensor.choice import WrenchChoice
 
 FIXTURE = Path(__file__).parent.parent / "fixtures" / "ur5_circle.csv"
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
@@ -120,14 +120,13 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return paths
 
 
-def asked(name: str, *free: Path, zero: Path | None = None, **more: object) -> AnalysisChoice:
+def asked(name: str, *free: Path, **more: object) -> AnalysisChoice:
     """A choice of reference and free runs, bands measured."""
     return AnalysisChoice(
         robot=RobotChoice(name="ur5"),
         observers=ObserverChoice(names=("gmo", "rts-auto")),
         reference=ReferenceChoice(name=name),
         free=FreeChoice(logs=free),
-        wrench=WrenchChoice(zero=ZeroChoice(log=zero)) if zero is not None else None,
         **more,  # type: ignore[arg-type]
     )
 
@@ -136,10 +135,9 @@ def asked(name: str, *free: Path, zero: Path | None = None, **more: object) -> A
 @pytest.mark.parametrize(
     ("words", "reads", "models", "alignments"),
     [
-        ("compare LOAD --reference two-cycle --free FREE --zero FREE", 2, 2, 1),
         ("compare LOAD --reference two-cycle --free FREE --free MORE", 3, 3, 2),
         ("compare LOAD MORE --reference two-cycle --free FREE", 3, 3, 2),
-        ("compare LOAD --reference TRUTH --zero FREE", 2, 2, 1),
+        ("compare LOAD --reference TRUTH --free FREE", 2, 2, 1),
         ("compare LOAD --reference two-cycle --remove-bias free-cycle --free-cycles 1", 1, 1, 0),
         ("estimate LOAD --free FREE -o OUT", 2, 2, 1),
         ("report LOAD --reference two-cycle --free FREE -o OUT", 2, 2, 1),
@@ -155,7 +153,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
     models: int,
     alignments: int,
 ) -> None:
-    """In a command; the same --free F --zero F read F 3 times, modelled it 4 times."""
+    """In a command."""
     counted = {"read_chosen": 0, "dynamics_terms": 0, "align": 0}
 
     def count(module: object, name: str) -> None:
@@ -210,11 +208,6 @@ def test_a_free_run_as_long_as_the_log_is_told_from_it(runs: list[Path]) -> None
         choice = asked("two-cycle", one, refinement=RefinementChoice(remove_bias="free-cycle"))
         tunings.append(analyse_log(log, choice).tunings["rts-auto"].omega_n)
     np.testing.assert_allclose(*tunings, rtol=0.1)  # grid of 1.1: two samples change little
-
-
-def test_the_zero_of_a_free_run_and_its_bias_removal_exclude_each_other(runs: list[Path]) -> None:
-    with pytest.raises(ParameterError, match="take it off twice"):
-        asked("zero", zero=runs[1], refinement=RefinementChoice(remove_bias="model"))
 
 
 def test_what_needs_the_complete_log_does_not_go_with_causal_observers() -> None:

@@ -172,13 +172,11 @@ MAKE = ("identify", "-o", "own.toml")
 BATCH = cut(0, 4, "batch", "--do", "estimate", "--observer", "gmo", "-o", "b", "--workers", "0")
 W = "wrench/fx|wrench/fy|wrench/fz|wrench/mx|wrench/my|wrench/mz"
 TRUTH = f"file:{FIXTURES / 'ur5_circle.csv.truth.parquet'}"
-TWICE = beside(cut(0, 4, *EST, "--wrench", "--remove-bias", "model", "--free", "0.3:3.9"),
-               "--zero", free_log)  # fmt: skip
 ONE_LOG = beside(cut(0, 9, *TWO, "--period", "4"), "--free", free_log)
 BOTH_GAINS = beside(beside(cut(0, 4, *EST), "--gains", gains), "--set-file", gains)
 WHOLE_CAUSAL = cut(0, 4, *EST, "--remove-bias", "whole-log", "--causal")
 PRINTED_MATCHED = cut(0, 4, *EST, "--match", "delay=0.05", "--as-printed")
-SENSOR_ZERO = beside(fixture("ur5_sensor.parquet", "0:6", "admit", "--sensor"), "--zero", free_log)
+LOG_AS_ZERO = beside(cut(0, 4, *EST, "--wrench"), "--zero", free_log)
 TOO_LONG = cut(0, 9, *TWO, "--period", "30")
 
 ROWS = [
@@ -231,8 +229,6 @@ ROWS = [
         "rtde"),
     Row("cannot log in a UR", simulated("panda-bearing", "-o", "sim", "--as", "rtde"), "as",
         "libfranka"),
-    Row("--zero LOG and --remove-bias each", TWICE, "zero", AWAY),
-    Row("--zero LOG and --remove-bias each", TWICE, "remove-bias", AWAY),
     Row("whole-log needs the complete log", WHOLE_CAUSAL, "remove-bias", AWAY),
     Row("whole-log needs the complete log", WHOLE_CAUSAL, "causal", AWAY),
     Row("give another solver", cut(0, 4, *EST, "--wrench", "--solver", "smoother", "--causal"),
@@ -246,10 +242,8 @@ ROWS = [
     Row("the forces lie on one line", fixture("ur5_sensor.parquet", "0:5", *SENSOR,
                                               "--sensor-pose", "fit"), "sensor-pose", "0,0,0.05"),
     Row("six components of a wrench", of_five_joints, "wrench", AWAY),
-    Row("--zero LOG removes what", SENSOR_ZERO, "zero", "0:1"),
-    Row("--zero LOG removes what", SENSOR_ZERO, "zero", "start"),
+    Row("name a log of free motion by --free", LOG_AS_ZERO, "zero", "0:1"),
     Row("no unloaded start", cut(4.5, 9, *EST, "--wrench", "--zero", "start"), "zero", "0:1"),
-    Row("no unloaded start", cut(4.5, 9, *EST, "--wrench", "--zero", "start"), "zero", free_log),
     Row("or take it all with --anyway", touched_late, "interval", "0:30.5"),
     Row("or take it all with --anyway", touched_late, "anyway", FLAG),
 ]  # fmt: skip
@@ -288,15 +282,13 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
         "is not a positive time in seconds", "is not a positive cutoff in Hz",
         "is not a list of cycle numbers such as", "names no cycle; they count from 1",
         "s; it must be positive", "is shorter than four samples", "is not a cutoff between 0 and",
-        "is neither A:B in seconds, nor start", "one positive number, or one for each of"),
+        "one positive number, or one for each of"),
     "says what cannot be combined, or not here; there is nothing to try": (
         "of the wrench's options it takes only --zero A:B", "is of an arm with … joints",
-        "and --force does not overwrite that either", "--zero takes one free run"),
+        "and --force does not overwrite that either"),
     "asks for another recording, or for poses that no fixture has": (
         "a log at rest identifies no friction", "have a partner in the free run",
-        "less than the period of", "no whole cycle of",
-        "cannot be weighed: the unloaded samples are all in one orientation",
-        "too few unloaded samples; name the unloaded spans"),
+        "less than the period of", "no whole cycle of"),
     "only Python gets as far; the command line refuses such a log or word first": (
         "samples are not finite; leave them out with --interval",
         "nothing to identify: give --method", "… has … joints, … has …: a free run must be"),

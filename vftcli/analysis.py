@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from vftcli.repetition.free_motion import FreeMotion
     from vftcli.repetition.free_run import ModelledRun
     from vftcli.signals.wrench import Wrench
-    from vftcli.virtual_sensor.detection import ContactScore
     from vftcli.virtual_sensor.sensor_reading import SensorReading
     from vftcli.virtual_sensor.smoother.observer_wrench import SmootherInput
 
@@ -44,7 +43,6 @@ class Analysis(Shown):
         reference: What the estimates are judged by, or None.
         errors: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
         contacts: What touched the arm, or None where it is not asked or cannot be told.
-        contact_scores: How each observer tells contacts, or empty where it was not asked.
         published: A printed table beside these errors, or None where none was asked for.
         examinations: What is wrong with the log, then with its free runs.
         remarks: What the reader of the numbers should know, as `Remarks`.
@@ -60,7 +58,6 @@ class Analysis(Shown):
     reference: ExternalTorque | None = None
     errors: "pl.DataFrame | None" = None
     contacts: "ContactList | None" = None
-    contact_scores: "tuple[ContactScore, ...]" = ()
     published: "Comparison | None" = None
     examinations: "tuple[Examination, ...]" = ()
     remarks: tuple[Remark, ...] = ()

@@ -71,11 +71,6 @@ class AnalysisChoice:
     )
 
     def __post_init__(self) -> None:
-        if self.zero_log is not None and self.refinement.removes_bias:
-            raise ParameterError(
-                "--zero LOG and --remove-bias each take off what the observers read untouched, "
-                "together they would take it off twice; give one of them"
-            )
         if self.observers.causal and self.refinement.corrects_all:
             raise ParameterError(
                 "--remove-bias whole-log needs the complete log, which --causal leaves out; "
@@ -86,11 +81,6 @@ class AnalysisChoice:
                 "--solver smoother needs the complete log, which --causal leaves out; "
                 "give another solver, as pinv"
             )
-
-    @property
-    def zero_log(self) -> Path | None:
-        """The free run whose torque is the zero of the wrench, None without one."""
-        return self.wrench.zero.log if self.wrench is not None else None
 
     @property
     def looks_back(self) -> bool:
@@ -232,15 +222,12 @@ def read(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Mod
     """Read the log's free runs, each once."""
     literal = choice.observers.as_printed
     log = models.of(recording, robot, literal=literal)
-    runs: dict[Path | None, FreeRun] = {}
-    # One file may be the free run of several options.
-    for path in {*choice.free.logs, choice.zero_log}:
-        if path is not None:
-            free = choice.library.open(path, choice.read.whole)
-            free = choice.examiner.taken(free, robot, choice.read)
-            runs[path] = FreeRun(run=models.of(free, robot, literal=literal), log=log)
-    given = tuple(runs[path] for path in choice.free.logs)
-    return FreeMotion(log=log, choice=choice.free, runs=given, zero=runs.get(choice.zero_log))
+    runs = []
+    for path in choice.free.logs:
+        free = choice.library.open(path, choice.read.whole)
+        free = choice.examiner.taken(free, robot, choice.read)
+        runs.append(FreeRun(run=models.of(free, robot, literal=literal), log=log))
+    return FreeMotion(log=log, choice=choice.free, runs=tuple(runs))
 
 
 def examine(motion: FreeMotion, choice: AnalysisChoice) -> tuple["Examination", ...]:
@@ -249,7 +236,7 @@ def examine(motion: FreeMotion, choice: AnalysisChoice) -> tuple["Examination", 
     Raises:
         ExaminationError: If a finding makes every result meaningless.
     """
-    runs = [motion.log, *(free.run for free in (*motion.runs, motion.zero) if free is not None)]
+    runs = [motion.log, *(free.run for free in motion.runs)]
     found = [choice.examiner.examine(run.recording, run.robot) for run in runs]
     if choice.spares_memory:
         let_go_of_examined(motion.log.recording, motion.log.robot)
@@ -340,7 +327,6 @@ def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
         observers,
         estimates,
         asked or WrenchChoice(),
-        analysis.terms_of,
         analysis.smoother_input,
         gate_of(analysis, asked),
     )

@@ -32,9 +32,9 @@ def comes_in_blocks(recording: Recording, robot: Robot, choice: AnalysisChoice) 
         return False
     names = choice.observers.names
     if wrench is not None:
-        asked = (wrench.torque_sd, wrench.sensor_pose, *wrench.zero.spans, wrench.zero.log)
+        asked = (wrench.torque_sd, wrench.sensor_pose, *wrench.zero.spans)
         smooths = any(map(wrench.smooths, names))
-        if smooths or wrench.zero.start or wrench.sensor_weight or any(asked):
+        if smooths or wrench.zero.start or any(asked):
             return False
     timing = recording.long.timing
     observers, _ = choice.observers.build(robot, timing.step)

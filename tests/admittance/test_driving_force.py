@@ -52,12 +52,6 @@ def test_the_logs_sensor_drives_as_the_log_states_it() -> None:
     assert [r.code for r in unstated.remarks] == ["wrench-frame-unstated", "sensor-pose-unstated"]
 
 
-def test_no_free_run_zeroes_a_sensor(tmp_path) -> None:
-    log = Recording(t=T, q=Q, wrench=WRENCH, wrench_frame=BASE)
-    with pytest.raises(ParameterError, match="in a free run"):
-        sensor_force(log, UR5, choice(log=tmp_path))
-
-
 def truth(path: Path, **columns: np.ndarray) -> Path:
     pl.DataFrame({"t": T, **columns}).write_parquet(path)
     return path

@@ -167,6 +167,21 @@ def test_frames_without_a_number_stop_it_or_are_marked(dataset: Path, tmp_path: 
 
 
 @pytest.mark.slow
+def test_poses_that_hide_the_wrench_stop_it(dataset: Path, tmp_path: Path) -> None:
+    def stretch(positions: np.ndarray) -> None:
+        positions[:200, 3] = -0.5  # J4 of episode 0: σ_min .004 m
+
+    def still(velocities: np.ndarray) -> None:
+        velocities[:200, 3] = 0.0
+
+    edited(dataset, "observation.state", stretch)
+    edited(dataset, "observation.velocity", still)
+    by_map = ForceChoice(wrench=WrenchChoice(solver="map"), anyway=True)
+    with pytest.raises(LogError, match="--solver smoother has a wrench in every pose"):
+        made(dataset, tmp_path / "copy", by_map)
+
+
+@pytest.mark.slow
 def test_what_tells_no_forces_is_refused_and_leaves_nothing(dataset: Path, tmp_path: Path) -> None:
     def zero(values: np.ndarray) -> None:
         values[:, :4] = 0.0

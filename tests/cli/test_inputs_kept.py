@@ -37,7 +37,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "convert link.csv -o ./log.csv",
         "estimate estimates.parquet --robot ur5 -o .",
         "estimate log.csv --free recording.rrd --robot ur5 --rrd -o .",
-        "estimate log.csv --zero recording.rrd --robot ur5 --rrd -o .",
         "report log.csv --robot ur5 --reference file:estimates.parquet -o .",
         "identify log.csv --robot arm.toml -o arm.toml",
         "tune log.csv --robot arm.toml -o arm.toml",

@@ -64,7 +64,7 @@ BAD = {
     "--solver": ("qr", "no solver 'qr'"),
     "--tool": ("1,2", "--tool"),
     "--sensor-pose": ("hand", "--sensor-pose"),
-    "--zero": ("nowhere", "is neither A:B in seconds, nor start, nor a log that exists"),
+    "--zero": ("nowhere", "is neither A:B with A < B, in seconds, nor start; name a log"),
     "--torque-sd": ("some", "--torque-sd"),
     "--derive": ("tau", "--derive 'tau'"),
     "--reference": ("magic", "no reference 'magic'"),
@@ -124,7 +124,7 @@ def test_the_same_bad_value_is_refused_with_the_same_line(
 def test_every_shared_option_is_tried() -> None:
     """A new option of several commands needs its bad value here, or is one that takes all."""
     takes_all = {"--output", "--help", "--json", "--force", "--causal", "--wrench", "--as-printed",
-                 "--sensor-weight", "--contacts", "--no-contacts", "--reference-columns",
+                 "--contacts", "--no-contacts", "--reference-columns",
                  "--anyway", "--mcap", "--layouts", "--open", "--details", "--quiet",
                  "--latex"}  # fmt: skip
     count: dict[str, int] = {}
@@ -157,7 +157,7 @@ def test_a_command_that_reads_a_log_reads_it_as_all_do(command: str) -> None:
 
 @pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
 def test_a_command_that_estimates_takes_all_that_can_be_asked(command: str) -> None:
-    whole = {*BAD, "--causal", "--wrench", "--as-printed", "--sensor-weight"}
+    whole = {*BAD, "--causal", "--wrench", "--as-printed"}
     whole -= {"--reference", "--figures", "--rrd-detail"}  # what is compared, shown, written
     assert set(parameters(command)) >= whole
 

@@ -74,7 +74,7 @@ def test_contacts_stand_below_the_errors() -> None:
         false_alarms_per_h=7.5,
         delay=(0.1, 0.3, np.nan),
     )
-    score = ContactScore(name="gmo", signal="torque", detection=detection, curve=(), found=())
+    score = ContactScore(name="gmo", signal="torque", detection=detection)
     errors = pl.DataFrame({"recording": ["log"], "observer": ["gmo"]})
     row = with_contacts(errors, "log", "truth", [score]).row(1, named=True)
     assert row["contacts"] == 3

@@ -77,7 +77,7 @@ OPTIONS = {
     "--friction": lambda rng: pick(rng, ("none", "profile", "x")),
     "--format": lambda rng: pick(rng, ("table", "ur-csv", "libfranka-csv", "npz", "x", "")),
     "--frame": lambda rng: pick(rng, ("flange", "base", "tool", "sensor", "x")),
-    "--solver": lambda rng: pick(rng, ("pinv", "damped", "map", "x")),
+    "--solver": lambda rng: pick(rng, ("pinv", "map", "x")),
     "--tool": pose,
     "--sensor-pose": pose,
     "--torque-sd": lambda rng: str(pick(rng, (*NUMBERS, "own"))),

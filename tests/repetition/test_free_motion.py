@@ -120,9 +120,7 @@ def test_the_covered_time_is_in_seconds(part_of: Make, circle: ModelledRun) -> N
     assert remark.values["deviation_mrad"] < 3.0  # the arm gives way where it is pushed
 
 
-def test_the_log_itself_is_no_free_run_and_no_zero(circle: ModelledRun) -> None:
+def test_the_log_itself_is_no_free_run(circle: ModelledRun) -> None:
     run = FreeRun(run=ModelledRun(recording=circle.recording, robot=ROBOT), log=circle)
     with pytest.raises(ReferenceTorqueError, match="is the log itself"):
         FreeMotion(log=circle, runs=(run,))
-    with pytest.raises(ReferenceTorqueError, match="is the log itself"):
-        FreeMotion(log=circle, zero=run)

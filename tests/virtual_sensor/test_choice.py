@@ -1,7 +1,5 @@
 """What a user may choose of the virtual sensor: one meaning of each option."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -19,7 +17,6 @@ from vftcli.virtual_sensor.choice import FIT, WrenchChoice, ZeroChoice
         {"tool": "0,0,0.1"},
         {"sensor_pose": FIT},
         {"zero": ["1:2"]},
-        {"sensor_weight": True},
         {"torque_sd": "own"},
     ],
 )
@@ -48,26 +45,17 @@ def test_a_named_solver_is_every_observers(name: str) -> None:
     assert WrenchChoice(solver="map").by_pose == "map"
 
 
-def test_a_zero_is_spans_the_start_or_a_log(tmp_path: Path) -> None:
-    log = tmp_path / "free.csv"
-    log.touch()
+def test_a_zero_is_spans_or_the_start() -> None:
     assert ZeroChoice.parsed(["1:2", "8:9"]).spans == ((1.0, 2.0), (8.0, 9.0))
     assert ZeroChoice.parsed(["start"]) == ZeroChoice(start=True)
-    both = ZeroChoice.parsed([str(log), "start"])
-    assert (both.log, both.start) == (log, True)
     assert ZeroChoice.parsed([]) == ZeroChoice()
-
-
-def test_a_log_may_hold_a_colon_in_its_name(tmp_path: Path) -> None:
-    log = tmp_path / "12:30.csv"
-    log.touch()
-    assert ZeroChoice.parsed([str(log)]).log == log
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["nowhere.csv"], "neither A:B in seconds, nor start, nor a log that exists"),
+        (["free.csv"], "nor start; name a log of free motion by --free LOG"),
+        (["12:30.csv"], "nor start; name a log of free motion by --free LOG"),
         (["start", "1:2"], "either start or spans A:B"),
         (["2:1"], "A:B with A < B"),
     ],
@@ -75,14 +63,6 @@ def test_a_log_may_hold_a_colon_in_its_name(tmp_path: Path) -> None:
 def test_a_zero_that_is_none(words: list[str], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         ZeroChoice.parsed(words)
-
-
-def test_two_free_runs_are_no_zero(tmp_path: Path) -> None:
-    logs = [tmp_path / "a.csv", tmp_path / "b.csv"]
-    for log in logs:
-        log.touch()
-    with pytest.raises(ParameterError, match="one free run"):
-        ZeroChoice.parsed([str(log) for log in logs])
 
 
 @pytest.mark.parametrize("wrong", [{"frame": "wrist"}, {"solver": "svd"}])

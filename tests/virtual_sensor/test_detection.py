@@ -24,7 +24,6 @@ from vftcli.virtual_sensor.detection import (
     read_in_free_runs,
     true_intervals,
 )
-from vftcli.virtual_sensor.free_run_torque import as_modelled
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 from vftcli.virtual_sensor.zero import zero_drift
@@ -89,7 +88,7 @@ def test_settling_is_no_contact() -> None:
     tau = reference(2.0).tau + np.exp(-5.0 * T)[:, None] * 50.0
     (score,) = judge_contacts([ExternalTorque(name="gmo", t=T, tau=tau)], None, reference(2.0))
     assert score.detection.false_alarms == 0
-    assert [round(c.start, 1) for c in score.found] == [5.0]
+    assert score.detection.delay == (0.0,)
 
 
 def reading(values: np.ndarray, zero: tuple[float, float] | None) -> SensorReading:
@@ -132,14 +131,14 @@ def test_false_alarms_count_by_the_hour_of_the_whole_log() -> None:
 
 
 def test_what_is_listed_is_judged_as_it_stands() -> None:
-    """Two rows for one push: one is credited, the other a piece; no band, no curve."""
+    """Two rows for one push: one is credited, the other a piece."""
     told = ToldContacts(
         untouched=np.zeros(len(T), dtype=bool),
-        listed={"best": (ContactInterval(5.0, 5.8, 1.0), ContactInterval(6.0, 7.0, 1.0))},
+        listed={"best": (ContactInterval(5.0, 5.8), ContactInterval(6.0, 7.0))},
     )
     best = ExternalTorque(name="best", t=T, tau=np.zeros((len(T), 2)))
     (score,) = judge_contacts([best], None, reference(2.0), told)
-    assert (score.signal, score.curve) == ("list", ())
+    assert score.signal == "list"
     assert (score.detection.found, score.detection.listed, score.detection.split) == (1, 2, 1)
 
 
@@ -166,10 +165,14 @@ def test_observers_are_run_along_free_runs() -> None:
     run = ModelledRun(recording=log, robot=load_robot("ur5"))
     piece = FreePiece(run, (log.t > 0.3) & (log.t < 4.0), ())
     gmo = MomentumObserver(gain=10.0)
-    torques = read_in_free_runs([piece], [gmo], as_modelled, None)["gmo"]
+
+    def read_by(pieces, sensor):
+        return read_in_free_runs(pieces, [gmo], lambda _name, run: run.terms, sensor)
+
+    torques = read_by([piece], None)["gmo"]
     # From the settling, at 1 s, to 4 s.
     settled = (log.t >= 1.0) & (log.t < 4.0)
     np.testing.assert_array_equal(torques, gmo.estimate(run.terms).tau[settled])
-    wrenches = read_in_free_runs([piece], [gmo], as_modelled, VirtualSensor(frame="base"))["gmo"]
+    wrenches = read_by([piece], VirtualSensor(frame="base"))["gmo"]
     assert wrenches.shape == (len(torques), 6)
-    assert read_in_free_runs([], [gmo], as_modelled, None) == {}
+    assert read_by([], None) == {}

@@ -17,7 +17,7 @@ from vftcli.signals.pose import IDENTITY, Pose, rpy_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
 from vftcli.virtual_sensor.frames import FRAMES, Mounting, from_base
-from vftcli.virtual_sensor.log_wrench import logged_wrench, placement, sensor_reading_of
+from vftcli.virtual_sensor.log_wrench import logged_wrench, placement
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 UR5 = load_robot("ur5")
@@ -184,13 +184,3 @@ def test_a_wrench_of_zeros_is_no_reference() -> None:
         logged_wrench(log(None, np.zeros((30, 6))), UR5.chain, Mounting())
     with pytest.raises(MissingSignalError, match="no wrenches"):
         logged_wrench(Recording(t=np.arange(30.0), q=Q), UR5.chain, Mounting())
-
-
-def test_only_sensor_axes_tell_a_sensors_pose_and_weight() -> None:
-    by = WrenchFrame("sensor", "sensor", "by-robot")
-    np.testing.assert_array_equal(sensor_reading_of(log(by), "--sensor-weight"), -READ)
-    np.testing.assert_array_equal(sensor_reading_of(log(None), "--sensor-weight"), READ)
-    with pytest.raises(
-        ParameterError, match=r"--sensor-weight: .* in base axes .*wrench\[sensor\]"
-    ):
-        sensor_reading_of(log(WrenchFrame("base", "flange")), "--sensor-weight")

@@ -1,7 +1,6 @@
 """Zero drift: removed, reported, and suspected where it is a contact."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -136,5 +135,3 @@ def test_a_sensors_own_zero_is_removed_by_the_same_choice() -> None:
     by_start = without_zero(wrench, ZeroChoice(start=True))
     np.testing.assert_allclose(by_start.values, clean.values, atol=1e-12)
     assert without_zero(wrench, ZeroChoice()) is wrench
-    with pytest.raises(ParameterError, match="in a free run"):
-        without_zero(wrench, ZeroChoice(log=Path("free.csv")))

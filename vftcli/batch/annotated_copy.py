@@ -267,7 +267,7 @@ def refuse_missing(record: Mapping[str, Any]) -> None:
     if record["status"] == "part":
         name, count = next(iter(record["missing_frames"].items()))
         why = (
-            "in these poses it cannot be told; --solver damped or map says something everywhere"
+            "in these poses it cannot be told; --solver smoother has a wrench in every pose"
             if name == "wrench"
             else "a value of the log is no number there"
         )

@@ -336,7 +336,7 @@ def looped(
     choice = chosen(analysis)
     assert choice.wrench is not None, "`chosen` asks for one"
     zero = choice.wrench.zero
-    if zero.start or zero.log is not None:
+    if zero.start:
         raise ParameterError("--closed-loop holds still over a span: give it as --zero A:B")
     scenario = load_scenario(str(loop.closed_loop), ())
     arm = load_robot(scenario.robot)

@@ -199,7 +199,7 @@ def inputs_of(values: Mapping[str, Any]) -> list[Path]:
             if name == "output" or not isinstance(path, Path):
                 continue
             # A word without an ending is a name of ours, as of a robot, where no log is asked for.
-            if path is word or path.suffix or name.endswith(("free", "zero")):
+            if path is word or path.suffix or name.endswith("free"):
                 found.append(path)
     return found
 

@@ -184,11 +184,10 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
     )
     solver: str | None = option(
         "--solver",
-        "smoother|pinv|damped|map",
+        "smoother|pinv|map",
         "How torques become a wrench: smoothed over the whole log with a band in every pose "
         "(default for best: zero outside of the listed contacts), least squares (default for the "
-        "others), damped, or with a prior of "
-        "50 N and 10 N·m. Implies --wrench.",
+        "others), or with a prior of 50 N and 10 N·m. Implies --wrench.",
         seldom=True,
     )
     tool: str | None = option(
@@ -206,14 +205,9 @@ class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
     )
     zero: Words = option(
         "--zero",
-        "A:B|start|LOG",
-        "Unloaded span whose mean comes off. Also the unloaded start, or a free run. Repeat A:B to "
-        "see the drift between spans. Implies --wrench.",
-    )
-    sensor_weight: bool = flag(
-        "--sensor-weight",
-        "Weigh the sensor's own tool in the unloaded spans and remove it from its reading.",
-        seldom=True,
+        "A:B|start",
+        "Unloaded span whose mean comes off. Also the unloaded start. Repeat A:B to see the "
+        "drift between spans. Implies --wrench.",
     )
     torque_sd: str | None = option(
         "--torque-sd",

@@ -61,10 +61,7 @@ def events(t: Array, level: Array) -> tuple[ContactInterval, ...]:
     if not len(above):
         return ()
     parts = np.split(above, np.flatnonzero(np.diff(t[above]) >= APART) + 1)
-    return tuple(
-        ContactInterval(float(t[part[0]]), float(t[part[-1]]), float(level[part].max()))
-        for part in parts
-    )
+    return tuple(ContactInterval(float(t[part[0]]), float(t[part[-1]])) for part in parts)
 
 
 class Threshold(NamedTuple):

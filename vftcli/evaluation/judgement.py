@@ -16,7 +16,7 @@ from vftcli.refinement.paper_gap import EXPECTED, MEASURED, gap_remark
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark
-from vftcli.virtual_sensor.detection import ContactScore, ToldContacts, judge_contacts
+from vftcli.virtual_sensor.detection import ToldContacts, judge_contacts
 from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference
 
 
@@ -27,13 +27,11 @@ class Judgement(NamedTuple):
         reference: What they are judged by.
         errors: The tidy error table (`vftcli.evaluation.SCHEMA`).
         virtual_sensor: The wrenches, with the reference's beside them; None without wrenches.
-        contacts: How each observer tells contacts, or empty where it was not asked.
     """
 
     reference: ExternalTorque
     errors: pl.DataFrame
     virtual_sensor: SensorReading | None
-    contact_scores: tuple[ContactScore, ...]
 
 
 def with_measured_gap(
@@ -79,7 +77,7 @@ def judge(
     source = ReferenceSource(motion=motion)
     if sensed is not None:
         mounting = sensed.sensor.mounting
-        source = ReferenceSource(motion=motion, mounting=mounting, logged=sensed.logged)
+        source = ReferenceSource(motion=motion, mounting=mounting)
     made = make_reference(source, choice)
     reference = made.torque
     errors = evaluate(recording.name, estimates, reference)
@@ -87,10 +85,7 @@ def judge(
         theirs = reference_wrench(recording, robot, made, sensed.sensor)
         sensed = with_reference(sensed, theirs, of_sensor=choice.name == "sensor")
         errors = with_wrenches(errors, recording.name, sensed)
-    scores: tuple[ContactScore, ...] = ()
     if choice.contacts:
         scores = judge_contacts(estimates, sensed, reference, told)
         errors = with_contacts(errors, recording.name, reference.name, scores)
-    return Judgement(
-        reference=reference, errors=errors, virtual_sensor=sensed, contact_scores=scores
-    )
+    return Judgement(reference=reference, errors=errors, virtual_sensor=sensed)

@@ -10,7 +10,6 @@ from vftcli.evaluation.reference_sensor import sensor_reference
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.two_cycle import two_cycle_reference
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import NOTHING, Mounting
 
 FILE = "file:"
@@ -59,12 +58,10 @@ class ReferenceSource:
     Attributes:
         motion: The log that is compared, its robot, and its free motion.
         mounting: Where tool and sensor sit on the flange.
-        logged: The log's own wrench without its tool's weight, None where it was not weighed.
     """
 
     motion: FreeMotion
     mounting: Mounting = NOTHING
-    logged: Wrench | None = None
 
 
 REFERENCES: dict[str, Callable[[ReferenceSource], ReferenceLoad]] = {
@@ -72,7 +69,7 @@ REFERENCES: dict[str, Callable[[ReferenceSource], ReferenceLoad]] = {
     "vendor": lambda source: vendor_reference(source.motion.log.recording),
     "two-cycle": lambda source: ReferenceLoad(torque=two_cycle_reference(source.motion)),
     "sensor": lambda source: sensor_reference(
-        source.motion.log.recording, source.motion.log.robot, source.mounting, source.logged
+        source.motion.log.recording, source.motion.log.robot, source.mounting
     ),
 }
 """Name at the command line → what makes it; ``file:PATH`` is the one name with a path in it."""

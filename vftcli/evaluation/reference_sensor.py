@@ -15,7 +15,7 @@ from vftcli.virtual_sensor.log_wrench import logged_wrench
 
 
 def sensor_reference(
-    recording: Recording, robot: Robot, mounting: Mounting = NOTHING, wrench: Wrench | None = None
+    recording: Recording, robot: Robot, mounting: Mounting = NOTHING
 ) -> ReferenceLoad:
     """τ_ext = J_Fᵀ w of the wrench that the log holds.
 
@@ -23,14 +23,13 @@ def sensor_reference(
         recording: The log.
         robot: The arm.
         mounting: Where tool and sensor sit on the flange.
-        wrench: The log's wrench in base axes without its tool's weight, None to take it as it is.
 
     Raises:
         MissingSignalError: If the log has no wrench, or one that is all zeros.
         ParameterError: If the wrench's frame is not one there is.
     """
     check_joints(recording, robot)
-    wrench = wrench or logged_wrench(recording, robot.chain, mounting)
+    wrench = logged_wrench(recording, robot.chain, mounting)
     remarks = (caution("reference-sensor"), *wrench.remarks)
     return ReferenceLoad(
         torque=torque_of(wrench, recording, robot, "sensor", remarks), wrench=wrench

@@ -68,7 +68,6 @@ class FreeMotion(Shown):
         log: The log.
         choice: What the user says is free.
         runs: Free runs in other recordings.
-        zero: The free run whose torque is the zero of a wrench; it may be one of `runs`.
 
     Raises:
         ReferenceTorqueError: If a free run is the log itself, or two free runs are one.
@@ -77,27 +76,18 @@ class FreeMotion(Shown):
     log: ModelledRun
     choice: FreeChoice = field(default_factory=FreeChoice)
     runs: tuple[FreeRun, ...] = ()
-    zero: FreeRun | None = None
 
     def __post_init__(self) -> None:
         refuse_repeated_runs(self.log.recording, [run.recording for run in self.runs])
-        if self.zero is not None:
-            refuse_repeated_runs(self.log.recording, [self.zero.recording])
 
     @property
     def steadied(self) -> "FreeMotion":
         """The motion without samples that stand alone; itself where there are none."""
-        log, zero = self.log.steadied, self.zero
-        runs = (*self.runs, *(() if zero is None else (zero,)))
-        if log is self.log and all(run.run is run.run.steadied for run in runs):
+        log = self.log.steadied
+        if log is self.log and all(run.run is run.run.steadied for run in self.runs):
             return self
-        made = [FreeRun(run=run.run.steadied, log=log) for run in runs]
-        return replace(
-            self,
-            log=log,
-            runs=tuple(made[: len(self.runs)]),
-            zero=None if zero is None else made[-1],
-        )
+        runs = tuple(FreeRun(run=run.run.steadied, log=log) for run in self.runs)
+        return replace(self, log=log, runs=runs)
 
     @cached_property
     def period(self) -> "Period":
@@ -202,12 +192,10 @@ class FreeMotion(Shown):
         return FreePart(tuple(pieces), own, tuple(remarks))
 
     def unloaded(self, spans: tuple[tuple[float, float], ...]) -> "FreeMotion":
-        """The log with its unloaded spans or its zero run as free motion, where none is given."""
-        if self.choice.is_given or not (spans or self.zero):
+        """The log with its unloaded spans as free motion, where none is given."""
+        if self.choice.is_given or not spans:
             return self
-        if spans:
-            return replace(self, choice=replace(self.choice, spans=spans))
-        return replace(self, runs=() if self.zero is None else (self.zero,))
+        return replace(self, choice=replace(self.choice, spans=spans))
 
     @property
     def repeats(self) -> bool:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError
@@ -30,7 +29,6 @@ class ZeroChoice:
     Attributes:
         spans: Unloaded spans of the log: the first is the zero, further ones show its drift. [s]
         start: Whether the unloaded start is to be found and taken.
-        log: A log of the arm unloaded, or None.
 
     Raises:
         ParameterError: If both spans and the start are chosen.
@@ -38,7 +36,6 @@ class ZeroChoice:
 
     spans: tuple[tuple[float, float], ...] = ()
     start: bool = False
-    log: Path | None = None
 
     def __post_init__(self) -> None:
         if self.spans and self.start:
@@ -46,27 +43,23 @@ class ZeroChoice:
 
     @classmethod
     def parsed(cls, words: Sequence[str]) -> "ZeroChoice":
-        """The choice that ``--zero A:B|start|LOG``, which may be repeated, states.
+        """The choice that ``--zero A:B|start``, which may be repeated, states.
 
         Raises:
-            ParameterError: If a word is none of the three, or they exclude each other.
+            ParameterError: If a word is neither, or they exclude each other.
         """
-        spans, logs = [], []
+        spans = []
         for text in words:
             if text == START:
                 continue
-            # A file that is there wins: its name may hold a colon.
-            if Path(text).exists():
-                logs.append(Path(text))
-            elif ":" in text:
+            try:
                 spans.append(interval(text))
-            else:
+            except ParameterError:
                 raise ParameterError(
-                    f"--zero {text!r} is neither A:B in seconds, nor start, nor a log that exists"
-                )
-        if len(logs) > 1:
-            raise ParameterError("--zero takes one free run, and either start or spans A:B")
-        return cls(spans=tuple(spans), start=START in words, log=logs[0] if logs else None)
+                    f"--zero {text!r} is neither A:B with A < B, in seconds, nor start; name a log "
+                    "of free motion by --free LOG"
+                ) from None
+        return cls(spans=tuple(spans), start=START in words)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +73,6 @@ class WrenchChoice:
         tool: The tool's pose as text or a name in the robot file, None for the file's own.
         sensor_pose: The sensor's pose likewise, or "fit".
         zero: What is taken as the zero.
-        sensor_weight: Whether the sensor's own tool is weighed in the unloaded spans and removed.
         torque_sd: Torque error the covariance starts from: "own", a number or one a joint as text,
             or None for the best that is known. [N·m]
 
@@ -93,7 +85,6 @@ class WrenchChoice:
     tool: str | None = None
     sensor_pose: str | None = None
     zero: ZeroChoice = field(default_factory=ZeroChoice)
-    sensor_weight: bool = False
     torque_sd: str | None = None
 
     def __post_init__(self) -> None:
@@ -139,25 +130,17 @@ class WrenchChoice:
         tool: str | None = None,
         sensor_pose: str | None = None,
         zero: Sequence[str] | None = None,
-        sensor_weight: bool = False,
         torque_sd: str | None = None,
     ) -> "WrenchChoice | None":
         """The choice that the options of a command state, None where none of them asks for one.
 
-        Args:
-            wrench: Whether ``--wrench`` was given; any other option of the sensor asks as well.
-            frame: Frame of the answer, None for the flange's.
-            solver: See the attribute.
-            tool: See the attribute, as the next.
-            sensor_pose: See the attribute.
-            zero: The words of every ``--zero``.
-            sensor_weight: See the attribute, as the next.
-            torque_sd: See the attribute.
+        `wrench` says whether ``--wrench`` was given, `zero` holds the words of every ``--zero``;
+        the others are fields. Any of them asks for a wrench.
 
         Raises:
             ParameterError: If a frame or solver does not exist, or a zero is malformed.
         """
-        options = (frame, solver, tool, sensor_pose, zero or None, torque_sd, sensor_weight or None)
+        options = (frame, solver, tool, sensor_pose, zero or None, torque_sd)
         if not wrench and all(option is None for option in options):
             return None
         return cls(
@@ -166,6 +149,5 @@ class WrenchChoice:
             tool=tool,
             sensor_pose=sensor_pose,
             zero=ZeroChoice.parsed(zero or ()),
-            sensor_weight=sensor_weight,
             torque_sd=torque_sd,
         )

@@ -6,12 +6,12 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask, seal
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.series import runs_of
 
 LEAVE = 0.6
-"""A contact ends where the score falls below this share of the threshold: hysteresis."""
+"""A contact ends where the score falls below this share of its threshold, 1: hysteresis."""
 
 HOLD = 0.02
 """A contact must last at least this long, so that one noisy sample is none. [s]"""
@@ -33,81 +33,55 @@ class ContactInterval(NamedTuple):
     Attributes:
         start: When the score rises above 1. [s]
         stop: When it has fallen below `LEAVE`. [s]
-        peak: Largest score in between: multiples of the free band.
     """
 
     start: float
     stop: float
-    peak: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class FreeBand:
-    """The band that a signal keeps within while nothing touches the arm.
+def departure(values: Array, quiet: Array, least: Array | float) -> Array:
+    """Largest departure over the columns, in half widths of the free band; 0 if unknown. (T,)
 
-    Attributes:
-        centre: Middle of the band. (k,)
-        half: Half its width. (k,)
-    """
-
-    centre: Array
-    half: Array
-
-    def __post_init__(self) -> None:
-        seal(self, "centre", "half")
-
-    def score(self, values: Array) -> Array:
-        """Largest departure over the columns, in half widths; 0 where nothing is known. (T,)"""
-        share = np.abs(values - self.centre) / self.half
-        worst: Array = np.nan_to_num(share, nan=0.0).max(axis=1)
-        return worst
-
-
-def free_band(values: Array, free: Mask, least: Array | float) -> FreeBand:
-    """The band of the free part: its median ± `BAND` × its largest departure.
+    The band is the median of what is read untouched ± `BAND` × its largest departure.
 
     Args:
         values: A wrench or joint torques, NaN where unknown. (T, k)
-        free: Samples of the free part. (T,)
-        least: Smallest half width, one or one a column. (k,)
+        quiet: The same where nothing touches the arm. (S, k)
+        least: Smallest half width, one or one a column.
 
     Raises:
-        ParameterError: If the free part holds no known sample.
+        ParameterError: If no sample of the free part is known.
     """
-    inside = values[free & np.all(np.isfinite(values), axis=1)]
+    inside = quiet[np.all(np.isfinite(quiet), axis=1)]
     if len(inside) == 0:
         raise ParameterError("the free part holds no sample in which the wrench is known")
     centre = np.median(inside, axis=0)
-    half = BAND * np.max(np.abs(inside - centre), axis=0)
-    return FreeBand(centre=centre, half=np.maximum(half, least))
+    half = np.maximum(BAND * np.max(np.abs(inside - centre), axis=0), least)
+    worst: Array = np.nan_to_num(np.abs(values - centre) / half, nan=0.0).max(axis=1)
+    return worst
 
 
-def find_contacts(
-    t: Array, score: Array, enter: float = 1.0, gap: float = GAP
-) -> tuple[ContactInterval, ...]:
-    """Intervals in which a score rises above `enter` until it falls below `LEAVE` of it.
+def find_contacts(t: Array, score: Array, gap: float = GAP) -> tuple[ContactInterval, ...]:
+    """Intervals in which a score rises above 1 until it falls below `LEAVE`.
 
     Those shorter than `HOLD` are dropped, those closer than `gap` joined.
 
     Args:
         t: Time. (T,) [s]
         score: Departure in half widths of the free band. (T,)
-        enter: Threshold, in half widths.
         gap: Two contacts closer than this are one. [s]
     """
     found: list[ContactInterval] = []
-    for begin, end in runs_of(score > LEAVE * enter):
-        above = score[begin:end] > enter
+    for begin, end in runs_of(score > LEAVE):
+        above = score[begin:end] > 1.0
         if not above.any():
             continue
-        # It starts where `enter` is first exceeded, not where the lower threshold is.
-        first = begin + int(np.argmax(above))
-        start, stop, peak = float(t[first]), float(t[end - 1]), float(score[first:end].max())
+        # It starts where 1 is first exceeded, not where the lower threshold is.
+        start, stop = float(t[begin + int(np.argmax(above))]), float(t[end - 1])
         # A hand that slips for a moment has not let go.
         if found and start - found[-1].stop < gap:
-            found[-1] = ContactInterval(found[-1].start, stop, max(found[-1].peak, peak))
-        else:
-            found.append(ContactInterval(start, stop, peak))
+            start = found.pop().start
+        found.append(ContactInterval(start, stop))
     return tuple(c for c in found if c.stop - c.start >= HOLD)
 
 
@@ -225,34 +199,3 @@ def match_contacts(
             for i, c in zip(given, true, strict=True)
         ),
     )
-
-
-class OperatingPoint(NamedTuple):
-    """One point of a receiver operating characteristic.
-
-    Attributes:
-        threshold: Multiple of the free band at which a contact begins.
-        found: Share of the true contacts that are found.
-        false_alarms_per_h: False alarms per hour without contact. [1/h]
-        delay: Mean detection delay. [s]
-    """
-
-    threshold: float
-    found: float
-    false_alarms_per_h: float
-    delay: float
-
-
-def operating_curve(
-    t: Array, score: Array, true: Sequence[ContactInterval], thresholds: Sequence[float]
-) -> tuple[OperatingPoint, ...]:
-    """Hits against false alarms as the threshold goes through `thresholds` (ROC)."""
-    duration = float(t[-1] - t[0])
-    points = []
-    for threshold in thresholds:
-        counts = match_contacts(find_contacts(t, score, threshold), true, duration)
-        found = 1.0 - counts.missed / counts.contacts if counts.contacts else float("nan")
-        points.append(
-            OperatingPoint(threshold, found, counts.false_alarms_per_h, counts.mean_delay)
-        )
-    return tuple(points)

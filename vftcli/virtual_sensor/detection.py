@@ -1,6 +1,6 @@
 """Contacts of every observer, or of a list, against the true ones, one to one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -8,6 +8,8 @@ import numpy as np
 
 from vftcli.observers.observer import Observer
 from vftcli.repetition.free_motion import FreePiece
+from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
@@ -16,13 +18,10 @@ from vftcli.virtual_sensor.contact import (
     ContactInterval,
     Detection,
     Interval,
-    OperatingPoint,
+    departure,
     find_contacts,
-    free_band,
     match_contacts,
-    operating_curve,
 )
-from vftcli.virtual_sensor.free_run_torque import TermsOf
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 from vftcli.virtual_sensor.zero import SETTLING
@@ -40,9 +39,6 @@ TRUE_GAP = 0.12
 """Contacts of an exact reference closer than this are one; those of a measured one, which has a
 floor, as those of an observer. [s]"""
 
-THRESHOLDS = tuple(float(x) for x in np.geomspace(0.1, 10.0, 41))
-"""Multiples of the free band of an operating curve."""
-
 
 class ContactScore(NamedTuple):
     """How one observer tells contacts.
@@ -51,15 +47,11 @@ class ContactScore(NamedTuple):
         name: The observer.
         signal: What it tells them from: "torque", "wrench", or "list" of contacts.
         detection: Counts and delays, of the free band itself or of the list.
-        curve: Hits against false alarms over `THRESHOLDS`; none of a list, which has no band.
-        found: The contacts it found.
     """
 
     name: str
     signal: str
     detection: Detection
-    curve: tuple[OperatingPoint, ...]
-    found: tuple[Interval, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,7 +72,7 @@ class ToldContacts:
 def read_in_free_runs(
     pieces: Sequence[FreePiece],
     observers: Sequence[Observer],
-    terms_of: TermsOf,
+    terms_of: Callable[[str, ModelledRun], DynamicsTerms],
     sensor: VirtualSensor | None,
 ) -> dict[str, Array]:
     """What each observer reads in free runs once it has settled: wrenches, or joint torques.
@@ -88,7 +80,7 @@ def read_in_free_runs(
     Args:
         pieces: The free samples of each run.
         observers: The observers.
-        terms_of: What each of them runs on.
+        terms_of: Name of an observer, and a recording → p and μ that it runs on.
         sensor: What makes their wrenches, None for joint torques.
 
     Returns:
@@ -175,50 +167,21 @@ def judge_contacts(
     t = reference.t
     duration = float(t[-1] - t[0])
     told = told or ToldContacts(untouched=np.zeros(len(t), dtype=bool))
-    zero = measured.free if measured is not None and measured.drifts else None
+    settled = t >= t[0] + SETTLING
+    quiet = told.untouched & settled
+    if measured is not None and measured.drifts:
+        quiet = measured.free
     found = []
     for name, values in signals.items():
         if name in told.listed:
-            rows = tuple(told.listed[name])
-            counts = match_contacts(rows, true, duration)
-            found.append(ContactScore(name, "list", counts, (), rows))
+            counts = match_contacts(told.listed[name], true, duration)
+            found.append(ContactScore(name, "list", counts))
             continue
-        quiet = untouched_values(values, told.beside.get(name), told.untouched, zero, (t, true))
+        free = values[quiet] if quiet.any() else told.beside.get(name, ())
+        if not len(free):
+            free = values[learned_free(t, true)]
         # Observers rise from zero: what they read before they have settled touches nothing.
-        band = free_band(quiet, np.ones(len(quiet), dtype=bool), least)
-        score = np.where(t < t[0] + SETTLING, 0.0, band.score(values))
-        here = find_contacts(t, score)
-        curve = operating_curve(t, score, true, THRESHOLDS)
-        found.append(ContactScore(name, kind, match_contacts(here, true, duration), curve, here))
+        score = np.where(settled, departure(values, np.asarray(free), least), 0.0)
+        counts = match_contacts(find_contacts(t, score), true, duration)
+        found.append(ContactScore(name, kind, counts))
     return tuple(found)
-
-
-def untouched_values(
-    values: Array,
-    beside: Array | None,
-    own: Mask,
-    zero: Mask | None,
-    true: tuple[Array, Sequence[ContactInterval]],
-) -> Array:
-    """What an observer reads where nothing touches the arm. (S, k)
-
-    Args:
-        values: What it reads of the log. (T, k)
-        beside: What it reads in free runs, None without any. (S, k)
-        own: The log's own free samples; none where nothing is known. (T,)
-        zero: Samples of the zero spans, None without any. (T,)
-        true: Time, and the true contacts.
-
-    Raises:
-        ParameterError: If nothing tells.
-    """
-    t, contacts = true
-    chosen = own & (t >= t[0] + SETTLING)
-    if zero is not None:
-        chosen = zero
-    elif not chosen.any():
-        if beside is not None and len(beside):
-            return beside
-        chosen = learned_free(t, contacts)
-    found: Array = values[chosen]
-    return found

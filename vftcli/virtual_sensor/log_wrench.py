@@ -114,28 +114,3 @@ def in_base_axes(recording: Recording, chain: Chain, mounting: Mounting) -> Wren
         frame="base",
         remarks=(*why, *where.remarks),
     )
-
-
-def sensor_reading_of(recording: Recording, option: str) -> Array:
-    """The log's wrench as force on the robot in sensor axes, for what only a sensor's axes tell.
-
-    Args:
-        recording: The log.
-        option: The option that needs it, for the message.
-
-    Returns:
-        Force, then moment. (T, 6) [N, N·m]
-
-    Raises:
-        MissingSignalError: If the log has no wrench.
-        ParameterError: If the log states other axes than a sensor's.
-    """
-    values = recording.require("wrench")
-    frame = recording.wrench_frame or UNSTATED
-    if frame.axes != "sensor":
-        raise ParameterError(
-            f"{option}: the log's wrench is in {frame}, not in sensor axes; name it with --columns "
-            "wrench[sensor]=…, or leave the option out"
-        )
-    reading: Array = frame.factor * values
-    return reading

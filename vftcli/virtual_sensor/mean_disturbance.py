@@ -13,9 +13,6 @@ from vftcli.signals.arrays import handed_over
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.series import resample_columns
 
-DISTURBANCE = "disturbance"
-"""Its name."""
-
 HALF = 0.05
 """Half the time it is averaged over: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]"""
 
@@ -28,9 +25,9 @@ def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
     """
     t, joints = terms.t, terms.joints
     if len(t) < 2:
-        return ExternalTorque(name=DISTURBANCE, t=t, tau=np.zeros((len(t), joints)))
+        return ExternalTorque(name="disturbance", t=t, tau=np.zeros((len(t), joints)))
     total = disturbance_impulse(terms)
     before, after = np.maximum(t - HALF, t[0]), np.minimum(t + HALF, t[-1])
     mean = resample_columns(after, t, total) - resample_columns(before, t, total)
     mean /= (after - before)[:, None]
-    return ExternalTorque(name=DISTURBANCE, t=t, tau=handed_over(mean))
+    return ExternalTorque(name="disturbance", t=t, tau=handed_over(mean))

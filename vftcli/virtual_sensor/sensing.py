@@ -16,17 +16,9 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
-from vftcli.virtual_sensor.free_run_torque import (
-    FreeRunTorque,
-    TermsOf,
-    as_modelled,
-    free_run_torque,
-    less_free_run,
-)
-from vftcli.virtual_sensor.log_wrench import logged_wrench
-from vftcli.virtual_sensor.mean_disturbance import DISTURBANCE, mean_disturbance
-from vftcli.virtual_sensor.mounting import find_mounting, without_tool_weight
+from vftcli.virtual_sensor.mean_disturbance import mean_disturbance
 from vftcli.virtual_sensor.null_space import contact_elsewhere
+from vftcli.virtual_sensor.sensor import find_mounting
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.smoother.observer_wrench import (
     Gate,
@@ -61,7 +53,6 @@ def sense(
     observers: Sequence[Observer],
     estimates: Sequence[ExternalTorque],
     choice: WrenchChoice,
-    terms_of: TermsOf = as_modelled,
     input_of: InputOf | None = None,
     gate: Gate | None = None,
 ) -> SensorReading:
@@ -72,11 +63,10 @@ def sense(
     observers run.
 
     Args:
-        motion: The log, its robot, and the free run whose torque is the zero, if there is one.
+        motion: The log and its robot.
         observers: The observers, whose lag widens the band.
         estimates: Their torques, in the same order.
         choice: What is asked of the virtual sensor.
-        terms_of: What each observer runs on.
         input_of: What the smoother takes for an observer whose wrench it makes, by name; None for
             the log and its free part as they are.
         gate: The contacts, outside of which the smoother's wrench is zero; None where the whole log
@@ -84,29 +74,24 @@ def sense(
 
     Raises:
         ParameterError: If a pose or zero interval cannot be used, or cannot be found in the log.
-        MissingSignalError: If the log has no wrench and a sensor's pose or weight is asked for.
+        MissingSignalError: If the log has no wrench and a sensor's pose is asked for.
         RobotError: If the arm has fewer than six joints.
     """
     recording, robot, terms = motion.log.recording, motion.log.robot, motion.log.terms
     t, chain = recording.t, robot.chain
-    free_run = None
-    if motion.zero is not None:
-        free_run = free_run_torque(motion.zero, observers, terms_of)
-    (disturbance,) = less_free_run((mean_disturbance(terms),), free_run)
+    disturbance = mean_disturbance(terms)
     raw = VirtualSensor(frame="base").wrench(disturbance, recording.q, chain)
     mounting, found = find_mounting(recording, robot, disturbance, choice)
     # The disturbance was solved in base axes, so that --frame moves no zero.
     sensor = VirtualSensor(solver=choice.by_pose, frame=choice.frame, mounting=mounting)
-    torques = less_free_run(estimates, free_run)
     zero = zero_spans(choice.zero, raw)
-    error = torque_error(choice, motion, observers, torques, zero.chosen(t), free_run)
-    wrenches = sensor.wrenches(torques, recording.q, chain, dict(error.sd))
+    error = torque_error(choice, motion, observers, estimates, zero.chosen(t))
+    wrenches = sensor.wrenches(estimates, recording.q, chain, dict(error.sd))
     smoothed = smooth_all(
         motion,
         [wrench.name for wrench in wrenches if choice.smooths(wrench.name)],
         input_of,
         unloaded=zero.chosen(t),
-        torque=None if free_run is None else free_run.everywhere(DISTURBANCE),
         gate=gate,
     )
     wrenches = tuple(
@@ -134,25 +119,19 @@ def sense(
     free = zero.unloaded(t)
     vendor = check_vendor(recording, raw, chain)
     elsewhere = tuple(e for w in wrenches if (e := contact_elsewhere(w, free)) is not None)
-    logged = None
-    if choice.sensor_weight:
-        lighter, weight = without_tool_weight(recording, chain, mounting, free)
-        logged = logged_wrench(lighter, chain, mounting)
-        found += weight
     return SensorReading(
         sensor=sensor,
         wrenches=wrenches,
         masked=raw.hidden,
         drifts=tuple(chained.from_iterable(drifts)),
         free=free,
-        logged=logged,
         vendor=vendor,
         smoothed=smoothed,
         elsewhere=elsewhere,
         remarks=(
             *warnings,
             *found,
-            *(() if drifts or motion.zero else payload_remark(recording, robot)),
+            *(() if drifts else payload_remark(recording, robot)),
             *(
                 mask_remark(raw.hidden, raw.sigma_min)
                 if any(w.hidden.any() for w in wrenches)
@@ -160,7 +139,6 @@ def sense(
             ),
             *moved,
             *bands,
-            *(() if free_run is None else (free_run.remark,)),
             *(() if vendor is None else vendor.remarks),
             *(remark for e in elsewhere for remark in e.remarks),
         ),
@@ -191,27 +169,24 @@ def torque_error(
     observers: Sequence[Observer],
     torques: Sequence[ExternalTorque],
     free: Mask,
-    free_run: FreeRunTorque | None,
 ) -> TorqueError:
     """The torque error behind the band: what was given, else measured, else unknown.
 
     Args:
         choice: What is asked.
-        motion: The log, and the free run that is its zero, if there is one.
+        motion: The log.
         observers: The observers.
-        torques: Their estimates, less the zero.
+        torques: Their estimates.
         free: Samples of the zero spans; none if no zero was given. (T,)
-        free_run: What the free run reads, or None.
     """
     if choice.torque_sd is not None:
         return given_error(choice.torque_sd, torques)
     if torques and all(torque.error_sd is not None for torque in torques):
         return from_band(torques)
-    if free_run is None and np.count_nonzero(free) < 2:
+    if np.count_nonzero(free) < 2:
         return unknown_error()
-    quiet = motion.zero.run.terms if motion.zero is not None else None
-    missed = missed_torque(motion.log.terms, observers, quiet, free)
-    return from_free_part(motion.log, torques, free, free_run, missed)
+    missed = missed_torque(motion.log.terms, observers, free)
+    return from_free_part(motion.log, torques, free, missed)
 
 
 def payload_remark(recording: Recording, robot: Robot) -> tuple[Remark, ...]:

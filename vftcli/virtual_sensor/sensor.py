@@ -1,19 +1,23 @@
-"""A real force/torque sensor beside the virtual one: its pose, its tool's weight, its lag."""
+"""Pose of a real force/torque sensor on the flange: as asked, or found in the log."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.pose import Pose, rpy_angles, skew
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
+from vftcli.virtual_sensor.choice import FIT, WrenchChoice
+from vftcli.virtual_sensor.frames import Mounting
+from vftcli.virtual_sensor.log_wrench import UNSTATED
+from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 LEAST_DIRECTIONS = 0.02
 """Second to first singular value of the forces below which they lie on one line."""
-
-LEAST_TURN = 0.1
-"""Spread of the gravity direction (rms, each axis) below which poses cannot weigh a tool."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,85 +92,30 @@ def fit_pose(flange: Array, sensor: Array) -> PoseFit:
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class ToolWeight:
-    """What a sensor weighs, and its zero.
-
-    Attributes:
-        mass: Mass beyond the measuring element. [kg]
-        com: Its centre of mass in sensor axes. (3,) [m]
-        zero: The sensor's reading without weight. (6,) [N, N·m]
-        mass_sd: Standard deviation of the mass. [kg]
-        force_rms: Force left unexplained over the poses, rms. [N]
-    """
-
-    mass: float
-    com: Array
-    zero: Array
-    mass_sd: float
-    force_rms: float
-
-    def __post_init__(self) -> None:
-        seal(self, "com", "zero")
-
-    @property
-    def remark(self) -> Remark:
-        """What was weighed."""
-        return fact(
-            "sensor-tool-weighed",
-            mass_kg=self.mass,
-            mass_sd_kg=self.mass_sd,
-            com_mm=(self.com * 1e3).tolist(),
-            force_rms_N=self.force_rms,
-        )
-
-    def reading(self, rotation: Array, gravity: Array) -> Array:
-        """What the sensor reads of weight and zero. (T, 6) [N, N·m]
-
-        Args:
-            rotation: Orientation of the sensor in the base. (T, 3, 3)
-            gravity: Gravity vector in base axes. (3,) [m/s²]
-        """
-        weight = self.mass * np.einsum("tji,j->ti", rotation, gravity)
-        loaded: Array = np.concatenate([weight, np.cross(self.com, weight)], axis=1) + self.zero
-        return loaded
-
-
-def weigh_tool(sensor: Array, rotation: Array, gravity: Array) -> ToolWeight:
-    """Mass, centre of mass and zero from unloaded readings in several orientations.
-
-    Linear least squares: F = m Rᵀg + F₀ and N = (m c) × Rᵀg + N₀.
+def find_mounting(
+    recording: Recording, robot: Robot, disturbance: ExternalTorque, choice: WrenchChoice
+) -> tuple[Mounting, tuple[Remark, ...]]:
+    """Tool and sensor poses as asked, and what was found: ``fit`` estimates the sensor's pose.
 
     Args:
-        sensor: Readings as force on the robot, in sensor axes. (T, 6) [N, N·m]
-        rotation: Orientation of the sensor in the base. (T, 3, 3)
-        gravity: Gravity vector in base axes. (3,) [m/s²]
+        recording: The log.
+        robot: The arm.
+        disturbance: The torque whose wrench the sensor's reading is laid on.
+        choice: What is asked.
 
     Raises:
-        ParameterError: If the orientations are all alike, so that weight and zero cannot be told
-            apart.
+        ParameterError: If a pose is malformed, or cannot be found in the log.
+        MissingSignalError: If it is to be found and the log has no wrench.
     """
-    down = np.einsum("tji,j->ti", rotation, gravity)
-    centred = down - down.mean(axis=0)
-    turned = np.sqrt(np.mean(centred**2)) / np.linalg.norm(gravity)
-    if not turned > LEAST_TURN:
+    mounting = choice.mounting(robot)
+    if choice.sensor_pose != FIT:
+        return mounting, ()
+    reading, frame = recording.require("wrench"), recording.wrench_frame or UNSTATED
+    if frame.axes != "sensor":
         raise ParameterError(
-            "the sensor's tool cannot be weighed: the unloaded samples are all in one orientation "
-            f"(gravity turns by {turned:.2g} rms); give --zero spans in other poses"
+            f"--sensor-pose fit: the log's wrench is in {frame}, not in sensor axes; name it with "
+            "--columns wrench[sensor]=…, or leave the option out"
         )
-    force, moment = sensor[:, :3], sensor[:, 3:]
-    mass = float(np.sum(centred * force) / np.sum(centred**2))
-    zero = force.mean(axis=0) - mass * down.mean(axis=0)
-    left = force - mass * down - zero
-    # (m c) × Rᵀg is linear in m c, the first moment of the mass.
-    lever = skew(-centred).reshape(-1, 3)
-    moved = (moment - moment.mean(axis=0)).ravel()
-    first = np.linalg.lstsq(lever, moved, rcond=None)[0]
-    torque_zero = (moment - np.cross(first, down)).mean(axis=0)
-    return ToolWeight(
-        mass=mass,
-        com=first / mass if mass != 0.0 else np.zeros(3),
-        zero=np.concatenate([zero, torque_zero]),
-        mass_sd=float(np.sqrt(np.mean(left**2) / np.sum(centred**2))),
-        force_rms=float(np.sqrt(np.mean(left**2))),
-    )
+    ours = VirtualSensor(frame="flange").wrench(disturbance, recording.q, robot.chain)
+    fit = fit_pose(ours.known, frame.factor * reading)
+    return mounting._replace(sensor=fit.pose), (fit.remark,)

@@ -25,8 +25,6 @@ class SensorReading(Shown):
 
     Attributes:
         sensor: Solver, frame and mounting used.
-        logged: The log's own wrench less the weight of its sensor's tool, None where that was not
-            asked.
         wrenches: One an observer, drift removed where a zero was given.
         masked: Samples in which the pose cannot tell a wrench, whoever observes it. (T,)
         drifts: Zero drift, one an unloaded span and observer.
@@ -43,7 +41,6 @@ class SensorReading(Shown):
     masked: Mask
     drifts: tuple[Drift, ...] = ()
     free: Mask
-    logged: Wrench | None = None
     vendor: VendorCheck | None = None
     smoothed: Mapping[str, SmoothedWrench] = field(default_factory=dict)
     elsewhere: tuple[NullSpaceVerdict, ...] = ()

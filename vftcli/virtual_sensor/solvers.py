@@ -11,7 +11,6 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import RobotError
-from vftcli.signals.parsing import check_known
 
 LENGTH = 0.3
 """Length by which moments are made comparable with forces. [m]"""
@@ -21,9 +20,6 @@ SCALE = np.array([1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH])
 
 LEAST_SIGMA = 0.05
 """Below this σ_min of S J the pose cannot tell the wrench: 1 N·m of torque error is 20 N. [m]"""
-
-DAMPING = 0.05
-"""Damping δ of the damped solver, the singular value below which it starts to hold back. [m]"""
 
 PRIOR = np.repeat([50.0, 10.0 / LENGTH], 3)
 """Standard deviations of the MAP solver's prior about zero: 50 N and 10 N·m, of w_s. (6,) [N]"""
@@ -83,8 +79,13 @@ class Solution(NamedTuple):
     root: Array
 
 
-def spectral_gain(parts: Decomposition, inverse: Array) -> Array:
-    """S U diag(inverse) Uᵀ J_s, for functions of the squared singular values. (T, 6, n)"""
+def least_squares_gain(parts: Decomposition, left_out: float = 0.0) -> Array:
+    """S U diag(1/λ) Uᵀ J_s; no gain in singular values of at most `left_out` [m]. (T, 6, n)"""
+    # λ is a difference of larger numbers: below its rounding it may even be negative.
+    rounding = np.finfo(np.float64).eps * parts.squares[:, -1:]
+    inverse = 1.0 / np.maximum(parts.squares, rounding)
+    if left_out:
+        inverse = np.where(parts.squares > left_out**2, inverse, 0.0)
     U = parts.U
     gain: Array = SCALE[:, None] * (
         (U * inverse[:, None, :]) @ (np.swapaxes(U, 1, 2) @ parts.scaled)
@@ -92,30 +93,12 @@ def spectral_gain(parts: Decomposition, inverse: Array) -> Array:
     return gain
 
 
-def inverses(parts: Decomposition, left_out: float = 0.0) -> Array:
-    """1/λ, and 0 in directions whose singular value is at most `left_out` [m]. (T, 6) [1/m²]"""
-    # λ is a difference of larger numbers: below its rounding it may even be negative.
-    rounding = np.finfo(np.float64).eps * parts.squares[:, -1:]
-    safe = np.maximum(parts.squares, rounding)
-    return np.where(parts.squares > left_out**2, 1.0 / safe, 0.0) if left_out else 1.0 / safe
-
-
 def pinv(parts: Decomposition, sd: Array) -> Solution:
     """Least squares (46), the pseudo-inverse of Jᵀ: unbiased, and unbounded as σ_min → 0.
 
     Its covariance is that of the torque, seen through it.
     """
-    gain = spectral_gain(parts, inverses(parts))
-    return Solution(gain, gain * sd[:, None, :])
-
-
-def damped(parts: Decomposition, sd: Array) -> Solution:
-    """Damped least squares, 1/λ replaced by 1/(λ + δ²).
-
-    Bounded everywhere and biased everywhere, towards zero by the share δ²/(σ² + δ²) in each
-    singular direction; the covariance does not hold that bias.
-    """
-    gain = spectral_gain(parts, 1.0 / (np.maximum(parts.squares, 0.0) + DAMPING**2))
+    gain = least_squares_gain(parts)
     return Solution(gain, gain * sd[:, None, :])
 
 
@@ -135,7 +118,6 @@ def maximum_a_posteriori(parts: Decomposition, sd: Array) -> Solution:
 
 SOLVERS: dict[str, Callable[[Decomposition, Array], Solution]] = {
     "pinv": pinv,
-    "damped": damped,
     "map": maximum_a_posteriori,
 }
 """Name at the command line → what turns a decomposed Jacobian and torque sd (T, n) into A and B."""
@@ -143,11 +125,6 @@ SOLVERS: dict[str, Callable[[Decomposition, Array], Solution]] = {
 
 LEAST_SQUARES = "pinv"
 """The solver where none is asked for."""
-
-
-def check_solver(name: str) -> None:
-    """Raise a ParameterError that lists the solvers if there is none of that name."""
-    check_known(name, SOLVERS, f"no solver {name!r} for a wrench")
 
 
 def null_space(parts: Decomposition, tau: Array) -> Array:
@@ -195,6 +172,6 @@ def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> FlangeWrenc
         RobotError: If the arm has fewer than six joints.
     """
     parts = decompose(jacobian)
-    gain = spectral_gain(parts, inverses(parts, left_out))
+    gain = least_squares_gain(parts, left_out)
     values = np.squeeze(gain @ tau[:, :, None], axis=2)
     return FlangeWrench(values, parts.sigma_min >= LEAST_SIGMA)

@@ -24,34 +24,26 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import numbers
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.virtual_sensor.free_run_torque import FreeRunTorque
 
 OWN = "own"
 """The word for the observers' own covariance as the torque error."""
 
 
 def missed_torque(
-    terms: DynamicsTerms,
-    observers: Sequence[Observer],
-    free_run: DynamicsTerms | None,
-    free: Mask,
+    terms: DynamicsTerms, observers: Sequence[Observer], free: Mask
 ) -> Mapping[str, Array] | None:
     """What each observer's lag leaves out of the contacts, mean square. (n,) [(N·m)²]
 
     Args:
         terms: p and μ along the log.
         observers: The observers.
-        free_run: p and μ along a free run, or None.
-        free: Unloaded samples of the log, used where there is no free run. (T,)
+        free: Unloaded samples of the log. (T,)
 
     Returns:
         Observer → mean square; None where a part is too short for a spectrum.
     """
-    loaded, quiet = Part(terms, ~free), Part(terms, free)
-    if free_run is not None:
-        loaded, quiet = (Part(run, np.ones(len(run.t), dtype=bool)) for run in (terms, free_run))
     try:
-        spectra = spectra_of(loaded, [quiet])
+        spectra = spectra_of(Part(terms, ~free), [Part(terms, free)])
     except ParameterError:
         return None
     f, step, n = spectra.frequency, spectra.step, terms.joints
@@ -110,7 +102,6 @@ def from_free_part(
     run: ModelledRun,
     torques: Sequence[ExternalTorque],
     free: Mask,
-    free_run: FreeRunTorque | None,
     missed: Mapping[str, Array] | None,
 ) -> TorqueError:
     """The error of the free part and of the lag, as the module's equation has it.
@@ -119,7 +110,6 @@ def from_free_part(
         run: The log.
         torques: The estimates.
         free: Unloaded samples. (T,)
-        free_run: What a free run reads, or None to take the spread over `free` about its mean.
         missed: What each observer's lag leaves out of the contacts; None where that is not known.
             (n,) [(N·m)²]
     """
@@ -127,12 +117,8 @@ def from_free_part(
     rests = resting(run.recording.t, run.recording.require("dq"))
     sd, seen = {}, True
     for torque in torques:
-        if free_run is not None:
-            error = free_run.error[torque.name]
-        else:
-            inside = torque.tau[free]
-            spread = inside - np.nanmean(inside, axis=0)
-            error = free_error(spread, rests[free], friction)
+        inside = torque.tau[free]
+        error = free_error(inside - np.nanmean(inside, axis=0), rests[free], friction)
         seen = seen and not np.any(error.unseen & ~rests.all(axis=0))
         lag = np.zeros(torque.joints) if missed is None else missed[torque.name]
         sd[torque.name] = error_band(error, lag, rests)

@@ -64,7 +64,13 @@ def fit_axes(ours: Array, theirs: Array) -> AxesFit:
     known = np.all(np.isfinite(ours) & np.isfinite(theirs), axis=1)
     x, y = ours[known] - ours[known].mean(axis=0), theirs[known] - theirs[known].mean(axis=0)
     U, _, Vt = np.linalg.svd(y.T @ x)
-    return fit_signs(x, y, permutation(U @ Vt))
+    matrix = permutation(U @ Vt)
+    z = x @ matrix.T
+    power = float(np.sum(z**2))
+    gain = float(np.sum(z * y)) / power if power > 0 else float("nan")
+    scale = float(np.sqrt(power * np.sum(y**2)))
+    correlation = float(np.sum(z * y)) / scale if scale > 0 else float("nan")
+    return AxesFit(matrix=matrix, gain=gain, correlation=correlation)
 
 
 def permutation(Q: Array) -> Array:
@@ -74,19 +80,6 @@ def permutation(Q: Array) -> Array:
     P = np.zeros((3, 3))
     P[np.arange(3), best] = np.sign(Q[np.arange(3), best])
     return P
-
-
-def fit_signs(x: Array, y: Array, matrix: Array) -> AxesFit:
-    """Gain and correlation of centred forces under a given matrix."""
-    z = x @ matrix.T
-    power = float(np.sum(z**2))
-    gain = float(np.sum(z * y)) / power if power > 0 else float("nan")
-    scale = float(np.sqrt(power * np.sum(y**2)))
-    return AxesFit(
-        matrix=matrix,
-        gain=gain,
-        correlation=float(np.sum(z * y)) / scale if scale > 0 else float("nan"),
-    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,6 +11,7 @@ from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.parsing import check_known
 from vftcli.signals.shown import Shown
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import Mounting, check_frame, frame_pose, from_base
@@ -20,7 +21,6 @@ from vftcli.virtual_sensor.solvers import (
     SOLVERS,
     TORQUE_SD,
     Decomposition,
-    check_solver,
     decompose,
     null_space,
 )
@@ -49,7 +49,7 @@ class VirtualSensor(Shown):
     least_sigma: float = LEAST_SIGMA
 
     def __post_init__(self) -> None:
-        check_solver(self.solver)
+        check_known(self.solver, SOLVERS, f"no solver {self.solver!r} for a wrench")
         frame_pose(check_frame(self.frame), self.mounting)
 
     def wrench(

@@ -109,16 +109,9 @@ def without_drift(wrench: Wrench, drift: Drift) -> Wrench:
 def without_zero(wrench: Wrench, choice: ZeroChoice) -> Wrench:
     """A wrench less its mean over the first span of a choice, or over its own unloaded start.
 
-    For a wrench that no observer made, as a sensor's: a free run tells nothing of its zero.
-
     Raises:
-        ParameterError: If the zero is to be a log, or the span holds no known samples.
+        ParameterError: If the span holds no known samples, or there is no unloaded start.
     """
-    if choice.log is not None:
-        raise ParameterError(
-            "--zero LOG removes what an observer reads in a free run; for this wrench give the "
-            "unloaded span as --zero A:B, or --zero start"
-        )
     chosen = zero_spans(choice, wrench)
     return without_drift(wrench, zero_drift(wrench, chosen.zero)) if chosen.zero else wrench
 
@@ -175,7 +168,7 @@ def zero_spans(choice: ZeroChoice, wrench: Wrench) -> ZeroSpans:
     if start is None:
         raise ParameterError(
             "--zero start: the log has no unloaded start of half a second in a regular pose; give "
-            "the unloaded span as --zero A:B, or a free run as --zero LOG"
+            "the unloaded span as --zero A:B"
         )
     return ZeroSpans((start,), None)
 

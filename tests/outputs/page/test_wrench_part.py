@@ -1,19 +1,13 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.page.wrench_part import (
-    SHOWN,
     condition_charts,
-    contact_grid,
-    trade_off_grid,
     wrench_chart,
     wrench_section,
 )
-from vftcli.virtual_sensor.contact import Detection, OperatingPoint
-from vftcli.virtual_sensor.detection import ContactScore
 
 
 def test_the_pose_has_a_chart_with_its_threshold(with_wrench: Analysis) -> None:
@@ -65,41 +59,3 @@ def test_the_band_is_grey_where_no_contact_is_listed(pushed: Analysis) -> None:
     assert not line.quiet[inside].any()
     assert line.quiet[t < 4.0].all()
     assert np.nanmin(line.half) > 0.0
-
-
-@pytest.fixture
-def score() -> ContactScore:
-    """Thresholds in steps of √2 about the free band; hits fall as they rise."""
-    detection = Detection(
-        contacts=4,
-        listed=5,
-        missed=1,
-        merged=1,
-        split=0,
-        false_alarms=2,
-        false_alarms_per_h=7.25,
-        delay=(0.04, 0.06, float("nan")),
-    )
-    marks = [2 ** (0.5 * k) for k in range(-4, 6)]
-    curve = tuple(
-        OperatingPoint(
-            threshold=mark, found=1.0 / mark if mark > 1 else 1.0, false_alarms_per_h=k, delay=0.0
-        )
-        for k, mark in enumerate(marks)
-    )
-    return ContactScore("gmo", "torque", detection, curve, ())
-
-
-def test_contacts_are_counted(score: ContactScore) -> None:
-    (row,) = contact_grid((score,)).rows
-    assert row[:8] == ("gmo", 4, 5, 3, 1, 1, 0, 7.25)
-    assert row[8:] == (pytest.approx(0.05), pytest.approx(0.06))
-
-
-def test_the_trade_off_shows_the_nearest_threshold_that_was_tried(score: ContactScore) -> None:
-    (row,) = trade_off_grid((score,)).rows
-    assert len(row) == 1 + len(SHOWN)
-    at = dict(zip(SHOWN, row[1:], strict=True))
-    assert at[1.0] == "100% at 4.00/h"
-    assert at[2.0] == "50% at 6.00/h"
-    assert at[3.0] == "35% at 7.00/h"  # 2.83 is nearer than 4, as a ratio

@@ -26,7 +26,6 @@ from vftcli.virtual_sensor.smoother.observer_wrench import (
     SmootherInput,
     corrected_input,
     known_free,
-    less_torque,
     plain_input,
     smooth_all,
 )
@@ -53,6 +52,11 @@ def motion() -> FreeMotion:
     asked = choice("gmo")
     recording = asked.library.open(CIRCLE, asked.read)
     return read(*prepared(recording, asked), asked, Models())
+
+
+def lessened(terms: DynamicsTerms, torque: np.ndarray) -> DynamicsTerms:
+    """Terms whose disturbance is less by a torque. (T, n) [N·m]"""
+    return replace(terms, mu=terms.mu + torque)
 
 
 def reading(*names: str, **wrench: object) -> SensorReading:
@@ -118,15 +122,6 @@ def test_a_zero_takes_its_mean_off_the_smoothed_wrench_too() -> None:
     np.testing.assert_allclose(wrench.values[sensed.free].mean(axis=0), 0.0, atol=1e-9)
 
 
-def test_a_torque_is_taken_off_the_terms(motion: FreeMotion) -> None:
-    log = motion.log
-    torque = np.broadcast_to(np.arange(6.0), log.recording.q.shape)
-    more = DynamicsTerms(t=log.terms.t, p=log.terms.p, mu=log.terms.mu - torque)
-    found = less_torque(more, torque)
-    np.testing.assert_allclose(found.mu, log.terms.mu, atol=1e-12)
-    assert less_torque(more, None) is more
-
-
 @pytest.mark.parametrize("newtons", [0.0, 40.0])
 def test_a_correction_is_left_out_where_the_log_shows_one_load(
     motion: FreeMotion, newtons: float
@@ -140,10 +135,10 @@ def test_a_correction_is_left_out_where_the_log_shows_one_load(
             motion.log.recording.t
         )
         taken = np.einsum("tij,ti->tj", J, pushes.values)
-        free = tuple(piece._replace(terms=less_torque(piece.terms, taken)) for piece in plain.free)
-        plain = SmootherInput(less_torque(plain.terms, taken + newtons * J[:, 2]), free)
+        free = tuple(piece._replace(terms=lessened(piece.terms, taken)) for piece in plain.free)
+        plain = SmootherInput(lessened(plain.terms, taken + newtons * J[:, 2]), free)
     corrected = plain._replace(
-        terms=less_torque(plain.terms, np.ones_like(J[:, 0])), uncorrected=plain
+        terms=lessened(plain.terms, np.ones_like(J[:, 0])), uncorrected=plain
     )
     nothing = np.zeros(len(J), dtype=bool)
     found = smooth_all(motion, ["best"], lambda _: corrected, unloaded=nothing)["best"]
@@ -179,8 +174,8 @@ def test_a_load_of_the_free_part_is_in_the_wrench_and_no_noise(motion: FreeMotio
         mass=2.0, moment=np.array([0.0, 0.0, 0.1]), sd=0.1, moment_sd=np.full(3, 0.01), share=0.5
     )
     run, nothing = motion.log, np.zeros(motion.log.recording.samples, dtype=bool)
-    plain, torque = plain_input(motion), load.torque(run)
-    loaded = replace(motion, log=run.with_terms(less_torque(run.terms, -torque)))
+    plain = plain_input(motion)
+    loaded = replace(motion, log=run.with_terms(lessened(run.terms, -load.torque(run))))
     pieces = [piece._replace(run=loaded.log) for piece in motion.part.pieces]
     given = corrected_input(loaded, pieces, load, lambda _name, of: of.terms, "best")
     gate = Gate([(4.5, 5.0)], WrenchPrior(1.0, 30.0))
@@ -196,16 +191,11 @@ def test_a_load_of_the_free_part_is_in_the_wrench_and_no_noise(motion: FreeMotio
     np.testing.assert_allclose(found.values, bare.values + weight, atol=1e-6)
     np.testing.assert_allclose(found.covariance, bare.covariance + spread, atol=1e-6)
     np.testing.assert_allclose(weight[:, 2], -2.0 * 9.81, rtol=1e-3)
-    # What a free run reads at the same place comes off, and the load with it.
-    zero = smooth_all(
-        loaded, ["best"], lambda _: given, unloaded=nothing, torque=torque, gate=gate
-    )["best"]
-    assert zero.load is None
 
 
 def test_an_observers_own_terms_go_with_the_uncorrected_ones(motion: FreeMotion) -> None:
     pieces = motion.part.pieces
-    shifted = less_torque(motion.log.terms, np.ones_like(motion.log.terms.mu))
+    shifted = lessened(motion.log.terms, np.ones_like(motion.log.terms.mu))
 
     def terms_of(name: str, run: ModelledRun) -> DynamicsTerms:
         return shifted if name == "best" and run is motion.log else run.terms
@@ -217,15 +207,3 @@ def test_an_observers_own_terms_go_with_the_uncorrected_ones(motion: FreeMotion)
     assert best.free[0].terms is shifted
     assert best.uncorrected is not None
     assert best.uncorrected.terms is motion.log.terms
-
-
-def test_a_free_run_takes_the_place_of_a_correction(motion: FreeMotion) -> None:
-    plain = plain_input(motion)
-    shape = motion.log.terms.mu.shape
-    other = plain._replace(terms=less_torque(plain.terms, np.ones(shape)), uncorrected=plain)
-    nothing, torque = np.zeros(shape[0], dtype=bool), np.full(shape, 0.5)
-    both = [
-        smooth_all(motion, ["best"], lambda _, x=x: x, unloaded=nothing, torque=torque)["best"]
-        for x in (other, plain)
-    ]
-    np.testing.assert_array_equal(both[0].values, both[1].values)

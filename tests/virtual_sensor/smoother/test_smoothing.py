@@ -71,8 +71,6 @@ def test_a_steady_load_is_found_to_be_one_and_weighed(name: str) -> None:
     assert np.all(np.abs(error) <= 3.0 * found.sd)
     assert np.all(found.sd[:, :3] < 5.0)
     assert np.sqrt(np.mean(error[:, 2] ** 2)) < 2.0
-    assert np.isfinite(found.model_error).all()
-    assert found.model_error_sd.min() > 0.0
 
 
 def test_pushes_are_followed_in_short_blocks() -> None:

@@ -44,7 +44,7 @@ def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
     ``contact``, the row's number in the list of contacts or null, where they are listed; where a
     wrench is asked for, and of ``best`` where contacts are listed, ``wrench/<observer>/fx``…``mz``
     [N, N·m], null where the pose cannot tell it, ``wrench_sd/<observer>/fx``…,
-    ``null_space/<observer>`` [N·m] and ``sigma_min`` [m]; with a bounded solver, what it says of
+    ``null_space/<observer>`` [N·m] and ``sigma_min`` [m]; by ``--solver map``, what it says of
     the masked samples stands apart in ``wrench_masked/<observer>/fx``….
     What is not known is null.
     """
@@ -84,7 +84,7 @@ def wrench_columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
     bounded = sensed is not None and sensed.sensor.solver != "pinv"
     for wrench in analysis.wrenches:
         yield from wrench.columns()
-        # By plain least squares nothing can be said there; a bounded solver says something finite.
+        # By plain least squares nothing can be said there; `map` says something finite.
         if bounded and wrench.hidden.any():
             said = np.where(wrench.hidden[:, None], wrench.values, np.nan)
             yield from per_axis(f"wrench_masked/{wrench.name}", said)

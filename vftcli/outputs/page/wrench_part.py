@@ -1,4 +1,4 @@
-"""The virtual sensor on the page: drift, what the pose can tell, contacts and their trade-off."""
+"""The virtual sensor on the page: drift, what the pose can tell, and contacts."""
 
 from collections.abc import Iterator
 from html import escape
@@ -7,8 +7,8 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.observers.table import BEST
-from vftcli.outputs.grid import Column, Entry, Grid, html, significant
-from vftcli.outputs.log.wrench_tables import drift_grid
+from vftcli.outputs.grid import html
+from vftcli.outputs.log.wrench_tables import contact_grids, drift_grid
 from vftcli.outputs.page.charts import (
     REFERENCE,
     Chart,
@@ -22,12 +22,8 @@ from vftcli.outputs.page.torque_part import contact_spans, legend_name
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.external_torque import COVERS
 from vftcli.signals.wrench import AXES, unit_of
-from vftcli.virtual_sensor.detection import ContactScore
 from vftcli.virtual_sensor.frames import FRAMES
 from vftcli.virtual_sensor.sensor_reading import SensorReading
-
-SHOWN = (0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0)
-"""Thresholds of the operating curve that the table lists, in half widths of the free band."""
 
 
 def wrench_chart(analysis: Analysis) -> Chart | None:
@@ -132,8 +128,8 @@ def wrench_section(analysis: Analysis, chart: Chart | None) -> str:
     if sensed is None or chart is None:
         return ""
     grids = [drift_grid(sensed.drifts, spans=True)] if sensed.drifts else []
-    if scores := analysis.contact_scores:
-        grids += [contact_grid(scores), trade_off_grid(scores)]
+    if analysis.errors is not None:
+        grids += contact_grids(analysis.errors)
     axes, solver = FRAMES[sensed.sensor.frame], sensed.solver
     parts = (
         multiples(chart),
@@ -162,41 +158,4 @@ def masked_words(sensed: SensorReading) -> str:
         f"{sensed.sensor.least_sigma:g} m an error of 1 N·m is more than "
         f"{1 / sensed.sensor.least_sigma:.0f} N. The chart of the masked samples shows what the "
         "solver says; no table and no column contains it.</p>"
-    )
-
-
-def contact_grid(contacts: tuple[ContactScore, ...]) -> Grid:
-    """Contacts found and missed, false alarms and delays of each observer."""
-    heads = (
-        *("contacts", "rows", "found", "missed", "of them merged", "split"),
-        *("false alarms/h", "mean delay [s]", "longest [s]"),
-    )
-    rows: list[tuple[Entry, ...]] = []
-    for score in contacts:
-        found = score.detection
-        times = (found.false_alarms_per_h, found.mean_delay, found.longest_delay)
-        counts = (found.contacts, found.listed, found.found, found.missed, found.merged)
-        rows.append((score.name, *counts, found.split, *map(float, times)))
-    return Grid(
-        title="Contacts against the reference, one to one: of best its list, else at the free band",
-        columns=(Column("observer", words=True), *map(Column, heads)),
-        rows=tuple(rows),
-        swatches=True,
-    )
-
-
-def trade_off_grid(contacts: tuple[ContactScore, ...]) -> Grid:
-    """The operating curve (ROC): contacts found against false alarms, by threshold."""
-    rows = []
-    for score in (each for each in contacts if each.curve):
-        marks = np.array([point.threshold for point in score.curve])
-        # The nearest threshold that was tried, as a ratio: the curve's steps are geometric.
-        points = [score.curve[int(np.argmin(np.abs(np.log(marks / at))))] for at in SHOWN]
-        cells = (f"{p.found:.0%} at {significant(p.false_alarms_per_h)}/h" for p in points)
-        rows.append((score.name, *cells))
-    return Grid(
-        title="Contacts found, and false alarms per hour, over the threshold in free bands (ROC)",
-        columns=(Column("observer", words=True), *(Column(f"× {at:g}") for at in SHOWN)),
-        rows=tuple(rows),
-        swatches=True,
     )

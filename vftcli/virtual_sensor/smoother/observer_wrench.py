@@ -12,7 +12,7 @@ from vftcli.repetition.free_motion import FreeMotion, FreePiece
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.kinematics import link_poses
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.arrays import Mask, handed_over
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
@@ -60,9 +60,12 @@ log calls for one steady load it is left out, since a load and an error of the m
 """
 
 
-def plain_input(motion: FreeMotion, name: str = "") -> SmootherInput:  # noqa: ARG001
-    """The log as the robot's model explains it, with its free part; the same for every name."""
-    pieces = motion.part.pieces if has_part(motion) else ()
+def plain_input(motion: FreeMotion) -> SmootherInput:
+    """The log as the robot's model explains it, with the free part that is given or found."""
+    try:
+        pieces = motion.part.pieces
+    except ReferenceTorqueError:
+        pieces = ()
     return input_under(motion, pieces, lambda run: run.terms)
 
 
@@ -102,37 +105,19 @@ def input_under(
     return SmootherInput(terms_of(motion.log), tuple(free), load)
 
 
-def has_part(motion: FreeMotion) -> bool:
-    """Whether a free part is given or found."""
-    try:
-        return bool(motion.part.pieces)
-    except ReferenceTorqueError:
-        return False
-
-
 def known_free(motion: FreeMotion, found: SmootherInput, unloaded: Mask) -> tuple[FreeTerms, ...]:
     """The free motion of an input, what a zero says is free where there is no other.
 
     Args:
-        motion: The log and the free run of its zero.
+        motion: The log.
         found: The input.
         unloaded: Samples of the log that its zero says are unloaded. (T,)
     """
     if found.free:
         return found.free
-    free = []
-    if np.count_nonzero(unloaded) > 1:
-        free.append(FreeTerms(found.terms, motion.log.recording.q, unloaded))
-    if motion.zero is not None:
-        run = motion.zero.run
-        whole = np.ones(run.recording.samples, dtype=bool)
-        free.append(FreeTerms(run.terms, run.recording.q, whole))
-    return tuple(free)
-
-
-def less_torque(terms: DynamicsTerms, torque: Array | None) -> DynamicsTerms:
-    """Terms whose disturbance is less by a torque; None for nothing. (T, n) [N·m]"""
-    return terms if torque is None else replace(terms, mu=handed_over(terms.mu + torque))
+    if np.count_nonzero(unloaded) < 2:
+        return ()
+    return (FreeTerms(found.terms, motion.log.recording.q, unloaded),)
 
 
 def carrying(found: SmoothedWrench, load: FreeLoad, run: ModelledRun) -> SmoothedWrench:
@@ -181,7 +166,6 @@ def smooth_all(
     input_of: InputOf | None = None,
     *,
     unloaded: Mask,
-    torque: Array | None = None,
     gate: Gate | None = None,
 ) -> dict[str, SmoothedWrench]:
     """What the smoother finds for each observer, once for all that rest on the same terms.
@@ -191,7 +175,6 @@ def smooth_all(
         names: The observers.
         input_of: What each one's wrench is smoothed from; None for `plain_input`.
         unloaded: Samples of the log that its zero says are unloaded. (T,)
-        torque: What a free run reads at the same place, to be removed; None for nothing. (T, n)
         gate: The contacts, outside of which there is no wrench; None where the log is one.
 
     Raises:
@@ -199,32 +182,23 @@ def smooth_all(
     """
     made: list[tuple[DynamicsTerms, SmoothedWrench]] = []
     found: dict[str, SmoothedWrench] = {}
-    take = input_of or partial(plain_input, motion)
     for name in names:
-        given = take(name)
+        given = plain_input(motion) if input_of is None else input_of(name)
         same = next((smoothed for terms, smoothed in made if terms is given.terms), None)
-        found[name] = same or smooth_input(motion, given, unloaded, torque, gate)
+        found[name] = same or smooth_input(motion, given, unloaded, gate)
         made.append((given.terms, found[name]))
     return found
 
 
 def smooth_input(
-    motion: FreeMotion,
-    given: SmootherInput,
-    unloaded: Mask,
-    torque: Array | None,
-    gate: Gate | None,
+    motion: FreeMotion, given: SmootherInput, unloaded: Mask, gate: Gate | None
 ) -> SmoothedWrench:
     """What the smoother finds from one input; the other arguments as of `smooth_all`."""
     q, robot, plain = motion.log.recording.q, motion.log.robot, given.uncorrected
-    if plain is not None and torque is not None:
-        # A free run takes the model's error off by itself; the correction would do it again.
-        given, plain = plain, None
     if gate is not None:
-        # What a zero takes off holds the load too.
-        load = given.load if torque is None else None
+        load = given.load
         terms = given.terms if load is None else load.off(given.terms, motion.log)
-        free, terms = known_free(motion, given, unloaded), less_torque(terms, torque)
+        free = known_free(motion, given, unloaded)
         found = smooth_wrench(terms, q, robot, free, gate.spans, gate.prior)
         return found if load is None else carrying(found, load, motion.log)
     if plain is not None:
@@ -234,4 +208,4 @@ def smooth_input(
             found = smooth_wrench(plain.terms, q, robot, free, prior=prior)
             return replace(found, uncorrected=True)
     free = known_free(motion, given, unloaded)
-    return smooth_wrench(less_torque(given.terms, torque), q, robot, free)
+    return smooth_wrench(given.terms, q, robot, free)

@@ -64,8 +64,6 @@ class SmoothedWrench:
         values: Force and moment on the robot. (K, 6) [N, N·m]
         covariance: Their covariance, widened by `WIDENED`, and in contacts by what the drives and
             the blocks may hide; outside of the listed ones that of `unlisted`. (K, 6, 6)
-        model_error: What the model errs by, as far as it can be told from the wrench. (K, n) [N·m]
-        model_error_sd: Its standard deviation. (K, n) [N·m]
         inside: Blocks in which there may be a wrench; zero, as far as the pose can show, in the
             others. (K,)
         seconds: Length of a block. [s]
@@ -79,8 +77,6 @@ class SmoothedWrench:
     t: Array
     values: Array
     covariance: Array
-    model_error: Array
-    model_error_sd: Array
     inside: Mask
     seconds: float
     prior: WrenchPrior
@@ -90,7 +86,7 @@ class SmoothedWrench:
     load: FreeLoad | None = None
 
     def __post_init__(self) -> None:
-        seal(self, "t", "values", "covariance", "model_error", "model_error_sd")
+        seal(self, "t", "values", "covariance")
 
     @property
     def sd(self) -> Array:
@@ -229,8 +225,6 @@ def smooth_wrench(
         t=blocks.t,
         values=mean[:, :6],
         covariance=spread,
-        model_error=mean[:, 6:],
-        model_error_sd=deviations(covariance[:, 6:, 6:]),
         inside=inside,
         seconds=seconds,
         prior=prior,
