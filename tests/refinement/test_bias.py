@@ -8,13 +8,12 @@ import pytest
 
 from vftcli.observers import MomentumObserver
 from vftcli.readers import read
-from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
+from vftcli.refinement.baseline import baseline_of, free_reading
 from vftcli.refinement.bias import (
     RANGE,
     Scale,
     features,
     fitted,
-    remove_free_cycle,
     remove_modelled,
     remove_nothing,
     ridge,
@@ -34,61 +33,11 @@ def log() -> ModelledRun:
     return ModelledRun(recording=read(FIXTURE), robot=load_robot("ur5"))
 
 
-def read_by_gmo(found: Baseline):
-    """What the observer reads."""
-    return free_reading(found, GMO, GMO.estimate(found.terms))
-
-
-def test_what_two_free_cycles_leave_of_one_another_is_the_free_error(log: ModelledRun) -> None:
-    """With cycles 1 and 2 the free samples are what is left of each, less the other."""
-    found = baseline_of(FreeMotion(log=log, choice=FreeChoice(cycles=(1, 2))))
-    reading = read_by_gmo(found)
-    (after,) = remove_free_cycle(found, [reading]).readings
-    own, tau = found.part.own, reading.estimate.tau
-    first, second = (pairing.there(tau) for pairing in found.part.pairings)
-    other = np.where(np.isfinite(first), first, second)[own]
-    np.testing.assert_allclose(after.samples, tau[own] - other, atol=1e-9)
-    assert len(after.resting) == len(after.samples)
-    assert np.all(after.rms > 0.05)  # the second cycle is pushed: the difference is not nothing
-    np.testing.assert_allclose(after.estimate.tau[own], tau[own] - other, atol=1e-9)
-
-
-def test_one_free_cycle_is_zero_and_keeps_its_free_error(log: ModelledRun) -> None:
-    found = baseline_of(FreeMotion(log=log, choice=FreeChoice(cycles=(1,))))
-    reading = read_by_gmo(found)
-    removal = remove_free_cycle(found, [reading])
-    (after,) = removal.readings
-    assert np.all(after.estimate.tau[found.part.own] == 0.0)
-    np.testing.assert_array_equal(after.samples, reading.samples)
-    codes = [remark.code for remark in removal.remarks]
-    assert codes[:2] == ["bias-at-phase", "free-cycle-is-zero"]
-
-
-def test_samples_outside_the_free_motion_keep_their_bias(log: ModelledRun) -> None:
-    found = baseline_of(FreeMotion(log=log, choice=FreeChoice(cycles=(1,))))
-    pairing = found.part.pairings[0]
-    cut = pairing._replace(times=np.where(log.recording.t < 12.0, pairing.times, np.nan))
-    piece = found.pieces[0]._replace(pairings=(cut,))
-    found = replace(found, part=found.part._replace(pieces=(piece,)))
-    reading = read_by_gmo(found)
-    removal = remove_free_cycle(found, [reading])
-    late = log.recording.t > 12.0
-    np.testing.assert_array_equal(
-        removal.readings[0].estimate.tau[late], reading.estimate.tau[late]
-    )
-    kept = next(remark for remark in removal.remarks if remark.code == "bias-kept-outside")
-    assert kept.values["share"] == pytest.approx(np.mean(late), abs=0.01)  # and the cycles' seams
-
-
 def test_a_bias_without_a_free_part_is_not_removed(log: ModelledRun) -> None:
     found = replace(baseline_of(FreeMotion(log=log)), part=None)
     reading = free_reading(found, GMO, GMO.estimate(found.terms))
-    for remove, words in (
-        (remove_free_cycle, "a motion that repeats"),
-        (remove_modelled, "--free"),
-    ):
-        with pytest.raises(ParameterError, match=words):
-            remove(found, [reading])
+    with pytest.raises(ParameterError, match="--free"):
+        remove_modelled(found, [reading])
     assert remove_nothing(found, [reading]).readings == (reading,)
 
 

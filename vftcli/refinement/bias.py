@@ -1,9 +1,7 @@
 """Bias removal: what an observer reads where nothing touches the arm is not contact.
 
-On a repeated motion the free cycle's estimate at the same phase is subtracted: friction and model
-error repeat with position and velocity. Where nothing repeats, a model of the bias over position
-and velocity is fitted to the free part; it is cross-validated and used only where it predicts free
-samples that it has not seen.
+A model of the bias over position and velocity is fitted to the free part; it is cross-validated and
+used only where it predicts free samples that it has not seen.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,12 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.refinement.baseline import Baseline, FreeReading, bias_at_phase
-from vftcli.repetition.free_motion import FreePart
+from vftcli.refinement.baseline import Baseline, FreeReading
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.remarks import Remark, Where, fact
 
 FOLDS = 5
 """Contiguous parts of the free samples, each predicted from the others."""
@@ -51,53 +48,6 @@ class Removal(NamedTuple):
 def remove_nothing(_found: Baseline, readings: Sequence[FreeReading]) -> Removal:
     """Leave the estimates as they are."""
     return Removal(tuple(readings))
-
-
-def remove_free_cycle(found: Baseline, readings: Sequence[FreeReading]) -> Removal:
-    """Subtract the free cycle's own estimate at the same phase, or the free run's, aligned.
-
-    With several free cycles or runs it is their mean, for a free cycle that of the others; a single
-    free cycle becomes zero by construction. Samples outside the repeated motion keep their bias.
-
-    Raises:
-        ParameterError: If there is no free motion to subtract.
-    """
-    part = found.part
-    if part is None or not part.pairings:
-        here = f". Here: {found.missing}" if found.missing is not None else ""
-        raise ParameterError(
-            "--remove-bias free-cycle needs a motion that repeats with a free cycle, or a free run "
-            "of the same motion (--free LOG); --remove-bias model needs neither, only a free part"
-            f"{here}"
-        )
-    removed = tuple(minus_free_motion(part, reading) for reading in readings)
-    count = len(part.pairings)
-    remarks = [fact("bias-at-phase" if count == 1 else "bias-at-phase-mean", motions=count)]
-    if count == 1 and part.own.any():
-        remarks.append(fact("free-cycle-is-zero"))
-    known = np.any([pairing.known for pairing in part.pairings], axis=0) | part.own
-    if not known.all():
-        remarks.append(caution("bias-kept-outside", share=float(np.mean(~known))))
-    return Removal(removed, tuple(remarks))
-
-
-def minus_free_motion(part: FreePart, reading: FreeReading) -> FreeReading:
-    """An estimate less what its observer reads in the free motion at the same phase.
-
-    What two free motions leave of one another takes the place of what one reads; after a single
-    one nothing measures what is left, and the free samples stay those of before.
-    """
-    estimate = reading.estimate
-    bias = bias_at_phase(part, [e.tau for e in reading.free])
-    # A free cycle that no other is laid under reads nothing but bias.
-    own = part.own & ~np.isfinite(bias[:, 0])
-    bias[own] = estimate.tau[own]
-    less = replace(estimate, tau=handed_over(estimate.tau - np.nan_to_num(bias)))
-    if not (part.own.any() and len(part.pairings) > 1):
-        return reading._replace(estimate=less)
-    inside = part.pieces[0].inside
-    left = (estimate.tau - bias)[inside]
-    return reading._replace(estimate=less, samples=left, resting=reading.resting[: len(left)])
 
 
 def remove_modelled(found: Baseline, readings: Sequence[FreeReading]) -> Removal:
@@ -190,7 +140,6 @@ def ridge(X: Array, y: Array, penalty: float) -> Array:
 
 
 REMOVALS: dict[str, Callable[[Baseline, Sequence[FreeReading]], Removal]] = {
-    "free-cycle": remove_free_cycle,
     "model": remove_modelled,
 }
 """The words of ``--remove-bias`` that take something off once the observers have run."""

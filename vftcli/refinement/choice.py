@@ -13,7 +13,7 @@ WHOLE_LOG = "whole-log"
 NOTHING = "none"
 """The word for a bias that stays."""
 
-REMOVALS = (AUTOMATIC, WHOLE_LOG, "free-cycle", "model", NOTHING)
+REMOVALS = (AUTOMATIC, WHOLE_LOG, "model", NOTHING)
 """What ``--remove-bias`` takes; `vftcli.refinement.bias.REMOVALS` makes what is left of them once
 observers have run."""
 
@@ -52,12 +52,7 @@ class RefinementChoice:
     @property
     def removes_bias(self) -> bool:
         """Whether the estimates lose what their observers read of free motion."""
-        return self.remove_bias in {"free-cycle", "model"}
-
-    @property
-    def at_phase(self) -> bool:
-        """Whether the bias taken off is what the free motion reads at the same phase."""
-        return self.remove_bias == "free-cycle"
+        return self.remove_bias == "model"
 
     @property
     def looks_back(self) -> bool:
