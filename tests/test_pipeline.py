@@ -195,11 +195,6 @@ def test_a_free_run_as_long_as_the_log_is_told_from_it(runs: list[Path]) -> None
     np.testing.assert_allclose(*tunings, rtol=0.1)  # grid of 1.1: two samples change little
 
 
-def test_the_zero_of_a_free_run_and_its_bias_removal_exclude_each_other(runs: list[Path]) -> None:
-    with pytest.raises(ParameterError, match="take it off twice"):
-        asked("zero", zero=runs[1], refinement=RefinementChoice(remove_bias="model"))
-
-
 def test_what_needs_the_complete_log_does_not_go_with_causal_observers() -> None:
     online = AnalysisChoice(observers=ObserverChoice(causal=True), wrench=WrenchChoice())
     with pytest.raises(ParameterError, match="--remove-bias whole-log needs the complete log"):

@@ -172,8 +172,6 @@ MAKE = ("identify", "-o", "own.toml")
 BATCH = cut(0, 4, "batch", "--do", "estimate", "--observer", "gmo", "-o", "b", "--workers", "0")
 W = "wrench/fx|wrench/fy|wrench/fz|wrench/mx|wrench/my|wrench/mz"
 TRUTH = f"file:{FIXTURES / 'ur5_circle.csv.truth.parquet'}"
-TWICE = beside(cut(0, 4, *EST, "--wrench", "--remove-bias", "model", "--free", "0.3:3.9"),
-               "--zero", free_log)  # fmt: skip
 ONE_LOG = beside(cut(0, 9, *TWO, "--period", "4"), "--free", free_log)
 BOTH_GAINS = beside(beside(cut(0, 4, *EST), "--gains", gains), "--set-file", gains)
 WHOLE_CAUSAL = cut(0, 4, *EST, "--remove-bias", "whole-log", "--causal")
@@ -227,8 +225,6 @@ ROWS = [
         "rtde"),
     Row("cannot log in a UR", simulated("panda-bearing", "-o", "sim", "--as", "rtde"), "as",
         "libfranka"),
-    Row("--zero LOG and --remove-bias each", TWICE, "zero", AWAY),
-    Row("--zero LOG and --remove-bias each", TWICE, "remove-bias", AWAY),
     Row("whole-log needs the complete log", WHOLE_CAUSAL, "remove-bias", AWAY),
     Row("whole-log needs the complete log", WHOLE_CAUSAL, "causal", AWAY),
     Row("give another solver", cut(0, 4, *EST, "--wrench", "--solver", "smoother", "--causal"),

@@ -71,11 +71,6 @@ class AnalysisChoice:
     )
 
     def __post_init__(self) -> None:
-        if self.zero_log is not None and self.refinement.removes_bias:
-            raise ParameterError(
-                "--zero LOG and --remove-bias each take off what the observers read untouched, "
-                "together they would take it off twice; give one of them"
-            )
         if self.observers.causal and self.refinement.corrects_all:
             raise ParameterError(
                 "--remove-bias whole-log needs the complete log, which --causal leaves out; "
@@ -95,7 +90,7 @@ class AnalysisChoice:
     @property
     def looks_back(self) -> bool:
         """Whether anything is asked that needs the complete log and its free part."""
-        asked = self.refinement.looks_back or self.free.is_asked
+        asked = self.refinement.corrects_all or self.free.is_asked
         return asked or self.observers.from_spectra
 
     @property
@@ -286,7 +281,7 @@ def observe(motion: FreeMotion, baseline: "Baseline | None", choice: AnalysisCho
 
 
 def refine(analysis: "Analysis", baseline: "Baseline | None", choice: AnalysisChoice) -> "Analysis":
-    """Give the estimates what only the complete log allows: bands, and bias removal."""
+    """Give the estimates what only the complete log allows: their bands."""
     if baseline is None:
         return analysis
     from vftcli.refinement import refine as room

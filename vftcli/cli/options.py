@@ -161,9 +161,8 @@ class BiasOptions(ChoiceBundle["RefinementChoice"]):
 
     remove_bias: str | None = option(
         "--remove-bias",
-        "auto|whole-log|model|none",
-        "What comes off: the bias fitted to the whole log, or to free motion over position and "
-        "velocity. auto: the whole log's for best, none for the others.",
+        "auto|whole-log|none",
+        "Whether the bias fitted to the whole log comes off; auto: for best alone.",
         seldom=True,
     )
 
