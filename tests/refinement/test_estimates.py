@@ -125,16 +125,6 @@ def test_what_limits_the_log_is_said_joint_by_joint(worked_up: Analysis) -> None
     np.testing.assert_allclose(parts, read, rtol=1e-9)
 
 
-def test_innovations_of_the_tuned_filter_have_their_expected_size(worked_up: Analysis) -> None:
-    found = worked_up.refinement
-    assert found is not None
-    by_name = {one.name: one for one in found.consistency}
-    assert set(by_name) == {"kfo-zoh", "kfo-auto"}
-    # R is scaled to the loaded part; the free fifth of the log pulls the mean down
-    assert np.all((by_name["kfo-auto"].nis > 0.6) & (by_name["kfo-auto"].nis < 1.5))
-    assert np.all(by_name["kfo-zoh"].nis < 0.1)
-
-
 def test_a_log_that_repeats_nothing_falls_back_and_says_so() -> None:
     request = AnalysisChoice(
         read=ReadChoice(interval=(4.5, 6.0)),

@@ -10,7 +10,6 @@ from vftcli.refinement.band import band_remarks, with_band
 from vftcli.refinement.baseline import Baseline, free_reading
 from vftcli.refinement.budget import Budget, budget, limits_remark
 from vftcli.refinement.choice import AUTOMATIC
-from vftcli.refinement.consistency import Consistency, consistency
 from vftcli.refinement.fallback import with_spare
 from vftcli.refinement.paper_gap import expected_gap
 from vftcli.signals.external_torque import ExternalTorque
@@ -27,7 +26,6 @@ class Refinement(Shown):
         baseline: The log's free part and spectra.
         curves: Observer that was tuned → the curve that was minimised.
         budgets: Where each observer's error comes from, one an observer; none without spectra.
-        consistency: How each Kalman filter's innovations look, one a filter.
         removed: What ``--remove-bias`` asked for.
         remarks: What the reader of the estimates should know.
     """
@@ -36,7 +34,6 @@ class Refinement(Shown):
     baseline: Baseline
     curves: Mapping[str, Curve]
     budgets: tuple[Budget, ...]
-    consistency: tuple[Consistency, ...]
     removed: str
     remarks: tuple[Remark, ...]
 
@@ -61,15 +58,13 @@ def refine(
     # Not every observer need run on the same terms: each is measured on those that it runs on.
     under = [found.under(observer.name) for observer in observers]
     spared = [with_spare(*each) for each in zip(under, observers, estimates, strict=True)]
-    pairs = [(observer, estimate) for observer, estimate, _ in spared]
-    readings = [free_reading(on, *pair) for on, pair in zip(under, pairs, strict=True)]
+    readings = [free_reading(on, *each[:2]) for on, each in zip(under, spared, strict=True)]
     budgets = [
         budget(on, on.spectra, reading)
         for on, reading in zip(under, readings, strict=True)
         if on.spectra is not None
     ]
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
-    checks = [consistency(on, *pair) for on, pair in zip(under, pairs, strict=True)]
     shown = tuple(with_band(*pair) for pair in zip(under, readings, strict=True))
     gap = expected_gap(found, shown, gains_of_file=gains_of_file)
     return Refinement(
@@ -77,7 +72,6 @@ def refine(
         baseline=found,
         curves=curves,
         budgets=tuple(budgets),
-        consistency=tuple(check for check in checks if check is not None),
         removed=removed,
         remarks=(
             *found.remarks,
