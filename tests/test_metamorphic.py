@@ -243,7 +243,7 @@ def logs_permuted(ask: Ask, logs: Logs) -> None:
     )
 
 
-REMOVAL = ("--remove-bias", "free-cycle", "--observer", "gmo", "--observer", "rts-auto")
+TUNED = ("--observer", "gmo", "--observer", "rts-auto")
 
 
 def free_runs_permuted(ask: Ask, logs: Logs, more: tuple[str, ...] = ()) -> None:
@@ -360,7 +360,7 @@ RELATIONS: dict[str, tuple[Callable[..., None], tuple[str, ...]]] = {
         ("compare", "report"),
     ),
     "permute logs": (logs_permuted, ("compare", "identify")),
-    "permute free runs": (partial(free_runs_permuted, more=REMOVAL), FREE),
+    "permute free runs": (partial(free_runs_permuted, more=TUNED), FREE),
     "permute free runs of the reference": (
         partial(free_runs_permuted, more=TWO_CYCLE),
         ("compare", "report"),
@@ -385,7 +385,7 @@ RELATIONS: dict[str, tuple[Callable[..., None], tuple[str, ...]]] = {
     "add an observer before a sensor": (observer_added_before_a_sensor, ("compare",)),
     "split reading: another format": (split, SINGLE),
     "split reading: two parts": (in_two_parts, ("convert",)),
-    "same clock": (partial(same_clock, more=REMOVAL), FREE),
+    "same clock": (partial(same_clock, more=TUNED), FREE),
     "same clock of the gains": (same_clock, ("tune",)),
 }
 """Relation → what it tries, and the commands that take it."""

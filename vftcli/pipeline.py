@@ -85,7 +85,7 @@ class AnalysisChoice:
     @property
     def looks_back(self) -> bool:
         """Whether anything is asked that needs the complete log and its free part."""
-        asked = self.refinement.looks_back or self.free.is_asked
+        asked = self.refinement.corrects_all or self.free.is_asked
         return asked or self.observers.from_spectra
 
     @property
@@ -273,7 +273,7 @@ def observe(motion: FreeMotion, baseline: "Baseline | None", choice: AnalysisCho
 
 
 def refine(analysis: "Analysis", baseline: "Baseline | None", choice: AnalysisChoice) -> "Analysis":
-    """Give the estimates what only the complete log allows: bands, and bias removal."""
+    """Give the estimates what only the complete log allows: their bands."""
     if baseline is None:
         return analysis
     from vftcli.refinement import refine as room

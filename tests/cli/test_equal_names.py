@@ -138,7 +138,6 @@ def test_one_run_given_twice_is_refused(logs, tmp_path):
     [
         ("compare", "--reference", "two-cycle"),
         ("compare", "--reference", "zero"),
-        ("compare", "--reference", "zero", "--remove-bias", "free-cycle"),
         ("estimate",),
         ("tune",),
     ],

@@ -59,7 +59,7 @@ BAD = {
     "--period": ("-3", "is not a positive time in seconds"),
     "--alignment": ("odd", "no alignment 'odd'"),
     "--low-pass": ("-3", "is not a positive cutoff in Hz, none or auto"),
-    "--remove-bias": ("all", "there is auto, whole-log, free-cycle, model, none"),
+    "--remove-bias": ("all", "there is auto, whole-log, none"),
     "--frame": ("world", "world"),
     "--solver": ("qr", "no solver 'qr'"),
     "--tool": ("1,2", "--tool"),

@@ -85,7 +85,7 @@ OPTIONS = {
     "--free-cycles": lambda rng: pick(rng, ("1", "1,2", "1-3", "0", "9-1", "x", "1-999999999")),
     "--low-pass": lambda rng: str(pick(rng, (*NUMBERS, "auto", "none", "x"))),
     "--alignment": lambda rng: pick(rng, ("auto", "phase", "model", "x")),
-    "--remove-bias": lambda rng: pick(rng, ("free-cycle", "model", "none", "x")),
+    "--remove-bias": lambda rng: pick(rng, ("whole-log", "none", "x")),
     "--payload": lambda rng: pick(rng, ("franka_hand", "x", "")),
 }  # fmt: skip
 

@@ -1,6 +1,5 @@
 """One analysed log for all tests here: the reference fixture with its truth."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +8,6 @@ from vftcli.analysis import Analysis
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
-from vftcli.refinement.choice import RefinementChoice
 from vftcli.robots.choice import RobotChoice
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
@@ -33,10 +31,3 @@ def request_() -> AnalysisChoice:
 @pytest.fixture(scope="session")
 def worked_up(request_: AnalysisChoice) -> Analysis:
     return analyse_log(FIXTURE, request_)
-
-
-@pytest.fixture(scope="session")
-def without_bias(request_: AnalysisChoice) -> Analysis:
-    return analyse_log(
-        FIXTURE, replace(request_, refinement=RefinementChoice(remove_bias="free-cycle"))
-    )

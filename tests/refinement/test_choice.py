@@ -2,7 +2,6 @@
 
 import pytest
 
-from vftcli.refinement import bias
 from vftcli.refinement.choice import AUTOMATIC, REMOVALS, RefinementChoice
 from vftcli.signals.errors import ParameterError
 
@@ -10,31 +9,19 @@ from vftcli.signals.errors import ParameterError
 def test_nothing_said_asks_for_no_complete_log_by_itself() -> None:
     """The observers do: `best` runs on what the whole log allows."""
     assert RefinementChoice.parsed() == RefinementChoice(remove_bias=AUTOMATIC)
-    assert not RefinementChoice().looks_back
+    assert not RefinementChoice().corrects_all
 
 
 @pytest.mark.parametrize(
-    ("word", "best", "everyone", "afterwards", "phase"),
-    [
-        ("auto", True, False, False, False),
-        ("whole-log", True, True, False, False),
-        ("free-cycle", False, False, True, True),
-        ("model", False, False, True, False),
-        ("none", False, False, False, False),
-    ],
+    ("word", "best", "everyone"),
+    [("auto", True, False), ("whole-log", True, True), ("none", False, False)],
 )
-def test_what_is_taken_off(
-    word: str, best: bool, everyone: bool, afterwards: bool, phase: bool
-) -> None:
+def test_what_is_taken_off(word: str, best: bool, everyone: bool) -> None:
     asked = RefinementChoice.parsed(remove_bias=word)
     assert (asked.corrects_best, asked.corrects_all) == (best, everyone)
-    assert (asked.removes_bias, asked.at_phase) == (afterwards, phase)
-    assert asked.looks_back == (everyone or afterwards)
-    # What comes off once the observers have run has its maker; what comes off before has none.
-    assert (word in bias.REMOVALS) == afterwards
 
 
 def test_the_words_are_all_there_is() -> None:
-    assert REMOVALS == ("auto", "whole-log", "free-cycle", "model", "none")
-    with pytest.raises(ParameterError, match="there is auto, whole-log, free-cycle, model, none"):
+    assert REMOVALS == ("auto", "whole-log", "none")
+    with pytest.raises(ParameterError, match="there is auto, whole-log, none"):
         RefinementChoice(remove_bias="all")

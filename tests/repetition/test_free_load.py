@@ -85,7 +85,7 @@ def test_a_simulation_without_noise_or_torque_carries_nothing(log: Recording) ->
     still = replace(log, q=np.zeros_like(log.q), dq=np.zeros_like(log.q), current=0.0 * log.current)
     weightless = replace(ROBOT, chain=replace(ROBOT.chain, gravity=np.zeros(3)))
     run = ModelledRun(recording=still, robot=weightless)
-    assert free_load((FreePiece(run, log.t > 1.0, ()),)) is None
+    assert free_load((FreePiece(run, log.t > 1.0),)) is None
 
 
 def test_a_payload_is_torque_and_no_noise(log: Recording) -> None:
@@ -122,9 +122,7 @@ def test_what_lies_far_from_a_piece_is_not_heard(
     log: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13 of signals up to 100 N·m, forward and back."""
-    piece = FreePiece(
-        run=ModelledRun(recording=log, robot=ROBOT), inside=(log.t > 8) & (log.t < 9), pairings=()
-    )
+    piece = FreePiece(ModelledRun(recording=log, robot=ROBOT), (log.t > 8) & (log.t < 9))
     near = columns(piece)
     monkeypatch.setattr("vftcli.repetition.free_load.HEARD", 100.0)
     whole = columns(piece)

@@ -68,7 +68,6 @@ def test_a_cycle_inside_a_free_span_is_free(circle: ModelledRun) -> None:
 
 def test_a_span_without_a_whole_cycle_leaves_the_cycles_to_be_found(circle: ModelledRun) -> None:
     motion = motion_of(circle, choice=FreeChoice(spans=((0.5, 2.0),)))
-    assert motion.part.pairings == ()
     assert motion.free_cycles.numbers == (0,)  # as found: the first is the free one
 
 
@@ -93,19 +92,15 @@ def test_a_cycle_that_is_not_there_is_refused(circle: ModelledRun) -> None:
 
 
 @pytest.mark.slow
-def test_each_run_is_a_piece_with_its_own_pairing(part_of: Make, circle: ModelledRun) -> None:
+def test_each_run_is_a_piece(part_of: Make, circle: ModelledRun) -> None:
     log = ModelledRun(recording=part_of(circle.recording, 8.0, 14.0), robot=ROBOT)
     same, more = part_of(circle.recording, 0.0, 4.0), part_of(circle.recording, 4.0, 8.0)
     other = replace(same, q=same.q[:, ::-1] + 0.5, source=replace(same.source, t0=99.0))
     paths = tuple(Path(name) for name in "abc")
     motion = motion_of(log, same, other, more, choice=FreeChoice(logs=paths))
     found = motion.part
-    assert [len(piece.pairings) for piece in found.pieces] == [1, 0, 1]
     assert codes(found.remarks) == ["free-run", "free-run-of-another-motion", "free-run"]
-    assert [pairing.free for pairing in found.pairings] == [
-        motion.runs[0].run.drive,
-        motion.runs[2].run.drive,
-    ]
+    assert [piece.run for piece in found.pieces] == [run.run for run in motion.runs]
     assert not found.own.any()
     assert all(piece.inside.all() for piece in found.pieces)
 

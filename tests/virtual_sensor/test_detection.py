@@ -163,7 +163,7 @@ def test_the_band_is_learned_where_the_arm_is_known_to_be_free() -> None:
 def test_observers_are_run_along_free_runs() -> None:
     log = read(Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv")
     run = ModelledRun(recording=log, robot=load_robot("ur5"))
-    piece = FreePiece(run, (log.t > 0.3) & (log.t < 4.0), ())
+    piece = FreePiece(run, (log.t > 0.3) & (log.t < 4.0))
     gmo = MomentumObserver(gain=10.0)
 
     def read_by(pieces, sensor):

@@ -161,10 +161,8 @@ class BiasOptions(ChoiceBundle["RefinementChoice"]):
 
     remove_bias: str | None = option(
         "--remove-bias",
-        "auto|whole-log|free-cycle|model|none",
-        "What comes off: the bias fitted to the whole log, what the observers read in free motion "
-        "at the same phase, or a model of it over position and velocity. auto: the whole log's for "
-        "best, none for the others.",
+        "auto|whole-log|none",
+        "Whether the bias fitted to the whole log comes off; auto: for best alone.",
         seldom=True,
     )
 

@@ -161,9 +161,9 @@ def inferred_motion(log: ModelledRun, bias: WholeLogBias, seconds: float) -> Unt
     corrected = log.with_terms(bias.corrected(log.terms))
     short = any(remark.code in SHORT_LOG for remark in bias.remarks)
     # An arm that holds one pose does not tell a mass from a push.
-    weighed = free_load([FreePiece(corrected, bias.free, ())]) if bias.fitted or short else None
+    weighed = free_load([FreePiece(corrected, bias.free)]) if bias.fitted or short else None
     corrected = unloaded(corrected, weighed)
-    free = (FreePiece(corrected, bias.free, ()),) if bias.fitted else ()
+    free = (FreePiece(corrected, bias.free),) if bias.fitted else ()
     found = inferred(corrected, free, seconds)
     if found is None:
         return None
@@ -227,9 +227,9 @@ def free_part(motion: FreeMotion) -> FreePart | None:
         if not choice.cycles and is_touched(log, own):
             return None
         remarks.append(found.remark(motion.cycles.whole))
-    pieces = [FreePiece(log, own, ())] if own.any() else []
+    pieces = [FreePiece(log, own)] if own.any() else []
     for run in motion.runs:
-        pieces.append(FreePiece(run.run, np.ones(run.recording.samples, dtype=bool), ()))
+        pieces.append(FreePiece(run.run, np.ones(run.recording.samples, dtype=bool)))
         remarks.append(fact("free-log", Where(about=run.recording.name)))
     return FreePart(tuple(pieces), own, tuple(remarks))
 

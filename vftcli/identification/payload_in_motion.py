@@ -130,7 +130,7 @@ def weigh_motion(runs: Sequence[ModelledRun], carried: Array) -> MotionWeighing:
     """
     robot, signals = runs[0].robot, []
     for run in [carrying(run, carried) for run in runs] if carried.any() else runs:
-        piece = FreePiece(run, np.ones(run.recording.samples, dtype=bool), ())
+        piece = FreePiece(run, np.ones(run.recording.samples, dtype=bool))
         at, own = weighed(piece), columns(piece)
         if own is not None:
             signals.append((*own, run.recording.q[at], run.recording.require("dq")[at]))

@@ -1,6 +1,5 @@
 """A log's free part and spectra, and what the observers read where nothing touches the arm."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,15 +12,12 @@ from vftcli.refinement.tuning import gains_of
 from vftcli.repetition.free_load import FreeLoad, free_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.repetition.free_run import ModelledRun
-from vftcli.repetition.pairing import mean_of
 from vftcli.repetition.standstill import standing
-from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution
-from vftcli.signals.series import resample_columns
 
 if TYPE_CHECKING:
     from vftcli.refinement.whole_log import WholeLogBias
@@ -184,67 +180,19 @@ def baseline_of(motion: FreeMotion) -> Baseline:
     return replace(bare, missing=caution("free-part-not-quiet", residuals=listed))
 
 
-def without_free_motion(found: Baseline) -> Baseline:
-    """The baseline with spectra as they are once the free motion at the same phase is subtracted.
-
-    What repeats is gone from both parts. Left in the free one is what does not repeat: the noise
-    in S_n, from the log and from the mean of the k free motions, 1 + 1/k of it.
-    """
-    part, spectra = found.part, found.spectra
-    if part is None or spectra is None or not part.pairings:
-        return found
-    free = bias_at_phase(part, [raw_disturbance_of(piece.run.terms) for piece in part.pieces])
-    d = raw_disturbance_of(found.terms) - free
-    known = np.isfinite(d[:, 0]) & ~part.own
-    # Terms whose raw disturbance is d: the same estimator then makes its spectrum.
-    step = np.diff(found.terms.t, prepend=found.terms.t[0])[:, None]
-    p = np.cumsum(step * np.nan_to_num(d), axis=0)
-    left = Part(DynamicsTerms(t=found.terms.t, p=p, mu=np.zeros_like(p)), known)
-    try:
-        loaded = spectra_of(left, found.samples)
-    except ParameterError:
-        return found
-    floor = (1.0 + 1.0 / len(part.pairings)) * spectra.floor
-    noise = resample_columns(loaded.frequency, spectra.frequency, floor)
-    return replace(found, spectra=replace(loaded, free=noise))
-
-
-def raw_disturbance_of(terms: DynamicsTerms) -> Array:
-    """The raw disturbance, its first value repeated so that every sample has one. (T, n) [N·m]"""
-    d = raw_disturbance(terms)
-    return np.concatenate([d[:1], d])
-
-
-def bias_at_phase(part: FreePart, series: Sequence[Array]) -> Array:
-    """Mean over the free motions of a signal at each sample's phase, NaN where there is none.
-
-    Args:
-        part: The free part.
-        series: The signal along each of its pieces, in their order. (S, n) each
-
-    Returns:
-        (T, n), on the log's clock.
-    """
-    laid = zip(part.pieces, series, strict=True)
-    signals = [x for piece, x in laid for _ in piece.pairings]
-    return mean_of(part.pairings, signals)
-
-
 class FreeReading(NamedTuple):
     """What one observer reads of a log, and where nothing touches the arm.
 
     Attributes:
         observer: The observer.
         estimate: Its estimate of the log.
-        free: Its estimate along each free piece, in the pieces' order.
-        samples: Of these, what it reads in the free samples, of all pieces in a row, less a load
-            that the free part carries. (S, n) [N·m]
+        samples: What it reads in the free samples, of all pieces in a row, less a load that the
+            free part carries. (S, n) [N·m]
         resting: Whether a joint rests in them. (S, n)
     """
 
     observer: Observer
     estimate: ExternalTorque
-    free: tuple[ExternalTorque, ...]
     samples: Array
     resting: Mask
 
@@ -259,11 +207,11 @@ class FreeReading(NamedTuple):
 
 def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:
     """Run an observer along the free pieces; along the log itself that is its estimate."""
-    free = tuple(
-        estimate if piece.run is found.motion.log else observer.estimate(found.terms_of(piece.run))
-        for piece in found.pieces
-    )
-    read = [e.tau for e in free]
+    log = found.motion.log
+    read = [
+        estimate.tau if run is log else observer.estimate(found.terms_of(run)).tau
+        for run, _ in found.pieces
+    ]
     if found.load is not None:
         # A load is torque, and no error of who reads it.
         carried = [found.load.torque(piece.run) for piece in found.pieces]
@@ -274,7 +222,6 @@ def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) 
     return FreeReading(
         observer,
         estimate,
-        free,
         samples=np.concatenate([np.zeros(none), *inside]),
         resting=np.concatenate([np.zeros(none, dtype=bool), *rests]),
     )

@@ -13,9 +13,8 @@ WHOLE_LOG = "whole-log"
 NOTHING = "none"
 """The word for a bias that stays."""
 
-REMOVALS = (AUTOMATIC, WHOLE_LOG, "free-cycle", "model", NOTHING)
-"""What ``--remove-bias`` takes; `vftcli.refinement.bias.REMOVALS` makes what is left of them once
-observers have run."""
+REMOVALS = (AUTOMATIC, WHOLE_LOG, NOTHING)
+"""What ``--remove-bias`` takes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,18 +47,3 @@ class RefinementChoice:
     def corrects_best(self) -> bool:
         """Whether `best` does."""
         return self.remove_bias in {AUTOMATIC, WHOLE_LOG}
-
-    @property
-    def removes_bias(self) -> bool:
-        """Whether the estimates lose what their observers read of free motion."""
-        return self.remove_bias in {"free-cycle", "model"}
-
-    @property
-    def at_phase(self) -> bool:
-        """Whether the bias taken off is what the free motion reads at the same phase."""
-        return self.remove_bias == "free-cycle"
-
-    @property
-    def looks_back(self) -> bool:
-        """Whether it needs the complete log, whichever observers run."""
-        return self.removes_bias or self.corrects_all

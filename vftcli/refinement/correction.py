@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.observers.spectra import Part, spectra_of
-from vftcli.refinement.baseline import Baseline, baseline_of, without_free_motion
+from vftcli.refinement.baseline import Baseline, baseline_of
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.repetition.free_load import free_load
@@ -34,8 +34,6 @@ def baseline_for(motion: FreeMotion, choice: RefinementChoice, *, best: bool) ->
     """
     motion, as_read = motion.steadied, motion.log
     found = baseline_of(motion)
-    if choice.at_phase:
-        return without_free_motion(found)
     if not (choice.corrects_all or (best and choice.corrects_best)):
         return found
     try:
@@ -66,7 +64,7 @@ def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
         # What was given is dropped, and why has to be said.
         reason = found.missing.values["reason"]
         remark = caution("free-by-the-fit-instead", share=share, reason=reason)
-    part = FreePart((FreePiece(log, quiet, ()),), quiet, (remark,))
+    part = FreePart((FreePiece(log, quiet),), quiet, (remark,))
     made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
     try:
         return replace(made, spectra=spectra_of(Part(log.terms, ~quiet), made.samples))

@@ -1,4 +1,4 @@
-"""From a log's baseline to finished estimates: bands drawn, bias removed, limits named."""
+"""From a log's baseline to finished estimates: bands drawn, limits named."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,10 +8,8 @@ from vftcli.observers.observer import Observer
 from vftcli.observers.table import BEST
 from vftcli.refinement.band import band_remarks, with_band
 from vftcli.refinement.baseline import Baseline, free_reading
-from vftcli.refinement.bias import REMOVALS, remove_nothing
 from vftcli.refinement.budget import Budget, budget, limits_remark
-from vftcli.refinement.choice import NOTHING
-from vftcli.refinement.consistency import Consistency, consistency
+from vftcli.refinement.choice import AUTOMATIC
 from vftcli.refinement.fallback import with_spare
 from vftcli.refinement.paper_gap import expected_gap
 from vftcli.signals.external_torque import ExternalTorque
@@ -24,11 +22,10 @@ class Refinement(Shown):
     """What the complete log makes of its estimates.
 
     Attributes:
-        estimates: The estimates with their bands, and without their bias where that is asked for.
+        estimates: The estimates with their bands.
         baseline: The log's free part and spectra.
         curves: Observer that was tuned → the curve that was minimised.
         budgets: Where each observer's error comes from, one an observer; none without spectra.
-        consistency: How each Kalman filter's innovations look, one a filter.
         removed: What ``--remove-bias`` asked for.
         remarks: What the reader of the estimates should know.
     """
@@ -37,7 +34,6 @@ class Refinement(Shown):
     baseline: Baseline
     curves: Mapping[str, Curve]
     budgets: tuple[Budget, ...]
-    consistency: tuple[Consistency, ...]
     removed: str
     remarks: tuple[Remark, ...]
 
@@ -46,46 +42,37 @@ def refine(
     found: Baseline,
     observers: Sequence[Observer],
     estimates: Sequence[ExternalTorque],
-    removal: str = NOTHING,
+    removed: str = AUTOMATIC,
     *,
     gains_of_file: bool = False,
 ) -> Refinement:
-    """Give estimates their bands, take their bias off, and say what limits them.
+    """Give estimates their bands, and say what limits them.
 
     Args:
         found: The log's baseline.
         observers: The observers.
         estimates: Their estimates, in the same order.
-        removal: What ``--remove-bias`` asks for.
+        removed: What ``--remove-bias`` asked for.
         gains_of_file: Whether the paper's observers ran with the gains of the robot's file.
-
-    Raises:
-        ParameterError: If the bias cannot be removed as asked.
     """
     # Not every observer need run on the same terms: each is measured on those that it runs on.
     under = [found.under(observer.name) for observer in observers]
     spared = [with_spare(*each) for each in zip(under, observers, estimates, strict=True)]
-    pairs = [(observer, estimate) for observer, estimate, _ in spared]
-    readings = [free_reading(on, *pair) for on, pair in zip(under, pairs, strict=True)]
-    finished = REMOVALS.get(removal, remove_nothing)(found, readings)
+    readings = [free_reading(on, *each[:2]) for on, each in zip(under, spared, strict=True)]
     budgets = [
         budget(on, on.spectra, reading)
         for on, reading in zip(under, readings, strict=True)
         if on.spectra is not None
     ]
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
-    checks = [consistency(on, *pair) for on, pair in zip(under, pairs, strict=True)]
-    shown = tuple(
-        with_band(on, reading) for on, reading in zip(under, finished.readings, strict=True)
-    )
+    shown = tuple(with_band(*pair) for pair in zip(under, readings, strict=True))
     gap = expected_gap(found, shown, gains_of_file=gains_of_file)
     return Refinement(
         estimates=shown,
         baseline=found,
         curves=curves,
         budgets=tuple(budgets),
-        consistency=tuple(check for check in checks if check is not None),
-        removed=removal,
+        removed=removed,
         remarks=(
             *found.remarks,
             *(remark for _, _, said in spared for remark in said),
@@ -104,7 +91,6 @@ def refine(
                 for remark in bound_remarks(name, curve.best, curve.omega_n)
             ),
             *band_remarks(found),
-            *finished.remarks,
             *(limits_remark(one, found.stuck) for one in leading(budgets)),
             *(() if gap is None else (gap,)),
         ),

@@ -19,7 +19,6 @@ from vftcli.signals.shown import Shown
 if TYPE_CHECKING:
     from vftcli.repetition.cycles import Cycles
     from vftcli.repetition.free_cycles import FreeCycles
-    from vftcli.repetition.pairing import Pairing
     from vftcli.repetition.periodicity import Period
 
 SLACK = 0.03
@@ -32,13 +31,10 @@ class FreePiece(NamedTuple):
     Attributes:
         run: The recording they are in: the log itself or a free run.
         inside: Which of its samples they are. (S,)
-        pairings: Where in them each sample of the log belongs, one a free cycle or run that repeats
-            the log's motion; none where nothing repeats.
     """
 
     run: ModelledRun
     inside: Mask
-    pairings: tuple["Pairing", ...]
 
 
 class FreePart(NamedTuple):
@@ -53,11 +49,6 @@ class FreePart(NamedTuple):
     pieces: tuple[FreePiece, ...]
     own: Mask
     remarks: tuple[Remark, ...]
-
-    @property
-    def pairings(self) -> tuple["Pairing", ...]:
-        """Where in each free motion that repeats the log's the log's samples belong."""
-        return tuple(pairing for piece in self.pieces for pairing in piece.pairings)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -147,13 +138,6 @@ class FreeMotion(Shown):
             return FreeCycles(self.cycles_given, None)
         return find_free_cycles(self.log.drive, self.cycles)
 
-    def pairings_by(self, period: float, numbers: tuple[int, ...]) -> tuple["Pairing", ...]:
-        """The log laid over cycles of its own, counted from 0, by a period. [s]"""
-        from vftcli.repetition.pairing import pair_with_cycle
-
-        drive, cycles = self.log.drive, self.cycles
-        return tuple(pair_with_cycle(drive, cycles, number, period) for number in numbers)
-
     @cached_property
     def part(self) -> FreePart:
         """The free part: what is given of the log itself and of other runs, else its free cycles.
@@ -162,32 +146,24 @@ class FreeMotion(Shown):
             ReferenceTorqueError: If nothing is given and the log repeats nothing.
             ParameterError: If a given span holds no samples, or the whole log.
         """
-        from vftcli.repetition.free_cycles import FreeCycles
-
         log, choice = self.log, self.choice
         own, t = self.within_spans, log.recording.t
         remarks = [
             fact("free-span", begin_s=max(a, float(t[0])), end_s=min(b, float(t[-1])))
             for a, b in choice.spans
         ]
-        pairings: tuple[Pairing, ...] = ()
         if choice.cycles or not choice.is_given:
             found = self.free_cycles
             own = own | np.isin(self.cycles.number(t), found.numbers)
-            pairings = self.pairings_by(self.cycles.period, found.drawn)
-            remarks += found.remarks(self.cycles.whole)
-        elif choice.spans and self.repeats:
-            given = FreeCycles(self.cycles_given, None)
-            pairings = self.pairings_by(self.cycles.period, given.drawn)
-        pieces = [FreePiece(log, own, pairings)] if own.any() else []
+            remarks.append(found.remark(self.cycles.whole))
+        pieces = [FreePiece(log, own)] if own.any() else []
         for run in self.runs:
             whole = np.ones(run.recording.samples, dtype=bool)
             about = Where(about=run.recording.name)
+            pieces.append(FreePiece(run.run, whole))
             if run.is_same_motion:
-                pieces.append(FreePiece(run.run, whole, (run.pairing,)))
                 remarks.append(fact("free-run", about, shift_s=run.alignment.shift))
             else:
-                pieces.append(FreePiece(run.run, whole, ()))
                 remarks.append(fact("free-run-of-another-motion", about))
         return FreePart(tuple(pieces), own, tuple(remarks))
 
@@ -196,14 +172,6 @@ class FreeMotion(Shown):
         if self.choice.is_given or not spans:
             return self
         return replace(self, choice=replace(self.choice, spans=spans))
-
-    @property
-    def repeats(self) -> bool:
-        """Whether the log repeats its motion."""
-        try:
-            return self.cycles.whole > 0
-        except ReferenceTorqueError:
-            return False
 
     @property
     def within_spans(self) -> Mask:

@@ -114,7 +114,7 @@ class Models:
 class FreeRun:
     """A motion in another recording that nobody touched, beside the log it serves.
 
-    Everything that is asked of it, by references, bias removal, zero and bands, is made once.
+    Everything that is asked of it, by references, zero and bands, is made once.
 
     Attributes:
         run: The free run.

@@ -12,7 +12,7 @@ from vftcli.repetition.error_model import TRUSTED_SHARE, rms
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import FreeRun, ModelledRun
 from vftcli.repetition.ladder import LOW_PASS, RUNGS, Difference, differences, most_certain
-from vftcli.repetition.pairing import Pairing, pair_with_run
+from vftcli.repetition.pairing import Pairing, pair_with_cycle, pair_with_run
 from vftcli.repetition.standstill import STILL
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
@@ -115,7 +115,7 @@ def partners_in_log(motion: FreeMotion) -> Partners:
     """The free cycles of a log, laid under the others."""
     period, cycles, stated = motion.period, motion.cycles, motion.choice.period
     free = motion.free_cycles
-    clocks = {"found": motion.pairings_by(cycles.period, free.drawn)}
+    clocks = {"found": cycles.period}
     values: dict[str, Any] = {
         "period_s": cycles.period,
         "deviation_rad": period.deviation,
@@ -125,13 +125,18 @@ def partners_in_log(motion: FreeMotion) -> Partners:
     }
     remarks = [fact("period", **values)]
     if stated is not None:
-        clocks["commanded"] = motion.pairings_by(stated, free.drawn)
+        clocks["commanded"] = stated
         remarks = [fact("period-near-stated", stated_s=stated, **values)]
     remarks += free.remarks(cycles.whole)
     if len(free.numbers) == 1:
         remarks.append(fact("free-cycle-without-reference"))
     inside = np.isin(cycles.number(motion.log.recording.t), free.numbers)
-    return Partners(clocks, tuple(remarks), inside)
+    drive = motion.log.drive
+    laid = {
+        clock: [pair_with_cycle(drive, cycles, number, seconds) for number in free.drawn]
+        for clock, seconds in clocks.items()
+    }
+    return Partners(laid, tuple(remarks), inside)
 
 
 def partners_in_logs(motion: FreeMotion) -> Partners:

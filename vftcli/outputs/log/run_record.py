@@ -255,7 +255,7 @@ def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
 
 
 def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
-    """What the complete log told: free part, chosen gains, error budget, consistency."""
+    """What the complete log told: free part, chosen gains, error budget."""
     found = analysis.refinement
     if found is None:
         return None
@@ -269,7 +269,6 @@ def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
             for name, curve in found.curves.items()
         },
         "error_budget_Nm": {budget.name: budget.parts for budget in found.budgets},
-        "consistency": {one.name: one._asdict() for one in found.consistency},
         "band_sd_Nm": {
             e.name: np.sqrt(np.mean(e.error_sd**2, axis=0))
             for e in analysis.estimates

@@ -1,6 +1,6 @@
-"""What the complete log told, on the page: free part, error budget, consistency, spectra."""
+"""What the complete log told, on the page: free part, error budget, spectra."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 
 import numpy as np
@@ -12,7 +12,7 @@ from vftcli.outputs.grid import Column, Entry, Grid, html, joint_columns
 from vftcli.outputs.page.charts import Chart, ChartLine, LineStyle, multiples, observer_lines
 from vftcli.outputs.page.shell import section
 from vftcli.outputs.page.torque_part import joint_panels
-from vftcli.refinement.refine import Refinement
+from vftcli.refinement.budget import Budget
 from vftcli.signals.arrays import Array
 
 FREE, LOADED = "#3b7ea1", "#c2410c"
@@ -20,17 +20,14 @@ FREE, LOADED = "#3b7ea1", "#c2410c"
 
 
 def refinement_section(analysis: Analysis) -> str:
-    """Error budget, innovations, spectra and tuning of a complete log, "" without one."""
+    """Error budget, spectra and tuning of a complete log, "" without one."""
     found = analysis.refinement
     if found is None:
         return ""
-    tables = {
-        "Error budget in N·m rms, estimated from the log itself": budget_grid(found),
-        "Innovations; in brackets what a true model would give": consistency_grid(found),
-    }
-    shown = "".join(
-        f"<h3>{escape(caption)}</h3>{html(grid)}" for caption, grid in tables.items() if grid.rows
-    )
+    shown = ""
+    if found.budgets:
+        caption = "Error budget in N·m rms, estimated from the log itself"
+        shown = f"<h3>{caption}</h3>{html(budget_grid(found.budgets))}"
     charts = []
     if (spectra := found.baseline.spectra) is not None:
         charts.append(spectra_chart(spectra))
@@ -40,41 +37,16 @@ def refinement_section(analysis: Analysis) -> str:
     return section("What the complete log tells", shown + drawn, name="complete-log")
 
 
-def budget_grid(found: Refinement) -> Grid:
+def budget_grid(budgets: Sequence[Budget]) -> Grid:
     """Where every observer's error comes from, cause by cause. [N·m]"""
-    rows = [
-        (budget.name, cause, values)
-        for budget in found.budgets
+    rows: list[tuple[Entry, ...]] = [
+        (budget.name, cause, *map(float, values))
+        for budget in budgets
         # Stiction at rest is a bound, not a cause that adds up: the sum leaves it out.
         for cause, values in (*budget.parts.items(), ("all but stiction at rest", budget.total))
     ]
-    return joint_grid("observer", "cause", rows)
-
-
-def consistency_grid(found: Refinement) -> Grid:
-    """How the innovations of the Kalman filters look."""
-    rows = [
-        (one.name, what, values)
-        for one in found.consistency
-        for what, values in (
-            ("mean NIS (1)", one.nis),
-            ("NIS within its 95 % (0.95)", one.inside),
-            ("correlation, one sample (0)", one.correlation),
-            ("coloured lags of 20 (0.05)", one.coloured),
-            ("half of the free power below [Hz]", one.loudest),
-        )
-    ]
-    return joint_grid("filter", "what", rows)
-
-
-def joint_grid(first: str, second: str, rows: Iterable[tuple[str, str, Array]]) -> Grid:
-    """Two columns of words, then a number a joint."""
-    lines: list[tuple[Entry, ...]] = [
-        (name, what, *map(float, values)) for name, what, values in rows
-    ]
-    joints = joint_columns(len(lines[0]) - 2 if lines else 0)
-    words = (Column(first, words=True), Column(second, words=True))
-    return Grid(columns=(*words, *joints), rows=tuple(lines))
+    words = (Column("observer", words=True), Column("cause", words=True))
+    return Grid(columns=(*words, *joint_columns(len(budgets[0].total))), rows=tuple(rows))
 
 
 def spectra_chart(found: Spectra) -> Chart:

@@ -98,7 +98,7 @@ def input_under(
 ) -> SmootherInput:
     """The log and its free pieces under one correction, these less a load."""
     free = []
-    for run, inside, _ in pieces:
+    for run, inside in pieces:
         terms = terms_of(run)
         terms = terms if load is None else load.off(terms, run)
         free.append(FreeTerms(terms, run.recording.q, inside))
