@@ -273,17 +273,16 @@ def memory_per_sample(samples: int) -> float:
     return peak / len(estimates[0].t)
 
 
-def measured(robot: Robot, samples: int, rounds: int, long: int = 1_000_000) -> dict[str, float]:
-    """Every ratio by its name; memory of a log of `long` samples."""
-    with one_core():
-        ratios = core_ratios(robot, samples, rounds)
+def log_ratios(robot: Robot, samples: int, rounds: int) -> dict[str, float]:
+    """The ratios of a wide log, which is removed again."""
     with TemporaryDirectory() as folder:
         log, table = Path(folder) / "long.csv", wide_table(robot, samples)
         pl.DataFrame(table).write_csv(log)
         columns = [name for name in table if not name.startswith(FILLED)]
-        ratios["examination_over_estimate"] = examination_ratio(robot, log, rounds)
-        ratios["estimate_over_reading"] = command_ratio(robot, log, columns, rounds)
-    return {**ratios, "memory_bytes_per_sample": memory_per_sample(long)}
+        return {
+            "examination_over_estimate": examination_ratio(robot, log, rounds),
+            "estimate_over_reading": command_ratio(robot, log, columns, rounds),
+        }
 
 
 def main() -> None:
@@ -294,7 +293,11 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=7)
     chosen = parser.parse_args()
     print(f"{chosen.robot}, {chosen.samples} samples, {chosen.rounds} rounds, NumPy with {simd()}")
-    for name, value in measured(load_robot(chosen.robot), chosen.samples, chosen.rounds).items():
+    run = (load_robot(chosen.robot), chosen.samples, chosen.rounds)
+    with one_core():
+        ratios = core_ratios(*run)
+    ratios |= {**log_ratios(*run), "memory_bytes_per_sample": memory_per_sample(1_000_000)}
+    for name, value in ratios.items():
         print(f"{name:<30} {value:8.3g}  {RATIOS[name]}")
 
 

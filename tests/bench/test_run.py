@@ -14,9 +14,20 @@ bench = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(bench)
 
 
+UR5 = load_robot("ur5")
+
+
 @pytest.mark.slow
-def test_every_ratio_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_ratio_of_the_core_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "SCRIPT_SAMPLES", 50)
-    ratios = bench.measured(load_robot("ur5"), samples=1200, rounds=1, long=1000)
-    assert ratios.keys() == bench.RATIOS.keys()
+    ratios = bench.core_ratios(UR5, samples=1200, rounds=1)
+    assert ratios.keys() < bench.RATIOS.keys()
+    assert all(value > 0.0 for value in ratios.values())
+    assert bench.memory_per_sample(1000) > 0.0
+
+
+@pytest.mark.slow
+def test_every_ratio_of_a_wide_log_is_measured() -> None:
+    ratios = bench.log_ratios(UR5, samples=300, rounds=1)
+    assert ratios.keys() < bench.RATIOS.keys()
     assert all(value > 0.0 for value in ratios.values())
