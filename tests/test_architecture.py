@@ -64,7 +64,6 @@ FILES = (
     "robots/xacro_text.py",
     "signals/identity.py",  # the digest of what was read
     "signals/remarks.py",  # the catalogue of words
-    "simulation/calibration_motions.py",
     "simulation/load.py",
     "simulation/scenario.py",
     "simulation/schema.py",

@@ -7,7 +7,7 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario
-from vftcli.simulation.calibration_motions import ExcitationSpec, JointwiseSpec, PosesSpec
+from vftcli.simulation.calibration_motions import JointwiseSpec, PosesSpec
 from vftcli.simulation.kinematics import check_limits, flange_pose
 from vftcli.simulation.motion import Command
 from vftcli.simulation.trajectories import CircleSpec, HoldSpec, JointMovesSpec, OffsetsSpec, plan
@@ -19,7 +19,7 @@ SPECS = [
     JointMovesSpec(moves=((0.2, 1.5, 0.1, 0, 0.3, 0, 0, 0.2),), length=2.0),
     PosesSpec(count=3),
     JointwiseSpec(joints=(2, 5), speeds=(0.4,)),
-    ExcitationSpec(cycles=1.0),
+    load_scenario("free-excitation").trajectory,
 ]
 
 
@@ -74,17 +74,21 @@ def base_columns(robot):
     return kept
 
 
-@pytest.mark.parametrize(("name", "rank", "condition"), [("ur5", 58, 13.9), ("panda", 69, 10.1)])
+@pytest.mark.parametrize(
+    ("name", "rank", "condition"),
+    [("", 58, 13.9), ("panda-", 69, 10.1), ("fr3-load-", 69, 11.8)],
+)
 def test_excitation_is_well_conditioned_inside_the_limits(name, rank, condition):
-    robot, best = load_robot(name), ExcitationSpec(cycles=1.0).motion(load_robot(name))
-    motion = best.at(np.linspace(0.0, best.period, 500, endpoint=False))
+    scenario = load_scenario(f"{name}free-excitation")
+    robot, series = load_robot(scenario.robot), scenario.trajectory
+    motion = series.motion(robot).at(np.linspace(0.0, series.period, 500, endpoint=False))
     check_limits(robot, motion.q, motion.dq, name)
     known = np.where(np.isfinite(robot.limits.qdd_max), robot.limits.qdd_max, np.inf)
     assert np.all(np.abs(motion.ddq) <= known)
     columns = base_columns(robot)
     assert len(columns) == rank  # of 14n: the ranks known for these arms
     Y = regressor(robot, motion)[:, columns]
-    # the figures that stand in the files of the two series
+    # the figures that stand in the files of the scenarios
     assert np.linalg.cond(Y / np.linalg.norm(Y, axis=0)) == pytest.approx(condition, abs=0.1)
 
 

@@ -6,16 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError, VftError
 from vftcli.simulation import load_scenario, scenario_names, simulate
 from vftcli.simulation.load import to_toml
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.schema import section_from
+from vftcli.simulation.trajectories import plan
 
 NAMES = (
+    "fr3-load-free-excitation",
+    "fr3-load-static-poses",
     "free-excitation",
     "jointwise",
     "panda-bearing",
+    "panda-free-excitation",
+    "panda-static-poses",
     "payload-pair",
     "static-poses",
     "ur5-circle",
@@ -41,9 +47,18 @@ def test_scenario_runs_and_its_file_makes_it_again(name: str, tmp_path: Path) ->
     assert load_scenario(path) == scenario
 
 
-def test_free_excitation_moves_a_panda() -> None:
-    run = simulate(load_scenario("free-excitation", ["robot=panda", "duration=0.5"]))
-    assert run.recording.joints == 7
+@pytest.mark.parametrize("name", NAMES)
+def test_scenario_stays_inside_the_limits_of_its_arm(name: str) -> None:
+    scenario = load_scenario(name)
+    robot = load_robot(scenario.robot)
+    t = np.arange(0.0, scenario.trajectory.motion(robot).duration, 0.02)
+    reference = plan(scenario.trajectory, robot, t)  # refuses places and speeds beyond them
+    assert np.all(np.isfinite(reference))
+
+
+def test_an_excitation_of_another_arm_is_refused() -> None:
+    with pytest.raises(ParameterError, match="must have 7 numbers, one a joint of 'panda'"):
+        simulate(load_scenario("free-excitation", ["robot=panda"]))
 
 
 @pytest.mark.slow
@@ -75,6 +90,7 @@ def test_twists_exceed_the_threshold() -> None:
         (["contacts.hnd.style=taps"], "Did you mean hand"),
         (["contacts.hand.kind=push"], "Did you mean pushes"),
         (["trajectory.kind=cirlce"], "Did you mean circle"),
+        (["trajectory={kind='excitation'}"], "lacks trajectory.mean"),
         (["step=two"], "must be a number"),
         (["duration=inf"], "finite"),
         (["pair=1"], "true or false"),

@@ -105,7 +105,7 @@ COMMANDS = {
     ),
     "bench": ListedCommand(
         "bench:bench",
-        "Time the observers, and scripts that do the same.",
+        "Time the observers.",
         STUDY,
     ),
     "robots": ListedCommand(

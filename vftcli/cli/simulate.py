@@ -71,13 +71,13 @@ def simulate_log(
     from vftcli.simulation.writers import usual_format
 
     if scenario == "list":
-        for name, title in listing():
-            typer.echo(f"{name:<16} {title}")
+        scenarios = listing()
+        width = max(len(name) for name, _ in scenarios)
+        for name, title in scenarios:
+            typer.echo(f"{name:<{width}} {title}")
         return
     check_installed("pinocchio", "vftcli simulate")
     setup = load_scenario(scenario, experiment.settings or ())
-    for words in setup.adapted or ():
-        say(f"note: {words}")
     paths = [output, free_path(output)] if setup.pair else [output]
     log_folder(paths, force)
     usual_format(setup, load_robot(setup.robot), experiment.log_format)  # refused before the run
@@ -88,7 +88,6 @@ def simulate_log(
     if json:
         about = {"scenario": setup.name, "seed": runs[0].seed, "files": files}
         about |= {"samples": len(runs[0].measured.rows), "robot": setup.robot}
-        about |= {"adapted": list(setup.adapted or ())}
         say_json(about)
         return
     for file in files:

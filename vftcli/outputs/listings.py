@@ -112,7 +112,7 @@ def robot_text(robot: "Robot") -> str:
 
 def bench_grid(result: Mapping[str, Any]) -> Grid:
     """How long dynamics and observers took, with the paper's times on its laptop beside them."""
-    rows = [{"name": "dynamics", **result["dynamics"]}, *result["observers"], *result["core"]]
+    rows = [{"name": "dynamics", **result["dynamics"]}, *result["observers"]]
     return Grid(
         columns=(
             Column("", words=True, width=15),

@@ -1,8 +1,6 @@
-"""Motions for identification: poses at rest, single-joint sweeps, optimised excitation."""
+"""Motions for identification: poses at rest, single-joint sweeps, Fourier series."""
 
-import tomllib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -10,12 +8,8 @@ import numpy as np
 from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.fourier_excitation import make_excitation
 from vftcli.simulation.kinematics import check_start, flange_pose
 from vftcli.simulation.motion import Command, Periodic, Stretches, straight_paths
-
-EXCITATIONS = Path(__file__).parent / "scenarios" / "excitation"
-"""Optimised trajectories, a file a robot."""
 
 TABLE = 0.15
 """Least height of the flange in poses that are drawn. [m]"""
@@ -117,65 +111,36 @@ class JointwiseSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class ExcitationSpec:
-    """A persistently exciting Fourier trajectory, stated, optimised for a robot, or made for it.
+    """A Fourier series of the joints.
 
     Attributes:
-        period: Time of one round; 0 takes the optimised one. [s]
+        period: Time of one round. [s]
         cycles: Rounds.
-        mean: Mean positions; empty takes the optimised series, or makes one. (n,) [rad]
+        mean: Mean positions. (n,) [rad]
         cosine: Cosine coefficients, one row a harmonic. (H, n) [rad]
         sine: Sine coefficients. (H, n) [rad]
     """
 
     KIND: ClassVar[str] = "excitation"
-    period: float = 0.0
+    period: float = 10.0
     cycles: float = 2.0
-    mean: tuple[float, ...] = ()
-    cosine: tuple[tuple[float, ...], ...] = ()
-    sine: tuple[tuple[float, ...], ...] = ()
+    mean: tuple[float, ...]
+    cosine: tuple[tuple[float, ...], ...]
+    sine: tuple[tuple[float, ...], ...]
 
     def motion(self, robot: Robot) -> Command:
-        """The stated series, the one optimised for `robot`, or one made for it."""
-        if not self.mean and is_optimised(robot.name):
-            return optimised_excitation(robot.name, self.period, self.cycles)
-        if not self.mean:
-            return make_excitation(robot, self.period, self.cycles).series
-        check_start(robot, self.mean)
-        shape = (len(self.cosine), robot.joints)
-        cosine, sine = np.array(self.cosine), np.array(self.sine)
-        if cosine.shape != shape or sine.shape != shape or self.period <= 0:
+        """The series, if its lengths are those of the arm's joints."""
+        sizes = {len(row) for row in (self.mean, *self.cosine, *self.sine)}
+        if sizes != {robot.joints} or len(self.cosine) != len(self.sine) or self.period <= 0:
             raise ParameterError(
-                "trajectory.cosine and trajectory.sine must have one row a harmonic and one "
-                "number a joint, and trajectory.period must be positive"
+                f"trajectory.mean and each row of cosine and sine must have {robot.joints} "
+                f"numbers, one a joint of {robot.name!r}, cosine and sine as many rows, and "
+                "trajectory.period must be positive"
             )
         return Periodic(
             period=self.period,
             cycles=self.cycles,
             mean=np.array(self.mean),
-            cosine=cosine,
-            sine=sine,
+            cosine=np.array(self.cosine),
+            sine=np.array(self.sine),
         )
-
-
-def is_optimised(robot: str) -> bool:
-    """Whether there is a trajectory optimised for a robot of this name."""
-    return (EXCITATIONS / f"{robot}.toml").is_file()
-
-
-def optimised_excitation(robot: str, period: float, cycles: float) -> Periodic:
-    """The trajectory optimised for a built-in robot.
-
-    The condition number of the base regressor was made small, inside the limits, as in J. Swevers
-    et al., "Optimal robot excitation and identification", IEEE Trans. Robotics and Automation 13
-    (1997).
-
-    Args:
-        robot: Name of the profile.
-        period: Time of one round; 0 takes the one it was optimised for. [s]
-        cycles: Rounds.
-    """
-    table = tomllib.loads((EXCITATIONS / f"{robot}.toml").read_text(encoding="utf-8"))
-    mean, cosine, sine = (np.array(table[key]) for key in ("mean", "cosine", "sine"))
-    return Periodic(
-        period=period or table["period"], cycles=cycles, mean=mean, cosine=cosine, sine=sine
-    )

@@ -5,12 +5,9 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
-from vftcli.robots import load_robot
 from vftcli.robots.writing import lines_of
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import assignment, toml_tables
-from vftcli.simulation.adaptation import adapt
-from vftcli.simulation.calibration_motions import ExcitationSpec
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.schema import section_from, unknown_name
 
@@ -30,8 +27,6 @@ def listing() -> list[tuple[str, str]]:
 def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     """Read a built-in scenario or a user's TOML file and apply `key=value` overrides.
 
-    Where these name another robot, the motion is suited to it, save what the user has stated.
-
     Args:
         name: Name of a built-in scenario, or a file.
         overrides: As ``servo.stiffness=soft`` or ``contacts.hand.style=taps``; values are TOML, a
@@ -39,7 +34,6 @@ def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
 
     Raises:
         ParameterError: If there is no such scenario, key or kind, or a value has the wrong type.
-        RobotError: If the robot that was asked for is none.
     """
     path = FOLDER / f"{name}.toml"
     if not path.is_file():
@@ -51,16 +45,9 @@ def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
             )
     table = read_table(path)
     table.setdefault("name", path.stem)
-    written_for = table.get("robot", Scenario.robot)
-    own = () if path.parent == FOLDER else table.get("trajectory", ())
     for override in overrides:
         apply_override(table, override)
-    scenario = section_from(Scenario, table, "")
-    if scenario.robot == written_for and not isinstance(scenario.trajectory, ExcitationSpec):
-        return scenario
-    stated = {override.partition("=")[0].strip() for override in overrides}
-    stated |= {f"trajectory.{key}" for key in own}
-    return adapt(scenario, load_robot(scenario.robot), stated)
+    return section_from(Scenario, table, "")
 
 
 def read_table(path: Path) -> dict[str, Any]:

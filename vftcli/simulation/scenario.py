@@ -185,7 +185,6 @@ class Scenario:
         force_sensor: A force/torque sensor on the flange.
         contacts: Everything that touches the arm.
         sensing: What the log sees.
-        adapted: What of the motion was suited to the robot, in words; None if nothing was.
     """
 
     name: str
@@ -205,4 +204,3 @@ class Scenario:
     force_sensor: ForceSensorSpec | None = None
     contacts: tuple[ContactSpec, ...] = ()
     sensing: SensingSpec = field(default_factory=SensingSpec)
-    adapted: tuple[str, ...] | None = None
